@@ -10,19 +10,17 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from gaitswarm.errors import simulation_errors
 from gaitswarm.mesh_copies import MeshCopies, copy_meshes
+from gaitswarm.robot_defaults import JOB_FILE
 from services.optimizer.errors import InvalidRequest
 from sim.errors import RobotFileError
 from sim.proposal.apart import walking_proposal
 from sim.proposal.document import Proposal
 from sim.proposal.drive import ActuatorChoice
 from sim.robot.bounds import LONGEST_URDF
-
-JOB_FILE: Final = "job.json"
-"""In a robot's folder: what a job of this robot has unless it says otherwise."""
 
 _NAME: Final = re.compile(r"\w[^/\\]{0,99}")
 
@@ -108,30 +106,6 @@ def not_utf8(path: Path, error: UnicodeDecodeError) -> str:
         f"cannot read {path}: it is not UTF-8 text (byte 0x{byte:02x} at {error.start}); save it as"
         " UTF-8"
     )
-
-
-def job_defaults(folder: str | os.PathLike[str]) -> dict[str, Any]:
-    """What the folder of a robot says that its jobs have.
-
-    Args:
-        folder: Of the robot.
-
-    Returns:
-        Fields of a spec, unchecked; none if there is no such file.
-
-    Raises:
-        InvalidRequest: The file cannot be read, or is no JSON object.
-    """
-    path = Path(folder) / JOB_FILE
-    if not path.is_file():
-        return {}
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise InvalidRequest(f"cannot read {path}: {error}", field="robot") from error
-    if not isinstance(document, dict):
-        raise InvalidRequest(f"{path} must hold one JSON object", field="robot")
-    return document
 
 
 def check_name(name: str) -> None:

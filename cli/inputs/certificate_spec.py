@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from typing import Any, Final, cast
 
 from cli.inputs.design_file import given_design, may_be_file
-from cli.inputs.robots import chosen_robot, scenario_data
+from cli.inputs.robots import chosen_robot, chosen_scenarios, robot_defaults, scenario_data
 from cli.inputs.spec_file import parse_spec
 from services.optimizer.errors import InvalidRequest, NotFound
-from services.optimizer.jobs.kinds.certificate import CertificateSpec, certificate_scenarios
+from services.optimizer.jobs.kinds.certificate import CertificateSpec
+from services.optimizer.jobs.kinds.held_out import certificate_walks
 from sim.worlds import PERTURBATIONS
 
 _PLAIN: Final = ("worlds", "seed", "preference", "precision", "engines", "name")
@@ -42,6 +43,7 @@ def certificate_spec(design: str, db: str | None, given: Mapping[str, Any]) -> C
         document["scenarios"] = [
             known.get(entry, entry) if isinstance(entry, str) else entry for entry in chosen
         ]
+        document |= _still_held_out(document)
     if "robot" in options:
         document["robot"] = chosen_robot(options["robot"])
     document |= _perturbations(document, options)
@@ -70,9 +72,8 @@ def _earlier(design: str, db: str | None, options: Mapping[str, Any]) -> dict[st
 
 
 def _new(design: str, db: str | None, options: Mapping[str, Any]) -> dict[str, Any]:
-    found = given_design(
-        design, options.get("controller"), robot=options.get("robot"), server=None, db=db
-    )
+    robot = options.get("robot")
+    found = given_design(design, options.get("controller"), robot=robot, server=None, db=db)
     document: dict[str, Any] = {
         "kind": "certificate",
         "name": f"certificate of {found.label}",
@@ -80,12 +81,24 @@ def _new(design: str, db: str | None, options: Mapping[str, Any]) -> dict[str, A
         "design": found.values,
     }
     if found.spec is None:
-        return document
-    return document | {
-        "robot": found.spec.robot,
-        "preference": found.spec.resolved_preference(),
-        "scenarios": certificate_scenarios(found.spec.resolved_scenarios()),
+        walker, tuned = chosen_robot(robot), chosen_scenarios("all", robot)
+        document |= {"robot": walker, "preference": robot_defaults(robot).preference}
+    else:
+        walker = found.spec.robot if robot is None else chosen_robot(robot)
+        tuned = found.spec.resolved_scenarios()
+        document |= {"robot": walker, "preference": found.spec.resolved_preference()}
+    return document | certificate_walks(tuned, walker, found.values)
+
+
+def _still_held_out(document: Mapping[str, Any]) -> dict[str, Any]:
+    """`held_out` without what is not walked, if the spec says which are."""
+    if document.get("held_out") is None:
+        return {}
+    walked = {
+        entry if isinstance(entry, str) else dict(entry).get("name")
+        for entry in document["scenarios"]
     }
+    return {"held_out": [name for name in document["held_out"] if name in walked]}
 
 
 def _perturbations(document: Mapping[str, Any], options: Mapping[str, Any]) -> dict[str, Any]:

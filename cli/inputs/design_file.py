@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from cli.inputs.job_ids import full_id
-from cli.inputs.robots import folder_defaults
+from cli.inputs.robots import robot_defaults
 from cli.inputs.spec_file import json_object, read_json_object
 from services.optimizer.errors import InvalidRequest, NotFound
 from sim.controllers import CONTROLLERS, Controller, ControllerName
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 _PUBLISHED: Final = "published:"
 _JOB: Final = "job:"
-_DEFAULT_CONTROLLER: Final = "fuzzy-pi"
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,8 +76,7 @@ def given_design(
         label = f"published {given.removeprefix(_PUBLISHED)}"
     else:
         label = "design" if _is_json(given) else Path(given).stem
-    named = controller or ({} if robot is None else folder_defaults(robot)).get("controller")
-    chosen = _controller_name(named or _DEFAULT_CONTROLLER)
+    chosen = _controller_name(controller or robot_defaults(robot).controller)
     return GivenDesign(label, chosen, read_design(given, chosen, trajectory))
 
 

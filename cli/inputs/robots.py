@@ -12,6 +12,7 @@ from sim.robot import DEFAULT_ROBOT
 if TYPE_CHECKING:
     from pydantic import ValidationError
 
+    from gaitswarm.robot_defaults import RobotDefaults
     from sim.robot import RobotFiles, RobotVariant
     from sim.scenario import Scenario
 
@@ -65,20 +66,17 @@ def _text(path: Path) -> str:
         raise InvalidRequest(not_utf8(path, error), field="robot") from error
 
 
-def folder_defaults(text: str, controller: object = None) -> dict[str, Any]:
-    """What the folder of a robot says that its jobs have; nothing for other robots.
+def robot_defaults(text: str | None) -> RobotDefaults:
+    """What jobs and walks of a robot have unless an option says otherwise. Raises InvalidRequest.
 
-    controller: of the job, if it names one; variables of another one are left out. Raises
-    InvalidRequest.
+    text: as the option names it.
     """
-    if text.lstrip().startswith("{") or not Path(text).is_dir():
-        return {}
-    from gaitswarm.robots import job_defaults
+    from gaitswarm.robot_defaults import RobotDefaults
+    from gaitswarm.robot_defaults import robot_defaults as defaults_of
 
-    defaults = job_defaults(text)
-    if controller in (None, defaults.get("controller")):
-        return defaults
-    return {k: value for k, value in defaults.items() if k not in ("variables", "fixed")}
+    if text is None or text.lstrip().startswith("{") or not Path(text).is_dir():
+        return RobotDefaults()
+    return defaults_of(text)
 
 
 def scenario_data(text: str, robot: str | None = None) -> list[str | dict[str, Any]]:
@@ -90,36 +88,24 @@ def scenario_data(text: str, robot: str | None = None) -> list[str | dict[str, A
     text: `all`, or entries separated by commas, FILE.json for a scenario of one's own. robot: as
     the option names it. Raises InvalidRequest for a file that is not JSON.
     """
-    from sim.scenario import SCENARIOS
-
-    own = {} if robot is None else _own_scenarios(robot)
+    defaults = robot_defaults(robot)
     if text == "all":
-        return list(own.values()) or [scenario.name for scenario in SCENARIOS]
+        return defaults.scenarios
+    own = defaults.own_scenarios
     numbers = {str(number): entry for number, entry in enumerate(own.values(), start=1)}
     entries = [entry.strip() for entry in text.split(",")]
     return [own.get(e) or numbers.get(e) or _scenario_entry(e) for e in entries]
 
 
-def _own_scenarios(robot: str) -> dict[str, str | dict[str, Any]]:
-    """Those of a robot's folder by name, which may be a preset's number. Raises InvalidRequest."""
-    found = folder_defaults(robot).get("scenarios", [])
-    if not isinstance(found, list) or not all(isinstance(e, str | int | dict) for e in found):
-        raise InvalidRequest(
-            "its job.json must have a list under scenarios, of names, numbers or objects",
-            field="robot",
-        )
-    entries = [str(e) if isinstance(e, int) else e for e in found]
-    return {e if isinstance(e, str) else str(e.get("name")): e for e in entries}
-
-
 def chosen_scenarios(text: str, robot: str | None = None) -> tuple[Scenario, ...]:
     """The scenarios of `scenario_data`. Raises SimulationInputError, InvalidRequest."""
+    return tuple(map(_found_scenario, scenario_data(text, robot)))
+
+
+def _found_scenario(entry: str | dict[str, Any]) -> Scenario:
     from sim.scenario import find_scenario
 
-    return tuple(
-        find_scenario(entry) if isinstance(entry, str) else _own_scenario(entry)
-        for entry in scenario_data(text, robot)
-    )
+    return find_scenario(entry) if isinstance(entry, str) else _own_scenario(entry)
 
 
 def _own_scenario(data: dict[str, Any]) -> Scenario:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from cli.inputs.robots import chosen_robot, folder_defaults, scenario_data
+from cli.inputs.robots import chosen_robot, robot_defaults, scenario_data
 from services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def build_spec(options: SpecOptions) -> AnySpec:
     data = read_json_object(options.spec, "spec") if options.spec is not None else {}
     if options.robot is not None and data.get("kind", "tuning") == "tuning":
         controller = options.given.get("controller", data.get("controller"))
-        data = folder_defaults(options.robot, controller) | data
+        data = robot_defaults(options.robot).of_controller(controller) | data
     chosen = {name: value for name, value in options.given.items() if name != "spec"}
     if options.scenarios is not None:
         chosen["scenarios"] = scenario_data(options.scenarios, options.robot)

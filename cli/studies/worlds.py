@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 from services.optimizer.analysis.ratio import MedianInterval, median_interval, median_ratio
 from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.kinds.certificate import CertificateSpec, certificate_scenarios
+from services.optimizer.jobs.kinds.certificate import CertificateSpec
+from services.optimizer.jobs.kinds.held_out import certificate_walks
 from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.optimizer_choice import with_settings
+from sim.catalogue import design_numbers
 
 if TYPE_CHECKING:
     from cli.tables.fitted import Table
@@ -178,7 +180,9 @@ def certificate_of(
         robot=spec.robot,
         controller=spec.controller,
         design=dict(design),
-        scenarios=certificate_scenarios(spec.resolved_scenarios()),
+        **certificate_walks(
+            spec.resolved_scenarios(), spec.robot, design_numbers(spec.controller, design)
+        ),
         preference=spec.preference,
         worlds=held_out.worlds,
         seed=held_out.seed,

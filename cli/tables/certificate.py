@@ -114,7 +114,7 @@ def _by_scenario(view: CertificateView) -> Table:
         table.add_row(marked, *_failed(found.failed), *_spread(found.utility))
     table.add_row("all", *_failed(view.failed), *_spread(view.fitness), style="bold")
     if any(found.held_out for found in view.scenarios.values()):
-        table.caption, table.caption_justify = "* held out: none of table 4.2", "left"
+        table.caption, table.caption_justify = "* held out: the design was not tuned in it", "left"
     return table
 
 

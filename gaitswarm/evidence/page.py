@@ -154,7 +154,8 @@ def _certificate(certificate: CertificateOnPage) -> Iterator[str]:
     yield (
         "<p>Utility by scenario, minimized; a failed walk is worse than any other. The probability"
         " of one is at most so much, at 95 %. CVaR is the mean of the worst 5 %, a lower bound"
-        " where some failed. Scenarios with a star are held out: none of table 4.2.</p>"
+        " where some failed. Scenarios with a star are held out: the design was not tuned in"
+        " them.</p>"
     )
     heads = ["scenario", "failed", "at most", "nominal", "median", "95 %", "CVaR 95 %", "worst"]
     rows = [

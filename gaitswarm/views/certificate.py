@@ -89,8 +89,8 @@ class CertifiedScenarioView(View):
     """One scenario over all worlds."""
 
     held_out: bool = Field(
-        description="Whether it is held out: a preset for which no design of the thesis was"
-        " optimized, as jobs do not have it by default."
+        description="Whether it is held out: one of the spec's `held_out`, which the design was"
+        " not tuned in; without them a preset for which no design of the thesis was optimized."
     )
     statuses: dict[StatusName, int] = Field(
         description="How many walks ended so; those that are missing are 0.",
@@ -114,7 +114,7 @@ class CertifiedScenarioView(View):
         Args:
             case: of the certificate.
             names: of its objectives.
-            held_out: whether it is one of `HELD_OUT`.
+            held_out: whether the design was not tuned in it.
         """
         return cls(
             held_out=held_out,
@@ -350,7 +350,7 @@ class CertificateView(View):
             failed=ProportionView.from_proportion(found.failed),
             scenarios={
                 case.name: CertifiedScenarioView.from_case(
-                    case, names, held_out=case.name in spec.held_out
+                    case, names, held_out=case.name in spec.held_out_names
                 )
                 for case in found.cases
             },

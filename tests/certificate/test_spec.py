@@ -11,7 +11,8 @@ from pydantic import ValidationError
 
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.documents import SPECS
-from services.optimizer.jobs.kinds.certificate import CASES, CertificateSpec, certificate_scenarios
+from services.optimizer.jobs.kinds.certificate import CertificateSpec
+from services.optimizer.jobs.kinds.held_out import CASES, certificate_scenarios
 from sim.scenario import HELD_OUT, SCENARIOS
 from sim.worlds import PERTURBATIONS, sample_worlds
 from tests.certificate.examples import DOCUMENT, PI, small
@@ -98,7 +99,7 @@ def test_eight_scenarios_those_that_were_tuned_and_held_out_ones() -> None:
     default = SPECS.validate_python({"kind": "certificate", "controller": "pi", "design": PI})
     assert isinstance(default, CertificateSpec)
     assert list(default.case_names) == names
-    assert default.held_out == ("turn-left-fast", "downhill-fast")
+    assert default.held_out_names == ("turn-left-fast", "downhill-fast")
 
 
 def test_a_stored_certificate_reads_back_as_it_was() -> None:

@@ -2,13 +2,43 @@
 
 from __future__ import annotations
 
+import json
+import shutil
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from pathlib import Path
+from typing import Any, Final
 
 from sim.robot import Robot
 from sim.robot.description import RobotDescription
 from sim.robot.identifiable import with_parameters
+from tests.examples.paths import QUADRUPED
+
+SLOW: Final[dict[str, Any]] = {
+    "name": "slow",
+    "cycle_time": 2.0,
+    "radius": 0.22,
+    "hip_height": 0.16,
+    "stride": 0.06,
+    "height": 0.03,
+    "duty_factor": 0.8,
+    "cycles": 1,
+}
+"""A walk of the quadruped, as a document."""
+
+FAST: Final[dict[str, Any]] = SLOW | {"name": "fast", "stride": 0.08}
+"""The same with longer strides."""
+
+
+def robot_folder(folder: Path, **job: Any) -> Path:
+    """The folder of the quadruped, whose jobs have these fields in place of pi, C, slow and fast.
+
+    folder: to be made. job: fields of job.json.
+    """
+    shutil.copytree(QUADRUPED, folder)
+    document = {"controller": "pi", "preference": "C", "scenarios": [SLOW, FAST]} | job
+    (folder / "job.json").write_text(json.dumps(document), encoding="utf-8")
+    return folder
 
 
 def changed(robot: Robot, **tables: Any) -> Robot:

@@ -34,8 +34,9 @@ def certify(
     scenarios: Annotated[
         str | None,
         typer.Option(
-            help="Names, numbers or FILE.json, separated by commas. Default: those of the job, or"
-            " of table 4.2, and so many held-out ones that there are eight, two at least."
+            help="Names, numbers or FILE.json, separated by commas. Default: those of the job, of"
+            " the robot's folder or of table 4.2, and so many held-out ones that there are eight,"
+            " two at least."
         ),
     ] = None,
     ranges: Annotated[
@@ -62,11 +63,19 @@ def certify(
         ),
     ] = None,
     controller: Annotated[
-        str | None, typer.Option(help="Of a published design or a file. [default: fuzzy-pi]")
+        str | None,
+        typer.Option(
+            help="Of a published design or a file [default: that of the robot's folder, else"
+            " fuzzy-pi]."
+        ),
     ] = None,
     robot: RobotOption = None,
     preference: Annotated[
-        str | None, typer.Option(help="A, B, C or chapter-3: how objectives are weighed.")
+        str | None,
+        typer.Option(
+            help="A, B, C or chapter-3: how objectives are weighed [default: the job's, else that"
+            " of the robot's folder, else A]."
+        ),
     ] = None,
     precision: Precision = None,
     engines: Annotated[

@@ -53,10 +53,10 @@ def gaits(
 
 
 def _scenario(given: str | None, robot: str | None) -> Scenario:
-    from cli.inputs.robots import chosen_scenarios, folder_defaults
+    from cli.inputs.robots import chosen_scenarios, robot_defaults
     from services.optimizer.errors import InvalidRequest
 
-    own = None if robot is None else folder_defaults(robot).get("scenarios")
+    own = robot_defaults(robot).own_scenarios
     chosen = chosen_scenarios(given or ("1" if own else "normal-slow"), robot)
     if len(chosen) != 1:
         raise InvalidRequest("one scenario, not several", field="scenario")

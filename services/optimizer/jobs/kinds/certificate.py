@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Final, Literal, Self
 
 import numpy as np
@@ -17,6 +17,7 @@ from services.optimizer.jobs.kinds.certified_worlds import (
     world_positions,
     world_space,
 )
+from services.optimizer.jobs.kinds.held_out import certificate_scenarios
 from services.optimizer.jobs.kinds.walks import WalksSpec
 from services.optimizer.jobs.optimizer_choice import OptimizerChoice
 from services.optimizer.jobs.preference import PreferenceChoice
@@ -29,7 +30,7 @@ from sim.controllers import CONTROLLERS, ControllerName
 from sim.errors import SimulationInputError
 from sim.identification.recorded_walk import Recordings
 from sim.mujoco.engines import ENGINES, LIBRARY, EngineName, check_installed
-from sim.scenario import HELD_OUT, SCENARIOS, Scenario, ScenarioChoice
+from sim.scenario import HELD_OUT, ScenarioChoice, ScenarioName
 from sim.simulate import check_reach
 from sim.variables import VariableName, VariableValue
 from sim.worlds import EngineWalk, WorldWalk, check_worlds, sample_worlds
@@ -39,29 +40,8 @@ Floats = NDArray[np.float64]
 BATCH: Final = 50
 """Worlds of an iteration: with eight scenarios 400 walks, half a second or so of two cores."""
 
-CASES: Final = 8
-"""Scenarios of a certificate that names none."""
-
-_MIRRORED: Final = ("turn-left-fast", "downhill-fast")
-"""The held-out scenarios that come first: the turn and the slope of table 4.2, the other way."""
-
 _OPTIMIZER: Final[TypeAdapter[Any]] = TypeAdapter(OptimizerChoice)
 _COUNT: Final[TypeAdapter[int | None]] = TypeAdapter(int | None)
-
-
-def certificate_scenarios(tuned: Sequence[Scenario] = SCENARIOS) -> tuple[Scenario, ...]:
-    """The scenarios of a certificate: those that a design was tuned in, and held-out ones.
-
-    Args:
-        tuned: Scenarios of the job that found the design; by default those of table 4.2.
-
-    Returns:
-        These, and so many of `HELD_OUT` that there are `CASES`, but two of them at least.
-    """
-    names = {scenario.name for scenario in tuned}
-    others = [scenario for scenario in HELD_OUT if scenario.name not in names]
-    others.sort(key=lambda scenario: scenario.name not in _MIRRORED)
-    return (*tuned, *others[: max(len(_MIRRORED), CASES - len(tuned))])
 
 
 class CertificateSpec(WalksSpec):
@@ -86,7 +66,7 @@ class CertificateSpec(WalksSpec):
         },
     )
 
-    unwalked = (WalksSpec.unwalked or frozenset()) | {"preference", "worlds", "engines"}
+    unwalked = (WalksSpec.unwalked or frozenset()) | {"preference", "worlds", "engines", "held_out"}
 
     searches = False
 
@@ -105,7 +85,14 @@ class CertificateSpec(WalksSpec):
         max_length=32,
         description="Walks that every world is put to: names or numbers of presets (see"
         " /v1/scenarios), or your own. Default: the six of table 4.2, and its turn and"
-        " its slope the other way.",
+        " its slope the other way; name other walks for a robot that these do not suit.",
+    )
+    held_out: tuple[ScenarioName, ...] | None = Field(
+        default=None,
+        max_length=32,
+        description="Names of those `scenarios` that the design was not tuned in, which are marked"
+        " so. Default: the presets beside those of table 4.2.",
+        examples=[["fast-turn-left", "fast-downhill"]],
     )
     preference: PreferenceChoice = Field(
         default="A",
@@ -173,6 +160,9 @@ class CertificateSpec(WalksSpec):
         for name in self.engines:
             if self.engines.count(name) > 1:
                 raise ValueError(f"engines: {name!r} is named twice")
+        for held_out in self.held_out or ():
+            if held_out not in self.case_names:
+                raise ValueError(f"held_out: {held_out!r} is none of the scenarios")
         check_design(self.controller, self.design)
         self.design_space()
         return self
@@ -271,9 +261,11 @@ class CertificateSpec(WalksSpec):
                 raise InvalidRequest(str(error), field="engines") from error
 
     @property
-    def held_out(self) -> tuple[str, ...]:
-        """Names of the scenarios for which no design of the thesis was optimized."""
-        names = {scenario.name for scenario in HELD_OUT}
+    def held_out_names(self) -> tuple[str, ...]:
+        """Names of the scenarios that the design was not tuned in."""
+        names = self.held_out
+        if names is None:
+            names = tuple(scenario.name for scenario in HELD_OUT)
         return tuple(name for name in self.case_names if name in names)
 
     def cases(self, recordings: Recordings) -> tuple[Case, ...]:  # noqa: ARG002 - needs none

@@ -1,0 +1,128 @@
+"""Walks that a design was not tuned in: they show whether it was made for its scenarios alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Final
+
+from sim.errors import SimulationInputError
+from sim.gait_variables import GAIT_CATALOGUE, with_gait
+from sim.robot import DEFAULT_ROBOT, RobotChoice, load_robot
+from sim.scenario import HELD_OUT, SCENARIOS, Scenario
+from sim.simulate import check_reach
+
+CASES: Final = 8
+"""Scenarios of a certificate that names none."""
+
+LEAST: Final = 2
+"""Held-out ones among them, however many there are."""
+
+TURN: Final = 0.5
+"""Of walks that turn, as in table 4.2 [1]."""
+
+SLOPE: Final = 5.0
+"""Of walks up and down [deg]: half of table 4.2's, as other robots' walks are not made for one."""
+
+LOAD_SHARE: Final = 0.25
+"""Of walks with a load, of the robot's mass, as in table 4.2 [1]."""
+
+PACE: Final = 0.8
+"""Cycle time of a faster walk, as a share of the tuned one; that of a slower one is divided by
+it."""
+
+_MIRRORED: Final = ("turn-left-fast", "downhill-fast")
+"""The presets that come first: the turn and the slope of table 4.2, the other way."""
+
+_LONGEST_NAME: Final = 60
+
+
+def certificate_scenarios(
+    tuned: Sequence[Scenario] = SCENARIOS,
+    robot: RobotChoice = DEFAULT_ROBOT,
+    design: Mapping[str, float] | None = None,
+) -> tuple[Scenario, ...]:
+    """The scenarios of a certificate: those that a design was tuned in, and held-out ones.
+
+    Args:
+        tuned: Scenarios of the job that found the design; by default those of table 4.2.
+        robot: That walks.
+        design: As the simulator takes it; its gait variables replace the scenarios' values. None
+            for a design without any.
+
+    Returns:
+        These, and so many held-out ones that there are `CASES`, but `LEAST` of them at least, as
+        far as a robot that does not ship with gaitswarm reaches so many.
+
+    Raises:
+        SimulationInputError: The robot cannot be read.
+    """
+    count = max(LEAST, CASES - len(tuned))
+    if load_robot(robot).ships:
+        names = {scenario.name for scenario in tuned}
+        others = [scenario for scenario in HELD_OUT if scenario.name not in names]
+        others.sort(key=lambda scenario: scenario.name not in _MIRRORED)
+    else:
+        others = _derived(tuned, robot, design or {})
+    return (*tuned, *others[:count])
+
+
+def certificate_walks(
+    tuned: Sequence[Scenario], robot: RobotChoice, design: Mapping[str, float]
+) -> dict[str, Any]:
+    """Fields of a certificate's spec that say where a design walks.
+
+    Args:
+        tuned: Scenarios of the job that found the design.
+        robot: That walks.
+        design: As the simulator takes it.
+
+    Returns:
+        `scenarios`; and `held_out` where these are derived from the tuned ones, and no presets.
+
+    Raises:
+        SimulationInputError: The robot cannot be read.
+    """
+    scenarios = certificate_scenarios(tuned, robot, design)
+    if load_robot(robot).ships:
+        return {"scenarios": scenarios}
+    held_out = tuple(scenario.name for scenario in scenarios[len(tuned) :])
+    return {"scenarios": scenarios, "held_out": held_out}
+
+
+def _derived(
+    tuned: Sequence[Scenario], robot: RobotChoice, design: Mapping[str, float]
+) -> list[Scenario]:
+    """Walks like the fastest of the tuned ones, as far as the legs reach, each another one."""
+    fastest = max(tuned, key=lambda scenario: scenario.stride / scenario.cycle_time)
+    gait = {name: value for name, value in design.items() if name in GAIT_CATALOGUE}
+    names = {scenario.name for scenario in tuned}
+    walked = [_unnamed(with_gait(scenario, gait)) for scenario in tuned]
+    found = []
+    for suffix, changes in _changes(fastest, load_robot(robot).mass):
+        name = f"{fastest.name[: _LONGEST_NAME - len(suffix) - 1]}-{suffix}"
+        try:
+            scenario = Scenario.model_validate(fastest.model_dump() | changes | {"name": name})
+            check_reach(scenario, tuple(design), tuple(design.values()), robot=robot)
+        except (ValueError, SimulationInputError):
+            # Beyond the bounds of a scenario, or out of the legs' reach.
+            continue
+        other = _unnamed(with_gait(scenario, gait))
+        if name not in names and other not in walked:
+            walked.append(other)
+            found.append(scenario)
+    return found
+
+
+def _changes(base: Scenario, mass: float) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Name's end and changed fields, those first that differ most from each other."""
+    yield "turn-left", {"turn": -TURN}
+    yield "downhill", {"slope": -SLOPE, "slope_direction": 0.0}
+    yield "loaded", {"load": round(base.load + LOAD_SHARE * mass, 3)}
+    yield "faster", {"cycle_time": round(base.cycle_time * PACE, 4)}
+    yield "uphill", {"slope": SLOPE, "slope_direction": 0.0}
+    yield "slower", {"cycle_time": round(base.cycle_time / PACE, 4)}
+    yield "turn-right", {"turn": TURN}
+
+
+def _unnamed(scenario: Scenario) -> Scenario:
+    return scenario.model_copy(update={"name": ""})

@@ -102,6 +102,19 @@ def chosen_scenarios(text: str, robot: str | None = None) -> tuple[Scenario, ...
     return tuple(map(_found_scenario, scenario_data(text, robot)))
 
 
+def one_scenario(text: str | None, robot: str | None, *, preset: str) -> Scenario:
+    """The walk of a command that is about one.
+
+    text: as the option names it; None for the first of the robot's folder, or else the preset.
+    Raises SimulationInputError, InvalidRequest.
+    """
+    first = "1" if robot_defaults(robot).own_scenarios else preset
+    chosen = chosen_scenarios(text or first, robot)
+    if len(chosen) != 1:
+        raise InvalidRequest("one scenario, not several", field="scenario")
+    return chosen[0]
+
+
 def _found_scenario(entry: str | dict[str, Any]) -> Scenario:
     from sim.scenario import find_scenario
 

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from sim.gait.leg_gaits import leg_gaits
-from sim.gait.trajectory import desired_angles
+from sim.gait.trajectory import desired_angles, require_reachable
 from sim.mujoco.mjcf import Rig, Surroundings, mjcf
 from sim.mujoco.model import Feet, even_drags, with_contacts
 from sim.robot import Robot
@@ -33,9 +33,11 @@ def exported(robot: Robot, scenario: Scenario, *, contacts: bool = True) -> str:
         The text, which MuJoCo has compiled once.
 
     Raises:
-        UnreachablePose: The walk's first pose is out of the legs' reach.
+        UnreachablePose: The walk is out of the legs' reach.
+        BeyondJointLimit: A joint would leave its limits in it.
         RobotFileError: The URDF's tree is not one that can be simulated.
     """
+    require_reachable(robot, scenario)
     surroundings = Surroundings.of(robot, scenario)
     joints = desired_angles(robot, scenario).start
     mass = robot.mass + scenario.load

@@ -15,6 +15,7 @@ from sim.robot import RobotFiles, RobotVariant, load_robot
 from sim.scenario import SCENARIOS, Scenario
 from tests.examples.commands import run_command
 from tests.examples.paths import ROOT
+from tests.examples.robots import SLOW, robot_folder
 from tests.examples.walks import STEEP
 
 DEFAULT = RobotVariant()
@@ -92,6 +93,25 @@ def test_the_command_writes_a_model(tmp_path: Path) -> None:
     assert shown.out.strip() == file.read_text(encoding="utf-8").strip()
     falling = run_command("mjcf", "--no-contacts")
     assert mujoco.MjModel.from_xml_string(falling.out).npair == 0
+
+
+def test_a_robot_of_ones_own_begins_the_first_walk_of_its_folder(tmp_path: Path) -> None:
+    folder = robot_folder(tmp_path / "dog")
+    result = run_command("mjcf", "--robot", folder)
+    assert result.code == 0, result.err
+    assert result.out == run_command("mjcf", "--robot", folder, "--scenario", "slow").out
+    assert result.out != run_command("mjcf", "--robot", folder, "--scenario", "fast").out
+
+
+@pytest.mark.parametrize("changes", [{"radius": 0.5}, {"hip_height": 0.05, "height": 0.2}])
+def test_a_pose_that_the_legs_do_not_reach_is_refused(
+    tmp_path: Path, changes: dict[str, float]
+) -> None:
+    folder = robot_folder(tmp_path / "dog", scenarios=[SLOW | changes])
+    result = run_command("mjcf", "--robot", folder, "-o", tmp_path / "dog.xml")
+    assert result.code == 2
+    assert "scenario 'slow': " in result.err and "; reduce stride" in result.err
+    assert not (tmp_path / "dog.xml").exists()
 
 
 @pytest.mark.parametrize(

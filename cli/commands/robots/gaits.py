@@ -10,7 +10,6 @@ from cli.inputs.options import Json, RobotOption
 
 if TYPE_CHECKING:
     from gaitswarm.gaits import GaitsView, GaitView
-    from sim.scenario import Scenario
 
 
 def register(app: typer.Typer) -> None:
@@ -38,29 +37,21 @@ def gaits(
     as_json: Json = False,
 ) -> None:
     """List gaits: order of footfalls, feet that stand, and whether they are statically stable."""
-    from cli.inputs.robots import chosen_robot
+    from cli.inputs.robots import chosen_robot, one_scenario
     from cli.output import print_json, print_text
     from gaitswarm.gaits import planned_gaits
 
     view = planned_gaits(
-        chosen_robot(robot), _scenario(scenario, robot), name=gait, duty_factor=duty_factor
+        chosen_robot(robot),
+        one_scenario(scenario, robot, preset="normal-slow"),
+        name=gait,
+        duty_factor=duty_factor,
     )
     if as_json:
         print_json(view)
         return
     heading = f"{view.robot} in the scenario {view.scenario}\n\n"
     print_text(heading + (_list(view) if gait is None else diagram(view.items[0])))
-
-
-def _scenario(given: str | None, robot: str | None) -> Scenario:
-    from cli.inputs.robots import chosen_scenarios, robot_defaults
-    from services.optimizer.errors import InvalidRequest
-
-    own = robot_defaults(robot).own_scenarios
-    chosen = chosen_scenarios(given or ("1" if own else "normal-slow"), robot)
-    if len(chosen) != 1:
-        raise InvalidRequest("one scenario, not several", field="scenario")
-    return chosen[0]
 
 
 def _list(view: GaitsView) -> str:

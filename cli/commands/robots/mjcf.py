@@ -19,9 +19,12 @@ def mjcf(
     *,
     robot: RobotOption = None,
     scenario: Annotated[
-        str,
-        typer.Option(help="Whose load, slope and first pose the model has: name, number or FILE."),
-    ] = "normal-fast",
+        str | None,
+        typer.Option(
+            help="Whose load, slope and first pose the model has: name, number or FILE [default:"
+            " the first of the robot's folder, else normal-fast]."
+        ),
+    ] = None,
     contacts: Annotated[
         bool,
         typer.Option(help="Let soles meet the ground, by MuJoCo's own contacts fitted to ours."),
@@ -36,20 +39,18 @@ def mjcf(
     Needs pip install 'gaitswarm[mujoco]'. The viewer comes with pip install mujoco:
     python -m mujoco.viewer --mjcf=FILE.xml.
     """
-    from cli.inputs.robots import chosen_robot, chosen_scenarios
+    from cli.inputs.robots import chosen_robot, one_scenario
     from cli.output import note, print_text
     from services.optimizer.errors import InvalidRequest
     from sim.mujoco.engines import check_installed
     from sim.robot import load_robot
 
     machine = load_robot(chosen_robot(robot))
-    chosen = chosen_scenarios(scenario, robot)
-    if len(chosen) != 1:
-        raise InvalidRequest("one scenario, not several", field="scenario")
+    chosen = one_scenario(scenario, robot, preset="normal-fast")
     check_installed()
     from sim.mujoco.export import exported
 
-    text = exported(machine, chosen[0], contacts=contacts)
+    text = exported(machine, chosen, contacts=contacts)
     if output is None:
         print_text(text)
         return

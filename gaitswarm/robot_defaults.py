@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from services.optimizer.errors import InvalidRequest
+from services.optimizer.jobs.preference import PreferenceName
 from sim.scenario import SCENARIOS
 
 JOB_FILE: Final = "job.json"
@@ -17,7 +18,7 @@ JOB_FILE: Final = "job.json"
 
 DEFAULT_CONTROLLER: Final = "fuzzy-pi"
 
-DEFAULT_PREFERENCE: Final = "A"
+DEFAULT_PREFERENCE: Final[PreferenceName] = "A"
 
 
 @dataclass(frozen=True, slots=True)

@@ -156,6 +156,13 @@ def _read_values(design: str, controller: str) -> dict[str, Any]:
     if design.startswith(_PUBLISHED):
         published = _controller(controller).published
         name = design.removeprefix(_PUBLISHED)
+        if not published:
+            own = ", ".join(variable.name for variable in _controller(controller).variables)
+            raise InvalidRequest(
+                f"no design of {controller} was published, for any robot; give a JSON object or a"
+                f" file with values of {own}, or job:ID for the best of a job",
+                field="design",
+            )
         if name not in published:
             known = ", ".join(published)
             raise InvalidRequest(

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
@@ -31,7 +32,6 @@ DesignOption = Annotated[
 ScenarioOption = Annotated[
     str, typer.Option("--scenario", help="Name or number of the walk, or FILE.json.")
 ]
-WalkController = Annotated[str, typer.Option("--controller", help="As for `simulate`.")]
 TrajectoryOption = Annotated[
     Path | None,
     typer.Option(
@@ -45,20 +45,21 @@ CyclesOption = Annotated[
 
 def read_walk(
     scenario: str,
-    controller: str,
+    controller: str | None,
     design: str,
     trajectory: Path | None,
     cycles: int | None,
     robot: str | None,
 ) -> MeasuredWalk:
     """Raises InvalidRequest or SimulationInputError that names what is wrong."""
-    from cli.inputs.design_file import read_design
+    from cli.inputs.design_file import given_design
     from cli.inputs.robots import chosen_robot, chosen_scenarios
     from sim.measurement.walk import MeasuredWalk
     from sim.robot import load_robot
 
-    values = read_design(design, controller, trajectory)
-    for name, value in values.items():
+    given = given_design(design, controller, trajectory, robot=robot, server=None, db=None)
+    unchecked: Mapping[str, Any] = given.values
+    for name, value in unchecked.items():
         number = isinstance(value, int | float) and not isinstance(value, bool)
         if not (number and -_HUGE < value < _HUGE):
             raise InvalidRequest("must be a finite number", field=f"design.{name}")
@@ -68,7 +69,7 @@ def read_walk(
     (chosen,) = scenarios
     if cycles is not None:
         chosen = chosen.model_copy(update={"cycles": float(cycles)})
-    return MeasuredWalk.of(load_robot(chosen_robot(robot)), chosen, controller, values)
+    return MeasuredWalk.of(load_robot(chosen_robot(robot)), chosen, given.controller, given.values)
 
 
 def synchronised(

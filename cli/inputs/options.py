@@ -78,6 +78,15 @@ RobotOption = Annotated[
     ),
 ]
 
+ControllerOption = Annotated[
+    str | None,
+    typer.Option(
+        "--controller",
+        help="Motor controller: fuzzy-pi, fuzzy-pi-3, p, pi, pid or, of torque-controlled"
+        " actuators, joint-pd [default: that of the job or spec, else of the robot's folder, else"
+        " fuzzy-pi].",
+    ),
+]
 
 Precision = Annotated[
     str | None,
@@ -141,9 +150,7 @@ class SpecOptions:
     scenarios: Annotated[
         str | None, typer.Option(help="Names, numbers or FILE.json, separated by commas.")
     ] = None
-    controller: Annotated[str | None, typer.Option(help="fuzzy-pi, fuzzy-pi-3, p, pi or pid.")] = (
-        None
-    )
+    controller: ControllerOption = None
     case: Annotated[
         str | None,
         typer.Option(

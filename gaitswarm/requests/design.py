@@ -8,6 +8,7 @@ from typing import Self
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from gaitswarm.errors import simulation_errors
+from gaitswarm.robot_defaults import DEFAULT_CONTROLLER
 from services.optimizer.errors import InvalidRequest
 from sim.catalogue import check_design, design_numbers
 from sim.controllers import CONTROLLERS, ControllerName
@@ -32,7 +33,8 @@ class DesignRequest(BaseModel):
         " backlash, or the text of the files of your own.",
     )
     controller: ControllerName = Field(
-        default="fuzzy-pi", description="Motor controller that drives it; see /v1/controllers."
+        default=DEFAULT_CONTROLLER,
+        description="Motor controller that drives it; see /v1/controllers.",
     )
     design: dict[VariableName, VariableValue] = Field(
         description="Value of each of the controller's variables, and of any gait variable, which"

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Field, FiniteFloat, model_validator
 
 from gaitswarm.requests.design import DesignRequest, ScenariosRequest
+from gaitswarm.robot_defaults import DEFAULT_PREFERENCE
 from gaitswarm.views import SimulationView
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice
@@ -111,7 +112,7 @@ class SimulationRequest(WalksRequest, WorldRequest):
     """One design, the walks in which to try it, and how they are judged."""
 
     preference: PreferenceChoice = Field(
-        default="A",
+        default=DEFAULT_PREFERENCE,
         description="How objectives are weighed: A, B, C of table 4.5, chapter-3 for eq. 3.1, or"
         " your own.",
     )

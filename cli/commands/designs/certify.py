@@ -7,7 +7,15 @@ from typing import Annotated
 
 import typer
 
-from cli.inputs.options import JobName, Json, Precision, RobotOption, WorkerOptions, with_groups
+from cli.inputs.options import (
+    ControllerOption,
+    JobName,
+    Json,
+    Precision,
+    RobotOption,
+    WorkerOptions,
+    with_groups,
+)
 
 
 def register(app: typer.Typer) -> None:
@@ -62,13 +70,7 @@ def certify(
             help="Draw these perturbations alone; the others stay nominal. Default: all.",
         ),
     ] = None,
-    controller: Annotated[
-        str | None,
-        typer.Option(
-            help="Of a published design or a file [default: that of the robot's folder, else"
-            " fuzzy-pi]."
-        ),
-    ] = None,
+    controller: ControllerOption = None,
     robot: RobotOption = None,
     preference: Annotated[
         str | None,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.inputs.options import Db, Json, RobotOption, Server
+from cli.inputs.options import ControllerOption, Db, Json, RobotOption, Server
 
 if TYPE_CHECKING:
     from gaitswarm.views.firmware import FirmwareView
@@ -37,10 +37,7 @@ def firmware(
             " other designs all]."
         ),
     ] = None,
-    controller: Annotated[
-        str | None,
-        typer.Option(help="fuzzy-pi, fuzzy-pi-3, p, pi or pid [default: the job's, or fuzzy-pi]."),
-    ] = None,
+    controller: ControllerOption = None,
     robot: RobotOption = None,
     table_bits: Annotated[
         str | None,

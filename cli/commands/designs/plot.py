@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cli.commands.designs.robustness import (
-    DesignController,
     Radius,
     Samples,
     Scenarios,
@@ -16,7 +15,7 @@ from cli.commands.designs.robustness import (
     estimate,
     robustness_request,
 )
-from cli.inputs.options import Db, JobId, Precision, RobotOption, Server
+from cli.inputs.options import ControllerOption, Db, JobId, Precision, RobotOption, Server
 
 if TYPE_CHECKING:
     from gaitswarm.requests.robustness import RobustnessRequest
@@ -98,7 +97,7 @@ def robustness(
     radius: Radius = 0.02,
     seed: Seed = 1,
     scenarios: Scenarios = None,
-    controller: DesignController = None,
+    controller: ControllerOption = None,
     robot: RobotOption = None,
     precision: Precision = None,
     title: Annotated[str, typer.Option(help="Of the picture.")] = "Robustness",
@@ -114,7 +113,7 @@ def robustness(
 
     requests: dict[str, RobustnessRequest] = {}
     for design in designs:
-        given = given_design(design, controller, server=server, db=db)
+        given = given_design(design, controller, robot=robot, server=server, db=db)
         label = f"{given.label} ({design})" if given.label in requests else given.label
         requests[label] = robustness_request(
             given,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cli.inputs.options import Db, Json, Precision, RobotOption, Server
+from cli.inputs.options import ControllerOption, Db, Json, Precision, RobotOption, Server
 
 if TYPE_CHECKING:
     from cli.inputs.design_file import GivenDesign
@@ -24,13 +24,7 @@ Scenarios = Annotated[
     str | None,
     typer.Option(
         help="Names, numbers or FILE.json, separated by commas, or all.",
-        show_default="those of the job, else all",
-    ),
-]
-DesignController = Annotated[
-    str | None,
-    typer.Option(
-        help="fuzzy-pi, fuzzy-pi-3, p, pi or pid.", show_default="that of the job, else fuzzy-pi"
+        show_default="those of the job, else all of the robot",
     ),
 ]
 
@@ -53,7 +47,7 @@ def robustness(
     radius: Radius = 0.02,
     seed: Seed = 1,
     scenarios: Scenarios = None,
-    controller: DesignController = None,
+    controller: ControllerOption = None,
     robot: RobotOption = None,
     precision: Precision = None,
     server: Server = None,
@@ -101,7 +95,7 @@ def robustness_request(
     """
     from pydantic import ValidationError
 
-    from cli.inputs.robots import chosen_robot, scenario_data
+    from cli.inputs.robots import chosen_robot, robot_defaults, scenario_data
     from gaitswarm.errors import invalid_request
     from gaitswarm.requests.robustness import RobustnessRequest
 
@@ -115,7 +109,9 @@ def robustness_request(
         "scenarios": scenario_data(scenarios or "all", robot),
         "robot": chosen_robot(robot),
     }
-    if given.spec is not None:
+    if given.spec is None:
+        data["variables"] = robot_defaults(robot).of_controller(given.controller).get("variables")
+    else:
         data["variables"] = given.spec.design_space().variables
         if scenarios is None:
             data["scenarios"] = given.spec.resolved_scenarios()

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cli.inputs.options import Db, Json, Precision, RobotOption, Server
+from cli.inputs.options import ControllerOption, Db, Json, Precision, RobotOption, Server
 
 if TYPE_CHECKING:
     from gaitswarm.views import SimulationView
@@ -28,13 +28,7 @@ def simulate(
             " best of a job.",
         ),
     ],
-    controller: Annotated[
-        str | None,
-        typer.Option(
-            help="fuzzy-pi, fuzzy-pi-3, p, pi or pid [default: the job's, else that of the robot's"
-            " folder, else fuzzy-pi]."
-        ),
-    ] = None,
+    controller: ControllerOption = None,
     scenario: Annotated[
         str | None,
         typer.Option(
@@ -49,7 +43,8 @@ def simulate(
     preference: Annotated[
         str | None,
         typer.Option(
-            help="A, B, C or chapter-3: how objectives are weighed [default: the job's, else A]."
+            help="A, B, C or chapter-3: how objectives are weighed [default: the job's, else that"
+            " of the robot's folder, else A]."
         ),
     ] = None,
     world: Annotated[
@@ -75,7 +70,7 @@ def simulate(
     from pydantic import ValidationError
 
     from cli.inputs.design_file import given_design
-    from cli.inputs.robots import chosen_robot, scenario_data
+    from cli.inputs.robots import chosen_robot, robot_defaults, scenario_data
     from cli.inputs.spec_file import json_object
     from cli.output import note
     from gaitswarm.errors import invalid_request
@@ -87,7 +82,7 @@ def simulate(
         "controller": given.controller,
         "design": given.values,
         "scenarios": scenario_data(scenario or "all", robot),
-        "preference": preference or "A",
+        "preference": preference or robot_defaults(robot).preference,
         "precision": precision or "double",
         "log": log is not None,
     }

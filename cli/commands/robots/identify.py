@@ -12,9 +12,9 @@ from cli.inputs.measured_walk import (
     DesignOption,
     ScenarioOption,
     TrajectoryOption,
-    WalkController,
 )
 from cli.inputs.options import (
+    ControllerOption,
     Db,
     JobName,
     Json,
@@ -48,7 +48,7 @@ def record(
     ],
     design: DesignOption,
     scenario: ScenarioOption,
-    controller: WalkController = "fuzzy-pi",
+    controller: ControllerOption = None,
     trajectory: TrajectoryOption = None,
     cycles: CyclesOption = None,
     robot: RobotOption = None,

@@ -12,9 +12,8 @@ from cli.inputs.measured_walk import (
     DesignOption,
     ScenarioOption,
     TrajectoryOption,
-    WalkController,
 )
-from cli.inputs.options import RobotOption
+from cli.inputs.options import ControllerOption, RobotOption
 
 
 def register(app: typer.Typer) -> None:
@@ -28,7 +27,7 @@ def synthesize(
     output: Annotated[
         Path, typer.Option("--output", "-o", metavar="FILE.csv", help="Where to write the log.")
     ],
-    controller: WalkController = "fuzzy-pi",
+    controller: ControllerOption = None,
     trajectory: TrajectoryOption = None,
     cycles: CyclesOption = None,
     robot: RobotOption = None,
@@ -65,7 +64,7 @@ def synthesize(
                 raise InvalidRequest("no such parameter of the robot", field=f"parameters.{name}")
         twin = Perturbation.of(values)
     log = synthetic_log(
-        walk.robot, walk.scenario, controller, walk.design, seed=seed, perturbation=twin
+        walk.robot, walk.scenario, walk.controller, walk.design, seed=seed, perturbation=twin
     )
     with replacing(output, "output") as file:
         file.write(format_measured_log(log).encode())

@@ -12,9 +12,8 @@ from cli.inputs.measured_walk import (
     DesignOption,
     ScenarioOption,
     TrajectoryOption,
-    WalkController,
 )
-from cli.inputs.options import Json, RobotOption
+from cli.inputs.options import ControllerOption, Json, RobotOption
 
 
 def register(app: typer.Typer) -> None:
@@ -29,7 +28,7 @@ def validate(
     ],
     design: DesignOption,
     scenario: ScenarioOption,
-    controller: WalkController = "fuzzy-pi",
+    controller: ControllerOption = None,
     trajectory: TrajectoryOption = None,
     cycles: CyclesOption = None,
     robot: RobotOption = None,
@@ -72,7 +71,7 @@ def validate(
             "measured": measured.name,
             **{f"measured, {key}": value for key, value in logs[measured].metadata.items()},
             "simulated": f"{walk.robot.description.name} in {walk.scenario.name}",
-            "controller": controller,
+            "controller": walk.controller,
             "design": ", ".join(f"{name}={value:g}" for name, value in walk.design.items()),
         }
         note(f"report written to {write_report(report, comparison, pairs[0], facts)}")

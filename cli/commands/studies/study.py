@@ -9,7 +9,7 @@ import typer
 from cli.commands.studies.study_controllers import controllers
 from cli.commands.studies.study_precision import precision
 from cli.commands.studies.study_worlds import worlds
-from cli.inputs.options import Json, RobotOption
+from cli.inputs.options import ControllerOption, Json, RobotOption
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -21,7 +21,6 @@ NoiseKind = Literal["angle", "torque"]
 Design = Annotated[
     str, typer.Option(metavar="JSON|FILE|published:NAME|job:ID", help="Design as for `simulate`.")
 ]
-Controller = Annotated[str, typer.Option(help="Controller of the design.")]
 Scenario = Annotated[str, typer.Option(help="Name or number, several separated by commas, or all.")]
 
 
@@ -62,24 +61,25 @@ def tables(
 
 def steps(
     design: Design = "published:A",
-    controller: Controller = "fuzzy-pi",
+    controller: ControllerOption = None,
     scenario: Scenario = "all",
     robot: RobotOption = None,
     as_json: Json = False,
 ) -> None:
     """Compare physics at 2.5, 5, 10 and 20 kHz with 40 kHz."""
-    from cli.inputs.design_file import read_design
+    from cli.inputs.design_file import given_design
     from cli.inputs.robots import chosen_robot, chosen_scenarios
     from sim.studies.accuracy import step_halving
 
-    values = read_design(design, controller)
+    given = given_design(design, controller, robot=robot, server=None, db=None)
     chosen = chosen_scenarios(scenario, robot)
-    _show(step_halving(controller, values, chosen, robot=chosen_robot(robot)), as_json=as_json)
+    machine = chosen_robot(robot)
+    _show(step_halving(given.controller, given.values, chosen, robot=machine), as_json=as_json)
 
 
 def noise(
     design: Design = "published:A",
-    controller: Controller = "fuzzy-pi",
+    controller: ControllerOption = None,
     scenario: Scenario = "1",
     kind: Annotated[
         NoiseKind, typer.Option(help="On the angle between gearhead and link, or on its torque.")
@@ -94,15 +94,15 @@ def noise(
     as_json: Json = False,
 ) -> None:
     """Put noise on one kind of link after the other; ratios to the noiseless walk (table 2.9)."""
-    from cli.inputs.design_file import read_design
+    from cli.inputs.design_file import given_design
     from cli.inputs.robots import chosen_robot, chosen_scenarios
     from sim.studies.accuracy import noise_on_links
 
-    values = read_design(design, controller)
+    given = given_design(design, controller, robot=robot, server=None, db=None)
     chosen = chosen_scenarios(scenario, robot)
     machine = chosen_robot(robot)
     found = noise_on_links(
-        controller, values, chosen, robot=machine, kind=kind, deviation=deviation
+        given.controller, given.values, chosen, robot=machine, kind=kind, deviation=deviation
     )
     _show(found, as_json=as_json, ratios=True)
 

@@ -15,7 +15,10 @@ if TYPE_CHECKING:
 @with_groups
 def worlds(
     *,
-    preference: Annotated[str, typer.Option(help="A, B, C or chapter-3.")] = "A",
+    preference: Annotated[
+        str | None,
+        typer.Option(help="A, B, C or chapter-3 [default: that of the robot's folder, else A]."),
+    ] = None,
     seeds: Annotated[int, typer.Option(min=1, max=100, help="Runs of each search.")] = 10,
     worlds: Annotated[
         str,
@@ -64,7 +67,7 @@ def worlds(
     """
     import json
 
-    from cli.inputs.robots import chosen_robot
+    from cli.inputs.robots import chosen_robot, robot_defaults
     from cli.output import note, print_text, stdout_console
     from cli.studies.worlds import (
         HeldOut,
@@ -79,10 +82,12 @@ def worlds(
 
     judged_in = HeldOut(held_out, held_out_seed)
     check_held_out(judged_in, seeds)
+    defaults = robot_defaults(robot)
     planned = contestants(
         {
+            **defaults.document,
             "robot": chosen_robot(robot),
-            "preference": preference,
+            "preference": preference or defaults.preference,
             "optimizer": optimizer or DEFAULT_METHOD,
             "particles": particles,
             "iterations": iterations,

@@ -9,7 +9,9 @@ from typing import Any
 import pytest
 
 from services.optimizer.jobs.preference import PREFERENCES
+from sim.controllers import CONTROLLERS
 from tests.examples.commands import Result, run_command
+from tests.examples.paths import ROOT
 from tests.examples.robots import SLOW, robot_folder
 
 PID = '{"P": 0.4, "I": 0.1, "D": 0.002}'
@@ -89,3 +91,16 @@ def test_a_design_that_was_not_published_says_what_can_be_given(dog: Path) -> No
         "design: no design of pid was published, for any robot; give a JSON object or a file with"
         " values of P, I, D, or job:ID" in " ".join(result.err.split())
     )
+
+
+@pytest.mark.parametrize("name", ["optimize", "simulate", "certify", "study steps", "validate"])
+def test_help_names_every_controller_that_there_is(name: str) -> None:
+    shown = " ".join(run_command(*name.split(), "--help").out.replace("│", " ").split())
+    for controller in CONTROLLERS.built_in:
+        assert f" {controller}" in shown
+
+
+@pytest.mark.parametrize("file", ["README.md", "docs/cli.md", "docs/robots.md"])
+def test_documents_name_every_controller_that_there_is(file: str) -> None:
+    text = (ROOT / file).read_text(encoding="utf-8")
+    assert [name for name in CONTROLLERS.built_in if f"`{name}`" not in text] == []

@@ -34,7 +34,8 @@ def save(page: Page, chart: str, entry: str, folder: Path) -> Path:
 def test_a_chart_gives_its_numbers_in_full_and_its_picture(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit], tmp_path: Path
 ) -> None:
-    page = visit(server.url).go(f"/jobs/{finished_job}")
+    page = visit(server.url).go(f"/jobs/{finished_job}?dots=yes")
+    expect(page.locator("[data-dots]")).to_be_visible()
     # All six iterations, also where they are there before the chart is.
     expect(page.locator(".uplot").first).to_have_attribute("data-range", "0 5")
     numbers = save(page, "Convergence", "Numbers (CSV)", tmp_path)
@@ -51,6 +52,15 @@ def test_a_chart_gives_its_numbers_in_full_and_its_picture(
     # Lines rather than pixels: the best so far has a place for every iteration.
     lines = [path.get("d", "") for path in drawing.iter(f"{SVG}path")]
     assert any(len(re.findall("[ML]", line)) == len(told) for line in lines)
+    # What is over the lines on the screen is over them here: words, and marks of what lies above.
+    best, published = told[-1]["best_so_far"], server.job(finished_job)["reference"]["fitness"]
+    assert {f"best {best:#.4g}", f"published A {published:#.4g}"} <= set(words)
+    places = r"M\S+ (\S+)L\S+ (\S+)L\S+ (\S+)Z"
+    marks = [found.groups() for found in map(re.compile(places).fullmatch, lines) if found]
+    assert len(marks) == int(page.locator("[data-above]").get_attribute("data-above") or 0) > 0
+    # They point up, as in the legend.
+    assert all(float(tip) < float(foot) == float(other) for foot, other, tip in marks)
+    assert "▴ worse designs lie above what is shown" in words
     assert not list(drawing.iter(f"{SVG}image"))
 
     picture = save(page, "Convergence", "Picture (PNG)", tmp_path).read_bytes()

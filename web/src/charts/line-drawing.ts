@@ -16,13 +16,18 @@ export function drawLines(context: Context, plot: uPlot, props: LineChartProps):
   // uPlot's places are those of the screen's pixels.
   context.scale(1 / ratio, 1 / ratio)
   drawAxes(context, plot, props, ratio)
+  const drawn: uPlot = Object.create(plot, { ctx: { value: context } })
+  context.save()
   context.beginPath()
   const { left, top, width, height } = plot.bbox
   context.rect(left, top, width, height)
   context.clip()
-  props.paint?.(Object.create(plot, { ctx: { value: context } }))
+  props.paint?.(drawn)
   for (const band of props.bands ?? []) drawBand(context, plot, band)
   for (const [k, series] of props.series.entries()) drawSeries(context, plot, series, k + 1, ratio)
+  context.restore()
+  // Marks and words may stand beside the plot.
+  props.paintOver?.(drawn)
   drawMarker(context, plot, props.marker ?? null, ratio)
   context.restore()
 }

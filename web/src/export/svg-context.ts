@@ -146,8 +146,12 @@ export class SvgContext {
   private text(text: string, x: number, y: number, colours: Readonly<Record<string, unknown>>) {
     const [, weight, size, family] = /^(?:(\d+|bold) )?([\d.]+)px (.*)$/.exec(this.font) ?? []
     const { fontBoundingBoxAscent: up, fontBoundingBoxDescent: down } = this.measureText(text)
-    const shift =
-      this.textBaseline === 'top' ? up : this.textBaseline === 'middle' ? (up - down) / 2 : 0
+    const shifts: Readonly<Record<string, number>> = {
+      top: up,
+      middle: (up - down) / 2,
+      bottom: -down,
+    }
+    const shift = shifts[this.textBaseline] ?? 0
     const attributes = {
       x,
       y: y + shift,

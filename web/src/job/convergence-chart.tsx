@@ -89,7 +89,7 @@ export function ConvergenceChart({
           )}
           {dots && <span data-dots={dots.fitness.length}>{dotsInWords(dots)}</span>}
           {painted.above.size > 0 && (
-            <span data-above={painted.above.size}>▾ worse designs lie above what is shown</span>
+            <span data-above={painted.above.size}>▴ worse designs lie above what is shown</span>
           )}
         </>
       }

@@ -45,6 +45,38 @@ def test_titles_name_the_job_and_its_progress(
     expect(page).to_have_title("small · queued 0/6 · gaitswarm")
 
 
+def test_titles_and_crumbs_name_what_is_shown(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+) -> None:
+    visited = visit(server.url)
+    job = f"job={finished_job}"
+    for path, title, crumbs in (
+        (
+            f"/walk?{job}&scenario=loaded&against=published:A",
+            "Best of small, scenario loaded, beside Published A, fuzzy-pi · Walk",
+            ["All jobs", "small", "Walk of the best"],
+        ),
+        (
+            f"/controller?{job}&iteration=2&particle=3",
+            "small, design 3 of iteration 2 · Controller",
+            ["All jobs", "small", "Iterations", "2", "Controller of design 3"],
+        ),
+        (
+            "/controller",
+            "Published A, fuzzy-pi · Controller",
+            ["Controller", "Published A, fuzzy-pi"],
+        ),
+        (f"/compare?jobs={finished_job}", "small · compared", ["All jobs", "Compared jobs"]),
+        (f"/jobs/new?clone={finished_job}", "New job from small", ["All jobs", "small", "New job"]),
+        ("/jobs/new?kind=calibration", "New calibration", ["All jobs", "New calibration"]),
+        ("/tournaments", "Tournaments", ["All jobs", "Tournaments"]),
+    ):
+        page = visited.go(path)
+        expect(page).to_have_title(f"{title} · gaitswarm")
+        place = page.get_by_role("navigation", name="Breadcrumbs").get_by_role("listitem")
+        expect(place).to_have_text(crumbs)
+
+
 FROM_ZERO = re.compile("^0 ")
 """Range of an axis that begins with the first iteration."""
 

@@ -1,6 +1,6 @@
 /** The frame around every page: header, navigation, and the page that the path means. */
 
-import { useEffect, useRef } from 'preact/hooks'
+import { useEffect, useLayoutEffect, useRef } from 'preact/hooks'
 import { Empty } from './components/feedback'
 import { lazyPage } from './components/lazy-page'
 import icon from './icon.svg'
@@ -28,11 +28,11 @@ const LINKS = [
   { page: 'controller', href: '/controller', label: 'Controller' },
 ] as const
 
-/** Null for a page that names itself. */
-const TITLES: Readonly<Record<Route['page'], string | null>> = {
+/** What pages are called before they name themselves by what they show. */
+const TITLES: Readonly<Record<Route['page'], string>> = {
   jobs: 'Jobs',
   'new-job': 'New job',
-  job: null,
+  job: 'Job',
   compare: 'Compared jobs',
   tournaments: 'Tournaments',
   walk: 'Walk',
@@ -86,9 +86,9 @@ export function App() {
 /** The page itself; takes the focus after each move, so that keyboards and readers start there. */
 function Main({ route }: { route: Route }) {
   const main = useRef<HTMLElement>(null)
+  // Before the effects of the page, which then calls itself otherwise.
+  useLayoutEffect(() => setTitle(TITLES[route.page]), [route.page])
   useEffect(() => {
-    const title = TITLES[route.page]
-    if (title !== null) setTitle(title)
     if (moved) main.current?.focus({ preventScroll: true })
     moved = true
     return forgetIgnored

@@ -3,6 +3,7 @@
 import { get } from '../api/client'
 import { useResource } from '../api/resource'
 import type { JobComparison } from '../api/types'
+import { ALL_JOBS, Breadcrumbs } from '../components/breadcrumbs'
 import { Empty, ErrorNotice, Loading } from '../components/feedback'
 import { Table } from '../components/table'
 import { formatCount, formatNumber, NONE, percent } from '../format/number'
@@ -11,8 +12,11 @@ import { idsOf } from '../router/query-value'
 import { jobPath } from '../router/routes'
 import { ConvergenceCard } from './convergence-card'
 import { DistributionCard } from './distribution-card'
-import { colourOf } from './series'
+import { type ComparedJob, colourOf } from './series'
 import './compare.css'
+
+/** Jobs that the title names at most. */
+const NAMED = 3
 
 export default function ComparePage() {
   const { query } = usePlace()
@@ -23,11 +27,13 @@ export default function ComparePage() {
   )
   return (
     <>
+      <Breadcrumbs
+        crumbs={[ALL_JOBS]}
+        here="Compared jobs"
+        title={found.data ? titleOf(found.data.jobs) : undefined}
+      />
       <header class="page-header">
         <h1>Compared jobs</h1>
-        <a class="button" href="/jobs">
-          All jobs
-        </a>
       </header>
       <div class="stack">
         {ids.length === 0 && (
@@ -51,6 +57,14 @@ export default function ComparePage() {
       </div>
     </>
   )
+}
+
+/** The jobs by name, a few of many, and how many are under way. */
+function titleOf(jobs: readonly ComparedJob[]): readonly string[] {
+  const names = jobs.slice(0, NAMED).map(({ name, id }) => name || id)
+  if (jobs.length > NAMED) names.push(`${jobs.length - NAMED} more`)
+  const running = jobs.filter(({ state }) => state === 'running').length
+  return [names.join(', '), ...(running > 0 ? [`${running} running`] : []), 'compared']
 }
 
 function Comparison({ found }: { found: JobComparison }) {

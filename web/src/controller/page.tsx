@@ -7,7 +7,7 @@ import { ErrorNotice, Loading } from '../components/feedback'
 import { Tabs } from '../components/tabs'
 import { formatExact, quantity } from '../format/number'
 import { setQuery } from '../router/navigation'
-import { DesignLinks, DesignPage } from '../walk/design-page'
+import { DesignHeading, DesignLinks, DesignPage } from '../walk/design-page'
 import { DesignPicker } from '../walk/design-picker'
 import { type DesignSource, queryOf, sourceOf, wordOf } from '../walk/design-source'
 import { type ResolvedDesign, resolveDesign } from '../walk/resolve-design'
@@ -34,6 +34,7 @@ function Controller({ source, query }: { source: DesignSource; query: URLSearchP
   const velocity = Number(query.get('velocity') ?? 0)
   return (
     <div class="stack">
+      <DesignHeading title="Controller" path="/controller" design={design} />
       <div class="card walk-choice">
         <DesignPicker
           label="Design"

@@ -1,14 +1,12 @@
 /** One job, live: header, commands, and its parts under tabs. */
 
-import { useEffect } from 'preact/hooks'
 import { isReadable } from '../api/readable'
 import type { Iteration, Job, StoredJob } from '../api/types'
-import { Breadcrumbs, type Crumb } from '../components/breadcrumbs'
+import { ALL_JOBS, Breadcrumbs, type Crumb } from '../components/breadcrumbs'
 import { ErrorNotice, Loading } from '../components/feedback'
 import { lazyPart } from '../components/lazy-page'
 import { capitalized } from '../format/words'
 import { jobPath } from '../router/routes'
-import { setTitle } from '../title'
 import { budgetSpent } from './budget'
 import { caseWords } from './fitness'
 import { type Gain, useGain } from './gain'
@@ -113,17 +111,18 @@ function OneJob({ id, tab }: { id: string; tab: string }) {
   const live = useJob(id)
   const { job } = live
   const gain = useGain(job)
-  const title = job ? titleOf(job, live.followed.iterations) : [`Job ${id}`]
-  useEffect(() => setTitle(...title), [title.join()])
   if (job === null) {
-    if (live.error === null) return <Loading what="the job" />
     return (
       <div class="stack">
-        <h1>Job {id}</h1>
-        <ErrorNotice what="The job cannot be shown." error={live.error} retry={live.reload} />
-        <p>
-          <a href="/jobs">All jobs</a>
-        </p>
+        <Breadcrumbs crumbs={[ALL_JOBS]} here={`Job ${id}`} />
+        {live.error === null ? (
+          <Loading what="the job" />
+        ) : (
+          <>
+            <h1>Job {id}</h1>
+            <ErrorNotice what="The job cannot be shown." error={live.error} retry={live.reload} />
+          </>
+        )}
       </div>
     )
   }
@@ -134,7 +133,11 @@ function OneJob({ id, tab }: { id: string; tab: string }) {
       data-best={live.followed.iterations.at(-1)?.best_so_far ?? ''}
       data-stream={streamState(live)}
     >
-      <Breadcrumbs crumbs={crumbsOf(job, tab)} here={hereOf(job, tab)} />
+      <Breadcrumbs
+        crumbs={crumbsOf(job, tab)}
+        here={hereOf(job, tab)}
+        title={titleOf(job, live.followed.iterations)}
+      />
       <JobHeader live={live} job={job} gain={gain} />
       {isReadable(job) && !live.held && <Parts live={live} job={job} tab={tab} gain={gain} />}
     </div>
@@ -149,7 +152,7 @@ function titleOf(job: StoredJob, iterations: readonly Iteration[]): readonly str
 }
 
 function crumbsOf(job: StoredJob, tab: string): readonly Crumb[] {
-  const above: Crumb[] = [['All jobs', '/jobs']]
+  const above: Crumb[] = [ALL_JOBS]
   if (tab !== '') above.push([job.name || job.id, jobPath(job.id)])
   const [section, inside] = tab.split('/')
   if (inside) above.push([capitalized(section), jobPath(job.id, section)])

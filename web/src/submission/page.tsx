@@ -4,10 +4,12 @@ import { get } from '../api/client'
 import { readableJob } from '../api/readable'
 import { useResource } from '../api/resource'
 import type { Job, JobSpec } from '../api/types'
+import { ALL_JOBS, Breadcrumbs, type Crumb } from '../components/breadcrumbs'
 import { ErrorNotice, Loading } from '../components/feedback'
 import { preferenceIn } from '../job/preference'
 import { usePlace } from '../router/navigation'
 import { idsOf } from '../router/query-value'
+import { jobPath } from '../router/routes'
 import { around } from './around-design'
 import { caseOf } from './case'
 import { type Catalogue, loadCatalogue, variablesOf } from './catalogue'
@@ -38,8 +40,14 @@ export default function NewJobPage() {
 function NewTuning({ query }: { query: URLSearchParams }) {
   const start = useResource(`new ${query}`, (signal) => prepare(query, signal))
   const from = start.data?.from ?? null
+  const above: readonly Crumb[] = from ? [[from.name || from.id, jobPath(from.id)]] : []
   return (
     <>
+      <Breadcrumbs
+        crumbs={[ALL_JOBS, ...above]}
+        here="New job"
+        title={[from ? `New job from ${from.name || from.id}` : 'New job']}
+      />
       <header class="page-header">
         <div>
           <h1>New job</h1>

@@ -3,6 +3,7 @@
 import { get } from '../api/client'
 import { usePolling, useResource } from '../api/resource'
 import type { Tournament } from '../api/types'
+import { ALL_JOBS, Breadcrumbs } from '../components/breadcrumbs'
 import { CopyBlock } from '../components/copy-button'
 import { Empty, ErrorNotice, Loading } from '../components/feedback'
 import { type Column, Table } from '../components/table'
@@ -25,6 +26,7 @@ function AllTournaments() {
   usePolling(found.reload, RENEW_MS, found.data?.items.some(isUnderWay) ?? false)
   return (
     <>
+      <Breadcrumbs crumbs={[ALL_JOBS]} here="Tournaments" />
       <header class="page-header">
         <h1>Tournaments</h1>
       </header>

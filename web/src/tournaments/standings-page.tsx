@@ -3,6 +3,7 @@
 import { get } from '../api/client'
 import { usePolling, useResource } from '../api/resource'
 import type { Tournament, TournamentStandings } from '../api/types'
+import { ALL_JOBS, Breadcrumbs } from '../components/breadcrumbs'
 import { Combobox } from '../components/combobox'
 import { Empty, ErrorNotice, Loading } from '../components/feedback'
 import { formatCount, formatNumber } from '../format/number'
@@ -35,15 +36,16 @@ export function StandingsPage({ id }: { id: string }) {
   }
   usePolling(renew, RENEW_MS, tournament !== undefined && isUnderWay(tournament))
   const hasRuns = tournament === undefined || runCount(tournament).ended > 0
+  const name = `Tournament${tournament ? ` on ${problemsInWords(tournament.problems)}` : ''}`
   return (
     <>
+      <Breadcrumbs
+        crumbs={[ALL_JOBS, ['All tournaments', '/tournaments']]}
+        here={name}
+        title={tournament ? [name, runsInWords(tournament)] : [name]}
+      />
       <header class="page-header">
-        <div>
-          <p class="small">
-            <a href="/tournaments">All tournaments</a>
-          </p>
-          <h1>Tournament{tournament && ` on ${problemsInWords(tournament.problems)}`}</h1>
-        </div>
+        <h1>{name}</h1>
       </header>
       <div class="stack">
         {tournament && <Size tournament={tournament} />}
@@ -66,6 +68,11 @@ export function StandingsPage({ id }: { id: string }) {
       </div>
     </>
   )
+}
+
+function runsInWords(tournament: Tournament): string {
+  const { ended, planned } = runCount(tournament)
+  return ended === planned ? `${planned} runs` : `running ${ended}/${planned}`
 }
 
 function Size({ tournament }: { tournament: Tournament }) {

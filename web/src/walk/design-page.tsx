@@ -1,10 +1,12 @@
 /** What the pages of walks and of controllers share: a design that the address names. */
 
 import type { ComponentChildren } from 'preact'
+import { ALL_JOBS, Breadcrumbs, type Crumb } from '../components/breadcrumbs'
 import { ErrorNotice } from '../components/feedback'
 import { usePlace } from '../router/navigation'
 import { jobPath, withQuery } from '../router/routes'
 import { type DesignSource, queryOf } from './design-source'
+import type { ResolvedDesign } from './resolve-design'
 
 /** A page about what its address names, or about what is wrong with the address. */
 export function DesignPage<A>({
@@ -25,25 +27,58 @@ export function DesignPage<A>({
 }) {
   const { query } = usePlace()
   const [address, wrong] = attempt(() => read(query))
+  if (address !== null) return <>{children(address, query)}</>
   return (
     <>
+      <h1>{title}</h1>
+      <ErrorNotice what={`This address names no ${what}.`} error={wrong} />
+      <p class="row">
+        <a class="button" href={path}>
+          Show the published optimum A
+        </a>
+      </p>
+    </>
+  )
+}
+
+/** Where the page of a design lies, below the job that the design is of, and its heading. */
+export function DesignHeading({
+  title,
+  path,
+  design,
+  beside = [],
+}: {
+  title: string
+  path: string
+  /** Null before it is known. */
+  design: ResolvedDesign | null
+  /** What is shown of it, for the tab. */
+  beside?: readonly string[]
+}) {
+  return (
+    <>
+      <Breadcrumbs {...placeOf(title, path, design)} title={titleOf(title, design, beside)} />
       <div class="page-header">
         <h1>{title}</h1>
       </div>
-      {address !== null ? (
-        children(address, query)
-      ) : (
-        <>
-          <ErrorNotice what={`This address names no ${what}.`} error={wrong} />
-          <p class="row">
-            <a class="button" href={path}>
-              Show the published optimum A
-            </a>
-          </p>
-        </>
-      )}
     </>
   )
+}
+
+function placeOf(title: string, path: string, design: ResolvedDesign | null) {
+  const { job, source } = design ?? {}
+  if (!design || !job)
+    return { crumbs: design ? [[title, path] as const] : [], here: design?.label ?? title }
+  const crumbs: Crumb[] = [ALL_JOBS, [job.name, jobPath(job.id)]]
+  if (source?.kind !== 'particle') return { crumbs, here: `${title} of the best` }
+  const { iteration, particle } = source
+  crumbs.push(['Iterations', jobPath(job.id, 'iterations')])
+  crumbs.push([String(iteration), jobPath(job.id, `iterations/${iteration}`)])
+  return { crumbs, here: `${title} of design ${particle}` }
+}
+
+function titleOf(title: string, design: ResolvedDesign | null, beside: readonly string[]) {
+  return design ? [[design.label, ...beside].join(', '), title] : [title]
 }
 
 /** The ways to the same design's other page, and to its job. */

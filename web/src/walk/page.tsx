@@ -8,7 +8,7 @@ import type { Scenario } from '../api/types'
 import { ErrorNotice, Loading } from '../components/feedback'
 import { setQuery } from '../router/navigation'
 import { useDelayedQuery, useQueryValue } from '../router/query-value'
-import { DesignLinks, DesignPage } from './design-page'
+import { DesignHeading, DesignLinks, DesignPage } from './design-page'
 import { DesignPicker } from './design-picker'
 import { type DesignSource, queryOf, sourceOf, sourceOfWord, wordOf } from './design-source'
 import { Playback } from './playback'
@@ -52,8 +52,15 @@ function Walk({ address, query }: { address: Address; query: URLSearchParams }) 
   const other = useWalk(against ? second.data : null, scenario, rate)
   const failed = [presets, first, second, one, other].find(({ error }) => error !== null)
   const awaited = against !== null && (other.data === null || other.loading)
+  const compared = second.data ? [`beside ${second.data.label}`] : []
   return (
     <div class="stack">
+      <DesignHeading
+        title="Walk"
+        path="/walk"
+        design={first.data}
+        beside={[`scenario ${wanted}`, ...compared]}
+      />
       <div class="card walk-choice">
         <DesignPicker
           label="Design"

@@ -3,6 +3,7 @@
 import { useRef, useState } from 'preact/hooks'
 import { get } from '../../api/client'
 import { useResource } from '../../api/resource'
+import { ALL_JOBS, Breadcrumbs } from '../../components/breadcrumbs'
 import { ErrorNotice, Loading } from '../../components/feedback'
 import { setQuery } from '../../router/navigation'
 import { idsOf } from '../../router/query-value'
@@ -40,6 +41,7 @@ export function FitPage({ kind, query }: { kind: FitKind; query: URLSearchParams
   const ids = idsOf(query.get('recordings'))
   return (
     <>
+      <Breadcrumbs crumbs={[ALL_JOBS]} here={TITLES[kind]} />
       <header class="page-header">
         <div>
           <h1>{TITLES[kind]}</h1>

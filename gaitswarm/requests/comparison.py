@@ -16,6 +16,7 @@ from gaitswarm.views.comparison import (
     JobComparisonView,
     SpecDifferenceView,
 )
+from gaitswarm.views.reference import ReferenceView
 from services.optimizer.errors import InvalidRequest, NotFound
 from services.optimizer.jobs.iteration import Iteration
 from services.optimizer.jobs.job import Job
@@ -92,6 +93,8 @@ def _compared(service: JobService, job: Job) -> ComparedJobView:
         name=job.name,
         state=job.state,
         best_fitness=finite(job.progress.best_fitness),
+        reference=ReferenceView.from_reference(job.reference),
+        gain=finite(job.gain),
         evaluations=len(fitness),
         failed=len(fitness) - len(walks),
         convergence=_convergence(service, job.id, POINTS),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from gaitswarm.views.base import View
+from gaitswarm.views.reference import ReferenceView
 from services.optimizer.jobs.job import JobState
 
 
@@ -40,6 +41,17 @@ class ComparedJobView(View):
     state: JobState = Field(description="The state that it is in.", examples=["succeeded"])
     best_fitness: float | None = Field(
         description="Least fitness so far; null while every design has failed.", examples=[17.2]
+    )
+    reference: ReferenceView | None = Field(
+        default=None,
+        description="Published design that it is measured against; null where there is none, and"
+        " until it is known.",
+    )
+    gain: float | None = Field(
+        default=None,
+        description="Share by which `best_fitness` is less than that of `reference` [1]; null"
+        " where one of them is not known.",
+        examples=[0.39],
     )
     evaluations: int = Field(description="Designs judged so far [1].", examples=[625])
     failed: int = Field(description="Of these, those that failed [1].", examples=[12])

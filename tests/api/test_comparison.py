@@ -9,6 +9,7 @@ import pytest
 
 from services.optimizer.jobs.job import Job
 from services.optimizer.jobs.kinds.tuning import JobSpec
+from services.optimizer.jobs.reference import Reference
 from services.optimizer.search.swarm.pso import PsoSettings
 from services.optimizer.store.sql_store import SqlStore
 from tests.api.conftest import PARTICLES, Commit
@@ -49,6 +50,19 @@ def test_jobs_stand_beside_each_other_with_what_their_specs_say_differently(
     assert (first["evaluations"], first["failed"]) == (12, 3)
     assert (first["fitness"][0], first["fitness"][-1]) == (99.0, 103.0)
     assert (first["shares"][0], first["shares"][-1]) == (0.0, 1.0)
+
+
+def test_the_published_design_and_the_gain_over_it_are_told_where_they_are_known(
+    client: httpx2.Client, store: SqlStore, job: Job, other: Job, commit: Commit
+) -> None:
+    commit(job, 3)
+    store.note_reference(job.id, Reference("A", 198.0))
+    view = client.get(f"/v1/jobs/{job.id}/comparison", params={"also": other.id}).json()
+    assert [(found["reference"], found["gain"]) for found in view["jobs"]] == [
+        ({"name": "A", "fitness": 198.0}, 0.5),
+        # Nobody walks for what is not known.
+        (None, None),
+    ]
 
 
 def test_another_measure_is_told_and_a_job_without_designs_has_no_distribution(

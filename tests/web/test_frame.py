@@ -58,7 +58,7 @@ def test_titles_and_crumbs_name_what_is_shown(
         ),
         (
             f"/controller?{job}&iteration=2&particle=3",
-            "small, design 3 of iteration 2 · Controller",
+            "small, design 2.3 · Controller",
             ["All jobs", "small", "Iterations", "2", "Controller of design 3"],
         ),
         (
@@ -114,6 +114,11 @@ def test_a_zoom_stays_while_iterations_arrive(
     last = int(page.locator("[data-stream]").get_attribute("data-iteration") or 0)
     wait_for_iteration(page, last + 5)
     assert chart_range(page) == zoomed
+    # A link shows it too, before the iterations are there and after.
+    expect(page).to_have_url(re.compile("zoom="))
+    page.reload()
+    wait_for_iteration(page, last + 5)
+    assert chart_range(page) == pytest.approx(zoomed, rel=1e-4)
     page.mouse.dblclick(box["x"] + 0.5 * box["width"], middle)
     expect(page.locator(".uplot").first).to_have_attribute("data-range", FROM_ZERO)
 

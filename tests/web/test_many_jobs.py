@@ -107,7 +107,21 @@ def test_chosen_jobs_are_compared(
     differences = page.get_by_role("table", name="Differences of the specs")
     fields = differences.get_by_role("rowheader")
     expect(fields).to_have_text(["name", "iterations", "seed"])
-    expect(page.get_by_role("img", name=re.compile("^Convergence of 2"))).to_be_visible()
+    published = server.job(two_jobs[0])["reference"]
+    lines = page.get_by_role("img", name=re.compile("^Convergence of 2"))
+    expect(lines).to_have_attribute(
+        "aria-label", re.compile(f"; published A {published['fitness']:#.4g}$")
+    )
+    first = page.locator(f"[data-compared='{two_jobs[0]}']")
+    expect(first).to_contain_text("% over A")
+    # What is zoomed to and how it is drawn is a link's to show.
+    page.get_by_label("logarithmic").uncheck()
+    plot = page.locator(".uplot").first
+    with_zoom = f"{page.url}&log=no&zoom=1:2"
+    expect(page).to_have_url(re.compile("log=no$"))
+    page.goto(with_zoom)
+    expect(plot).to_have_attribute("data-range", "1 2")
+    expect(page.get_by_label("logarithmic")).not_to_be_checked()
     page.get_by_role("main").get_by_role("combobox").select_option("seconds")
     expect(page).to_have_url(re.compile("by=seconds"))
     expect(
@@ -118,6 +132,24 @@ def test_chosen_jobs_are_compared(
     expect(shares.locator("tbody tr")).to_have_count(7)
     best = server.job(two_jobs[0])["best_fitness"]
     expect(shares.locator("tbody tr").first).to_contain_text(f"{best:.3f}"[:5])
+
+
+def test_a_comparison_goes_on_with_its_jobs(
+    start_server: Callable[..., Server], visit: Callable[..., Visit]
+) -> None:
+    server = start_server()
+    job_id = server.submit(SMALL_JOB)
+    page = visit(server.url).go(f"/compare?jobs={job_id}")
+    expect(page).to_have_title("small · 1 running · compared · gaitswarm")
+    compared = page.locator(f"[data-compared='{job_id}']")
+    expect(compared).to_contain_text("queued")
+
+    server.client.post(f"/v1/jobs/{job_id}/cancel")
+
+    # As when the tab is seen again: it need not be waited for.
+    page.evaluate("document.dispatchEvent(new Event('visibilitychange'))")
+    expect(compared).to_contain_text("cancelled")
+    expect(page).to_have_title("small · compared · gaitswarm")
 
 
 def test_jobs_that_cannot_be_compared_are_told(

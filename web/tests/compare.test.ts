@@ -1,5 +1,11 @@
 import { describe, expect, test } from 'vitest'
-import { type ComparedJob, convergences, distributions } from '../src/compare/series'
+import {
+  type ComparedJob,
+  convergences,
+  distributions,
+  isUnderWay,
+  publishedOf,
+} from '../src/compare/series'
 
 const job = (changes: Partial<ComparedJob['convergence']>, fitness: number[]): ComparedJob => ({
   id: 'k2q7zr5dm9xw',
@@ -25,6 +31,20 @@ const long = job(
   { iterations: [0, 1, 2], evaluations: [2, 4, 6], seconds: [2, 4, 6], best_so_far: [null, 5, 1] },
   [1, 5],
 )
+
+test('published designs are drawn once each, and jobs under way are asked for again', () => {
+  const reference = { name: 'A', fitness: 20.93 }
+  const none = { name: 'A', fitness: null }
+  const jobs = [
+    short,
+    { ...short, reference },
+    { ...long, reference },
+    { ...long, reference: none },
+  ]
+  expect(publishedOf(jobs)).toEqual([reference])
+  const states = ['queued', 'running', 'pausing', 'paused', 'succeeded'] as const
+  expect(states.filter((state) => isUnderWay({ ...short, state }))).toHaveLength(3)
+})
 
 describe('convergence of several jobs', () => {
   test('holds what a job has found until it finds better, and ends where the job does', () => {

@@ -117,7 +117,7 @@ export function LineChart(props: LineChartProps) {
   }, [theme, height, shapeOf(props)])
 
   useEffect(() => {
-    if (plot.current) renew(plot.current, dataOf(latest.current))
+    if (plot.current) renew(plot.current, dataOf(latest.current), latest.current.zoom ?? null)
   }, [props.x, props.series, props.yRange?.join()])
   useEffect(() => plot.current?.redraw(false), [props.marker, props.paint, props.paintOver])
 
@@ -147,9 +147,9 @@ function shapeOf({
   return JSON.stringify([lines, bands, axes])
 }
 
-/** New data under the same zoom; all of it where nothing is zoomed. */
-function renew(plot: uPlot, data: uPlot.AlignedData) {
-  const zoom = zoomOf(plot)
+/** New data under the same zoom, also one that the first data are to have; all where there is none. */
+function renew(plot: uPlot, data: uPlot.AlignedData, wanted: LineChartProps['zoom']) {
+  const zoom = wanted ?? zoomOf(plot)
   if (!zoom) {
     plot.setData(data)
     return
@@ -259,6 +259,8 @@ function options(props: { current: LineChartProps }, readout: HTMLElement) {
           u.root.dataset.range = `${min} ${max}`
           const range = zoomOf(u)
           const before = props.current.zoom ?? null
+          // Data that are still to come may reach beyond those that are there.
+          if (before?.[0] === min && before?.[1] === max) return
           if (u.root.dataset.settled && range?.join() !== before?.join())
             props.current.onZoom?.(range)
         },

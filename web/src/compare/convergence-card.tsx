@@ -1,12 +1,16 @@
 /** The best of every job as it went on, by iterations, evaluations or time. */
 
-import { useMemo } from 'preact/hooks'
+import { useCallback, useMemo } from 'preact/hooks'
+import type uPlot from 'uplot'
 import { LineChart } from '../charts/line-chart'
+import { paintPublished, publishedLabel } from '../charts/reference-line'
 import { ChartFrame, LegendEntry } from '../components/chart-frame'
+import { Check } from '../components/check'
 import { Table } from '../components/table'
 import { formatNumber } from '../format/number'
-import { setQuery, usePlace } from '../router/navigation'
-import { type Axis, type ComparedJob, colourOf, convergences, dashOf } from './series'
+import { fittedRange } from '../job/convergence-model'
+import { flag, oneOf, RANGE, useQueryValue } from '../router/query-value'
+import { type Axis, type ComparedJob, colourOf, convergences, dashOf, publishedOf } from './series'
 
 const AXES: Readonly<Record<Axis, { label: string; unit?: string }>> = {
   iterations: { label: 'iteration' },
@@ -14,10 +18,19 @@ const AXES: Readonly<Record<Axis, { label: string; unit?: string }>> = {
   seconds: { label: 'time of evaluation', unit: 's' },
 }
 
-export function ConvergenceCard({ jobs }: { jobs: readonly ComparedJob[] }) {
-  const { query } = usePlace()
-  const asked = query.get('by') ?? 'iterations'
-  const axis = (asked in AXES ? asked : 'iterations') as Axis
+const BY = oneOf(Object.keys(AXES) as Axis[], 'iterations')
+
+export function ConvergenceCard({
+  jobs,
+  comparable,
+}: {
+  jobs: readonly ComparedJob[]
+  /** Whether their fitness is the same quantity. */
+  comparable: boolean
+}) {
+  const [axis, setAxis] = useQueryValue<Axis>('by', BY, 'iterations')
+  const [logarithmic, setLogarithmic] = useQueryValue('log', flag(true), true)
+  const [zoom, setZoom] = useQueryValue('zoom', RANGE, null)
   const { x, lines } = useMemo(() => convergences(jobs, axis), [jobs, axis])
   const series = useMemo(
     () =>
@@ -31,21 +44,43 @@ export function ConvergenceCard({ jobs }: { jobs: readonly ComparedJob[] }) {
       })),
     [jobs, lines],
   )
+  const published = useMemo(() => (comparable ? publishedOf(jobs) : []), [jobs, comparable])
+  const range = useMemo(() => {
+    const levels = published.map(({ fitness }) => fitness)
+    return fittedRange(lines, levels, logarithmic)
+  }, [lines, published, logarithmic])
+  const over = useCallback(
+    (plot: uPlot) => {
+      for (const each of published) paintPublished(plot, each)
+    },
+    [published],
+  )
+  const beside = published.map((each) => `; ${publishedLabel(each)}`).join('')
   return (
     <ChartFrame
       title="Convergence"
       note="Best fitness so far; less is better. Drag to zoom, double-click to see all."
       tools={
-        <label class="row small">
-          <span>By</span>
-          <select value={axis} onChange={(event) => setQuery({ by: event.currentTarget.value })}>
-            {Object.entries(AXES).map(([name, { label }]) => (
-              <option key={name} value={name}>
-                {label}
-              </option>
-            ))}
-          </select>
-        </label>
+        <>
+          <label class="row small">
+            <span>By</span>
+            <select
+              value={axis}
+              onChange={(event) => {
+                setAxis(event.currentTarget.value as Axis)
+                // A stretch of another axis means nothing.
+                setZoom(null)
+              }}
+            >
+              {Object.entries(AXES).map(([name, { label }]) => (
+                <option key={name} value={name}>
+                  {label}
+                </option>
+              ))}
+            </select>
+          </label>
+          <Check label="logarithmic" checked={logarithmic} onChange={setLogarithmic} />
+        </>
       }
       legend={jobs.map((job, k) => (
         <LegendEntry key={job.id} colour={colourOf(k)} label={job.name || job.id} />
@@ -77,13 +112,17 @@ export function ConvergenceCard({ jobs }: { jobs: readonly ComparedJob[] }) {
     >
       <LineChart
         key={axis}
-        label={`Convergence of ${jobs.length} jobs by ${AXES[axis].label}`}
+        label={`Convergence of ${jobs.length} jobs by ${AXES[axis].label}${beside}`}
         x={x}
         xLabel={AXES[axis].label}
         xUnit={AXES[axis].unit}
         yLabel="fitness"
         series={series}
-        logarithmic
+        logarithmic={logarithmic}
+        zoom={zoom}
+        onZoom={setZoom}
+        yRange={range}
+        paintOver={over}
         height={320}
       />
     </ChartFrame>

@@ -1,10 +1,11 @@
 /** Jobs beside each other: how they converged, how their designs are spread, how their specs differ. */
 
 import { get } from '../api/client'
-import { useResource } from '../api/resource'
+import { usePolling, useResource } from '../api/resource'
 import type { JobComparison } from '../api/types'
 import { ALL_JOBS, Breadcrumbs } from '../components/breadcrumbs'
 import { Empty, ErrorNotice, Loading } from '../components/feedback'
+import { StateBadge } from '../components/state-badge'
 import { Table } from '../components/table'
 import { formatCount, formatNumber, NONE, percent } from '../format/number'
 import { usePlace } from '../router/navigation'
@@ -12,9 +13,11 @@ import { idsOf } from '../router/query-value'
 import { jobPath } from '../router/routes'
 import { ConvergenceCard } from './convergence-card'
 import { DistributionCard } from './distribution-card'
-import { type ComparedJob, colourOf } from './series'
+import { type ComparedJob, colourOf, isUnderWay } from './series'
 import './compare.css'
 
+/** How often jobs under way are asked for again [ms]. */
+const RENEW_MS = 4000
 /** Jobs that the title names at most. */
 const NAMED = 3
 
@@ -25,6 +28,7 @@ export default function ComparePage() {
   const found = useResource(ids.length === 0 ? null : ids.join(), (signal) =>
     get('/v1/jobs/{job_id}/comparison', { path: { job_id: first }, query: { also }, signal }),
   )
+  usePolling(found.reload, RENEW_MS, found.data?.jobs.some(isUnderWay) ?? false)
   return (
     <>
       <Breadcrumbs
@@ -63,7 +67,7 @@ export default function ComparePage() {
 function titleOf(jobs: readonly ComparedJob[]): readonly string[] {
   const names = jobs.slice(0, NAMED).map(({ name, id }) => name || id)
   if (jobs.length > NAMED) names.push(`${jobs.length - NAMED} more`)
-  const running = jobs.filter(({ state }) => state === 'running').length
+  const running = jobs.filter(isUnderWay).length
   return [names.join(', '), ...(running > 0 ? [`${running} running`] : []), 'compared']
 }
 
@@ -100,13 +104,28 @@ function Comparison({ found }: { found: JobComparison }) {
                 </>
               ),
             },
-            { key: 'state', label: 'State', value: ({ state }) => state },
+            {
+              key: 'state',
+              label: 'State',
+              value: ({ state }) => state,
+              cell: ({ state }) => <StateBadge state={state} />,
+            },
             {
               key: 'best',
               label: 'Best fitness',
               numeric: true,
               value: ({ best_fitness }) => best_fitness,
               cell: ({ best_fitness }) => formatNumber(best_fitness, 5),
+            },
+            {
+              key: 'gain',
+              label: 'Gain',
+              numeric: true,
+              value: ({ gain }) => gain ?? null,
+              cell: ({ gain, reference }) =>
+                typeof gain === 'number' && reference
+                  ? `${percent(gain, 3)} over ${reference.name}`
+                  : NONE,
             },
             {
               key: 'evaluations',
@@ -126,7 +145,7 @@ function Comparison({ found }: { found: JobComparison }) {
           ]}
         />
       </section>
-      <ConvergenceCard jobs={found.jobs} />
+      <ConvergenceCard jobs={found.jobs} comparable={found.comparable} />
       <DistributionCard jobs={found.jobs} />
       <Differences found={found} />
     </>

@@ -1,8 +1,25 @@
 /** Lines of several jobs over one axis, which a chart of lines takes with the same x for all. Pure. */
 
 import type { JobComparison } from '../api/types'
+import type { Published } from '../charts/reference-line'
 
 export type ComparedJob = JobComparison['jobs'][number]
+
+/** Whether more is to come of a job without anybody's doing. */
+export function isUnderWay({ state }: ComparedJob): boolean {
+  return ['queued', 'running', 'pausing'].includes(state)
+}
+
+/** Published designs that jobs of one measure are compared with, each once. */
+export function publishedOf(jobs: readonly ComparedJob[]): readonly Published[] {
+  const found = new Map<string, Published>()
+  for (const { reference } of jobs) {
+    if (typeof reference?.fitness !== 'number') continue
+    const { name, fitness } = reference
+    found.set(`${name} ${fitness}`, { name, fitness })
+  }
+  return [...found.values()]
+}
 
 const COLOURS = [1, 2, 3, 4, 5, 6].map((k) => `--series-${k}` as const)
 

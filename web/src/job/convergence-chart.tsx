@@ -6,7 +6,9 @@ import { getBytes } from '../api/client'
 import { useResource, useSlowly } from '../api/resource'
 import type { Iteration, Job } from '../api/types'
 import { type Band, LineChart, type Series } from '../charts/line-chart'
+import { type Published, publishedLabel } from '../charts/reference-line'
 import { ChartFrame, LegendEntry } from '../components/chart-frame'
+import { Check } from '../components/check'
 import { formatCount, formatNumber, withUnit } from '../format/number'
 import { flag, RANGE, useQueryValue } from '../router/query-value'
 import { ByIteration } from './by-iteration'
@@ -35,8 +37,8 @@ export function ConvergenceChart({
   job: Job
   iterations: readonly Iteration[]
   distribution: Distribution
-  /** Published design that the best is measured against. */
-  reference: { readonly name: string; readonly fitness: number } | null
+  /** What the best is measured against. */
+  reference: Published | null
 }) {
   const [logarithmic, setLogarithmic] = useQueryValue('log', flag(true), true)
   const [zoom, setZoom] = useQueryValue('zoom', RANGE, null)
@@ -47,7 +49,7 @@ export function ConvergenceChart({
   const best = iterations.at(-1)?.best_so_far ?? null
   const { range, painted } = useMemo(() => {
     const [bests, medians] = drawn.series.slice(-2).map(({ values }) => values)
-    const range = fittedRange([bests, medians], reference?.fitness ?? null, logarithmic)
+    const range = fittedRange([bests, medians], reference ? [reference.fitness] : [], logarithmic)
     const highest = drawn.bands.length > 0 ? drawn.series[0].values : null
     return { range, painted: paintedOf({ drawn, best, dots, range, highest, reference }) }
   }, [drawn, dots, reference, logarithmic, best])
@@ -59,22 +61,8 @@ export function ConvergenceChart({
       note="Fitness over the iterations; less is better. Drag to zoom, double-click to see all."
       tools={
         <>
-          <label class="check small">
-            <input
-              type="checkbox"
-              checked={single}
-              onChange={(event) => setSingle(event.currentTarget.checked)}
-            />
-            single designs
-          </label>
-          <label class="check small">
-            <input
-              type="checkbox"
-              checked={logarithmic}
-              onChange={(event) => setLogarithmic(event.currentTarget.checked)}
-            />
-            logarithmic
-          </label>
+          <Check label="single designs" checked={single} onChange={setSingle} />
+          <Check label="logarithmic" checked={logarithmic} onChange={setLogarithmic} />
         </>
       }
       legend={
@@ -117,7 +105,7 @@ export function ConvergenceChart({
 }
 
 function describe(iterations: number, best: number | null, { reference }: Painted): string {
-  const beside = reference ? `, ${reference.label}` : ''
+  const beside = reference ? `, ${publishedLabel(reference)}` : ''
   return `Convergence over ${iterations} iterations; best fitness ${formatNumber(best)}${beside}`
 }
 
@@ -157,15 +145,12 @@ function paintedOf({
   range: readonly [number, number] | null
   /** Of the spread that is drawn. */
   highest: Line | null
-  reference: { readonly name: string; readonly fitness: number } | null
+  reference: Published | null
 }): Painted {
   const last = drawn.x.at(-1)
   return {
     dots,
-    reference: reference && {
-      label: `published ${reference.name} ${formatNumber(reference.fitness)}`,
-      fitness: reference.fitness,
-    },
+    reference,
     end:
       best === null || last === undefined
         ? null

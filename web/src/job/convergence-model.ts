@@ -12,10 +12,10 @@ export const MOST_DOTS = 10_000
 /** A series of fitness by iteration; null where there is none. */
 export type Line = ArrayLike<number | null>
 
-/** Fitness that the axis shows: all of best, median and reference, with a little room. */
+/** Fitness that the axis shows: all of the lines and of the levels to compare with, with a little room. */
 export function fittedRange(
   lines: readonly Line[],
-  reference: number | null,
+  levels: readonly number[],
   logarithmic: boolean,
 ): readonly [number, number] | null {
   let [low, high] = [Number.POSITIVE_INFINITY, Number.NEGATIVE_INFINITY]
@@ -26,8 +26,8 @@ export function fittedRange(
   }
   for (const line of lines) for (let k = 0; k < line.length; k++) take(line[k])
   if (low > high) return null
-  // A reference alone is no reason to show a chart of nothing else.
-  take(reference)
+  // Levels alone are no reason to show a chart of nothing else.
+  levels.forEach(take)
   if (logarithmic) return logRange(low, high)
   const room = high > low ? ROOM * (high - low) : Math.max(Math.abs(high) * ROOM, 1e-9)
   return [low - room, high + room]

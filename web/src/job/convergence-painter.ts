@@ -2,12 +2,13 @@
 
 import type uPlot from 'uplot'
 import { withAlpha } from '../charts/line-chart'
+import { chartFont, type Published, paintPublished } from '../charts/reference-line'
 import { themeColour } from '../theme'
 import type { Dots } from './convergence-model'
 
 export interface Painted {
   readonly dots: Dots | null
-  readonly reference: { readonly label: string; readonly fitness: number } | null
+  readonly reference: Published | null
   /** Where the best line ends, and what is written there. */
   readonly end: { readonly x: number; readonly y: number; readonly label: string } | null
   /** Iterations in which something lies above the range. */
@@ -33,30 +34,12 @@ export function paintDots(plot: uPlot, { dots }: Painted): void {
 /** The reference, marks and the label, over the lines. */
 export function paintOver(plot: uPlot, painted: Painted): void {
   const { ctx } = plot
+  if (painted.reference) paintPublished(plot, painted.reference)
   ctx.save()
-  ctx.font = `${Math.round(12 * devicePixelRatio)}px ${getComputedStyle(document.body).fontFamily}`
-  paintReference(plot, painted.reference)
+  ctx.font = chartFont()
   paintAbove(plot, painted.above)
   paintEnd(plot, painted.end)
   ctx.restore()
-}
-
-function paintReference(plot: uPlot, reference: Painted['reference']): void {
-  if (reference === null) return
-  const { ctx, bbox } = plot
-  const y = plot.valToPos(reference.fitness, 'y', true)
-  if (y < bbox.top || y > bbox.top + bbox.height) return
-  ctx.strokeStyle = ctx.fillStyle = themeColour('--text-muted')
-  ctx.lineWidth = devicePixelRatio
-  ctx.setLineDash([6 * devicePixelRatio, 4 * devicePixelRatio])
-  ctx.beginPath()
-  ctx.moveTo(bbox.left, y)
-  ctx.lineTo(bbox.left + bbox.width, y)
-  ctx.stroke()
-  ctx.setLineDash([])
-  ctx.textAlign = 'right'
-  ctx.textBaseline = y - bbox.top > 20 * devicePixelRatio ? 'bottom' : 'top'
-  ctx.fillText(reference.label, bbox.left + bbox.width - 4 * devicePixelRatio, y)
 }
 
 /** A small triangle at the upper edge for each iteration. */

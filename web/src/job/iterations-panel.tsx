@@ -1,6 +1,7 @@
 /** Every committed iteration, to look through and to take away. */
 
 import type { Iteration, Job } from '../api/types'
+import { Check } from '../components/check'
 import { Empty } from '../components/feedback'
 import { type Column, Table } from '../components/table'
 import { formatNumber } from '../format/number'
@@ -59,14 +60,11 @@ export function IterationsPanel({ live, job }: { live: LiveJob; job: Job }) {
                 onInput={(event) => setLeast(event.currentTarget.value)}
               />
             </label>
-            <label class="check small">
-              <input
-                type="checkbox"
-                checked={improved}
-                onChange={(event) => setImproved(event.currentTarget.checked)}
-              />
-              only those that improved the best
-            </label>
+            <Check
+              label="only those that improved the best"
+              checked={improved}
+              onChange={setImproved}
+            />
             <span class="muted small" aria-live="polite">
               {shown.length} of {iterations.length}
             </span>

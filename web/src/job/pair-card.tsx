@@ -6,6 +6,7 @@ import { type Brushes, withBrush } from '../charts/parallel-coordinates'
 import type { Axis, ParallelModel } from '../charts/parallel-model'
 import { valueAt } from '../charts/parallel-model'
 import { ChartFrame, LegendEntry } from '../components/chart-frame'
+import { Check } from '../components/check'
 import { type Column, Table } from '../components/table'
 import { formatCount, formatExact, formatNumber, withUnit } from '../format/number'
 import { inWords } from '../format/words'
@@ -54,14 +55,7 @@ export function PairCard({
             />
             mean rank by cell
           </label>
-          <label class="check small">
-            <input
-              type="checkbox"
-              checked={isolines}
-              onChange={(event) => setIsolines(event.currentTarget.checked)}
-            />
-            isolines
-          </label>
+          <Check label="isolines" checked={isolines} onChange={setIsolines} />
         </>
       }
       legend={

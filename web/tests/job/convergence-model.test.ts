@@ -19,18 +19,18 @@ describe('the range of the convergence chart', () => {
         [20, 15, 10],
         [40, 30, null],
       ],
-      17,
+      [17],
       false,
     )!
     expect([low < 10, low > 8, high > 40, high < 42]).toEqual([true, true, true, true])
-    expect(fittedRange([[20], [40]], 90, false)![1]).toBeGreaterThan(90)
+    expect(fittedRange([[20], [40]], [90], false)![1]).toBeGreaterThan(90)
   })
 
   test('has positive ends where it is logarithmic, and is none without a number', () => {
-    const [low, high] = fittedRange([[0, 10], [1000]], null, true)!
+    const [low, high] = fittedRange([[0, 10], [1000]], [], true)!
     expect([low > 7, low < 10, high > 1000]).toEqual([true, true, true])
-    expect(fittedRange([[null], []], 17, true)).toBeNull()
-    expect(fittedRange([[5], [5]], null, false)![1]).toBeGreaterThan(5)
+    expect(fittedRange([[null], []], [17], true)).toBeNull()
+    expect(fittedRange([[5], [5]], [], false)![1]).toBeGreaterThan(5)
   })
 })
 

@@ -6,6 +6,7 @@ import { isPublished } from '../../api/robots'
 import type { Front, Job, JobSpec } from '../../api/types'
 import { Scatter } from '../../charts/scatter'
 import { ChartFrame, LegendEntry } from '../../components/chart-frame'
+import { Check } from '../../components/check'
 import { ErrorNotice } from '../../components/feedback'
 import { formatCount } from '../../format/number'
 import { type Place, placeWord } from '../../format/place'
@@ -85,14 +86,7 @@ export function ScatterCard({
               published designs
             </label>
           )}
-          <label class="check small">
-            <input
-              type="checkbox"
-              checked={logarithmic}
-              onChange={(event) => setLogarithmic(event.currentTarget.checked)}
-            />
-            logarithmic
-          </label>
+          <Check label="logarithmic" checked={logarithmic} onChange={setLogarithmic} />
         </>
       }
       legend={

@@ -8,13 +8,15 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import Page, Route, expect
 
-from services.optimizer.store.sql_store import SqlStore
 from tests.examples.jobs import SMALL_SPEC
 from tests.examples.servers import Server, ServerProcess
 from tests.web.conftest import SMALL_JOB
 from tests.web.visit import Visit
 
 pytestmark = pytest.mark.slow
+
+SUBMITTED = re.compile(r"/jobs/(?!new)\w+$")
+"""Address of a job's page."""
 
 
 def named(page: Page, name: str) -> None:
@@ -68,7 +70,7 @@ def test_a_job_is_deleted_after_its_page_has_said_what_is_lost_and_what_stays(
 
 
 def test_a_job_under_way_and_one_that_is_kept_offer_no_deletion(
-    start_server: Callable[..., Server], store: SqlStore, visit: Callable[..., Visit]
+    start_server: Callable[..., Server], visit: Callable[..., Visit]
 ) -> None:
     server = start_server()
     job_id = server.submit(SMALL_SPEC)
@@ -80,10 +82,34 @@ def test_a_job_under_way_and_one_that_is_kept_offer_no_deletion(
     named(page, "Cancel the job")
     expect(page.get_by_role("button", name="Delete…")).to_be_visible()
 
-    store.keep(job_id, True)
-    page.reload()
-    expect(page.get_by_role("link", name="Clone")).to_be_visible()
+    named(page, "Keep")
+    expect(page.locator("[data-labels]")).to_have_text("kept")
     expect(page.get_by_role("button", name="Delete…")).to_have_count(0)
+    assert server.job(job_id)["kept"]
+
+    named(page, "Release")
+    expect(page.get_by_role("button", name="Delete…")).to_be_visible()
+    assert not server.job(job_id)["kept"]
+
+
+def test_a_webhook_is_named_in_the_form_and_one_that_is_not_allowed_is_refused_there(
+    start_server: Callable[..., Server], visit: Callable[..., Visit]
+) -> None:
+    server = start_server(webhook_hosts="ci.example")
+    page = visit(server.url, allowed="status of 422").go("/jobs/new")
+    webhook = page.get_by_label("Webhook")
+    webhook.fill("https://elsewhere.example/hook")
+    named(page, "Submit the job")
+    expect(webhook).to_have_attribute("aria-invalid", "true")
+    assert server.client.get("/v1/jobs").json()["items"] == []
+
+    webhook.fill("https://ci.example/hook")
+    named(page, "Submit the job")
+    expect(page).to_have_url(SUBMITTED)
+    job_id = page.url.rpartition("/")[2]
+    server.client.post(f"/v1/jobs/{job_id}/cancel")
+    (told,) = server.client.get(f"/v1/jobs/{job_id}/notifications").json()
+    assert told["host"] == "ci.example"
 
 
 def test_a_job_has_a_priority_from_the_form_and_another_one_from_its_page(
@@ -93,7 +119,7 @@ def test_a_job_has_a_priority_from_the_form_and_another_one_from_its_page(
     page = visit(server.url).go("/jobs/new")
     page.get_by_label(re.compile("^Priority")).fill("3")
     named(page, "Submit the job")
-    expect(page).to_have_url(re.compile(r"/jobs/(?!new)\w+$"))
+    expect(page).to_have_url(SUBMITTED)
     job_id = page.url.rpartition("/")[2]
     assert server.job(job_id)["priority"] == 3
     expect(page.get_by_role("region", name="The job")).to_contain_text("priority 3")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 import pytest
@@ -21,10 +22,22 @@ def test_a_fork_and_its_parent_lead_to_each_other(
     expect(page.get_by_text("Submitted", exact=True)).to_be_visible()
     assert page.locator("[data-forks], [data-parent]").count() == 0
 
-    with gaitswarm.connect(server.url) as jobs:
-        fork = jobs.fork(finished_job, 2, optimizer="random", particles=4, name="another way")
-    server.wait_for(fork.id, "succeeded")
-    page.goto(f"{server.url}/jobs/{fork.id}")
+    page.goto(f"{server.url}/jobs/{finished_job}/iterations/1")
+    page.get_by_label("Other iterations").get_by_role("button", name="Fork…").click()
+    dialog = page.get_by_role("dialog", name="Fork the job")
+    # After the iteration that is shown.
+    expect(dialog.get_by_label("First iteration of its own")).to_have_value("2")
+    submit = dialog.get_by_role("button", name="Fork the job")
+    budget = dialog.get_by_label("Iterations in all")
+    budget.fill("2")
+    expect(submit).to_be_disabled()
+    budget.fill("3")
+    dialog.get_by_label("Name").fill("another way")
+    dialog.get_by_label("Method").select_option("random")
+    submit.click()
+    expect(page).not_to_have_url(re.compile(finished_job))
+    fork_id = page.url.rpartition("/")[2]
+    server.wait_for(fork_id, "succeeded")
     parent = page.locator(f"[data-parent='{finished_job}']")
     expect(parent).to_contain_text("with another optimizer")
     expect(parent).to_contain_text("another search method")
@@ -32,8 +45,8 @@ def test_a_fork_and_its_parent_lead_to_each_other(
     expect(page).to_have_url(f"{server.url}/jobs/{finished_job}")
     forks = page.locator("[data-forks='1']")
     expect(forks).to_contain_text("from iteration 2")
-    forks.get_by_role("link", name=fork.id).click()
-    expect(page).to_have_url(f"{server.url}/jobs/{fork.id}")
+    forks.get_by_role("link", name=fork_id).click()
+    expect(page).to_have_url(f"{server.url}/jobs/{fork_id}")
 
     page.goto(f"{server.url}/jobs")
     row = page.get_by_role("row").filter(has_text="another way")

@@ -69,7 +69,7 @@ def test_several_are_deleted_and_those_that_stay_are_named(
         page.locator(f"[data-job='{job_id}']").get_by_role("checkbox").check()
     page.get_by_role("button", name="Delete…").click()
     asked = page.get_by_role("dialog")
-    expect(asked).to_contain_text("kept: it is kept; release it first")
+    expect(asked).to_contain_text("kept: it is kept; release it first, on its page")
     expect(asked).to_contain_text("queued: it is queued; cancel or pause it first")
     expect(asked).to_contain_text("0 iterations with 0 evaluated designs are lost for good")
     asked.get_by_role("button", name="Delete 2 jobs").click()

@@ -27,7 +27,7 @@ describe('deleting several jobs', () => {
     expect(deletable.map(({ id }) => id)).toEqual(['a', 'd'])
     expect(refused.map(({ name, reason }) => [name, reason])).toEqual([
       ['job b', 'it is running; cancel or pause it first'],
-      ['job c', 'it is kept; release it first'],
+      ['job c', 'it is kept; release it first, on its page'],
     ])
     expect(lostWith(deletable)).toEqual({ iterations: 6, evaluations: 24 })
   })

@@ -1,7 +1,7 @@
-/** Pause, resume, extend, prioritize, cancel, delete and clone, as far as the job's state allows. */
+/** Pause, resume, extend, fork, keep, cancel, delete and clone, as far as the job's state allows. */
 
 import { useState } from 'preact/hooks'
-import { post, put, remove } from '../api/client'
+import { get, post, put, remove } from '../api/client'
 import { isReadable } from '../api/readable'
 import type { StoredJob } from '../api/types'
 import { ConfirmDialog } from '../components/confirm-dialog'
@@ -10,6 +10,7 @@ import { formatCount } from '../format/number'
 import { navigate } from '../router/navigation'
 import { withQuery } from '../router/routes'
 import { budgetSpent, iterationsSpent, spentInWords } from './budget'
+import { canFork, ForkButton } from './fork-dialog'
 import { LabelDialog } from './label-dialog'
 import { PriorityDialog } from './priority-dialog'
 
@@ -71,6 +72,15 @@ export function JobActions({ job, onJob, onDeleting }: Props) {
         <button type="button" disabled={busy} onClick={() => setAsking('label')}>
           Label…
         </button>
+        <button
+          type="button"
+          disabled={busy}
+          title={job.kept ? 'so that it can be deleted' : 'so that it cannot be deleted'}
+          onClick={() => command(() => (job.kept ? released(job.id) : kept(job.id)))}
+        >
+          {job.kept ? 'Release' : 'Keep'}
+        </button>
+        {canFork(job, job.iterations) && <ForkButton job={job} from={job.iterations} />}
         {isReadable(job) && (
           <a class="button" href={withQuery('/jobs/new', { clone: job.id })}>
             Clone
@@ -163,6 +173,16 @@ export function JobActions({ job, onJob, onDeleting }: Props) {
       />
     </div>
   )
+}
+
+/** Protected from deletion. */
+function kept(id: string): Promise<StoredJob> {
+  return put('/v1/jobs/{job_id}/keep', { path: { job_id: id } })
+}
+
+async function released(id: string): Promise<StoredJob> {
+  await remove('/v1/jobs/{job_id}/keep', { path: { job_id: id } })
+  return get('/v1/jobs/{job_id}', { path: { job_id: id } })
 }
 
 function ExtendDialog({

@@ -23,6 +23,11 @@ export function JobHeader({ live, job, gain }: { live: LiveJob; job: StoredJob; 
   const { followed } = live
   const spent = budgetSpent(job, followed.iterations)
   const tone = STATE_TONES[job.state]
+  const marks = [
+    ...(job.kept ? ['kept'] : []),
+    ...(job.archived ? ['archived'] : []),
+    ...(job.tags ?? []),
+  ]
   return (
     <section class="card job-header" aria-label="The job">
       <div class="job-summary">
@@ -37,9 +42,9 @@ export function JobHeader({ live, job, gain }: { live: LiveJob; job: StoredJob; 
               <EndNotice job={job} />
             </div>
             <p class="muted small">{subtitle(job)}</p>
-            {((job.tags ?? []).length > 0 || job.note || job.archived) && (
+            {(marks.length > 0 || job.note) && (
               <p class="small" data-labels>
-                {[...(job.archived ? ['archived'] : []), ...(job.tags ?? [])].join(' · ')}
+                {marks.join(' · ')}
                 {job.note && <span class="job-note">{job.note}</span>}
               </p>
             )}

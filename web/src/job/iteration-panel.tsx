@@ -10,6 +10,7 @@ import { formatValue } from '../format/value'
 import { jobPath, withQuery } from '../router/routes'
 import { searchedVariables } from './design-variables'
 import { caseWords, fitnessUnit } from './fitness'
+import { canFork, ForkButton } from './fork-dialog'
 
 export function IterationPanel({ job, index }: { job: Job; index: number }) {
   const evaluations = useResource(`${job.id} ${index}`, (signal) =>
@@ -23,6 +24,7 @@ export function IterationPanel({ job, index }: { job: Job; index: number }) {
       <header class="row spread">
         <h2 id="designs">Designs of iteration {index}</h2>
         <nav class="row" aria-label="Other iterations">
+          {canFork(job, index + 1) && <ForkButton job={job} from={index + 1} compact />}
           <a class="button compact" href={jobPath(job.id, 'iterations')}>
             All iterations
           </a>

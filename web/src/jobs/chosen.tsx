@@ -6,7 +6,7 @@ import type { JobSummary } from '../api/types'
 import { ConfirmDialog } from '../components/confirm-dialog'
 import { ErrorNotice } from '../components/feedback'
 import { formatCount } from '../format/number'
-import { comparePath } from '../router/routes'
+import { comparePath, jobPath } from '../router/routes'
 import { type Deletion, deleteAll, type Fate, lookedUp, lostWith } from './deletion'
 
 /** Jobs that can be compared at once. */
@@ -138,7 +138,7 @@ function Reasons({ items }: { items: Fate['refused'] }) {
     <ul class="small reasons">
       {items.map(({ id, name, reason }) => (
         <li key={id}>
-          <strong>{name || id}</strong>: {reason}
+          <a href={jobPath(id)}>{name || id}</a>: {reason}
         </li>
       ))}
     </ul>

@@ -46,7 +46,7 @@ export function fateOf(jobs: readonly JobSummary[]): Fate {
         id: job.id,
         name: job.name,
         reason: job.kept
-          ? 'it is kept; release it first'
+          ? 'it is kept; release it first, on its page'
           : `it is ${job.state}; cancel or pause it first`,
       })),
   }

@@ -7,7 +7,8 @@ import { ErrorNotice } from '../components/feedback'
 import { formatCount } from '../format/number'
 import { formatDuration } from '../format/time'
 import { HIGHEST, isPriority, LOWEST, PRIORITY_HELP } from '../job/priority'
-import type { Submission } from './use-submission'
+import { TextField } from './text-field'
+import { NOTIFY, type Submission } from './use-submission'
 
 export function SubmitPanel({
   spec,
@@ -44,6 +45,13 @@ export function SubmitPanel({
         {problem !== null && <ErrorNotice what={advice(problem)} error={problem} />}
       </div>
       <PriorityField submission={submission} />
+      <TextField
+        label="Webhook"
+        value={submission.notify}
+        hint="a URL that is told when the job ends; of a host that the server allows"
+        error={problemOf(problem, NOTIFY)}
+        onChange={submission.setNotify}
+      />
       <button type="submit" class="primary" disabled={sending}>
         {sending ? 'Submitting…' : 'Submit the job'}
       </button>
@@ -89,6 +97,12 @@ function PriorityField({ submission }: { submission: Submission }) {
       </span>
     </div>
   )
+}
+
+/** What the server has against a field. */
+function problemOf(problem: unknown, field: string): string | undefined {
+  const errors = problem instanceof ApiProblem ? problem.errors : []
+  return errors.find((error) => error.field === field)?.message
 }
 
 function Row({ label, value }: { label: string; value: string }) {

@@ -11,6 +11,9 @@ import { jobPath } from '../router/routes'
 /** Pause in typing after which the API is asked [ms]. */
 const PAUSE_MS = 400
 
+/** Header that names the URL. */
+export const NOTIFY = 'Notify-URL'
+
 export interface Submission {
   readonly estimate: Estimate | null
   /** What the API has against the spec as it stands; null if nothing is known. */
@@ -21,6 +24,9 @@ export interface Submission {
   /** How urgent the job is to be, as it was typed. */
   readonly priority: string
   readonly setPriority: (text: string) => void
+  /** URL that is told of the job's end, as it was typed; empty for none. */
+  readonly notify: string
+  readonly setNotify: (text: string) => void
   readonly submit: () => void
 }
 
@@ -30,6 +36,7 @@ export function useSubmission(spec: AnySpec): Submission {
   const [sending, setSending] = useState(false)
   const [attempts, setAttempts] = useState(0)
   const [priority, setPriority] = useState('0')
+  const [notify, setNotify] = useState('')
   const [latest] = useState(
     () =>
       new LatestAnswer(
@@ -53,7 +60,11 @@ export function useSubmission(spec: AnySpec): Submission {
   const key = useRef({ text: '', key: '' })
   const submit = () => {
     if (key.current.text !== text) key.current = { text, key: randomKey() }
-    const headers = { 'Idempotency-Key': key.current.key, 'Job-Priority': priority.trim() }
+    const headers = {
+      'Idempotency-Key': key.current.key,
+      'Job-Priority': priority.trim(),
+      ...(notify.trim() !== '' && { [NOTIFY]: notify.trim() }),
+    }
     setSending(true)
     post('/v1/jobs', { body: spec, headers })
       .then(
@@ -67,7 +78,10 @@ export function useSubmission(spec: AnySpec): Submission {
       )
       .finally(() => setSending(false))
   }
-  return { estimate, problem, sending, attempts, priority, setPriority, submit }
+  return {
+    ...{ estimate, problem, sending, attempts },
+    ...{ priority, setPriority, notify, setNotify, submit },
+  }
 }
 
 function randomKey(): string {

@@ -9,9 +9,9 @@ import { useFirstProblem } from '../first-problem'
 import { JsonForm } from '../json-form'
 import { ChoiceField, Problems } from '../number-field'
 import { SubmitPanel } from '../submit-panel'
+import { TextField } from '../text-field'
 import { useSubmission } from '../use-submission'
 import { errorsByPart, type FitDraft, hasParticles } from './fit'
-import { TextField } from './text-field'
 
 export function FitForm({
   title,

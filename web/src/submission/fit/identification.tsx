@@ -2,10 +2,10 @@
 
 import { useMemo, useState } from 'preact/hooks'
 import type { IdentificationSpec, OptimizerPreset } from '../../api/types'
+import { TextField } from '../text-field'
 import { EMPTY_FIT, type FitDraft, fitOf, number, words } from './fit'
 import { FitForm } from './fit-form'
 import type { FitProps } from './page'
-import { TextField } from './text-field'
 
 /** The spec of what was typed. */
 export function identificationSpec(

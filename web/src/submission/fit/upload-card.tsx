@@ -7,6 +7,7 @@ import type { MeasuredWalk } from '../../api/types'
 import { ErrorNotice } from '../../components/feedback'
 import type { Catalogue } from '../catalogue'
 import { ChoiceField } from '../number-field'
+import { TextField } from '../text-field'
 import {
   emptyWalk,
   measuredRequest,
@@ -15,7 +16,6 @@ import {
   walkErrors,
 } from './measured-walk'
 import { ReadLog } from './read-log'
-import { TextField } from './text-field'
 
 export function UploadCard({
   catalogue,

@@ -98,7 +98,7 @@ def _number(value: object) -> object:
 
 
 def _hint(key: str, known: Sequence[str]) -> str:
-    near = get_close_matches(key, known, n=1) if len(key) <= _LONGEST_KEY else []
+    near = get_close_matches(key, known, n=1, cutoff=0.7) if len(key) <= _LONGEST_KEY else []
     return f"did you mean {near[0]!r}?" if near else f"known are {', '.join(known)}"
 
 

@@ -37,20 +37,49 @@ def full_id(jobs: Jobs, given: str) -> str:
     return found[0] if found else given
 
 
-def completed(context: typer.Context, given: str) -> str:
-    """An id of the command line, in full.
+def completed_all(context: typer.Context, given: list[str]) -> list[str]:
+    """Ids of the command line, in full.
 
     Args:
         context: Of the command; its options --server and --db are read already.
-        given: As for `full_id`.
+        given: Each as for `full_id`.
 
     Returns:
         As `full_id`, which raises the errors as well.
     """
-    if context.resilient_parsing or not 0 < len(given) < _LENGTH:
+    if context.resilient_parsing or all(len(one) >= _LENGTH for one in given):
         return given
     from gaitswarm.jobs.open import open_jobs
 
     options = context.params
     with open_jobs(options.get("server"), options.get("db")) as jobs:
-        return full_id(jobs, given)
+        return [full_id(jobs, one) for one in given]
+
+
+def completed(context: typer.Context, given: str | None) -> str | None:
+    """An id of the command line, in full.
+
+    Args:
+        context: As for `completed_all`.
+        given: As for `full_id`; None stays None.
+
+    Returns:
+        As `full_id`, which raises the errors as well.
+    """
+    return None if given is None else completed_all(context, [given])[0]
+
+
+def completed_start(context: typer.Context, given: str | None) -> str | None:
+    """What a job begins with: ids of jobs in full, or the name of a file as it is.
+
+    Args:
+        context: As for `completed`.
+        given: Ids that are separated by commas, or a file whose name ends in .csv.
+
+    Returns:
+        The same, the ids in full.
+    """
+    if given is None or given.lower().endswith(".csv"):
+        return given
+    ids = [one.strip() for one in given.split(",") if one.strip()]
+    return ",".join(completed_all(context, ids))

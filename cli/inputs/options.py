@@ -11,12 +11,19 @@ from typing import Annotated, Any, get_type_hints
 
 import typer
 
-from cli.inputs.job_ids import completed
+from cli.inputs.job_ids import completed, completed_all, completed_start
 
 JobId = Annotated[
     str,
     typer.Argument(
         metavar="ID", callback=completed, help="Identifier of the job, or its beginning."
+    ),
+]
+
+JobIds = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="ID...", callback=completed_all, help="Identifiers of jobs, or their beginnings."
     ),
 ]
 
@@ -135,6 +142,7 @@ class SpecOptions:
         str | None,
         typer.Option(
             metavar="ID[,ID]|FILE.csv",
+            callback=completed_start,
             help="Begin with the best designs of earlier jobs, or with those of a file.",
         ),
     ] = None

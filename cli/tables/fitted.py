@@ -15,7 +15,7 @@ class Table(RichTable):
     """As Rich's, but ids and numbers stay whole on a console of any width.
 
     Cells break between words only. Where even so a row does not fit on a line, every row becomes a
-    block of lines, each with a heading and a cell.
+    block of lines, each with a heading and a cell; empty cells have none.
     """
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
@@ -45,14 +45,16 @@ class Table(RichTable):
             block.add_column(overflow="fold", no_wrap=True)
             block.add_column(overflow="fold")
             for column, cell in zip(self.columns, row, strict=True):
-                block.add_row(_on_one_line(column.header), cell)
+                if str(cell):
+                    block.add_row(_on_one_line(column.header), cell)
             yield block
 
 
 def _longest_word(console: Console, options: ConsoleOptions, column: Column) -> int:
-    """Of a column's heading and cells."""
-    cells = [column.header, *column.cells]
-    return max(Measurement.get(console, options, cell).minimum for cell in cells)
+    """Of a column's heading and cells; a cell that must not be wrapped is one word."""
+    head = Measurement.get(console, options, column.header).minimum
+    cells = [Measurement.get(console, options, cell) for cell in column.cells]
+    return max([head, *(cell.maximum if column.no_wrap else cell.minimum for cell in cells)])
 
 
 def _on_one_line(heading: RenderableType) -> RenderableType:

@@ -78,10 +78,10 @@ def jobs_table(jobs: Iterable[JobSummaryView]) -> Table:
 
 
 def _name(job: JobSummaryView) -> Text:
-    """Of a fork, also where it comes from."""
-    if job.lineage is None:
-        return Text(job.name or MISSING)
-    return Text("\n".join(filter(None, [job.name, "fork of", job.lineage.parent])))
+    """With tags, what is archived, and of a fork where it comes from."""
+    fork = [] if job.lineage is None else ["fork of", job.lineage.parent]
+    marks = [*(f"#{tag}" for tag in job.tags), *(["archived"] if job.archived else [])]
+    return Text("\n".join(filter(None, [job.name, *fork, " ".join(marks)])) or MISSING)
 
 
 def optimizers_table(optimizers: Iterable[OptimizerView]) -> Table:

@@ -52,3 +52,24 @@ def test_where_they_do_not_each_is_a_block_of_headings_and_cells() -> None:
     ]  # fmt: skip
     assert "best fitness  18.1539" in blocks[0]
     assert "pbnc75p8qd4s" in blocks[1]
+
+
+@pytest.mark.parametrize("width", [20, 30, 40, 60])
+def test_a_cell_that_must_not_be_wrapped_is_not_cut_either(width: int) -> None:
+    table = Table(box=None)
+    for head in ("variable", "moved with", "interval"):
+        table.add_column(head, no_wrap=True)
+    table.add_row("duty_factor", "cycle_time, -0.63", "51 (40 to 65)")
+    told = " ".join(printed(table, width).split())
+    if width > 40:
+        assert "duty_factor cycle_time, -0.63 51 (40 to 65)" in told
+    assert "…" not in told and "40 to 65" in told
+
+
+def test_a_block_has_no_lines_for_cells_without_a_word() -> None:
+    table = Table("drive", "status", "speed", box=None)
+    table.add_row("normal-fast")
+    table.add_row("2016", "ok", "0.152")
+    blocks = printed(table, 20).split("\n\n")
+    assert blocks[0].split() == ["drive", "normal-fast"]
+    assert len(blocks[1].splitlines()) == 3

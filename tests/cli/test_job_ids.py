@@ -32,6 +32,46 @@ def test_the_beginning_may_stand_before_the_options_that_say_where(
     assert told.json["id"] == finished.id
 
 
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("diff", "ID", "ID", "--json"),
+        ("importance", "ID", "--json"),
+        ("compare", "job:ID", "--scenario", "3", "--json"),
+        ("plot", "surface", "--design", "job:ID", "--output", "FILE"),
+        ("simulate", "--design", "job:ID", "--scenario", "3", "--json"),
+        ("targets", "ID", "--json"),
+        ("parameters", "ID", "--json"),
+        ("audit", "--job", "ID"),
+        ("list", "--forks-of", "ID", "--json"),
+        ("optimize", "--resume", "ID", "--json"),
+        ("optimize", "--start-from", "ID,ID", "--iterations", "0"),
+    ],
+    ids=lambda command: " ".join(command[:2]),
+)
+def test_it_is_enough_wherever_a_command_takes_an_id(
+    gaitswarm: Gaitswarm, finished: Finished, tmp_path: Path, command: tuple[str, ...]
+) -> None:
+    shutil.copy(finished.db, tmp_path / "jobs.db")
+
+    def told(job_id: str) -> tuple[int, str, str]:
+        words = [word.replace("ID", job_id) for word in command]
+        words = [str(tmp_path / "made.svg") if word == "FILE" else word for word in words]
+        result = gaitswarm(*words, "--db", tmp_path / "jobs.db")
+        return result.code, result.out, result.err
+
+    whole, beginning = told(finished.id), told(finished.id[:5])
+    assert beginning[0] == whole[0]
+    # Progress and places differ; what is said of the job does not.
+    assert "there is no job" not in beginning[2] and "nothing is known" not in beginning[2]
+    if "--json" in command and "optimize" not in command:
+        without = (
+            told[1].replace(finished.id, "").replace(finished.id[:5], "")
+            for told in (whole, beginning)
+        )
+        assert len(set(without)) == 1
+
+
 def test_a_beginning_of_no_id_is_refused_as_any_unknown_one(
     gaitswarm: Gaitswarm, finished: Finished
 ) -> None:

@@ -44,9 +44,22 @@ def test_the_terminal_writes_and_finds_them(finished: Finished) -> None:
     assert "'renamed', tag a, archived" in " ".join(written.out.split())
     listed = run_command("list", "--db", finished.db, "--tag", "a", "--archived", "--json").json
     assert [job["name"] for job in listed] == ["renamed"]
-    assert run_command("list", "--db", finished.db, "--not-archived", "--json").json == []
+    assert run_command("list", "--db", finished.db, "--json").json == []
+    assert "no job fits; --all lists archived ones" in run_command("list", "--db", finished.db).err
+    everything = run_command("list", "--db", finished.db, "--all")
+    assert {"#a", "archived"} <= set(everything.out.split())
     emptied = run_command("label", finished.id, "--db", finished.db, "--no-tags", "--json").json
     assert emptied["tags"] == []
+
+
+def test_a_list_says_that_there_is_more(reach: Reach, finished: Finished) -> None:
+    spec = reach(finished.db).job(finished.id).spec
+    with gaitswarm.open(finished.db) as jobs:
+        for seed in (8, 9):
+            jobs.submit(spec, seed=seed)
+    told = run_command("list", "--db", finished.db, "--limit", "2")
+    assert "there are more than 2: see them by --limit" in told.err
+    assert "there are more" not in run_command("list", "--db", finished.db, "--limit", "3").err
 
 
 def test_jobs_are_set_beside_each_other(reach: Reach, finished: Finished) -> None:

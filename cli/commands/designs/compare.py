@@ -58,11 +58,8 @@ def compare(
 
 
 def _drive(name: str, server: str | None, db: str | None) -> NamedDrive:
-    from cli.inputs.design_file import read_design
-    from gaitswarm.jobs.open import open_jobs
+    from cli.inputs.design_file import given_design, read_design
     from services.optimizer.errors import InvalidRequest
-    from services.optimizer.jobs.kinds.tuning import JobSpec
-    from sim.catalogue import design_numbers
     from sim.controllers import CONTROLLERS
     from sim.studies.drives import drive_of_design, find_drive
 
@@ -70,13 +67,8 @@ def _drive(name: str, server: str | None, db: str | None) -> NamedDrive:
     if not colon:
         return find_drive(name)
     if kind == "job":
-        with open_jobs(server, db) as jobs:
-            job, best = jobs.job(what), jobs.best(what)
-        if not isinstance(job.spec, JobSpec):
-            raise InvalidRequest(f"job {what} fits parameters, it tunes no drive", field="drive")
-        return drive_of_design(
-            name, job.spec.controller, design_numbers(job.spec.controller, best.design)
-        )
+        best = given_design(name, None, server=server, db=db)
+        return drive_of_design(name, best.controller, best.values)
     for controller in CONTROLLERS:
         if kind == controller:
             return drive_of_design(name, controller, read_design(what, controller))

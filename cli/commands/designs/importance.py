@@ -40,9 +40,8 @@ def importance(job_id: JobId, server: Server = None, db: Db = None, as_json: Jso
 
 
 def _print(view: ImportanceView) -> None:
-    from rich.table import Table
-
     from cli.output import stdout_console
+    from cli.tables.fitted import Table
     from cli.tables.views import MISSING, SHORT
 
     table = Table(box=None, padding=(0, 1, 0, 0))
@@ -73,6 +72,13 @@ def _order(variable: VariableImportanceView) -> float:
 
 
 def _lines(view: ImportanceView) -> Iterator[str]:
+    from services.optimizer.analysis.importance import LEAST_DESIGNS
+
+    if view.designs < LEAST_DESIGNS:
+        yield (
+            f"{view.designs} designs walk in every case, and indices need {LEAST_DESIGNS}:"
+            " `gaitswarm extend` lets the job try more"
+        )
     yield (
         f"share of the variance of ranks that goes with each variable alone, among {view.sampled}"
         f" designs that were tried, {view.failed} of {view.designs + view.failed} in all failed;"
@@ -86,9 +92,9 @@ def _lines(view: ImportanceView) -> Iterator[str]:
         advice = "no wider bound is known that can be simulated"
         if wider is not None:
             advice = f"widen it to {wider.low:g} to {wider.high:g} and run again"
+        unit = "" if variable.unit == "1" else f" {variable.unit}"
         yield (
-            f"{variable.name}: the winner lies at the {variable.at} bound {bound:g}"
-            f" {variable.unit}; {advice}"
+            f"{variable.name}: the winner lies at the {variable.at} bound {bound:g}{unit}; {advice}"
         )
 
 

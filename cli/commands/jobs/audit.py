@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from cli.inputs.job_ids import completed
 from cli.inputs.options import Db, Json
 
 
@@ -15,7 +16,14 @@ def register(app: typer.Typer) -> None:
 
 
 def audit(
-    job: Annotated[str | None, typer.Option(metavar="ID", help="Only changes of this job.")] = None,
+    job: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ID",
+            callback=completed,
+            help="Only changes of this job; in full, if it is deleted.",
+        ),
+    ] = None,
     limit: Annotated[int, typer.Option(min=1, max=10_000, help="Most changes to show.")] = 50,
     db: Db = None,
     as_json: Json = False,

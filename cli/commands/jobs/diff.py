@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
-from cli.inputs.options import Db, Json, Server
+from cli.inputs.options import Db, JobIds, Json, Server
 
 if TYPE_CHECKING:
     from gaitswarm.views.comparison import JobComparisonView
@@ -18,14 +18,12 @@ def register(app: typer.Typer) -> None:
 
 
 def diff(
-    job_ids: Annotated[
-        list[str], typer.Argument(metavar="ID...", help="Identifiers of the jobs, 12 at most.")
-    ],
+    job_ids: JobIds,
     server: Server = None,
     db: Db = None,
     as_json: Json = False,
 ) -> None:
-    """Set jobs beside each other: what they came to, and how their specs differ.
+    """Set up to 12 jobs beside each other: what they came to, and how their specs differ.
 
     With --json how they converged and how the fitness of their designs is distributed, too.
     """
@@ -41,15 +39,14 @@ def diff(
 
 
 def _print(view: JobComparisonView) -> None:
-    from rich.table import Table
-
     from cli.output import stdout_console
+    from cli.tables.fitted import Table
     from cli.tables.views import MISSING, number
 
     table = Table(box=None, padding=(0, 2, 0, 0))
     table.add_column("", no_wrap=True)
     for job in view.jobs:
-        table.add_column(job.id, overflow="fold")
+        table.add_column(job.id)
     table.add_row("name", *(job.name or MISSING for job in view.jobs))
     table.add_row("state", *(job.state for job in view.jobs))
     table.add_row("best fitness", *(number(job.best_fitness, 5) for job in view.jobs))

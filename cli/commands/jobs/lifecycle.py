@@ -7,6 +7,7 @@ from typing import Annotated, TypeVar
 
 import typer
 
+from cli.inputs.job_ids import completed
 from cli.inputs.options import (
     AcceptChanges,
     Db,
@@ -73,7 +74,10 @@ def list_jobs(
         ),
     ] = None,
     forks_of: Annotated[
-        str | None, typer.Option(metavar="ID", help="Only jobs that were forked from this one.")
+        str | None,
+        typer.Option(
+            metavar="ID", callback=completed, help="Only jobs that were forked from this one."
+        ),
     ] = None,
     search: Annotated[
         str,
@@ -91,8 +95,14 @@ def list_jobs(
     tag: Annotated[str | None, typer.Option(help="Only jobs that have this tag.")] = None,
     archived: Annotated[
         bool | None,
-        typer.Option("--archived/--not-archived", help="Only jobs that are archived, or are not."),
+        typer.Option(
+            "--archived/--not-archived",
+            help="Only jobs that are archived, or are not, which is the default.",
+        ),
     ] = None,
+    everything: Annotated[
+        bool, typer.Option("--all", help="Jobs that are archived as well as those that are not.")
+    ] = False,
     order: Annotated[
         str,
         typer.Option(
@@ -107,12 +117,15 @@ def list_jobs(
     as_json: Json = False,
 ) -> None:
     """List jobs, newest first unless another order is chosen."""
-    from cli.output import print_json_list, stdout_console
+    from cli.output import note, print_json_list, stdout_console
     from cli.tables.views import jobs_table
     from gaitswarm.jobs.open import open_jobs
+    from services.optimizer.errors import InvalidRequest
     from services.optimizer.jobs.job import JobOrder, JobState
     from services.optimizer.jobs.labels import JobFilter
 
+    if everything and archived is not None:
+        raise InvalidRequest("leaves out none; choose one of both", field="all")
     in_state = None if state is None else _one_of(JobState, state, "state")
     sorted_by = _one_of(JobOrder, order, "order")
     with open_jobs(server, db) as jobs:
@@ -120,15 +133,23 @@ def list_jobs(
             state=in_state,
             parent=forks_of,
             search=search,
-            where=JobFilter(archived, robot, controller, preference, tag),
+            where=JobFilter(
+                None if everything else bool(archived), robot, controller, preference, tag
+            ),
             order=sorted_by,
             reverse=reverse,
-            limit=limit,
+            limit=limit if as_json else limit + 1,
         )
         if as_json:
             print_json_list(found)
-        else:
-            stdout_console().print(jobs_table(found))
+            return
+        rows = list(found)
+    if rows:
+        stdout_console().print(jobs_table(rows[:limit]))
+    else:
+        note("no job fits; --all lists archived ones, too")
+    if len(rows) > limit:
+        note(f"there are more than {limit}: see them by --limit, or fewer by --search or --tag")
 
 
 def status(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = False) -> None:

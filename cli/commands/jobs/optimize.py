@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from cli.inputs.job_ids import completed
 from cli.inputs.options import AcceptChanges, Json, SpecOptions, WorkerOptions, with_groups
 
 
@@ -23,6 +24,7 @@ def optimize(
         str | None,
         typer.Option(
             metavar="ID",
+            callback=completed,
             help="Go on with this job, to the same bits as if it had never stopped.",
         ),
     ] = None,

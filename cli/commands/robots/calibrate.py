@@ -7,7 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from cli.inputs.options import Db, JobName, Json, Precision, Server, WorkerOptions, with_groups
+from cli.inputs.options import (
+    Db,
+    JobIds,
+    JobName,
+    Json,
+    Precision,
+    Server,
+    WorkerOptions,
+    with_groups,
+)
 
 if TYPE_CHECKING:
     from gaitswarm.jobs.port import Jobs
@@ -105,16 +114,16 @@ def calibrate(
 
 
 def targets(
-    job_ids: Annotated[
-        list[str],
-        typer.Argument(metavar="ID...", help="Calibrations that differ in their seed."),
-    ],
+    job_ids: JobIds,
     leave_one_out: LeaveOneOut = None,
     server: Server = None,
     db: Db = None,
     as_json: Json = False,
 ) -> None:
-    """Say how near calibrations come to their targets, and what the evidence decides."""
+    """Say how near calibrations that differ in their seed come to their targets.
+
+    And what the evidence decides.
+    """
     from gaitswarm.jobs.open import open_jobs
 
     with open_jobs(server, db) as jobs:

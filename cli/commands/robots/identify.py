@@ -16,6 +16,7 @@ from cli.inputs.measured_walk import (
 from cli.inputs.options import (
     ControllerOption,
     Db,
+    JobIds,
     JobName,
     Json,
     Precision,
@@ -141,10 +142,7 @@ def identify(
 
 
 def parameters(
-    job_ids: Annotated[
-        list[str],
-        typer.Argument(metavar="ID...", help="Jobs of one problem that differ in their seed."),
-    ],
+    job_ids: JobIds,
     truth: Truth = None,
     output: Annotated[
         Path | None,
@@ -154,7 +152,10 @@ def parameters(
     db: Db = None,
     as_json: Json = False,
 ) -> None:
-    """Say which fitted parameters can be trusted: intervals at twelve fitness thresholds."""
+    """Say which fitted parameters can be trusted: intervals at twelve fitness thresholds.
+
+    Of one job, or of jobs of one problem that differ in their seed.
+    """
     from cli.output import note
     from cli.pictures.plots import save
     from cli.tables.parameters import draw_parameters, read_truth, show_parameters

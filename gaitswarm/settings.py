@@ -143,7 +143,7 @@ class Settings(BaseSettings):
         default=None,
         ge=0,
         le=65535,
-        description="Port on which `runner` serves its metrics; 0 takes a free one, which the log"
+        description="Port on which `runner` serves metrics and /healthz; 0 takes a free one, which the log"
         " names; none: it does not.",
     )
     metrics_host: str = Field(

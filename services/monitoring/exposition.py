@@ -84,13 +84,20 @@ class MetricsAccess:
 
 @contextmanager
 def metrics_server(
-    metrics: Metrics, access: MetricsAccess, *, host: str, port: int
+    metrics: Metrics,
+    access: MetricsAccess,
+    *,
+    trouble: Callable[[], str | None],
+    host: str,
+    port: int,
 ) -> Iterator[str]:
-    """Serve metrics on a port of their own inside the block.
+    """Serve metrics and a probe of liveness on a port of their own inside the block.
 
     Args:
         metrics: What is served, on the path /metrics.
         access: Who may read them.
+        trouble: Why this process has to be started anew, None while it works: for /healthz, which
+            everybody may ask, and which asks no database.
         host: Address to listen on.
         port: 0 takes a free one.
 
@@ -107,8 +114,14 @@ def metrics_server(
             start(f"{status.value} {status.phrase}", [media_type, *headers])
             return [text.encode()]
 
-        if environ.get("PATH_INFO") != "/metrics" or environ["REQUEST_METHOD"] != "GET":
-            return plain(HTTPStatus.NOT_FOUND, "there is only GET /metrics here\n")
+        path = environ.get("PATH_INFO")
+        if path not in ("/metrics", "/healthz") or environ["REQUEST_METHOD"] != "GET":
+            return plain(HTTPStatus.NOT_FOUND, "there are GET /metrics and GET /healthz here\n")
+        if path == "/healthz":
+            said = trouble()
+            if said is None:
+                return plain(HTTPStatus.OK, "ok\n")
+            return plain(HTTPStatus.SERVICE_UNAVAILABLE, f"{said}\n")
         try:
             allowed = access.allows(environ.get("HTTP_AUTHORIZATION", ""))
         except StoreUnavailable as error:

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 import yaml
 
+from gaitswarm.settings import is_loopback
 from tests.examples.paths import ROOT
 from tests.monitoring.scraped import Scrape
 
@@ -68,6 +69,24 @@ def exposed(scrape: Scrape) -> dict[str, str]:
         for suffix in suffixes.get(family.type, ("",)):
             found[family.name + suffix] = family.type
     return found
+
+
+def test_prometheus_reads_what_docker_compose_opens() -> None:
+    services = yaml.safe_load((ROOT / "docker-compose.yml").read_text(encoding="utf-8"))["services"]
+    (job,) = yaml.safe_load((PROMETHEUS / "prometheus.yml").read_text(encoding="utf-8"))[
+        "scrape_configs"
+    ]
+    (api, api_port), (runner, runner_port) = (
+        target.split(":") for target in job["static_configs"][0]["targets"]
+    )
+    command = services[api]["command"]
+    assert command[command.index("--port") + 1] == api_port
+    assert services[api]["environment"]["GAITSWARM_API_ALLOWED_HOSTS"] == api
+    assert services[runner]["environment"]["GAITSWARM_METRICS_PORT"] == runner_port
+    assert not is_loopback(services[runner]["environment"]["GAITSWARM_METRICS_HOST"])
+    assert f":{runner_port}/healthz" in str(services[runner]["healthcheck"]["test"])
+    # One network leads to both.
+    assert "database" in services[api]["networks"] and "database" in services[runner]["networks"]
 
 
 @pytest.mark.parametrize("query", QUERIES)

@@ -93,9 +93,15 @@ def test_a_runners_port_asks_for_a_token_beyond_the_machine(
     assert Settings(**settings).metrics_need_token is needed  # type: ignore[arg-type]
 
 
-def served(check: Callable[[str], None], *, required: bool = False) -> None:
+def served(
+    check: Callable[[str], None],
+    *,
+    required: bool = False,
+    trouble: Callable[[], str | None] = lambda: None,
+    port: int = 0,
+) -> None:
     access = MetricsAccess(_Tokens, required=required)  # type: ignore[arg-type]
-    with metrics_server(Metrics(), access, host="127.0.0.1", port=0) as url:
+    with metrics_server(Metrics(), access, trouble=trouble, host="127.0.0.1", port=port) as url:
         check(url)
 
 
@@ -125,15 +131,24 @@ def test_a_port_of_its_own_refuses_whoever_has_no_token_and_stops() -> None:
 
 def test_a_port_that_is_taken_is_named() -> None:
     def check(url: str) -> None:
-        access = MetricsAccess(_Tokens, required=False)  # type: ignore[arg-type]
         port = int(url.split(":")[2].split("/", maxsplit=1)[0])
-        with (
-            pytest.raises(EvaluatorUnavailable, match="GAITSWARM_METRICS_PORT"),
-            metrics_server(Metrics(), access, host="127.0.0.1", port=port),
-        ):
-            pass
+        with pytest.raises(EvaluatorUnavailable, match="GAITSWARM_METRICS_PORT"):
+            served(check, port=port)
 
     served(check)
+
+
+def test_a_probe_is_told_without_a_token_whether_the_process_works() -> None:
+    said: list[str | None] = [None]
+
+    def check(url: str) -> None:
+        probe = url.replace("/metrics", "/healthz")
+        assert (httpx2.get(probe).status_code, httpx2.get(probe).text) == (200, "ok\n")
+        said[0] = "it has ended and runs no more jobs; restart this process"
+        answer = httpx2.get(probe)
+        assert (answer.status_code, answer.text) == (503, f"{said[0]}\n")
+
+    served(check, required=True, trouble=lambda: said[0])
 
 
 @pytest.mark.slow
@@ -153,6 +168,7 @@ def test_a_runner_serves_its_own_metrics_but_not_the_databases(database: Path) -
         scrape = seen[-1]
         assert scrape.value("gaitswarm_worker_slots", workers="threads") == 2
         assert not scrape.labels("gaitswarm_jobs") and not scrape.labels("gaitswarm_queue_jobs")
+        assert httpx2.get(url.replace("/metrics", "/healthz")).text == "ok\n"
     finally:
         process.terminate()
         process.communicate(timeout=60.0)

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 import yaml
 
+from gaitswarm.settings import Settings, is_loopback
 from tests.examples.api_document import api_document
 from tests.examples.paths import ROOT
 from tests.setup import command_line, settings_classes
@@ -97,10 +98,19 @@ def test_commands_are_those_of_docker_compose_and_exist() -> None:
 
 def test_probes_ask_routes_that_exist() -> None:
     paths = set(api_document()["paths"])
-    api = OURS["gaitswarm-api"]
+    api, runner = OURS["gaitswarm-api"], OURS["gaitswarm-runner"]
     for kind in ("readinessProbe", "livenessProbe"):
         assert api[kind]["httpGet"]["path"] in paths
         assert api[kind]["httpGet"]["port"] == api["ports"][0]["containerPort"]
+    port = int(_variables(runner)["GAITSWARM_METRICS_PORT"]["value"])
+    assert runner["livenessProbe"]["httpGet"] == {"path": "/healthz", "port": port}
+    assert runner["ports"] == [{"containerPort": port}]
+    assert not is_loopback(_variables(runner)["GAITSWARM_METRICS_HOST"]["value"])
+
+
+def test_a_runner_has_time_to_commit_what_is_under_way() -> None:
+    seconds = PODS["gaitswarm-runner"]["terminationGracePeriodSeconds"]
+    assert seconds >= 1.25 * Settings().drain_seconds
 
 
 def test_settings_of_ours_exist() -> None:

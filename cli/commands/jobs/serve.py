@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from services.monitoring.activity import Activity
     from services.monitoring.metrics import Metrics
     from services.monitoring.tracing import Tracing
-    from services.optimizer.access import Tokens
     from services.optimizer.run.runner import Runner
     from services.runtime import Runtime
 
@@ -145,7 +144,7 @@ def runner(options: RunnerOptions) -> None:
         suppress(EvaluationStopped),
         stop_on_signals(stop, at_once),
         _runtime(settings, metrics, should_stop=stop.is_set) as opened,
-        _served(metrics, settings, lambda: opened.service.store.tokens) as url,
+        _served(metrics, settings, opened) as url,
     ):
         log.info("ready: %d slots, %d jobs at once", opened.slots, settings.concurrent_jobs)
         if url is not None:
@@ -261,16 +260,17 @@ def _tracing() -> Tracing | None:
 
 
 @contextmanager
-def _served(
-    metrics: Metrics | None, settings: Settings, tokens: Callable[[], Tokens]
-) -> Iterator[str | None]:
-    """A runner's metrics, on the port of the settings; their URL, None without a port."""
+def _served(metrics: Metrics | None, settings: Settings, opened: Runtime) -> Iterator[str | None]:
+    """A runner's metrics and health on the port of the settings; URL of the metrics, if any."""
     if metrics is None or settings.metrics_port is None:
         yield None
         return
     from services.monitoring.exposition import MetricsAccess, metrics_server
 
-    access = MetricsAccess(tokens, required=settings.metrics_need_token)
+    access = MetricsAccess(
+        lambda: opened.service.store.tokens, required=settings.metrics_need_token
+    )
     host, port = settings.metrics_host, settings.metrics_port
-    with metrics_server(metrics, access, host=host, port=port) as url:
+    trouble = opened.runner.trouble if opened.runner is not None else lambda: None
+    with metrics_server(metrics, access, trouble=trouble, host=host, port=port) as url:
         yield url

@@ -143,8 +143,8 @@ class Settings(BaseSettings):
         default=None,
         ge=0,
         le=65535,
-        description="Port on which `runner` serves metrics and /healthz; 0 takes a free one, which the log"
-        " names; none: it does not.",
+        description="Port on which `runner` serves metrics and /healthz; 0 takes a free one, which"
+        " the log names; none: it does not.",
     )
     metrics_host: str = Field(
         default="127.0.0.1",

@@ -82,7 +82,7 @@ class _Schedule:
         """Values in registers."""
 
     def run(self) -> Iterator[Statement]:
-        """See `ordered`."""
+        """Write one statement after the other, the preferred one of those that are ready."""
         missing = [len(of) for of in self._sources]
         ready = [k for k, s in enumerate(self._statements) if s.operations and not missing[k]]
         given: set[int] = set()

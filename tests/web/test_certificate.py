@@ -66,7 +66,8 @@ def test_tables_show_what_the_design_comes_to_and_worlds_are_a_click_away(
     worst = found["worst"][0]
     page.get_by_role("link", name=str(worst["world"]), exact=True).click()
     expect(page.get_by_label("Design")).to_be_visible()
-    expect(page.get_by_text(f"iteration {worst['iteration']}").first).to_be_attached()
+    place = f"design {worst['iteration']}.{worst['particle']}"
+    expect(page.get_by_text(place).first).to_be_attached()
     objective = page.get_by_role("table", name="Objectives").or_(page.locator("table")).first
     expect(objective).to_be_visible()
     assert f"particle={worst['particle']}" in page.url

@@ -226,7 +226,7 @@ def list_jobs(
             description="`created`: newest first; `fitness`: best first, jobs without one last;"
             " `name`: by name, jobs without one last; `state`: those that wait or run first;"
             " `evaluations`, `iterations`, `priority`, `rate`: most first; `gain` over the"
-            " published design: greatest first; `time_left`: those that end soonest first."
+            " `reference`: greatest first; `time_left`: those that end soonest first."
         ),
     ] = JobOrder.CREATED,
     reverse: Annotated[
@@ -238,7 +238,7 @@ def list_jobs(
     ] = False,
     robot: Annotated[
         str | None,
-        Query(max_length=200, description="Only jobs of this robot; `own` for users' own."),
+        Query(max_length=200, description="Only jobs of this robot; `own` for all of users' own."),
     ] = None,
     controller: Annotated[
         str | None, Query(max_length=200, description="Only jobs that tune this controller.")

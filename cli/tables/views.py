@@ -71,10 +71,17 @@ def jobs_table(jobs: Iterable[JobSummaryView]) -> Table:
             *([str(job.priority)] if urgent else []),
             _spent(job),
             number(job.best_fitness),
-            *([MISSING if job.gain is None else f"{job.gain:.1%}"] if compared else []),
+            *([_gain(job)] if compared else []),
             f"{job.created_at:%Y-%m-%d %H:%M}",
         )
     return table
+
+
+def _gain(job: JobSummaryView) -> str:
+    if job.gain is None:
+        return MISSING
+    of_start = job.reference is not None and job.reference.kind == "start"
+    return f"{job.gain:.1%}{' over start' if of_start else ''}"
 
 
 def _name(job: JobSummaryView) -> Text:

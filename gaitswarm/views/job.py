@@ -152,8 +152,8 @@ class JobSummaryView(View):
     )
     robot: str | None = Field(
         default=None,
-        description="Name of its robot, `own` for one of its user's; null if the spec cannot be"
-        " read, or names none.",
+        description="Name of its robot, of one of its user's that in robot.toml, or `own`; null if"
+        " the spec cannot be read, or names none.",
         examples=["szabadka2-reconstructed"],
     )
     preference: str | None = Field(

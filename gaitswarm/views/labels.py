@@ -13,7 +13,7 @@ class JobFacetsView(View):
 
     total: int = Field(description="Jobs in all [1].", examples=[1000])
     states: dict[str, int] = Field(description="By state [1].", examples=[{"succeeded": 12}])
-    robots: dict[str, int] = Field(description="By robot, `own` for users' own [1].")
+    robots: dict[str, int] = Field(description="By name of the robot [1].")
     controllers: dict[str, int] = Field(description="By motor controller [1].")
     preferences: dict[str, int] = Field(description="By preference, `own` for any other [1].")
     tags: dict[str, int] = Field(description="By tag [1].", examples=[{"thesis": 3}])

@@ -6,13 +6,22 @@ from pydantic import Field
 
 from gaitswarm.views.base import View, finite
 from services.optimizer.jobs.job import Job
-from services.optimizer.jobs.reference import Reference
+from services.optimizer.jobs.reference import Reference, ReferenceKind
 
 
 class ReferenceView(View):
-    """The published design that a job's best is measured against."""
+    """The design that a job's best is measured against."""
 
-    name: str = Field(description="Study or preference that it was published for.", examples=["A"])
+    name: str = Field(
+        description="Study or preference that it was published for; or `start design`.",
+        examples=["A"],
+    )
+    kind: ReferenceKind = Field(
+        default="published",
+        description="`published`, or `start` of a robot of one's own, for which none was published:"
+        " the middle of the job's bounds.",
+        examples=["published"],
+    )
     fitness: float | None = Field(
         description="What it comes to in the job's scenarios under its preference, in double"
         " precision [1]; null where it does not walk in all of them.",
@@ -31,15 +40,15 @@ class ReferenceView(View):
         """
         if reference is None or reference.name is None:
             return None
-        return cls(name=reference.name, fitness=finite(reference.fitness))
+        return cls(name=reference.name, kind=reference.kind, fitness=finite(reference.fitness))
 
 
 class JobReferenceView(View):
-    """A job's best beside the published design."""
+    """A job's best beside the design that it is measured against."""
 
     id: str = Field(description="Identifier of the job.", examples=["k2q7zr5dm9xw"])
     reference: ReferenceView | None = Field(
-        description="The published design; null where there is none."
+        description="The published or the start design; null where there is none."
     )
     best_fitness: float | None = Field(
         description="Least fitness of the job so far [1]; null while every design has failed.",

@@ -7,14 +7,17 @@ from dataclasses import replace
 import httpx2
 import pytest
 
+from cli.tables.views import jobs_table
+from gaitswarm.views import JobSummaryView
 from services.optimizer.analysis import reference as references
-from services.optimizer.analysis.reference import note_reference, walked_reference
+from services.optimizer.analysis.reference import note_reference, walked_reference, with_reference
 from services.optimizer.jobs.job import Job, JobOrder
 from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.provenance import job_provenance
 from services.optimizer.jobs.reference import Reference
 from services.optimizer.store.sql_store import SqlStore
 from tests.api.conftest import Commit
+from tests.examples.walks import quadruped_files
 
 BRIEF = {"name": "brief", "cycle_time": 0.5, "cycles": 1.0, "radius": 0.16, "hip_height": 0.15}
 """A scenario of a single short cycle."""
@@ -40,7 +43,11 @@ def test_the_published_design_is_judged_as_the_jobs_own_and_kept(
     published = {"controller": "fuzzy-pi", "scenarios": [BRIEF], "preference": "B"}
     design = client.get("/v1/controllers").json()["items"][0]["published"]["B"]
     walk = client.post("/v1/simulations", json={**published, "design": design}).json()
-    assert found["reference"] == {"name": "B", "fitness": walk["fitness"]}
+    assert found["reference"] == {
+        "name": "B",
+        "kind": "published",
+        "fitness": walk["fitness"],
+    }
     assert found["gain"] == 1.0 - found["best_fitness"] / walk["fitness"]
     assert found["reason"] is None
 
@@ -48,6 +55,53 @@ def test_the_published_design_is_judged_as_the_jobs_own_and_kept(
     assert client.get(here).json() == found
     (listed,) = client.get("/v1/jobs").json()["items"]
     assert (listed["reference"], listed["gain"]) == (found["reference"], found["gain"])
+
+
+def test_a_robot_of_ones_own_is_measured_against_the_middle_of_the_bounds(
+    client: httpx2.Client, store: SqlStore, commit: Commit
+) -> None:
+    robot, walk = quadruped_files().model_dump(), BRIEF | {"radius": 0.22, "stride": 0.04}
+    bounds = [{"name": "P", "low": 0.2, "high": 0.6}, "I"]
+    spec = tuning(controller="pi", robot=robot, scenarios=[walk], variables=bounds)
+    job, _ = store.create_job(spec, provenance=job_provenance(spec))
+    commit(job, 1)
+    found = client.get(f"/v1/jobs/{job.id}/reference").json()
+    integral = next(v for v in spec.design_space().variables if v.name == "I")
+    asked = {
+        "controller": "pi", "robot": robot, "scenarios": [walk],
+        "design": {"P": 0.4, "I": (integral.low + integral.high) / 2},
+    }  # fmt: skip
+    walked = client.post("/v1/simulations", json=asked).json()
+    assert found["reference"] == {
+        "name": "start design",
+        "kind": "start",
+        "fitness": walked["fitness"],
+    }
+    assert found["gain"] == 1.0 - found["best_fitness"] / walked["fitness"]
+    (listed,) = client.get("/v1/jobs").json()["items"]
+    assert (listed["reference"], listed["robot"]) == (found["reference"], "quadruped")
+    table = jobs_table([JobSummaryView.model_validate(listed)])
+    (gains,) = (column for column in table.columns if column.header == "gain")
+    assert [*gains.cells] == [f"{found['gain']:.1%} over start"]
+
+
+def test_a_reference_that_is_stored_stays(store: SqlStore, commit: Commit) -> None:
+    spec = tuning(controller="pi", robot=quadruped_files())
+    job, _ = store.create_job(spec, provenance=job_provenance(spec))
+    commit(job, 1)
+    store.note_reference(job.id, Reference(None, None))
+    assert note_reference(store, store.job(job.id)).reference == Reference(None, None)
+    assert store.job(job.id).gain is None
+
+
+def test_a_start_that_does_not_walk_says_so(store: SqlStore, commit: Commit) -> None:
+    walk = BRIEF | {"radius": 0.5}
+    spec = tuning(controller="pi", robot=quadruped_files(), scenarios=[walk])
+    job, _ = store.create_job(spec, provenance=job_provenance(spec))
+    commit(job, 1)
+    found, reason = with_reference(store, store.job(job.id))
+    assert found.reference == Reference("start design", None, "start")
+    assert reason == "the start design does not walk in all of its scenarios"
 
 
 @pytest.mark.parametrize(

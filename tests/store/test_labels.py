@@ -7,8 +7,9 @@ import pytest
 from services.optimizer.errors import InvalidRequest, NotFound
 from services.optimizer.jobs.job import Command, Job, JobOrder
 from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.labels import JobFilter, LabelsChange
+from services.optimizer.jobs.labels import JobFilter, LabelsChange, robot_name
 from services.optimizer.store.sql_store import SqlStore
+from tests.examples.walks import quadruped_files
 from tests.store.examples import Clock
 
 
@@ -69,6 +70,26 @@ def test_jobs_are_found_by_what_they_are(store: SqlStore) -> None:
     assert counts.controllers["pi"] == 1
     assert counts.preferences == {"A": 1, "B": 1, "own": 1}
     assert store.facets(archived=True).total == 1
+
+
+def test_a_robot_of_ones_own_is_found_by_its_name_and_as_one_of_all(store: SqlStore) -> None:
+    files = quadruped_files()
+    shipped = submitted(store, robot="szabadka2")
+    dog = submitted(store, robot=files)
+    toml = files.toml.replace('name = "quadruped"', 'name = "szabadka2"', 1)
+    named_as_shipped = submitted(store, robot=files.model_copy(update={"toml": toml}))
+    for where, wanted in (
+        (JobFilter(robot="quadruped"), [dog]),
+        (JobFilter(robot="own"), [dog, named_as_shipped]),
+        (JobFilter(robot="szabadka2"), [shipped]),
+    ):
+        assert set(ids(store, where=where)) == {job.id for job in wanted}, where
+    assert store.facets().robots == {"szabadka2": 1, "quadruped": 1, "own": 1}
+
+
+@pytest.mark.parametrize("name", ["name = ", "name = 3", "x = 1", 'name = ""', "x = " + "[" * 5000])
+def test_a_robot_without_a_name_is_called_own(name: str) -> None:
+    assert robot_name({"toml": name, "urdf": ""}) == "own"
 
 
 @pytest.mark.parametrize("order", list(JobOrder))

@@ -4,7 +4,7 @@ import {
   convergences,
   distributions,
   isUnderWay,
-  publishedOf,
+  referencesOf,
 } from '../src/compare/series'
 
 const job = (changes: Partial<ComparedJob['convergence']>, fitness: number[]): ComparedJob => ({
@@ -32,16 +32,21 @@ const long = job(
   [1, 5],
 )
 
-test('published designs are drawn once each, and jobs under way are asked for again', () => {
-  const reference = { name: 'A', fitness: 20.93 }
-  const none = { name: 'A', fitness: null }
+test('what jobs are measured against is drawn once each, and jobs under way are asked for again', () => {
+  const reference = { name: 'A', kind: 'published', fitness: 20.93 } as const
+  const start = { name: 'start design', kind: 'start', fitness: 40 } as const
+  const none = { ...reference, fitness: null }
   const jobs = [
     short,
     { ...short, reference },
     { ...long, reference },
     { ...long, reference: none },
+    { ...long, reference: start },
   ]
-  expect(publishedOf(jobs)).toEqual([reference])
+  expect(referencesOf(jobs)).toEqual([
+    { label: 'published A', fitness: 20.93 },
+    { label: 'start design', fitness: 40 },
+  ])
   const states = ['queued', 'running', 'pausing', 'paused', 'succeeded'] as const
   expect(states.filter((state) => isUnderWay({ ...short, state }))).toHaveLength(3)
 })

@@ -1,4 +1,4 @@
-"""Lets the published design walk as a job's own do, so that its gain over that is known."""
+"""Lets a job's reference walk as its own designs do, so that its gain over that is known."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 from services.optimizer.jobs.job import Job
 from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.provenance import changes_since, job_provenance
-from services.optimizer.jobs.reference import Reference, published_for
+from services.optimizer.jobs.reference import START, Reference, reference_design
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.port.base import Store
 from sim.case import Walk, run_together
@@ -22,7 +22,7 @@ from sim.outcome import Status
 from sim.worlds.perturbed_walk import PerturbedWalk
 
 NONE: Final = Reference(None, None)
-"""Of a job for which nothing was published."""
+"""Of a job of a shipped robot for which nothing was published."""
 
 _JUDGED_BY: Final = frozenset(
     {"robot", "controller", "scenarios", "preference", "variables", "fixed", "worlds"}
@@ -33,7 +33,7 @@ _log = logging.getLogger(__name__)
 
 
 def walked_reference(spec: Spec) -> Reference:
-    """Let the published design of a job walk in the job's cases.
+    """Let the published or the start design of a job walk in the job's cases.
 
     Args:
         spec: Of the job.
@@ -44,7 +44,7 @@ def walked_reference(spec: Spec) -> Reference:
     Raises:
         SimulationError: It cannot be simulated here.
     """
-    if published_for(spec) is None:
+    if reference_design(spec) is None:
         return NONE
     return _walked(spec.model_dump_json(include=set(_JUDGED_BY)))
 
@@ -52,10 +52,10 @@ def walked_reference(spec: Spec) -> Reference:
 @lru_cache(maxsize=64)
 def _walked(judged_by: str) -> Reference:
     spec = JobSpec.model_validate_json(judged_by)
-    found = published_for(spec)
+    found = reference_design(spec)
     if found is None:
         return NONE
-    name, design = found
+    name, kind, design = found
     cases = [
         replace(case, variables=tuple(design), precision="double")
         for case in spec.cases({})
@@ -66,7 +66,7 @@ def _walked(judged_by: str) -> Reference:
     objectives = np.stack([outcome.objectives for outcome in outcomes], axis=1)
     failed = np.stack([outcome.statuses != Status.OK for outcome in outcomes], axis=1)
     fitness = float(spec.judge(objectives, failed).fitness[0])
-    return Reference(name, fitness if math.isfinite(fitness) else None)
+    return Reference(name, fitness if math.isfinite(fitness) else None, kind)
 
 
 def with_reference(store: Store, job: Job) -> tuple[Job, str | None]:
@@ -96,7 +96,7 @@ def with_reference(store: Store, job: Job) -> tuple[Job, str | None]:
                 return job, "its numbers come of other code, or of other libraries, than there are"
             reference = walked_reference(job.spec)
         except (SimulationError, OSError) as error:
-            return job, f"the published design cannot walk here: {error}"
+            return job, f"the design that it is compared with cannot walk here: {error}"
         store.note_reference(job.id, reference)
         job = replace(job, reference=reference)
     return job, None if job.gain is not None else _why_none(job)
@@ -107,7 +107,8 @@ def _why_none(job: Job) -> str:
     if reference.name is None:
         return "no design was published for its controller and its robot"
     if reference.fitness is None:
-        return f"the published design {reference.name} does not walk in all of its scenarios"
+        said = START if reference.kind == "start" else f"published design {reference.name}"
+        return f"the {said} does not walk in all of its scenarios"
     return "it has found no design yet that walks in every scenario"
 
 
@@ -130,5 +131,5 @@ def note_reference(store: Store, job: Job) -> Job:
         _log.exception("job %s: its best is compared with nothing", job.id)
     else:
         if reason is not None:
-            _log.debug("job %s: no gain over a published design: %s", job.id, reason)
+            _log.debug("job %s: no gain: %s", job.id, reason)
     return job

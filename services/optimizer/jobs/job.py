@@ -248,7 +248,7 @@ class Job:
 
     @property
     def gain(self) -> float | None:
-        """By which share its best is better than the published design [1]; None if not known."""
+        """By which share its best is better than its reference [1]; None if not known."""
         if self.reference is None:
             return None
         return self.reference.gain(self.progress.best_fitness)

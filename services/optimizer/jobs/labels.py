@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import json
+import tomllib
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Annotated, Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 from services.optimizer.jobs.preference import PREFERENCES
+from sim.robot.shipped import SHIPPED
 
 OWN: Final = "own"
-"""What a robot or a preference is called that is none of those shipped."""
+"""What a preference is called that is none of those shipped, and a robot that says no name."""
 
 Tag = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=40)]
 JobName = Annotated[str, StringConstraints(max_length=200)]
@@ -74,7 +77,7 @@ class JobFilter:
 
     Attributes:
         archived: Whether they are archived.
-        robot: Name of their robot, `own` for one of their users'.
+        robot: Name of their robot, `own` for any of their users'.
         controller: Motor controller that they tune.
         preference: Name of their preference, `own` for any other.
         tag: One of their tags.
@@ -101,7 +104,8 @@ class JobFilter:
             Whether it is.
         """
         wanted = (self.robot, self.controller, self.preference)
-        found = (facets.robot, facets.controller, facets.preference)
+        robot = OWN if self.robot == OWN and facets.own_robot else facets.robot
+        found = (robot, facets.controller, facets.preference)
         return all(w is None or w == f for w, f in zip(wanted, found, strict=True)) and (
             self.tag is None or self.tag in facets.tags
         )
@@ -116,10 +120,11 @@ class Facets:
 
     Attributes:
         state: Of the job.
-        robot: Its name, `own` for a user's own; None where it has none, or cannot be read.
+        robot: Its name; None where it has none, or cannot be read.
         controller: That it tunes; None for none.
         preference: Its name, `own` for any other; None for none.
         tags: Of the job.
+        own_robot: Whether the robot is a user's own.
     """
 
     state: str
@@ -127,6 +132,7 @@ class Facets:
     controller: str | None = None
     preference: str | None = None
     tags: tuple[str, ...] = ()
+    own_robot: bool = False
 
 
 @dataclass(slots=True)
@@ -174,14 +180,41 @@ def robot_name(robot: Any) -> str | None:
         robot: As the spec has it: a name, a variant or files; as object, document or JSON text.
 
     Returns:
-        Its name, `own` for files of a user; None for none.
+        Its name, of files that in robot.toml, or `own` where these say none or that of a shipped
+        robot; None for none.
     """
     known = _parsed(robot)
-    if isinstance(known, Mapping):
-        return str(known.get("name", OWN))
+    if is_own_robot(known):
+        return _name_in(str(_part(known, "toml")))
     if known is None or isinstance(known, str):
         return known or None
-    return str(getattr(known, "name", OWN))
+    return str(_part(known, "name") or OWN)
+
+
+def is_own_robot(robot: Any) -> bool:
+    """Say whether the robot of a spec is a user's own.
+
+    Args:
+        robot: As for `robot_name`.
+
+    Returns:
+        Whether it is given by its files.
+    """
+    return _part(_parsed(robot), "toml") is not None
+
+
+def _part(robot: Any, name: str) -> Any:
+    return robot.get(name) if isinstance(robot, Mapping) else getattr(robot, name, None)
+
+
+@lru_cache(maxsize=256)
+def _name_in(toml: str) -> str:
+    """Of lists with many jobs of one robot it is read once."""
+    try:
+        name = tomllib.loads(toml).get("name")
+    except (tomllib.TOMLDecodeError, RecursionError):
+        return OWN
+    return name if isinstance(name, str) and name and name not in SHIPPED else OWN
 
 
 def preference_name(preference: Any) -> str | None:

@@ -1,32 +1,41 @@
-"""What a job's best is measured against: a published design, judged as the job's own are."""
+"""What a job's best is measured against: a published or a start design, judged as its own are."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
 
 from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.labels import robot_name
+from services.optimizer.jobs.labels import is_own_robot
 from services.optimizer.jobs.preference import PREFERENCES
 from services.optimizer.jobs.spec import Spec
 from sim.controllers import CONTROLLERS
 from sim.gait_variables import GAIT_CATALOGUE
-from sim.robot.shipped import SHIPPED
+
+ReferenceKind = Literal["published", "start"]
+
+START: Final = "start design"
+"""What the middle of a job's bounds is called."""
 
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """A published design in the cases of a job.
+    """A published design, or the start design, in the cases of a job.
 
     Attributes:
-        name: Of the study or preference that it was published for; None where there is none for
-            the job.
+        name: Of the study or preference that it was published for, or `START`; None where there is
+            none for the job.
         fitness: What it comes to, judged as the job judges, in double precision; None where it
             does not walk in every case.
+        kind: Whether it was published or is the middle of the job's bounds.
     """
 
     name: str | None
     fitness: float | None
+    kind: ReferenceKind = "published"
 
     def gain(self, fitness: float | None) -> float | None:
         """How much better a design is.
@@ -60,9 +69,46 @@ def published_for(spec: Spec) -> tuple[str, Mapping[str, float]] | None:
     if not isinstance(spec, JobSpec) or spec.case is not None:
         return None
     study = published_study(spec)
-    if study is None or robot_name(spec.robot) not in SHIPPED:
+    if study is None or is_own_robot(spec.robot):
         return None
     return study, on_the_jobs_terms(CONTROLLERS[spec.controller].published[study], spec)
+
+
+def start_of(spec: Spec) -> Mapping[str, float] | None:
+    """The start design of a job: the middle of the bounds within which it searches.
+
+    Nobody published a design of a user's own robot; this one shows what the search has gained.
+
+    Args:
+        spec: Of the job.
+
+    Returns:
+        Its values by name; None for a shipped robot, a plug-in's case, and a job that tunes no
+        drive.
+    """
+    if not isinstance(spec, JobSpec) or spec.case is not None or not is_own_robot(spec.robot):
+        return None
+    space = spec.design_space()
+    middle = space.designs(np.array([(space.low + space.high) / 2.0]))
+    (values,) = space.simulated(middle).tolist()
+    return dict(zip(space.names, values, strict=True))
+
+
+def reference_design(spec: Spec) -> tuple[str, ReferenceKind, Mapping[str, float]] | None:
+    """The design that a job's best is measured against.
+
+    Args:
+        spec: Of the job.
+
+    Returns:
+        Its name, its kind and its values; None for none.
+    """
+    published = published_for(spec)
+    if published is not None:
+        name, design = published
+        return name, "published", design
+    start = start_of(spec)
+    return None if start is None else (START, "start", start)
 
 
 def published_study(spec: JobSpec) -> str | None:

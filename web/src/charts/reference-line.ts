@@ -4,14 +4,15 @@ import type uPlot from 'uplot'
 import { formatNumber } from '../format/number'
 import { themeColour } from '../theme'
 
-/** Published design that jobs are measured against. */
-export interface Published {
-  readonly name: string
+/** What jobs are measured against. */
+export interface ReferenceLine {
+  /** `published A`, or `start design`. */
+  readonly label: string
   readonly fitness: number
 }
 
-export function publishedLabel({ name, fitness }: Published): string {
-  return `published ${name} ${formatNumber(fitness)}`
+export function lineLabel({ label, fitness }: ReferenceLine): string {
+  return `${label} ${formatNumber(fitness)}`
 }
 
 export function chartFont(): string {
@@ -19,9 +20,9 @@ export function chartFont(): string {
 }
 
 /** Nothing where it lies outside of what is shown. */
-export function paintPublished(plot: uPlot, published: Published): void {
+export function paintReference(plot: uPlot, reference: ReferenceLine): void {
   const { ctx, bbox } = plot
-  const y = plot.valToPos(published.fitness, 'y', true)
+  const y = plot.valToPos(reference.fitness, 'y', true)
   if (y < bbox.top || y > bbox.top + bbox.height) return
   ctx.save()
   ctx.font = chartFont()
@@ -34,6 +35,6 @@ export function paintPublished(plot: uPlot, published: Published): void {
   ctx.stroke()
   ctx.textAlign = 'right'
   ctx.textBaseline = y - bbox.top > 20 * devicePixelRatio ? 'bottom' : 'top'
-  ctx.fillText(publishedLabel(published), bbox.left + bbox.width - 4 * devicePixelRatio, y)
+  ctx.fillText(lineLabel(reference), bbox.left + bbox.width - 4 * devicePixelRatio, y)
   ctx.restore()
 }

@@ -3,14 +3,14 @@
 import { useCallback, useMemo } from 'preact/hooks'
 import type uPlot from 'uplot'
 import { LineChart } from '../charts/line-chart'
-import { paintPublished, publishedLabel } from '../charts/reference-line'
+import { lineLabel, paintReference } from '../charts/reference-line'
 import { ChartFrame, LegendEntry } from '../components/chart-frame'
 import { Check } from '../components/check'
 import { Table } from '../components/table'
 import { formatNumber } from '../format/number'
 import { fittedRange } from '../job/convergence-model'
 import { flag, oneOf, RANGE, useQueryValue } from '../router/query-value'
-import { type Axis, type ComparedJob, colourOf, convergences, dashOf, publishedOf } from './series'
+import { type Axis, type ComparedJob, colourOf, convergences, dashOf, referencesOf } from './series'
 
 const AXES: Readonly<Record<Axis, { label: string; unit?: string }>> = {
   iterations: { label: 'iteration' },
@@ -44,18 +44,18 @@ export function ConvergenceCard({
       })),
     [jobs, lines],
   )
-  const published = useMemo(() => (comparable ? publishedOf(jobs) : []), [jobs, comparable])
+  const references = useMemo(() => (comparable ? referencesOf(jobs) : []), [jobs, comparable])
   const range = useMemo(() => {
-    const levels = published.map(({ fitness }) => fitness)
+    const levels = references.map(({ fitness }) => fitness)
     return fittedRange(lines, levels, logarithmic)
-  }, [lines, published, logarithmic])
+  }, [lines, references, logarithmic])
   const over = useCallback(
     (plot: uPlot) => {
-      for (const each of published) paintPublished(plot, each)
+      for (const each of references) paintReference(plot, each)
     },
-    [published],
+    [references],
   )
-  const beside = published.map((each) => `; ${publishedLabel(each)}`).join('')
+  const beside = references.map((each) => `; ${lineLabel(each)}`).join('')
   return (
     <ChartFrame
       title="Convergence"

@@ -1,7 +1,8 @@
 /** Lines of several jobs over one axis, which a chart of lines takes with the same x for all. Pure. */
 
 import type { JobComparison } from '../api/types'
-import type { Published } from '../charts/reference-line'
+import type { ReferenceLine } from '../charts/reference-line'
+import { referenceLabel } from '../job/gain'
 
 export type ComparedJob = JobComparison['jobs'][number]
 
@@ -10,13 +11,13 @@ export function isUnderWay({ state }: ComparedJob): boolean {
   return ['queued', 'running', 'pausing'].includes(state)
 }
 
-/** Published designs that jobs of one measure are compared with, each once. */
-export function publishedOf(jobs: readonly ComparedJob[]): readonly Published[] {
-  const found = new Map<string, Published>()
+/** What jobs of one measure are compared with, each once. */
+export function referencesOf(jobs: readonly ComparedJob[]): readonly ReferenceLine[] {
+  const found = new Map<string, ReferenceLine>()
   for (const { reference } of jobs) {
     if (typeof reference?.fitness !== 'number') continue
-    const { name, fitness } = reference
-    found.set(`${name} ${fitness}`, { name, fitness })
+    const label = referenceLabel(reference)
+    found.set(`${label} ${reference.fitness}`, { label, fitness: reference.fitness })
   }
   return [...found.values()]
 }

@@ -6,7 +6,7 @@ import { getBytes } from '../api/client'
 import { useResource, useSlowly } from '../api/resource'
 import type { Iteration, Job } from '../api/types'
 import { type Band, LineChart, type Series } from '../charts/line-chart'
-import { type Published, publishedLabel } from '../charts/reference-line'
+import { lineLabel, type ReferenceLine } from '../charts/reference-line'
 import { ChartFrame, LegendEntry } from '../components/chart-frame'
 import { Check } from '../components/check'
 import { formatCount, formatNumber, withUnit } from '../format/number'
@@ -38,7 +38,7 @@ export function ConvergenceChart({
   iterations: readonly Iteration[]
   distribution: Distribution
   /** What the best is measured against. */
-  reference: Published | null
+  reference: ReferenceLine | null
 }) {
   const [logarithmic, setLogarithmic] = useQueryValue('log', flag(true), true)
   const [zoom, setZoom] = useQueryValue('zoom', RANGE, null)
@@ -105,7 +105,7 @@ export function ConvergenceChart({
 }
 
 function describe(iterations: number, best: number | null, { reference }: Painted): string {
-  const beside = reference ? `, ${publishedLabel(reference)}` : ''
+  const beside = reference ? `, ${lineLabel(reference)}` : ''
   return `Convergence over ${iterations} iterations; best fitness ${formatNumber(best)}${beside}`
 }
 
@@ -145,7 +145,7 @@ function paintedOf({
   range: readonly [number, number] | null
   /** Of the spread that is drawn. */
   highest: Line | null
-  reference: Published | null
+  reference: ReferenceLine | null
 }): Painted {
   const last = drawn.x.at(-1)
   return {

@@ -2,13 +2,13 @@
 
 import type uPlot from 'uplot'
 import { withAlpha } from '../charts/line-chart'
-import { chartFont, type Published, paintPublished } from '../charts/reference-line'
+import { chartFont, paintReference, type ReferenceLine } from '../charts/reference-line'
 import { themeColour } from '../theme'
 import type { Dots } from './convergence-model'
 
 export interface Painted {
   readonly dots: Dots | null
-  readonly reference: Published | null
+  readonly reference: ReferenceLine | null
   /** Where the best line ends, and what is written there. */
   readonly end: { readonly x: number; readonly y: number; readonly label: string } | null
   /** Iterations in which something lies above the range. */
@@ -34,7 +34,7 @@ export function paintDots(plot: uPlot, { dots }: Painted): void {
 /** The reference, marks and the label, over the lines. */
 export function paintOver(plot: uPlot, painted: Painted): void {
   const { ctx } = plot
-  if (painted.reference) paintPublished(plot, painted.reference)
+  if (painted.reference) paintReference(plot, painted.reference)
   ctx.save()
   ctx.font = chartFont()
   paintAbove(plot, painted.above)

@@ -1,12 +1,13 @@
-/** By which share a job's best is better than the published design. */
+/** By which share a job's best is better than the published design, or than the start. */
 
 import { get } from '../api/client'
 import { useResource } from '../api/resource'
-import type { StoredJob } from '../api/types'
+import type { ReferenceView, StoredJob } from '../api/types'
+import type { ReferenceLine } from '../charts/reference-line'
 
 export interface Gain {
-  /** The published design; null while it is not known, and where there is none. */
-  readonly reference: { readonly name: string; readonly fitness: number } | null
+  /** Null while it is not known, and where there is none. */
+  readonly reference: ReferenceLine | null
   /** [1]; null if it is not known. */
   readonly share: number | null
   /** Why it is not known, for people. */
@@ -27,12 +28,17 @@ export function useGain(job: StoredJob | null): Gain {
 }
 
 export function gainOf(
-  reference: { readonly name: string; readonly fitness: number | null } | null,
+  reference: ReferenceView | null,
   best: number | null,
   reason: string | null,
 ): Gain {
   if (reference === null || reference.fitness === null) return { ...UNKNOWN, reason }
-  const { name, fitness } = reference
+  const { fitness } = reference
   const share = best === null || !(fitness > 0) ? null : 1 - best / fitness
-  return { reference: { name, fitness }, share, reason }
+  return { reference: { label: referenceLabel(reference), fitness }, share, reason }
+}
+
+/** What a job's best is measured against, for people. */
+export function referenceLabel({ name, kind }: Pick<ReferenceView, 'name' | 'kind'>): string {
+  return kind === 'start' ? name : `published ${name}`
 }

@@ -107,12 +107,12 @@ function Figures({ job, gain, committed }: { job: StoredJob; gain: Gain; committ
       />
       {gain.reference && (
         <Figure
-          label={`Gain over published ${gain.reference.name}`}
+          label={`Gain over ${gain.reference.label}`}
           value={`${percent(gain.share, 3)}, from ${quantity(gain.reference.fitness, unit, 5)}`}
         />
       )}
       {gain.reference === null && gain.reason !== null && job.kind === 'tuning' && (
-        <Figure label="Gain over a published design" value={`none: ${gain.reason}`} />
+        <Figure label="Gain" value={`none: ${gain.reason}`} />
       )}
       {search && (
         <Figure

@@ -8,6 +8,7 @@ import { formatNumber, percent, quantity } from '../format/number'
 import { formatAge, formatDuration, formatMoment } from '../format/time'
 import { budgetSpent, spentInWords } from '../job/budget'
 import { fitnessUnit } from '../job/fitness'
+import { referenceLabel } from '../job/gain'
 import { jobPath } from '../router/routes'
 import { Sparkline, type Sparklines } from './sparkline'
 
@@ -118,9 +119,7 @@ export function jobColumns(
 
 function GainCell({ job }: { job: JobSummary }) {
   if (typeof job.gain !== 'number' || !job.reference) return '–'
-  return (
-    <span title={`over the published design ${job.reference.name}`}>{percent(job.gain, 3)}</span>
-  )
+  return <span title={`over ${referenceLabel(job.reference)}`}>{percent(job.gain, 3)}</span>
 }
 
 function NameCell({ job }: { job: JobSummary }) {

@@ -26,13 +26,21 @@ test('each variable of the winner has its place in its bounds', () => {
 })
 
 test('a gain is over a published design that walks, of a best that there is', () => {
-  expect(gainOf({ name: 'A', fitness: 20 }, 15, null).share).toBe(0.25)
-  expect(gainOf({ name: 'A', fitness: 20 }, null, null).share).toBeNull()
-  expect(gainOf({ name: 'A', fitness: null }, 15, 'it falls')).toEqual({
+  const published = { name: 'A', kind: 'published', fitness: 20 } as const
+  expect(gainOf(published, 15, null).share).toBe(0.25)
+  expect(gainOf(published, null, null).share).toBeNull()
+  expect(gainOf({ ...published, fitness: null }, 15, 'it falls')).toEqual({
     reference: null,
     share: null,
     reason: 'it falls',
   })
+})
+
+test('a gain says over what it is: a published design, or the start of an own robot', () => {
+  const published = { name: 'A', kind: 'published', fitness: 20 } as const
+  const start = { name: 'start design', kind: 'start', fitness: 20 } as const
+  expect(gainOf(published, 15, null).reference?.label).toBe('published A')
+  expect(gainOf(start, 15, null).reference?.label).toBe('start design')
 })
 
 test('a notice says how the job ended, and whether there can be one', () => {

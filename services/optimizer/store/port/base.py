@@ -249,7 +249,7 @@ class Store(CommittedHistory, Deletions, KeptRecordings, Labelling, Runs, Protoc
 
         Args:
             job_id: Of the job; one that is gone is let be.
-            reference: The published design in the job's cases.
+            reference: The published or the start design in the job's cases.
         """
 
     def audit(

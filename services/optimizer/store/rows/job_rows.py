@@ -147,6 +147,7 @@ def reference_of(document: Any) -> Reference | None:
     return Reference(
         name if isinstance(name, str) else None,
         float(fitness) if isinstance(fitness, int | float) else None,
+        "start" if document.get("kind") == "start" else "published",
     )
 
 

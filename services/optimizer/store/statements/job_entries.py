@@ -64,7 +64,7 @@ class JobEntry:
 
     @property
     def gain(self) -> float | None:
-        """Over the published design [1]."""
+        """Over its reference [1]."""
         known = reference_of(self.reference)
         return None if known is None else known.gain(self.best_fitness)
 

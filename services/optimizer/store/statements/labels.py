@@ -13,6 +13,7 @@ from services.optimizer.jobs.labels import (
     FacetCounts,
     Facets,
     LabelsChange,
+    is_own_robot,
     preference_name,
     robot_name,
 )
@@ -87,7 +88,12 @@ def to_facets(row: Any) -> Facets:
     state, labels, robot, controller, preference = row
     tags = labels.get("tags", ()) if isinstance(labels, dict) else ()
     return Facets(
-        state, robot_name(robot), controller or None, preference_name(preference), tuple(tags)
+        state,
+        robot_name(robot),
+        controller or None,
+        preference_name(preference),
+        tuple(tags),
+        own_robot=is_own_robot(robot),
     )
 
 

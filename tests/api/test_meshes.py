@@ -12,9 +12,10 @@ import pytest
 from gaitswarm import mesh_library
 from gaitswarm.mesh_library import urdf_digest
 from gaitswarm.requests.replay import ReplayRequest, run_replay
+from tests.examples.commands import run_command
 from tests.examples.meshes import tetrahedron, with_mesh
 from tests.examples.paths import QUADRUPED
-from tests.examples.servers import Server, unframed
+from tests.examples.servers import Server, ServerProcess, unframed
 from tests.examples.walks import PUBLISHED_A, SHORT_WALK
 
 SECRET = "not for readers"
@@ -120,6 +121,25 @@ def test_nothing_is_asked_for_by_a_path(server: Server, digest: str, end: str) -
 def test_a_robot_in_no_folder_has_none(server: Server) -> None:
     assert listed(server, 64 * "0") == {}
     assert server.client.get("/v1/robots/..%2f..%2f/meshes").status_code in (404, 422)
+
+
+@pytest.mark.slow
+def test_serve_gives_out_the_meshes_of_the_folders_that_its_option_names_and_no_others(
+    folder: Path, digest: str, tmp_path: Path
+) -> None:
+    told, untold = (
+        ServerProcess(tmp_path / f"{name}.db", "--no-runner", *options)
+        for name, options in (("told", ("--robots", str(folder))), ("untold", ()))
+    )
+    try:
+        items = told.client.get(f"/v1/robots/{digest}/meshes").json()["items"]
+        assert [item["name"] for item in items if item["url"]][:2] == [*NAMES[:2]]
+        assert untold.client.get(f"/v1/robots/{digest}/meshes").json()["items"] == []
+    finally:
+        told.close()
+        untold.close()
+    refused = run_command("serve", "--robots", tmp_path / "nowhere")
+    assert refused.code == 2 and "nowhere" in refused.err
 
 
 def test_a_replay_tells_where_meshes_are(digest: str, folder: Path) -> None:

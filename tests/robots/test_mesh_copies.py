@@ -97,3 +97,15 @@ def test_what_is_too_large_or_in_anothers_place_is_left_out(
 )
 def test_a_copy_lies_inside_of_the_folder(name: str, place: str | None) -> None:
     assert own_place(name) == (None if place is None else Path(place))
+
+
+def test_init_says_how_the_page_shows_the_copies(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "trunk.stl").touch()
+    urdf = tmp_path / "dog.urdf"
+    urdf.write_text(named("trunk.stl"), encoding="utf-8")
+    for options, said in (((), True), (("--no-meshes",), False)):
+        folder = tmp_path / f"dog-{said}"
+        assert run(["robot", "init", str(urdf), "-o", str(folder), *options]) == 0
+        assert (f"gaitswarm serve --robots {folder}" in capsys.readouterr().err) == said

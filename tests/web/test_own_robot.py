@@ -64,6 +64,12 @@ def test_meshes_of_a_robot_of_ones_own_are_drawn_and_can_be_switched_off(
     meshes.uncheck()
     painted(canvas, lambda image: green(image) == 0)
 
+    expect(page.get_by_text("gaitswarm serve --robots FOLDER")).to_have_count(0)
+    (folder / "robot.urdf").unlink()
+    page.reload()
+    expect(player).to_have_attribute("data-meshes", "0")
+    expect(page.get_by_text("gaitswarm serve --robots FOLDER")).to_be_visible()
+
     expect(page.get_by_text("This robot has no published design.")).to_be_visible()
     expect(page.get_by_label("Scenario").locator("option")).to_have_count(1)
     page.goto(f"{server.url}/jobs/{job_id}/scenarios")

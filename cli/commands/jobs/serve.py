@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
@@ -51,6 +52,16 @@ def serve(
     no_runner: Annotated[
         bool, typer.Option("--no-runner", help="Run no jobs; other processes do.")
     ] = False,
+    robots: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="FOLDER",
+            exists=True,
+            file_okay=False,
+            help="Show this robot's meshes on the page, or those of the robots in this folder, to"
+            " whoever may read the jobs; may be repeated. [env: GAITSWARM_ROBOTS; default: none]",
+        ),
+    ] = None,
     options: RunnerOptions,
 ) -> None:
     """Serve the page and the REST API, and run queued jobs, until Ctrl-C."""
@@ -72,7 +83,9 @@ def serve(
         from services.monitoring.metrics import Metrics
         from services.optimizer.errors import EvaluatorUnavailable
 
-        settings = read_settings(**asdict(options), api_host=host, api_port=port)
+        settings = read_settings(
+            **asdict(options), api_host=host, api_port=port, robots=robots or None
+        )
         log_to_stderr(settings.log_level, settings.log_format)
         tell = note if settings.log_format == "console" else logging.getLogger("gaitswarm").info
         metrics = Metrics()

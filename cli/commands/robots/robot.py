@@ -98,6 +98,8 @@ def init(
     note(
         f"robot {made.name!r} written to {output}; look at it with `gaitswarm robot check {output}`"
     )
+    if made.meshes.copied:
+        note(f"`gaitswarm serve --robots {output}` shows its meshes on the page")
 
 
 def check(

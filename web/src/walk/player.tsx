@@ -11,7 +11,7 @@ import type { Playback } from './playback'
 import { PlayerControls, type ViewChoices } from './player-controls'
 import { pressed } from './player-keys'
 import { type Recorded, replaysOf } from './recorded'
-import type { Replay } from './replay'
+import { hasMeshes, type Replay } from './replay'
 import { LONGEST_STEP, LONGEST_STEP_OF_FILM, ReplayDriver } from './replay-driver'
 import type { CameraPlace, ViewName } from './scene/camera-rig'
 import type { WalkScene } from './scene/walk-scene'
@@ -44,6 +44,7 @@ export function Player({
   /** Meshes that were loaded, and why there are none of a robot that should have some. */
   const [meshes, setMeshes] = useState(0)
   const [lost, setLost] = useState<string | null>(null)
+  const [asked, setAsked] = useState(false)
   /** Choices as they are when something is loaded later. */
   const shown = useRef(choices)
   shown.current = choices
@@ -66,6 +67,7 @@ export function Player({
     setDrawn(false)
     setMeshes(0)
     setLost(null)
+    setAsked(false)
     import('./scene/walk-scene').then(
       ({ WalkScene }) => {
         if (leave.signal.aborted) return
@@ -82,6 +84,7 @@ export function Player({
             .loadMeshes(() => shown.current.meshes, leave.signal)
             .then((count) => {
               setMeshes(count)
+              setAsked(true)
               replayDriver.request()
             })
             .catch((error: unknown) => !leave.signal.aborted && setLost(messageOf(error)))
@@ -149,6 +152,9 @@ export function Player({
       </div>
       <SceneLegend walks={walks} cell={extent.cell} newtons={newtons} choices={choices} />
       {lost !== null && <p class="muted small">Meshes cannot be loaded: {lost}</p>}
+      {asked && meshes === 0 && walks.some(({ replay }) => hasMeshes(replay.header)) && (
+        <NoMeshes />
+      )}
       <PlayerControls
         playback={playback}
         comparing={walks.length > 1}
@@ -162,6 +168,15 @@ export function Player({
         <FilmDialog playback={playback} onRecord={record} onClose={() => setFilming(false)} />
       )}
     </section>
+  )
+}
+
+function NoMeshes() {
+  return (
+    <p class="muted small">
+      Simple solids: the server has none of the meshes that the robot's URDF names.{' '}
+      <code>gaitswarm serve --robots FOLDER</code> shows those in the robot's folder.
+    </p>
   )
 }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 import numpy as np
@@ -33,6 +34,16 @@ def test_the_surface_is_drawn_and_its_numbers_are_the_apis(
     for name, value in (("min", inference.min()), ("max", inference.max())):
         assert float(drawn.get_attribute(f"data-{name}") or "nan") == pytest.approx(value)
     painted(drawn.locator("canvas"), colourful(200))
+
+    # The camera stands where the link puts it: turned to and fro, it is there again.
+    page.goto("/controller?published=A&camera=-1.5:-2.5:1.5:0:0:-0.04")
+    painted(drawn.locator("canvas"), colourful(200))
+    drawn.press("ArrowLeft")
+    expect(page).not_to_have_url(re.compile("camera=-1.5"))
+    drawn.press("ArrowRight")
+    expect(page).to_have_url(re.compile(re.escape("camera=-1.5%3A-2.5%3A1.5%3A0%3A0%3A-0.04")))
+    page.get_by_role("button", name="Reset view").click()
+    expect(page).not_to_have_url(re.compile("camera="))
 
     heat = page.locator('canvas[data-layer="inference"]')
     painted(heat, colourful(50))

@@ -131,6 +131,10 @@ def test_a_new_order_begins_on_the_first_page(
     page = visit(server.url).go(f"/jobs/{job_id}/iterations")
     page.get_by_role("button", name="Next").click()
     expect(page.get_by_text("page 2 of 2")).to_be_visible()
+    # A link shows the same page.
+    expect(page).to_have_url(re.compile("page=2$"))
+    page.reload()
+    expect(page.get_by_text("page 2 of 2")).to_be_visible()
     page.get_by_role("columnheader", name="Worst").get_by_role("button").click()
     expect(page.get_by_text("page 1 of 2")).to_be_visible()
 

@@ -208,6 +208,10 @@ def test_a_jobs_headline_convergence_winner_and_walk(
     expect(page.get_by_role("img", name=re.compile("^Timeline of"))).to_be_visible()
     machines = page.get_by_role("table", name="Workers of the job").locator("tbody tr")
     expect(machines).to_have_count(1)
+    page.get_by_label("Least grave messages").select_option("from error on")
+    expect(page).to_have_url(re.compile("level=ERROR$"))
+    page.reload()
+    expect(page.get_by_label("Least grave messages")).to_have_value("ERROR")
     page.go_back()
 
     # Little movement is asked for: nothing walks by itself, and nothing is loaded for it.

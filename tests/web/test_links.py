@@ -94,13 +94,14 @@ def test_a_link_shows_a_walk_at_its_moment(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:
     camera = "0.9:-1.3:0.6:0.1:0:0"
-    page = visit(server.url).go(f"/walk?t=1.25&view=no-trail&camera={camera}")
+    page = visit(server.url).go(f"/walk?t=1.25&view=no-trail&zoom=0.5:1.5&camera={camera}")
     player = page.locator("[data-player]")
+    expect(page.locator(".uplot").first).to_have_attribute("data-range", "0.5 1.5")
     expect(player).to_have_attribute("data-time", "1.2500")
     expect(page.get_by_label("Trail")).not_to_be_checked()
     page.get_by_role("button", name="One frame ahead").click()
     page.get_by_label("Forces").uncheck()
-    query = re.compile(r"t=1\.26&view=no-forces%2Cno-trail&camera=(.+)$")
+    query = re.compile(r"t=1\.26&view=no-forces%2Cno-trail&zoom=.+&camera=(.+)$")
     expect(page).to_have_url(query)
     # The camera stands where the link puts it: turned to and fro, it is there again.
     player.locator("canvas").press("Shift+ArrowLeft")

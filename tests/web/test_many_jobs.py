@@ -90,7 +90,21 @@ def test_every_job_is_reached_by_pages(
     expect(page.locator("[data-job]")).to_have_count(3)
     assert rows(page) == ids[2::-1]
     expect(page.get_by_text("page 2", exact=True)).to_be_visible()
+    # The page and what is chosen there are the address's: Back and a reload come to both again.
+    page.locator(f"[data-job='{ids[1]}']").get_by_role("checkbox").check()
+    page.get_by_role("link", name="job 0", exact=True).click()
+    expect(page).to_have_url(re.compile(f"/jobs/{ids[0]}$"))
+    page.go_back()
+    expect(page.locator("[data-job]")).to_have_count(3)
+    page.reload()
+    expect(page.locator("[data-job]")).to_have_count(3)
+    expect(page.locator("[data-chosen='1']")).to_be_visible()
     page.get_by_role("button", name="Previous").click()
+    expect(page.locator("[data-job]")).to_have_count(50)
+    page.go_back()
+    expect(page.locator("[data-job]")).to_have_count(3)
+    # Another order begins anew.
+    page.get_by_label("Order").select_option("name")
     expect(page.locator("[data-job]")).to_have_count(50)
 
 

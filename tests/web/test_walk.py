@@ -6,6 +6,7 @@ import re
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import httpx2
@@ -114,7 +115,17 @@ def test_a_replay_is_saved_as_a_video_of_the_chosen_size_and_speed(
 ) -> None:
     page = visit(server.url).go("/walk?published=A&scenario=normal-fast&t=0.5")
     shown = player(page)
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Save as picture").click()
+    assert (
+        download.value.suggested_filename == "published-a-fuzzy-pi-scenario-normal-fast-0-50-s.png"
+    )
+    still = Path(download.value.path()).read_bytes()
+    assert still.startswith(b"\x89PNG")
     before = shown.locator("canvas").bounding_box()
+    assert before is not None
+    assert int.from_bytes(still[16:20]) == 2 * round(before["width"])
+
     page.get_by_role("button", name="Save as video").click()
     dialog = page.get_by_role("dialog", name="Save as video")
     # What is stopped is not saved.

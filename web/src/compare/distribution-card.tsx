@@ -1,7 +1,7 @@
 /** The distribution function of every job's fitness: how many of its designs are how good. */
 
 import { useMemo } from 'preact/hooks'
-import { LineChart } from '../charts/line-chart'
+import { LinkedChart } from '../charts/linked-chart'
 import { ChartFrame, LegendEntry } from '../components/chart-frame'
 import { Table } from '../components/table'
 import { formatNumber, percent } from '../format/number'
@@ -56,7 +56,8 @@ export function DistributionCard({ jobs }: { jobs: readonly ComparedJob[] }) {
         />
       )}
     >
-      <LineChart
+      <LinkedChart
+        zoomName="zoom-distribution"
         label={`Distribution of fitness of ${jobs.length} jobs`}
         x={x}
         xLabel="fitness"

@@ -35,6 +35,7 @@ export function Table<R>({
   order: initial,
   onOrder,
   pageSize = 50,
+  paging,
   tall = false,
   rowData,
   elsewhere,
@@ -48,6 +49,8 @@ export function Table<R>({
   /** Told of every other order. */
   onOrder?: (order: SortOrder) => void
   pageSize?: number
+  /** The page that is shown, from 0, where the address holds it; else the table holds it itself. */
+  paging?: readonly [page: number, onPage: (page: number) => void]
   /** Scroll inside a box of limited height. */
   tall?: boolean
   /** data- attributes of a row. */
@@ -57,7 +60,8 @@ export function Table<R>({
 }) {
   const [own, setOrder] = useState<SortOrder | null>(initial ?? null)
   const order = elsewhere?.order ?? own
-  const [wanted, setWanted] = useState(0)
+  const ownPage = useState(0)
+  const [wanted, setWanted] = paging ?? ownPage
   const sink = useContext(TableSink)
   if (sink) {
     sink({ caption, columns, rows } as unknown as CollectedTable)

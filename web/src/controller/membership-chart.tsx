@@ -1,7 +1,8 @@
 /** The fuzzy sets of an input or output: how much every value belongs to each. */
 
 import { useMemo } from 'preact/hooks'
-import { LineChart, type Series } from '../charts/line-chart'
+import type { Series } from '../charts/line-chart'
+import { LinkedChart } from '../charts/linked-chart'
 import { ChartFrame, LegendEntry } from '../components/chart-frame'
 import { type Column, Table } from '../components/table'
 import { formatNumber } from '../format/number'
@@ -42,7 +43,8 @@ export function MembershipChart({
           <LegendEntry key={label} label={label} colour={colour} />
         ))}
       >
-        <LineChart
+        <LinkedChart
+          zoomName={`zoom-${name}`}
           label={`Fuzzy sets of ${name}: ${memberships.map((m) => m.name).join(', ')}`}
           x={values}
           xLabel={name}

@@ -23,6 +23,7 @@ import {
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js'
 import { formatExact, formatNumber, withUnit } from '../format/number'
 import { currentTheme, themeColour } from '../theme'
+import type { CameraPlace } from '../walk/scene/camera-rig'
 import { disposeTree } from '../walk/scene/dispose'
 import { facingText } from '../walk/scene/label'
 import { palette } from '../walk/scene/palette'
@@ -50,6 +51,8 @@ export class SurfaceScene {
   constructor(
     private layer: Layer,
     private cell: Cell,
+    /** Told of every other place of the camera; null for the usual one. */
+    private readonly onPlaced: (place: CameraPlace | null) => void,
   ) {
     this.renderer = createRenderer()
     this.camera.up.set(0, 0, 1)
@@ -60,9 +63,10 @@ export class SurfaceScene {
     this.controls.enablePan = false
     this.controls.enableZoom = false
     this.controls.addEventListener('change', () => this.request())
+    this.controls.addEventListener('end', () => this.onPlaced(this.place))
     this.canvas.style.touchAction = 'pan-y'
     this.show(layer, cell)
-    this.resetView()
+    this.look(null)
   }
 
   get canvas(): HTMLCanvasElement {
@@ -102,14 +106,29 @@ export class SurfaceScene {
     if (steep < 0.99) this.camera.position.copy(lifted)
     this.controls.update()
     this.request()
+    this.onPlaced(this.place)
   }
 
   resetView(): void {
+    this.look(null)
+    this.onPlaced(null)
+  }
+
+  /** From a place, or the usual one, without telling of it. */
+  look(place: CameraPlace | null): void {
     const narrow = Math.min(1, this.camera.aspect / 1.5)
     this.camera.position.set(-1.35, -2.75, 1.75).multiplyScalar(1 / narrow)
     this.controls.target.set(0, 0, -0.04)
+    if (place) {
+      this.camera.position.set(...place.position)
+      this.controls.target.set(...place.target)
+    }
     this.controls.update()
     this.request()
+  }
+
+  private get place(): CameraPlace {
+    return { position: this.camera.position.toArray(), target: this.controls.target.toArray() }
   }
 
   resize(width: number, height: number): void {

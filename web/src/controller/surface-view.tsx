@@ -8,6 +8,7 @@ import { describeCanvas } from '../export/canvas-source'
 import { quantity, withUnit } from '../format/number'
 import { oneOf, useQueryValue } from '../router/query-value'
 import { useTheme } from '../theme'
+import { CAMERA } from '../walk/view-words'
 import { type Cell, cells, extent, type Layer, layerData } from './surface'
 import type { SurfaceScene } from './surface-scene'
 
@@ -57,8 +58,9 @@ export function SurfaceView({
 function Stage({ layer, cell }: { layer: Layer; cell: Cell }) {
   const stage = useRef<HTMLDivElement>(null)
   const scene = useRef<SurfaceScene | null>(null)
-  const latest = useRef({ layer, cell })
-  latest.current = { layer, cell }
+  const [camera, setCamera] = useQueryValue('camera', CAMERA, null)
+  const latest = useRef({ layer, cell, camera, setCamera })
+  latest.current = { layer, cell, camera, setCamera }
   const [failure, setFailure] = useState<string | null>(null)
   const theme = useTheme()
 
@@ -69,13 +71,14 @@ function Stage({ layer, cell }: { layer: Layer; cell: Cell }) {
     import('./surface-scene')
       .then(({ SurfaceScene }) => {
         if (left) return
-        const built = new SurfaceScene(latest.current.layer, latest.current.cell)
+        const { layer, cell } = latest.current
+        const built = new SurfaceScene(layer, cell, (place) => latest.current.setCamera(place))
         scene.current = built
         box.append(built.canvas)
         describeCanvas(built.canvas, { refresh: () => built.render() })
         const fill = () => box.clientWidth > 0 && built.resize(box.clientWidth, box.clientHeight)
         fill()
-        built.resetView()
+        built.look(latest.current.camera)
         observer = new ResizeObserver(fill)
         observer.observe(box)
       })

@@ -3,7 +3,8 @@
 import { useMemo } from 'preact/hooks'
 import type uPlot from 'uplot'
 import type { DistributionItem, Iteration, Job } from '../api/types'
-import { LineChart, withAlpha } from '../charts/line-chart'
+import { withAlpha } from '../charts/line-chart'
+import { LinkedChart } from '../charts/linked-chart'
 import { ChartFrame, LegendEntry } from '../components/chart-frame'
 import { formatNumber, percent } from '../format/number'
 import { themeColour } from '../theme'
@@ -71,7 +72,8 @@ export function DistributionChart({
         />
       )}
     >
-      <LineChart
+      <LinkedChart
+        zoomName="zoom-distribution"
         label={`Distribution of fitness over ${items.length} iterations`}
         x={drawn.x}
         xLabel="iteration"

@@ -1,7 +1,7 @@
 /** How far designs are spread over the design space. */
 
 import { useMemo } from 'preact/hooks'
-import { LineChart } from '../charts/line-chart'
+import { LinkedChart } from '../charts/linked-chart'
 import { ChartFrame } from '../components/chart-frame'
 import { percent } from '../format/number'
 import { ByIteration } from './by-iteration'
@@ -46,7 +46,8 @@ export function DiversityChart({ distribution }: { distribution: Distribution })
         />
       )}
     >
-      <LineChart
+      <LinkedChart
+        zoomName="zoom-diversity"
         label={`Diversity of the designs, now ${percent(items.at(-1)?.diversity)} of the range`}
         x={drawn.x}
         xLabel="iteration"

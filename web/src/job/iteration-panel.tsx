@@ -7,6 +7,7 @@ import { ErrorNotice, Loading } from '../components/feedback'
 import { type Column, Table } from '../components/table'
 import { formatNumber } from '../format/number'
 import { formatValue } from '../format/value'
+import { PAGE_NUMBER, useQueryValue } from '../router/query-value'
 import { jobPath, withQuery } from '../router/routes'
 import { searchedVariables } from './design-variables'
 import { caseWords, fitnessUnit } from './fitness'
@@ -19,6 +20,7 @@ export function IterationPanel({ job, index }: { job: Job; index: number }) {
       signal,
     }).then((answer) => answer.items),
   )
+  const paging = useQueryValue('page', PAGE_NUMBER, 0)
   return (
     <section class="card" aria-labelledby="designs">
       <header class="row spread">
@@ -53,6 +55,7 @@ export function IterationPanel({ job, index }: { job: Job; index: number }) {
           caption={`Designs of iteration ${index}`}
           rows={evaluations.data}
           rowKey={(e) => String(e.particle)}
+          paging={paging}
           order={{ column: 'fitness', descending: false }}
           columns={columns(job)}
           rowData={(e) => ({ 'data-particle': e.particle })}

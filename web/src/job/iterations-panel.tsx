@@ -6,7 +6,7 @@ import { Empty } from '../components/feedback'
 import { type Column, Table } from '../components/table'
 import { formatNumber } from '../format/number'
 import { formatMoment } from '../format/time'
-import { type Codec, flag, ORDER, useQueryValue } from '../router/query-value'
+import { type Codec, flag, ORDER, PAGE_NUMBER, useQueryValue } from '../router/query-value'
 import { jobPath } from '../router/routes'
 import { fitnessUnit } from './fitness'
 import type { LiveJob } from './use-job'
@@ -30,6 +30,7 @@ export function IterationsPanel({ live, job }: { live: LiveJob; job: Job }) {
       (below === Number.POSITIVE_INFINITY || (i.best !== null && i.best <= below)) &&
       (!improved || isImprovement(iterations, i)),
   )
+  const paging = useQueryValue('page', PAGE_NUMBER, 0)
   return (
     <section class="card" aria-labelledby="iterations">
       <header class="row spread">
@@ -73,6 +74,7 @@ export function IterationsPanel({ live, job }: { live: LiveJob; job: Job }) {
             caption="Iterations"
             rows={shown}
             rowKey={(i) => String(i.index)}
+            paging={paging}
             order={order}
             onOrder={setOrder}
             columns={columns(job)}

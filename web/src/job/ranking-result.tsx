@@ -2,7 +2,7 @@
 
 import { useMemo } from 'preact/hooks'
 import type { Job, Preference, RankedDesign, Ranking } from '../api/types'
-import { LineChart } from '../charts/line-chart'
+import { LinkedChart } from '../charts/linked-chart'
 import { ChartFrame } from '../components/chart-frame'
 import { Empty } from '../components/feedback'
 import { type Column, Table } from '../components/table'
@@ -239,7 +239,7 @@ function BestSoFar({ ranking }: { ranking: Ranking }) {
         />
       )}
     >
-      <LineChart
+      <LinkedChart
         label="Best fitness so far under this preference by iteration"
         x={drawn.x}
         xLabel="iteration"

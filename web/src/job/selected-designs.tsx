@@ -5,6 +5,7 @@ import { type Column, Table } from '../components/table'
 import { placeWord } from '../format/place'
 import { formatValue, named } from '../format/value'
 import { inWords } from '../format/words'
+import { PAGE_NUMBER, useQueryValue } from '../router/query-value'
 import { jobPath, withQuery } from '../router/routes'
 import { caseWords } from './fitness'
 import { columnNamed, type ParticleColumn, type Particles } from './particles'
@@ -27,11 +28,13 @@ export function SelectedDesigns({
   const iteration = columnNamed(particles, 'iteration')!.values
   const particle = columnNamed(particles, 'particle')!.values
   const numbers = particles.columns.filter(({ kind }) => kind !== 'index')
+  const paging = useQueryValue('page', PAGE_NUMBER, 0)
   return (
     <Table
       caption="Designs"
       rows={rows}
       rowKey={(row) => `${iteration[row]} ${particle[row]}`}
+      paging={paging}
       order={{ column: 'fitness', descending: false }}
       rowData={(row) => ({ 'data-marked': String(row === marked) })}
       columns={[

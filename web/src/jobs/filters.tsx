@@ -5,10 +5,11 @@ import type { JobFacets } from '../api/types'
 import { formatCount } from '../format/number'
 import { capitalized } from '../format/words'
 import { setQuery } from '../router/navigation'
-import { FACETS, type Facet, type ListQuery, ORDERS, STATES } from './list-query'
+import { FACETS, type Facet, FIRST_PAGE, type ListQuery, ORDERS, STATES } from './list-query'
 
 /** What `setQuery` takes to show all jobs. */
 export const NO_FILTER: Readonly<Record<string, null>> = {
+  ...FIRST_PAGE,
   search: null,
   archived: null,
   ...Object.fromEntries(FACETS.map((facet) => [facet, null])),
@@ -41,7 +42,9 @@ export function Filters({
           type="search"
           placeholder="Search by name, id, note or tag"
           value={query.search ?? ''}
-          onInput={(event) => setQuery({ search: event.currentTarget.value || null })}
+          onInput={(event) =>
+            setQuery({ ...FIRST_PAGE, search: event.currentTarget.value || null })
+          }
         />
       </label>
       {FACETS.map((facet) => (
@@ -50,7 +53,9 @@ export function Filters({
       <select
         aria-label="Order"
         value={query.order}
-        onChange={(event) => setQuery({ order: event.currentTarget.value, reverse: null })}
+        onChange={(event) =>
+          setQuery({ ...FIRST_PAGE, order: event.currentTarget.value, reverse: null })
+        }
       >
         {Object.entries(ORDERS).map(([order, words]) => (
           <option key={order} value={order}>
@@ -62,7 +67,7 @@ export function Filters({
         <input
           type="checkbox"
           checked={query.archived}
-          onChange={() => setQuery({ archived: query.archived ? null : '' })}
+          onChange={() => setQuery({ ...FIRST_PAGE, archived: query.archived ? null : '' })}
         />
         archived
       </label>
@@ -93,7 +98,7 @@ function FacetFilter({
     <select
       aria-label={capitalized(facet)}
       value={chosen ?? ''}
-      onChange={(event) => setQuery({ [facet]: event.currentTarget.value || null })}
+      onChange={(event) => setQuery({ ...FIRST_PAGE, [facet]: event.currentTarget.value || null })}
     >
       <option value="">
         all {COUNTS[facet]}

@@ -60,8 +60,8 @@ export function descends(order: Order, reverse: boolean): boolean {
 export function reordered(
   { order, reverse }: ListQuery,
   wanted: Order,
-): Readonly<Record<'order' | 'reverse', string | null>> {
-  return { order: wanted, reverse: order === wanted && !reverse ? '' : null }
+): Readonly<Record<'order' | 'reverse' | 'after', string | null>> {
+  return { order: wanted, reverse: order === wanted && !reverse ? '' : null, ...FIRST_PAGE }
 }
 
 /** What an address such as `?controller=pi&order=fitness` asks for. */
@@ -80,6 +80,9 @@ export function listQuery(query: URLSearchParams): ListQuery {
     reverse: query.has('reverse'),
   }
 }
+
+/** Another filter or order has other pages. */
+export const FIRST_PAGE = { after: null } as const
 
 /** Whether all jobs that are not archived, or all that are, fit. */
 export function isFiltered(query: ListQuery): boolean {

@@ -1,6 +1,5 @@
 /** All jobs: how they stand and where to go on; the server finds, sorts and pages them. */
 
-import { useEffect, useState } from 'preact/hooks'
 import { useNow } from '../api/resource'
 import type { JobFacets } from '../api/types'
 import { CopyBlock } from '../components/copy-button'
@@ -8,6 +7,7 @@ import { Empty, ErrorNotice, Loading } from '../components/feedback'
 import { Table } from '../components/table'
 import { formatCount } from '../format/number'
 import { setQuery, usePlace } from '../router/navigation'
+import { idsOf } from '../router/query-value'
 import { Chosen } from './chosen'
 import { jobColumns } from './columns'
 import { Filters, NO_FILTER } from './filters'
@@ -19,11 +19,11 @@ import { useFacets, useList } from './use-list'
 export function JobsPage() {
   const place = usePlace()
   const query = listQuery(place.query)
-  const key = JSON.stringify(query)
-  const [cursors, setCursors] = useState<readonly string[]>([])
-  // Another filter or order has other pages.
-  useEffect(() => setCursors([]), [key])
-  const [chosen, setChosen] = useState<readonly string[]>([])
+  // Where the pages before begin after, so that Previous, Back and a reload find them.
+  const cursors = place.query.getAll('after')
+  const setCursors = (after: readonly string[]) => setQuery({ after }, { replace: false })
+  const chosen = idsOf(place.query.get('chosen'))
+  const setChosen = (ids: readonly string[]) => setQuery({ chosen: ids.join() || null })
   const { page, error, announcement, reload } = useList(query, cursors.at(-1) ?? null)
   const facets = useFacets(query.archived)
   const now = useNow(1000)

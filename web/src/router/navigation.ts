@@ -19,15 +19,20 @@ export function navigate(href: string, { replace = false } = {}): void {
   for (const listener of [...listeners]) listener()
 }
 
-/** Change some of the query; null removes a value. The place in the history stays the same. */
-export function setQuery(changes: Readonly<Record<string, string | null>>): void {
+/** What is to change in a query: a value, several of one name, or none any more. */
+export type QueryChanges = Readonly<Record<string, string | readonly string[] | null>>
+
+/** Change some of the query. The place in the history stays the same, unless Back is to undo it. */
+export function setQuery(changes: QueryChanges, { replace = true } = {}): void {
   const query = new URLSearchParams(location.search)
   for (const [name, value] of Object.entries(changes)) {
-    if (value === null) query.delete(name)
-    else query.set(name, value)
+    const [first, ...rest] = [value ?? []].flat()
+    if (first === undefined) query.delete(name)
+    else query.set(name, first)
+    for (const each of rest) query.append(name, each)
   }
   const text = query.toString()
-  navigate(text === '' ? location.pathname : `${location.pathname}?${text}`, { replace: true })
+  navigate(text === '' ? location.pathname : `${location.pathname}?${text}`, { replace })
 }
 
 /** The present place; the component renders again when it changes. */

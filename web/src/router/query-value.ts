@@ -67,6 +67,12 @@ export function idsOf(text: string | null): string[] {
   return [...new Set((text ?? '').split(/[\s,]+/))].filter((id) => id !== '')
 }
 
+/** Page of a table, counted from 1 in the address and from 0 here. */
+export const PAGE_NUMBER: Codec<number> = {
+  read: (text) => (/^[1-9]\d{0,6}$/.test(text) ? Number(text) - 1 : undefined),
+  write: (page) => (page === 0 ? null : String(page + 1)),
+}
+
 /** Numbers between colons; NaN for what is none. */
 export function numbersOf(text: string): number[] {
   return text.split(':').map((part) => Number(part || Number.NaN))

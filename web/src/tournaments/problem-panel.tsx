@@ -4,7 +4,7 @@ import { useMemo, useRef } from 'preact/hooks'
 import { get } from '../api/client'
 import { useResource } from '../api/resource'
 import type { ProblemRuns, TournamentStandings } from '../api/types'
-import { LineChart } from '../charts/line-chart'
+import { LinkedChart } from '../charts/linked-chart'
 import { ChartFrame, LegendEntry } from '../components/chart-frame'
 import { ErrorNotice, Loading } from '../components/feedback'
 import { type Column, Table } from '../components/table'
@@ -87,7 +87,7 @@ function Clouds({ found, methods }: { found: ProblemRuns; methods: readonly Rank
         }
         table={() => <CurvesTable found={found} methods={known} />}
       >
-        <LineChart
+        <LinkedChart
           label={`Median fitness of ${known.length} methods over evaluations on ${found.problem}`}
           x={curves.x}
           xLabel="evaluations"
@@ -113,7 +113,8 @@ function Clouds({ found, methods }: { found: ProblemRuns; methods: readonly Rank
         }
         table={() => <RunsTable found={found} methods={known} />}
       >
-        <LineChart
+        <LinkedChart
+          zoomName="zoom-cloud"
           label={`Best fitness of ${points.x.length - 2} runs over the evaluations until it was found`}
           x={points.x}
           xLabel="evaluations until the best was found"

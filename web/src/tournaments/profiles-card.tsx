@@ -1,7 +1,8 @@
 /** Data profiles: which share of its runs a method has solved within a budget. */
 
 import type { TournamentProfile } from '../api/types'
-import { LineChart, type Series } from '../charts/line-chart'
+import type { Series } from '../charts/line-chart'
+import { LinkedChart } from '../charts/linked-chart'
 import { ChartFrame, LegendEntry } from '../components/chart-frame'
 import { Table } from '../components/table'
 import { formatExact, percent } from '../format/number'
@@ -27,7 +28,8 @@ export function ProfilesCard({
           legend={<MethodLegend methods={methods} />}
           table={() => <ProfileTable profile={profile} methods={methods} />}
         >
-          <LineChart
+          <LinkedChart
+            zoomName={`zoom-${profile.precision}`}
             label={`Share of solved runs of ${methods.length} methods over the budget`}
             x={profile.budgets}
             xLabel="evaluations / (variables + 1)"

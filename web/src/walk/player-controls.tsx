@@ -25,6 +25,7 @@ export function PlayerControls({
   onChoose,
   onLook,
   onFilm,
+  onPicture,
 }: {
   playback: Playback
   /** Whether there are two walks. */
@@ -36,6 +37,7 @@ export function PlayerControls({
   onLook: (view: ViewName) => void
   /** Null where there is no picture. */
   onFilm: (() => void) | null
+  onPicture: (() => void) | null
 }) {
   const set = (changes: Partial<ViewChoices>) => onChoose({ ...choices, ...changes })
   return (
@@ -74,6 +76,14 @@ export function PlayerControls({
             </button>
           ))}
         </span>
+        <button
+          type="button"
+          class="compact"
+          disabled={onPicture === null}
+          onClick={onPicture ?? undefined}
+        >
+          Save as picture
+        </button>
         <button
           type="button"
           class="compact"

@@ -2,7 +2,10 @@
 
 import { useEffect, useMemo, useRef, useState } from 'preact/hooks'
 import { messageOf } from '../api/problem'
+import { fileStem } from '../export/csv'
+import { saveFile } from '../export/save'
 import { useTheme } from '../theme'
+import { pageName } from '../title'
 import { extentOf } from './extent'
 import { film } from './film'
 import { FilmDialog, type FilmSize } from './film-dialog'
@@ -16,6 +19,9 @@ import { LONGEST_STEP, LONGEST_STEP_OF_FILM, ReplayDriver } from './replay-drive
 import type { CameraPlace, ViewName } from './scene/camera-rig'
 import type { WalkScene } from './scene/walk-scene'
 import { SceneLegend } from './scene-legend'
+
+/** Of a saved picture, for one of the page. */
+const PIXELS = 2
 
 export function Player({
   walks,
@@ -41,6 +47,8 @@ export function Player({
   const [failure, setFailure] = useState<string | null>(null)
   const [drawn, setDrawn] = useState(false)
   const [filming, setFilming] = useState(false)
+  /** Why a picture could not be saved. */
+  const [unsaved, setUnsaved] = useState<string | null>(null)
   /** Meshes that were loaded, and why there are none of a robot that should have some. */
   const [meshes, setMeshes] = useState(0)
   const [lost, setLost] = useState<string | null>(null)
@@ -145,12 +153,21 @@ export function Player({
       playback.seek(before)
     }
   }
+  const picture = async () => {
+    setUnsaved(null)
+    const shot = scene.current!
+    const { clientWidth, clientHeight } = shot.canvas
+    const still = shot.picture([PIXELS * clientWidth, PIXELS * clientHeight])
+    saveFile(await still, `${fileStem(pageName(), `${playback.time.toFixed(2)} s`)}.png`)
+    driver.current?.request()
+  }
   return (
     <section class="card player" ref={player} aria-label="Replay" data-player data-meshes={meshes}>
       <div class="player-stage" ref={stage}>
         {failure !== null && <NoScene reason={failure} />}
       </div>
       <SceneLegend walks={walks} cell={extent.cell} newtons={newtons} choices={choices} />
+      {unsaved !== null && <p class="wrong small">The picture was not saved: {unsaved}</p>}
       {lost !== null && <p class="muted small">Meshes cannot be loaded: {lost}</p>}
       {asked && meshes === 0 && walks.some(({ replay }) => hasMeshes(replay.header)) && (
         <NoMeshes />
@@ -163,6 +180,7 @@ export function Player({
         onChoose={onChoose}
         onLook={look}
         onFilm={drawn ? () => setFilming(true) : null}
+        onPicture={drawn ? () => picture().catch((error) => setUnsaved(messageOf(error))) : null}
       />
       {filming && (
         <FilmDialog playback={playback} onRecord={record} onClose={() => setFilming(false)} />

@@ -1,7 +1,8 @@
 /** One chart over time, whose line moves with the replay and whose clicks move the replay. */
 
 import { useMemo, useRef } from 'preact/hooks'
-import { LineChart, type Series } from '../charts/line-chart'
+import type { Series } from '../charts/line-chart'
+import { LinkedChart } from '../charts/linked-chart'
 import { ChartFrame } from '../components/chart-frame'
 import { type Column, Table } from '../components/table'
 import { formatNumber, quantity } from '../format/number'
@@ -40,7 +41,7 @@ export function PlotCard({
           <PlotLegend series={series} curves={spec.curves.length} frame={frame} unit={spec.unit} />
         }
       >
-        <LineChart
+        <LinkedChart
           label={`${spec.title} over time`}
           x={x}
           xLabel="time"

@@ -1,6 +1,5 @@
 /** What workers do for a job: a timeline, their health, and the log of the job. */
 
-import { useState } from 'preact/hooks'
 import { get } from '../../api/client'
 import { usePolling, useResource } from '../../api/resource'
 import type { Activity, Job } from '../../api/types'
@@ -9,15 +8,17 @@ import { type Column, Table } from '../../components/table'
 import { formatCount, formatNumber } from '../../format/number'
 import { formatMoment } from '../../format/time'
 import { sentence } from '../../format/words'
+import { oneOf, useQueryValue } from '../../router/query-value'
 import './activity.css'
 import { TimelineCard } from './timeline-card'
 
 const POLL_MS = 2000
 const LEVELS = ['DEBUG', 'INFO', 'WARNING', 'ERROR'] as const
 type Level = (typeof LEVELS)[number]
+const LEVEL = oneOf<Level>(LEVELS, 'INFO')
 
 export function ActivityPanel({ job }: { job: Job }) {
-  const [level, setLevel] = useState<Level>('INFO')
+  const [level, setLevel] = useQueryValue('level', LEVEL, 'INFO')
   const found = useResource(`activity ${job.id} ${level} ${job.state}`, (signal) =>
     get('/v1/jobs/{job_id}/activity', { path: { job_id: job.id }, query: { level }, signal }),
   )

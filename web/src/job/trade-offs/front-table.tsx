@@ -5,6 +5,7 @@ import { type Column, Table } from '../../components/table'
 import { formatNumber, NONE } from '../../format/number'
 import { type Place, placeWord } from '../../format/place'
 import { inWords } from '../../format/words'
+import { PAGE_NUMBER, useQueryValue } from '../../router/query-value'
 import { Where } from '../selected-designs'
 import type { PublishedDesign } from './designs'
 
@@ -49,11 +50,13 @@ export function FrontTable({
     },
     chooseColumn(chosen, onChoose),
   ]
+  const paging = useQueryValue('page', PAGE_NUMBER, 0)
   return (
     <Table
       caption="Designs of the front"
       rows={front.designs}
       rowKey={placeWord}
+      paging={paging}
       order={{ column: 'marks', descending: false }}
       pageSize={20}
       columns={columns}

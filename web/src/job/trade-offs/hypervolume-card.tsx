@@ -2,7 +2,7 @@
 
 import { useMemo } from 'preact/hooks'
 import type { Front } from '../../api/types'
-import { LineChart } from '../../charts/line-chart'
+import { LinkedChart } from '../../charts/linked-chart'
 import { ChartFrame } from '../../components/chart-frame'
 import { formatNumber } from '../../format/number'
 import { ByIteration } from '../by-iteration'
@@ -44,7 +44,7 @@ export function HypervolumeCard({ front }: { front: Front }) {
         />
       )}
     >
-      <LineChart
+      <LinkedChart
         label={`Hypervolume over ${iterations.length} iterations, now ${now}`}
         x={drawn.x}
         xLabel="iteration"

@@ -242,6 +242,19 @@ export class WalkScene {
     this.render()
   }
 
+  /** What is seen now, as a PNG of this size [px]. */
+  picture(size: Size): Promise<Blob> {
+    this.film(size)
+    // The pixels are taken before the page draws again.
+    const taken = new Promise<Blob>((done, fail) =>
+      this.canvas.toBlob((blob) =>
+        blob ? done(blob) : fail(new Error('The browser makes no picture of this size.')),
+      ),
+    )
+    this.film(null)
+    return taken
+  }
+
   render(): void {
     this.world.updateMatrixWorld()
     this.renderer.render(this.scene, this.rig.camera)

@@ -46,6 +46,12 @@ def test_a_link_shows_what_was_seen(
     expect(selected).to_have_attribute("data-selected", seen)
     expect(page.get_by_text("is ignored")).to_have_count(0)
 
+    # It is the same selection among the trade-offs.
+    page.get_by_role("link", name="Trade-offs", exact=True).click()
+    expect(selected).to_have_attribute("data-selected", seen)
+    expect(page.get_by_text(f"{seen} selected on Variables")).to_be_visible()
+    page.get_by_role("link", name="Variables", exact=True).click()
+    expect(selected).to_have_attribute("data-selected", seen)
     crumbs = page.get_by_role("navigation", name="Breadcrumbs")
     expect(crumbs.get_by_role("listitem")).to_have_text(["All jobs", "small", "Variables"])
     page.goto(f"/jobs/{finished_job}/iterations?sort=-worst")

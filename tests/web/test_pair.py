@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from itertools import product
 
 import pytest
 from playwright.sync_api import expect
@@ -54,8 +55,21 @@ def test_ranks_stand_in_cells_and_in_a_table_and_axes_may_be_objectives(
     expect(page.get_by_role("img", name=MAP)).to_have_attribute(
         "aria-label", "48 designs by energy and torque"
     )
+    chart = page.locator(".pair-chart")
+    expect(chart).to_contain_text("energy [J/m]")
+    assert int(chart.locator("[data-ticks]").first.get_attribute("data-ticks") or 0) > 2
     page.get_by_label("mean rank by cell").check()
     expect(page).to_have_url(re.compile("as=ranks"))
+    # Wherever there is a design, its cell is told under the pointer.
+    box = chart.get_by_role("img").bounding_box()
+    assert box is not None
+    for across, up in product(range(14), range(14)):
+        right, down = (across + 0.5) / 14, 1 - (up + 0.5) / 14
+        page.mouse.move(box["x"] + box["width"] * right, box["y"] + box["height"] * down)
+        if "mean rank" in chart.locator(".readout").inner_text():
+            break
+    else:
+        raise AssertionError("nothing is told of any cell")
     # Of a few designs, four cells side by side are hardly to be had.
     page.get_by_label("isolines").check()
     expect(page).to_have_url(re.compile("isolines=yes"))

@@ -1,5 +1,12 @@
 import { describe, expect, test } from 'vitest'
-import { CELLS, cellsOf, dragged, nearestRow } from '../src/charts/pair-model'
+import {
+  CELLS,
+  cellsOf,
+  dragged,
+  nearestRow,
+  placeInWords,
+  ticksOf,
+} from '../src/charts/pair-model'
 import { buildModel, selectRows } from '../src/charts/parallel-model'
 
 const source = (name: string, values: number[]) => ({
@@ -27,6 +34,26 @@ describe('two axes', () => {
     expect(at(0)).toMatchObject({ designs: 2 })
     expect(at(0).bucket!).toBeLessThan(at(CELLS - 1).bucket!)
     expect(at(CELLS / 2).bucket).toBeNull()
+  })
+
+  test('are marked at round numbers, or with the names of choices', () => {
+    expect(ticksOf(model.axes[0]).map(({ text }) => text)).toEqual(['0', '2', '4', '6', '8', '10'])
+    const laws = { ...model.axes[0], high: 1, choices: ['dead_zone', 'stick'] }
+    expect(ticksOf(laws)).toEqual([
+      { place: 0, text: 'dead zone' },
+      { place: 1, text: 'stick' },
+    ])
+    const decades = { ...model.axes[0], low: 3, high: 300, logarithmic: true }
+    expect(ticksOf(decades).every(({ place }) => place >= 0 && place <= 1)).toBe(true)
+  })
+
+  test('tell what is at a place: the nearest design, or the cell', () => {
+    const at = (place: number, asCells: boolean) =>
+      placeInWords(model, all, [0, 1], [place, place], { asCells, reach: 0.05 })
+    expect(at(1, false)).toBe('a 10  ·  b 10  ·  fitness 3.0000')
+    expect(at(0.3, false)).toBeNull()
+    expect(at(0, true)).toContain('2 designs  ·  mean rank')
+    expect(at(0.5, true)).toContain('all failed')
   })
 
   test('have a drag select the box between its ends, whatever its direction', () => {

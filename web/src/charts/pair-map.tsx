@@ -5,7 +5,8 @@ import { describeCanvas } from '../export/canvas-source'
 import { themeColour, useTheme } from '../theme'
 import { IsolineLayer } from './isoline-layer'
 import { isolinesOf } from './isolines'
-import { CELLS, cellsOf, dragged, nearestRow, sampleOf } from './pair-model'
+import { PairAxes } from './pair-axes'
+import { CELLS, cellsOf, dragged, nearestRow, placeInWords, sampleOf, ticksOf } from './pair-model'
 import { themePalette } from './parallel-coordinates'
 import { type Brush, FAILED, type ParallelModel } from './parallel-model'
 import type { Palette } from './progressive-painter'
@@ -55,6 +56,7 @@ export function PairMap({
   const start = useRef<Place | null>(null)
   const [drawn, setDrawn] = useState<readonly [Brush, Brush] | null>(null)
   const [width, setWidth] = useState(0)
+  const [under, setUnder] = useState<string | null>(null)
   const theme = useTheme()
   const palette = useMemo(() => themePalette(), [theme])
 
@@ -70,6 +72,7 @@ export function PairMap({
     element.width = Math.round(width * devicePixelRatio)
     element.height = Math.round(HEIGHT_PX * devicePixelRatio)
     const draw = (on: CanvasRenderingContext2D) => {
+      paintGrid(on, model, x, y)
       if (asCells) paintCells(on, model, rows, x, y, palette)
       else paintPoints(on, model, rows, x, y, palette)
       if (chosen !== null)
@@ -102,7 +105,7 @@ export function PairMap({
     }
   }
   const [across, up] = drawn ?? brushes
-  return (
+  const map = (
     <div class="pair-map">
       <canvas
         ref={canvas}
@@ -114,10 +117,11 @@ export function PairMap({
           start.current = place(event)
         }}
         onPointerMove={(event) => {
-          if (start.current && isStroke(start.current, place(event))) {
-            setDrawn(dragged(start.current, place(event)))
-          }
+          const at = place(event)
+          if (start.current && isStroke(start.current, at)) setDrawn(dragged(start.current, at))
+          setUnder(placeInWords(model, rows, [x, y], at, { asCells, reach: REACH }))
         }}
+        onPointerLeave={() => setUnder(null)}
         onPointerUp={end}
         onPointerCancel={() => {
           start.current = null
@@ -126,6 +130,16 @@ export function PairMap({
       />
       {isolines && <IsolineLayer lines={lines} words={(level) => String(level + 1)} />}
       {(across || up) && <Selection across={across ?? [0, 1]} up={up ?? [0, 1]} />}
+    </div>
+  )
+  return (
+    <div class="pair-chart">
+      <PairAxes across={model.axes[x]} up={model.axes[y]}>
+        {map}
+      </PairAxes>
+      <p class="readout" aria-hidden="true">
+        {under}
+      </p>
     </div>
   )
 }
@@ -144,6 +158,19 @@ function Selection({ across, up }: { across: Brush; up: Brush }) {
       }}
     />
   )
+}
+
+function paintGrid(
+  context: CanvasRenderingContext2D,
+  model: ParallelModel,
+  x: number,
+  y: number,
+): void {
+  const { width, height } = context.canvas
+  context.fillStyle = themeColour('--grid')
+  for (const { place } of ticksOf(model.axes[x])) context.fillRect(place * width, 0, 1, height)
+  for (const { place } of ticksOf(model.axes[y]))
+    context.fillRect(0, (1 - place) * height, width, 1)
 }
 
 function paintPoints(

@@ -1,6 +1,19 @@
 /** Two axes of parallel coordinates set against each other: points, cells, what a drag selects. Pure. */
 
-import { type Brush, FAILED, type ParallelModel } from './parallel-model'
+import { exactQuantity, formatCount, formatExact, formatNumber } from '../format/number'
+import { inWords } from '../format/words'
+import { linearTicks, logTicks } from './log-axis'
+import {
+  type Axis,
+  type Brush,
+  BUCKETS,
+  FAILED,
+  marksOf,
+  type ParallelModel,
+  placeOf,
+  stretchOf,
+  valueAt,
+} from './parallel-model'
 
 /** Rows that are looked at; of more, a fair sample. */
 export const SAMPLE = 4000
@@ -76,6 +89,53 @@ export function nearestRow(
     if (distance < least) [found, least] = [row, distance]
   }
   return found
+}
+
+/** Where an axis is marked, and with what: round numbers, or names of choices. */
+export function ticksOf(axis: Axis): readonly { readonly place: number; readonly text: string }[] {
+  if (axis.choices.length > 0) {
+    return marksOf(axis).map((name, k) => ({ place: placeOf(axis, k), text: inWords(`${name}`) }))
+  }
+  const { low, high } = axis
+  const values = axis.logarithmic ? logTicks(low, high) : linearTicks(low, high, 5)
+  return values
+    .map((value) => ({ place: placeOf(axis, value), text: formatExact(value, 4) }))
+    .filter(({ place }) => place >= 0 && place <= 1)
+}
+
+/** What is at a place, for people: the nearest design, or the cell; null where there is nothing. */
+export function placeInWords(
+  model: ParallelModel,
+  rows: Uint32Array,
+  pair: readonly [number, number],
+  at: readonly [number, number],
+  { asCells, reach }: { readonly asCells: boolean; readonly reach: number },
+): string | null {
+  const axes = pair.map((index) => model.axes[index])
+  if (asCells) {
+    const cells = at.map(cellAt)
+    const found = cellsOf(model, rows, ...pair).find(
+      ({ column, row }) => column === cells[0] && row === cells[1],
+    )
+    if (!found) return null
+    const [across, up] = axes.map((axis, k) => {
+      const from = cells[k]!
+      return `${inWords(axis.name)} ${stretchOf(axis, [from / CELLS, (from + 1) / CELLS])}`
+    })
+    const rank =
+      found.bucket === null
+        ? 'all failed'
+        : `mean rank ${formatNumber(found.bucket + 1, 3)} of ${BUCKETS}`
+    return [across, up, `${formatCount(found.designs)} designs`, rank].join('  ·  ')
+  }
+  const row = nearestRow(model, rows, pair, at, reach)
+  if (row === null) return null
+  const values = axes.map((axis) => {
+    const value = valueAt(axis, axis.places[row])
+    const name = axis.choices[Math.round(value)]
+    return `${inWords(axis.name)} ${name === undefined ? exactQuantity(value, axis.unit) : inWords(name)}`
+  })
+  return [...values, `fitness ${formatNumber(model.fitness[row], 5)}`].join('  ·  ')
 }
 
 function cellAt(place: number): number | null {

@@ -6,13 +6,15 @@ import { ALL_JOBS, Breadcrumbs, type Crumb } from '../components/breadcrumbs'
 import { ErrorNotice, Loading } from '../components/feedback'
 import { lazyPart } from '../components/lazy-page'
 import { capitalized } from '../format/words'
-import { jobPath } from '../router/routes'
+import { usePlace } from '../router/navigation'
+import { jobPath, withQuery } from '../router/routes'
 import { budgetSpent } from './budget'
 import { caseWords } from './fitness'
 import { type Gain, useGain } from './gain'
 import { JobHeader } from './header'
 import './job.css'
 import { OverviewPanel } from './overview-panel'
+import { SHARED } from './selection'
 import { type LiveJob, useJob } from './use-job'
 
 // Only the overview's code comes with the page.
@@ -176,13 +178,15 @@ interface PartProps {
 function Parts({ live, job, tab, gain }: PartProps) {
   const tabs = TABS.filter(({ tab }) => hasPart(job, tab))
   const [section] = tab.split('/')
+  const { query } = usePlace()
+  const kept = Object.fromEntries(SHARED.map((name) => [name, query.get(name) ?? undefined]))
   return (
     <>
       <nav class="tabs" aria-label="Parts of the job">
         {tabs.map((t) => (
           <a
             key={t.tab}
-            href={jobPath(job.id, t.tab)}
+            href={withQuery(jobPath(job.id, t.tab), kept)}
             aria-current={t.tab === section ? 'page' : undefined}
           >
             {t.tab === 'scenarios' ? capitalized(caseWords(job.kind).many) : t.label}

@@ -8,7 +8,7 @@ import { valueAt } from '../charts/parallel-model'
 import { ChartFrame, LegendEntry } from '../components/chart-frame'
 import { Check } from '../components/check'
 import { type Column, Table } from '../components/table'
-import { formatCount, formatExact, formatNumber, withUnit } from '../format/number'
+import { formatCount, formatExact, formatNumber } from '../format/number'
 import { inWords } from '../format/words'
 import { setQuery, usePlace } from '../router/navigation'
 import { flag, useQueryValue } from '../router/query-value'
@@ -64,9 +64,6 @@ export function PairCard({
           <LegendEntry colour="--rank-middle" label="middle" area />
           <LegendEntry colour="--rank-worst" label="worst, by rank of fitness" area />
           {isolines && <span>lines: mean rank by cell, in twelfths</span>}
-          <span>
-            {ends(across)} · {ends(up)}
-          </span>
         </>
       }
       table={() => <CellTable model={model} rows={selected} x={x} y={y} />}
@@ -86,11 +83,6 @@ export function PairCard({
       />
     </ChartFrame>
   )
-}
-
-/** `FI1R from 1500 to 6000`. */
-function ends(axis: Axis): string {
-  return `${withUnit(inWords(axis.name), axis.unit)} from ${formatExact(axis.low, 4)} to ${formatExact(axis.high, 4)}`
 }
 
 function AxisPicker({

@@ -5,13 +5,7 @@ import { getBytes } from '../api/client'
 import { useResource, useSlowly } from '../api/resource'
 import type { Job } from '../api/types'
 import { type Brushes, ParallelCoordinates } from '../charts/parallel-coordinates'
-import {
-  type AxisSource,
-  bestRows,
-  buildModel,
-  type ParallelModel,
-  selectRows,
-} from '../charts/parallel-model'
+import { bestRows, buildModel, type ParallelModel, selectRows } from '../charts/parallel-model'
 import { ChartFrame, LegendEntry } from '../components/chart-frame'
 import { Empty, ErrorNotice, Loading } from '../components/feedback'
 import { formatCount } from '../format/number'
@@ -24,10 +18,9 @@ import { caseWords } from './fitness'
 import { PairCard } from './pair-card'
 import { columnNamed, decodeParticles, type Particles, particlesTable } from './particles'
 import { SelectedDesigns } from './selected-designs'
+import { axesOf } from './selection'
 
 const NONE: Brushes = new Map()
-/** Kinds of columns that are variables. */
-const VARIABLES = new Set(['continuous', 'integer', 'categorical'])
 /** How often a running job's designs are asked for again [ms]. */
 const RENEW_MS = 8000
 
@@ -210,27 +203,4 @@ function rowOf(particles: Particles, place: Place | null): number | null {
     (iteration, k) => iteration === place.iteration && numbers[k] === place.particle,
   )
   return row < 0 ? null : row
-}
-
-/** Variables, what else is asked for by its kind, and the fitness last. */
-function axesOf(
-  { columns }: Particles,
-  more: { readonly utility: boolean; readonly objective: boolean },
-): readonly AxisSource[] {
-  const wanted = columns.filter(
-    ({ kind }) =>
-      VARIABLES.has(kind) ||
-      (kind === 'utility' && more.utility) ||
-      (kind === 'objective' && more.objective),
-  )
-  const fitness = columns.filter(({ kind }) => kind === 'fitness')
-  return [...wanted, ...fitness].map((column) => ({
-    name: column.name.replace(/^(utility|objective):/, ''),
-    unit: column.unit,
-    low: column.low,
-    high: column.high,
-    logarithmic: !VARIABLES.has(column.kind),
-    choices: column.choices,
-    values: column.values,
-  }))
 }

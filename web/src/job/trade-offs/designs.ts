@@ -30,6 +30,19 @@ export function allCloud(particles: Particles, x: string, y: string): Cloud | nu
   return { x: xs, y: ys, colour: '--series-6', radius: 2, opacity: 0.35 }
 }
 
+/** Some of all designs, drawn as rings around what stands there. rows: of `particles`. */
+export function selectedCloud(
+  particles: Particles,
+  rows: Uint32Array,
+  x: string,
+  y: string,
+): Cloud | null {
+  const all = allCloud(particles, x, y)
+  if (!all) return null
+  const of = (values: Cloud['x']) => Array.from(rows, (row) => values[row])
+  return { x: of(all.x), y: of(all.y), colour: '--text', radius: 5.5, opacity: 1 }
+}
+
 /** The front in two objectives; its order is that of `designs`. */
 export function frontCloud({ designs }: Front, x: string, y: string): Cloud {
   return {

@@ -15,7 +15,16 @@ import { setQuery, usePlace } from '../../router/navigation'
 import { flag, useQueryValue } from '../../router/query-value'
 import type { Particles } from '../particles'
 import { publishedWalks } from '../reference'
-import { allCloud, axesOf, frontCloud, marksOf, publishedDesign, publishedMarks } from './designs'
+import { selectedRows } from '../selection'
+import {
+  allCloud,
+  axesOf,
+  frontCloud,
+  marksOf,
+  publishedDesign,
+  publishedMarks,
+  selectedCloud,
+} from './designs'
 import { FrontTable, PublishedTable } from './front-table'
 
 export function ScatterCard({
@@ -35,10 +44,13 @@ export function ScatterCard({
   const { query } = usePlace()
   const [logarithmic, setLogarithmic] = useQueryValue('log', flag(true), true)
   const [x, y] = axesOf(front, query.get('x'), query.get('y'))
+  const brush = query.get('brush')
+  const selected = useMemo(() => all && selectedRows(all, brush), [all, brush])
   const clouds = useMemo(() => {
     const behind = all && allCloud(all, x, y)
-    return [...(behind ? [behind] : []), frontCloud(front, x, y)]
-  }, [front, all, x, y])
+    const marked = all && selected && selectedCloud(all, selected, x, y)
+    return [behind, marked, frontCloud(front, x, y)].filter((cloud) => cloud !== null)
+  }, [front, all, selected, x, y])
   // In worlds an objective is no mean over scenarios.
   const { worlds, robot } = job.spec as JobSpec
   const comparable = !worlds && isPublished(robot)
@@ -86,6 +98,16 @@ export function ScatterCard({
               published designs
             </label>
           )}
+          {selected && (
+            <button
+              type="button"
+              class="compact"
+              data-selected={selected.length}
+              onClick={() => setQuery({ brush: null })}
+            >
+              Select all
+            </button>
+          )}
           <Check label="logarithmic" checked={logarithmic} onChange={setLogarithmic} />
         </>
       }
@@ -93,6 +115,13 @@ export function ScatterCard({
         <>
           <LegendEntry colour="--series-1" label="front" area />
           <LegendEntry colour="--series-6" label="other designs" area />
+          {selected && (
+            <LegendEntry
+              colour="--text"
+              label={`${formatCount(selected.length)} selected on Variables`}
+              area
+            />
+          )}
           <LegendEntry
             colour="--series-5"
             label="best under A, B, C and the job’s own preference"

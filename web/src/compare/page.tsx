@@ -129,6 +129,7 @@ function Comparison({ found }: { found: JobComparison }) {
             },
             {
               key: 'evaluations',
+              minor: true,
               label: 'Evaluations',
               numeric: true,
               value: ({ evaluations }) => evaluations,
@@ -136,6 +137,7 @@ function Comparison({ found }: { found: JobComparison }) {
             },
             {
               key: 'failed',
+              minor: true,
               label: 'Failed',
               numeric: true,
               value: ({ failed, evaluations }) => failed / evaluations,

@@ -25,10 +25,22 @@ describe('the list of jobs', () => {
     })
   })
 
-  test('turns round what is sorted by already, and begins with any other as it is', () => {
-    expect(reordered(read('order=gain'), 'gain')).toEqual({ order: 'gain', reverse: '' })
-    expect(reordered(read('order=gain&reverse'), 'gain')).toEqual({ order: 'gain', reverse: null })
-    expect(reordered(read('order=gain&reverse'), 'name')).toEqual({ order: 'name', reverse: null })
+  test('turns round what is sorted by already, begins with any other as it is, and on the first page', () => {
+    expect(reordered(read('order=gain'), 'gain')).toEqual({
+      order: 'gain',
+      reverse: '',
+      after: null,
+    })
+    expect(reordered(read('order=gain&reverse'), 'gain')).toEqual({
+      order: 'gain',
+      reverse: null,
+      after: null,
+    })
+    expect(reordered(read('order=gain&reverse'), 'name')).toEqual({
+      order: 'name',
+      reverse: null,
+      after: null,
+    })
     expect([descends('gain', false), descends('gain', true)]).toEqual([true, false])
     expect([descends('created', false), descends('fitness', true)]).toEqual([false, true])
   })

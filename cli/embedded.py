@@ -18,7 +18,13 @@ from gaitswarm.settings import read_settings
 from services.optimizer.analysis.reference import note_reference
 from services.optimizer.jobs.job import JobState
 from services.optimizer.service import JobService
-from services.runtime import open_evaluator, open_store, run_embedded, stop_on_signals
+from services.runtime import (
+    check_address,
+    open_evaluator,
+    open_store,
+    run_embedded,
+    stop_on_signals,
+)
 
 if TYPE_CHECKING:
     from cli.inputs.options import WorkerOptions
@@ -54,6 +60,8 @@ class Embedded:
     """
 
     def __init__(self, settings: Settings, *, accepts_changes: bool = False) -> None:
+        # Workers are opened for the first job, which would be left behind.
+        check_address(settings.ray_address)
         self._settings = settings
         self._accepts_changes = accepts_changes
         self._evaluator: Evaluator | None = None

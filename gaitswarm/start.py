@@ -95,6 +95,11 @@ def start_from(source: str | os.PathLike[str], count: int | None = None) -> Star
         raise InvalidRequest("must be at least 1", field="start_count")
     if Path(source).suffix.lower() == ".csv":
         return read_designs(Path(source), count)
+    if Path(source).is_file():
+        raise InvalidRequest(
+            f"{os.fspath(source)} is a file, of which only CSV is read: its name must end in .csv",
+            field="start",
+        )
     ids = [entry.strip() for entry in str(source).split(",") if entry.strip()]
     return {"jobs": ids} if count is None else {"jobs": ids, "count": count}
 

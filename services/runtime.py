@@ -66,12 +66,7 @@ def open_evaluator(
         EvaluatorUnavailable: They cannot be reached, and nobody is patient; says what to do.
         EvaluationStopped: `should_stop` said so.
     """
-    if address is not None and "://" in address:
-        raise InvalidRequest(
-            f"{address!r} is no address of a cluster's head: Ray Client is not used, as it loses"
-            " its tasks with its connection; give HOST:6379, or auto on a machine that is a node",
-            field="ray_address",
-        )
+    check_address(address)
     if kind == "in-process":
         return InProcessEvaluator(cpus, niceness=niceness)
     if address is None:
@@ -82,6 +77,23 @@ def open_evaluator(
     else:
         cluster.wait_until_open(should_stop)
     return cluster
+
+
+def check_address(address: str | None) -> None:
+    """Check an address of a Ray cluster, before anything is begun with it.
+
+    Args:
+        address: As for `open_evaluator`.
+
+    Raises:
+        InvalidRequest: It is one of Ray Client (ray://).
+    """
+    if address is not None and "://" in address:
+        raise InvalidRequest(
+            f"{address!r} is no address of a cluster's head: Ray Client is not used, as it loses"
+            " its tasks with its connection; give HOST:6379, or auto on a machine that is a node",
+            field="ray_address",
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -81,5 +81,11 @@ def completed_start(context: typer.Context, given: str | None) -> str | None:
     """
     if given is None or given.lower().endswith(".csv"):
         return given
+    from services.optimizer.errors import NotFound
+
     ids = [one.strip() for one in given.split(",") if one.strip()]
-    return ",".join(completed_all(context, ids))
+    try:
+        return ",".join(completed_all(context, ids))
+    except NotFound:
+        # A database that is made with the job has none of them: the spec is refused by its place.
+        return given

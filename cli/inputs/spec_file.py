@@ -178,6 +178,8 @@ def json_object(text: str, what: str) -> dict[str, Any]:
 
     what: name of the option, for messages. Raises InvalidRequest.
     """
+    if text.lstrip().startswith("["):
+        raise InvalidRequest("must be an object, {...}, not a list", field=what)
     if not text.lstrip().startswith("{"):
         return read_json_object(Path(text.removeprefix("@")), what)
     try:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from cli.exit_codes import ExitCode
 from cli.inputs.spec_file import LARGEST_FILE
 from services.runtime import open_store
 from tests.cli.conftest import Finished, Gaitswarm, WriteJson
@@ -360,3 +362,27 @@ def test_a_start_that_makes_no_sense_is_refused_with_its_place(
         result = gaitswarm(*run, *options)
         assert result.code == 2
         assert message in result.err
+
+
+def test_an_address_that_is_none_of_a_cluster_leaves_no_job_behind(
+    gaitswarm: Gaitswarm, db: Path, small_spec: Path
+) -> None:
+    told = gaitswarm("optimize", "--spec", small_spec, "--db", db, "--ray-address", "ray://x:1")
+    assert told.code == ExitCode.BAD_INPUT and "is no address of a cluster's head" in told.err
+    assert gaitswarm("list", "--db", db, "--json").json == []
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--start-from", "FILE"), r"spec\.json is a file, .* its name must end in \.csv"),
+        (("--optimizer-settings", "[1]"), r"must be an object, \{\.\.\.\}, not a list"),
+    ],
+)
+def test_what_an_option_cannot_be_is_told_with_what_it_can_be(
+    gaitswarm: Gaitswarm, db: Path, small_spec: Path, options: tuple[str, ...], said: str
+) -> None:
+    words = [str(small_spec) if word == "FILE" else word for word in options]
+    told = gaitswarm("optimize", "--db", db, *words)
+    assert told.code == ExitCode.BAD_INPUT
+    assert re.search(said, " ".join(told.err.split())), told.err

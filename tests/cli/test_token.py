@@ -26,6 +26,21 @@ def test_a_token_is_made_listed_and_revoked(gaitswarm: Gaitswarm, db: Path) -> N
     assert "revoked" in gaitswarm("token", "list", "--db", db).out
 
 
+def test_looking_for_tokens_makes_no_database(gaitswarm: Gaitswarm, db: Path) -> None:
+    for arguments in (("list",), ("revoke", "ci")):
+        told = gaitswarm("token", *arguments, "--db", db)
+        assert told.code == ExitCode.NOT_FOUND and "there is no database" in told.err
+    assert not db.exists()
+
+
+def test_nothing_is_printed_but_the_secret_and_a_line_a_token(
+    gaitswarm: Gaitswarm, db: Path
+) -> None:
+    secrets = [gaitswarm("token", "create", name, "--db", db).out for name in ("a", "b")]
+    assert [secret.count("\n") for secret in secrets] == [1, 1]
+    assert len(gaitswarm("token", "list", "--db", db).out.splitlines()) == 2
+
+
 def test_what_cannot_be_made_or_revoked_is_named(gaitswarm: Gaitswarm, db: Path) -> None:
     gaitswarm("token", "create", "ci", "--db", db)
     again = gaitswarm("token", "create", "ci", "--db", db)

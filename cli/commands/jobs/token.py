@@ -48,14 +48,14 @@ def create(
         _print_json({**_document(token), "secret": secret})
         return
     note(f"token {name!r} of scope {scope}; its secret is shown only now:")
-    print_text(f"{secret}\n")
+    print_text(secret)
 
 
 def list_(db: Db = None, as_json: Json = False) -> None:
     """List all tokens, the oldest first."""
     from cli.output import note, print_text
 
-    with _tokens(db) as tokens:
+    with _tokens(db, made=False) as tokens:
         found = tokens.all()
     if as_json:
         _print_json([_document(token) for token in found])
@@ -65,14 +65,14 @@ def list_(db: Db = None, as_json: Json = False) -> None:
     for token in found:
         state = "valid" if token.revoked_at is None else f"revoked {token.revoked_at:%Y-%m-%d}"
         made = f"{token.created_at:%Y-%m-%d}"
-        print_text(f"{token.name:24} {token.scope:7} made {made}  {state}\n")
+        print_text(f"{token.name:24} {token.scope:7} made {made}  {state}")
 
 
 def revoke(name: Name, db: Db = None, as_json: Json = False) -> None:
     """Let a token allow nothing any more; servers know within five seconds."""
     from cli.output import note
 
-    with _tokens(db) as tokens:
+    with _tokens(db, made=False) as tokens:
         token = tokens.revoke(name)
     if as_json:
         _print_json(_document(token))
@@ -81,15 +81,19 @@ def revoke(name: Name, db: Db = None, as_json: Json = False) -> None:
 
 
 @contextmanager
-def _tokens(db: str | None) -> Iterator[Tokens]:
-    """Of the database that the option or the environment names; it is made if it is not there."""
+def _tokens(db: str | None, *, made: bool = True) -> Iterator[Tokens]:
+    """Of the database that the option or the environment names.
+
+    made: whether it is made if it is not there; else that is an error.
+    """
     from contextlib import closing
 
-    from gaitswarm.jobs.open import database_to_write
+    from gaitswarm.jobs.open import database_to_read, database_to_write
     from gaitswarm.settings import read_settings
     from services.runtime import open_store
 
-    with closing(open_store(database_to_write(read_settings(db=db or None)))) as store:
+    find = database_to_write if made else database_to_read
+    with closing(open_store(find(read_settings(db=db or None)))) as store:
         yield store.tokens
 
 
@@ -107,4 +111,4 @@ def _print_json(document: Any) -> None:
 
     from cli.output import print_text
 
-    print_text(json.dumps(document, indent=2) + "\n")
+    print_text(json.dumps(document, indent=2))

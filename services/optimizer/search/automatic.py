@@ -26,7 +26,7 @@ class AutoSettings(SearchSettings):
 
 
 AUTO_SUMMARY: Final = (
-    "The method that suits budget, dimension and kinds of variables, chosen on submission"
+    "CMA-ES, or differential evolution for more than 64 variables; chosen on submission"
 )
 
 if TYPE_CHECKING:

@@ -19,6 +19,7 @@ from sim.proposal.drive import GRAVITY
 from sim.proposal.gait import walk_of_robot
 from sim.proposal.legs import reach_below
 from sim.robot import Robot, RobotFiles, load_robot
+from sim.robot.identifiable import identifiable_variables
 from sim.robot.inertia import unphysical
 from sim.robot.legs import ChainLeg
 from sim.robot.posture import feet_and_centre_of_mass, leg_points
@@ -75,6 +76,7 @@ def check_robot(
     return RobotCheckView(
         name=robot.description.name,
         mass=robot.mass,
+        parameters=list(identifiable_variables(robot)),
         joints=robot.n_joints,
         legs=[
             CheckedLegView(

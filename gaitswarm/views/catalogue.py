@@ -21,6 +21,7 @@ from sim.controllers import CONTROLLERS
 from sim.gait_variables import GAIT_VARIABLES
 from sim.plugins import Kind, Registry
 from sim.robot import DEFAULT_ROBOT, SHIPPED, RobotName, load_robot
+from sim.robot.identifiable import CONVENTIONAL_VARIABLES, identifiable_variables
 from sim.scenario import PRESETS, Scenario
 from sim.variables import Variable
 
@@ -54,6 +55,12 @@ class RobotView(View):
     name: RobotName = Field(description="Name, as in job specs.", examples=["szabadka2"])
     description: str = Field(
         description="What it is, with its source.", examples=["Hexapod of 18 joints, 6.76 kg"]
+    )
+    parameters: list[Variable] = Field(
+        description="What an identification or calibration may fit of it, with bounds."
+    )
+    conventions: list[Variable] = Field(
+        description="How it is modelled: what a calibration may vary beside."
     )
 
 
@@ -146,7 +153,12 @@ class PluginView(View):
 def robot_views() -> list[RobotView]:
     """The robots that ship, the default one first."""
     return [
-        RobotView(name=name, description=load_robot(name).description.description)
+        RobotView(
+            name=name,
+            description=load_robot(name).description.description,
+            parameters=list(identifiable_variables(load_robot(name))),
+            conventions=list(CONVENTIONAL_VARIABLES),
+        )
         for name in sorted(SHIPPED, key=lambda name: name != DEFAULT_ROBOT)
     ]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from gaitswarm.views.base import View
+from sim.variables import Variable
 
 
 class CheckedLegView(View):
@@ -54,3 +55,7 @@ class RobotCheckView(View):
     standing: StandingStillView = Field(description="How it stands.")
     meshes: list[MeshView] = Field(description="That the URDF names, in its order.")
     warnings: list[str] = Field(description="What is unphysical or was guessed badly.")
+    parameters: list[Variable] = Field(
+        default_factory=list,
+        description="What an identification or calibration may fit of it, with bounds.",
+    )

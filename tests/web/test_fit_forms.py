@@ -11,8 +11,10 @@ from playwright.sync_api import Page, expect
 
 from sim.measurement.measured_csv import format_measured_log
 from sim.measurement.walk import MeasuredWalk
-from sim.robot import DEFAULT_ROBOT, load_robot
+from sim.robot import DEFAULT_ROBOT, RobotFiles, load_robot
+from sim.robot.identifiable import identifiable_variables
 from sim.scenario import find_scenario
+from tests.examples.paths import QUADRUPED
 from tests.examples.servers import ServerProcess
 from tests.examples.walks import PUBLISHED_A
 from tests.web.visit import Visit
@@ -80,7 +82,14 @@ def test_a_log_is_uploaded_read_and_identified_from(
     field.evaluate(PASTE, f"{recording}\n{recording}")
     expect(chosen).to_have_count(1)
 
-    page.get_by_label("Parameters").fill("body_mass=3:5, battery_voltage")
+    page.get_by_role("button", name="Fit none").click()
+    for name in ("body_mass", "battery_voltage"):
+        page.get_by_label(f"Treatment of {name}", exact=True).select_option("fitted")
+    mass = page.get_by_label("Lower bound of body_mass")
+    expect(mass).to_have_value("2")
+    mass.fill("light")
+    expect(mass).to_have_attribute("aria-invalid", "true")
+    mass.fill("3")
     page.get_by_label("Particles").fill("4")
     page.get_by_label("Iterations").fill("1")
     page.get_by_label("Links").fill("1, 2")
@@ -92,8 +101,8 @@ def test_a_log_is_uploaded_read_and_identified_from(
         [1, 2],
     )
     assert [(v["name"], v["low"]) for v in spec["variables"]] == [
-        ("body_mass", 3.0),
         ("battery_voltage", 8.0),
+        ("body_mass", 3.0),
     ]
 
 
@@ -138,3 +147,34 @@ def test_what_is_wrong_with_a_log_is_told_at_its_field(
     upload(page, broken)
     told = re.compile(r"line 10, column 'time \[s\]': 'warp.*' is not a number")
     expect(page.get_by_label("Log")).to_have_accessible_description(told)
+
+
+def test_parameters_of_a_robot_of_ones_own_are_those_of_its_legs(
+    server: ServerProcess, log: Path, visit: Callable[..., Visit]
+) -> None:
+    read = server.client.post(
+        "/v1/measured-walks",
+        json={
+            "robot": DEFAULT_ROBOT,
+            "scenario": find_scenario("normal-fast").model_dump(mode="json") | {"cycles": 1.0},
+            "controller": "fuzzy-pi",
+            "design": PUBLISHED_A,
+            "log": log.read_text(encoding="utf-8"),
+        },
+    )
+    recording = read.json()["recording"]["id"]
+    page = visit(server.url, allowed="422").go(
+        f"/jobs/new?kind=identification&recordings={recording}"
+    )
+    # Six legs of a foot and three gearheads each, battery and body.
+    parameters = page.locator("summary").filter(has_text="Parameters:")
+    expect(parameters).to_have_text("Parameters: 45 of 45 fitted")
+    page.get_by_role("button", name="a robot of one’s own").click()
+    page.get_by_label("URDF").set_input_files(QUADRUPED / "robot.urdf")
+    page.get_by_label("robot.toml").set_input_files(QUADRUPED / "robot.toml")
+    toml, urdf = (
+        (QUADRUPED / name).read_text(encoding="utf-8") for name in ("robot.toml", "robot.urdf")
+    )
+    own = load_robot(RobotFiles(toml=toml, urdf=urdf))
+    fitted = len(identifiable_variables(own))
+    expect(parameters).to_have_text(f"Parameters: {fitted} of {fitted} fitted")

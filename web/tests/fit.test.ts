@@ -1,9 +1,10 @@
 import { describe, expect, test } from 'vitest'
-import type { OptimizerPreset, RecordingView } from '../src/api/types'
+import type { OptimizerPreset, RecordingView, Variable } from '../src/api/types'
 import { EMPTY_FIT, errorsByPart } from '../src/submission/fit/fit'
 import { choiceOf, idsIn } from '../src/submission/fit/found-recordings'
 import { identificationSpec } from '../src/submission/fit/identification'
 import { emptyWalk, measuredRequest, walkErrors } from '../src/submission/fit/measured-walk'
+import { parameterDrafts, parameterErrors } from '../src/submission/fit/parameters'
 import { calibrationSpec, nextKey, withRecordings } from '../src/submission/fit/targets'
 import { CATALOGUE } from './catalogue-example'
 
@@ -33,20 +34,49 @@ const METHODS = [
   { settings: { name: 'one-at-a-time' } },
 ] as unknown as readonly OptimizerPreset[]
 
+const parameter = (name: string, low: number, high: number) =>
+  ({ name, low, high, unit: '1', kind: 'continuous', description: '' }) as unknown as Variable
+
+const KNOWN = [
+  parameter('body_mass', 2, 6),
+  parameter('battery_voltage', 8, 13),
+  { ...parameter('contact_law', 0, 0), kind: 'categorical', choices: ['stick', 'dead_zone'] },
+] as readonly Variable[]
+
+const ALL = { known: KNOWN, usual: null, said: {} }
+const drafts = parameterDrafts(ALL)
+
+test('what the API has against a parameter stands at it, however many are fitted', () => {
+  const parameters = { known: KNOWN, usual: ['battery_voltage'], said: {} }
+  const errors = [
+    { field: 'variables.0.low', message: 'must be a number' },
+    { field: 'variables', message: 'too few' },
+  ]
+  expect([...parameterErrors(errors, parameters)]).toEqual([
+    ['variables.battery_voltage.low', 'must be a number'],
+  ])
+})
+
 describe('an identification', () => {
-  test('has variables as they were typed: by name, with bounds, with choices', () => {
-    const variables = 'body_mass, battery_voltage=9:12\ncontact_law=stick:dead_zone'
-    const draft = { ...EMPTY_FIT, name: 'fit', variables }
-    expect(identificationSpec(draft, '1,3', 'hexapod', ['aa', 'bb'], METHODS)).toEqual({
+  test('has parameters as they were picked: by name, with bounds, with choices', () => {
+    const said = {
+      battery_voltage: { ...drafts.battery_voltage, mode: 'searched', low: '9' } as const,
+      contact_law: { ...drafts.contact_law, mode: 'searched', choices: ['stick'] } as const,
+    }
+    const draft = { ...EMPTY_FIT, name: 'fit', said }
+    const parameters = { known: KNOWN, usual: ['body_mass'], said }
+    expect(
+      identificationSpec(draft, parameters, '1,3', 'szabadka2', ['aa', 'bb'], METHODS),
+    ).toEqual({
       kind: 'identification',
       name: 'fit',
-      robot: 'hexapod',
+      robot: 'szabadka2',
       recordings: ['aa', 'bb'],
       links: [1, 3],
       variables: [
         'body_mass',
-        { name: 'battery_voltage', low: 9, high: 12 },
-        { name: 'contact_law', kind: 'categorical', choices: ['stick', 'dead_zone'] },
+        { name: 'battery_voltage', low: 9, high: 13 },
+        { name: 'contact_law', kind: 'categorical', choices: ['stick'] },
       ],
       optimizer: { name: 'pso', particles: 48, inertia_start: 0.9, inertia_end: 0.4 },
       iterations: 120,
@@ -56,9 +86,10 @@ describe('an identification', () => {
 
   test('sends what is no number as typed, and no particles to a method without', () => {
     const draft = { ...EMPTY_FIT, method: 'one-at-a-time', iterations: 'ten' }
-    const spec = identificationSpec(draft, 'foot', 'hexapod', [], METHODS)
+    const spec = identificationSpec(draft, ALL, 'foot', 'szabadka2', [], METHODS)
     expect(spec.optimizer).toEqual({ name: 'one-at-a-time' })
-    expect([spec.iterations, spec.links, 'variables' in spec]).toEqual(['ten', ['foot'], false])
+    expect([spec.iterations, spec.links]).toEqual(['ten', ['foot']])
+    expect(spec.variables).toEqual(['body_mass', 'battery_voltage', 'contact_law'])
   })
 
   test('has the messages of the API by part, with the entry', () => {
@@ -88,7 +119,14 @@ describe('a calibration', () => {
   test('has walk and currents of each recording, and none of a recording that is left out', () => {
     const [a, b] = [recording('aa'), recording('bb')]
     const targets = withRecordings([], [], [a, b])
-    const { walks, targets: sent } = calibrationSpec(EMPTY_FIT, targets, 'hexapod', [b], METHODS)
+    const { walks, targets: sent } = calibrationSpec(
+      EMPTY_FIT,
+      ALL,
+      targets,
+      'szabadka2',
+      [b],
+      METHODS,
+    )
     expect(walks).toEqual([
       { name: 'walk-1', controller: 'pi', design: { P: 0.4 }, scenarios: [{ name: 'fast' }] },
     ])
@@ -113,14 +151,14 @@ describe('a measured walk', () => {
 
   test('names its preset, unless other cycles were walked', () => {
     const { name } = CATALOGUE.scenarios[0]
-    const request = measuredRequest(draft, 'hexapod', 'time [s]', CATALOGUE)
-    expect(request).toMatchObject({ robot: 'hexapod', scenario: name, design: { P: 0.4 } })
-    const walked = measuredRequest({ ...draft, cycles: '5' }, 'hexapod', '', CATALOGUE)
+    const request = measuredRequest(draft, 'szabadka2', 'time [s]', CATALOGUE)
+    expect(request).toMatchObject({ robot: 'szabadka2', scenario: name, design: { P: 0.4 } })
+    const walked = measuredRequest({ ...draft, cycles: '5' }, 'szabadka2', '', CATALOGUE)
     expect(walked.scenario).toMatchObject({ name, cycles: 5 })
   })
 
   test('sends a design that is no JSON as typed, for the API to refuse', () => {
-    expect(measuredRequest({ ...draft, design: '{' }, '', '', CATALOGUE).design).toBe('{')
+    expect(measuredRequest({ ...draft, design: '{' }, 'szabadka2', '', CATALOGUE).design).toBe('{')
   })
 
   test('has the messages of the API at its fields, and those of none aside', () => {

@@ -5,6 +5,8 @@ import type { components } from './schema'
 type Schemas = components['schemas']
 
 export type JobSpec = Schemas['JobSpec']
+/** A shipped robot by its name, a variant of one, or the files of one's own. */
+export type RobotSource = NonNullable<JobSpec['robot']>
 export type TuningWorlds = Schemas['TuningWorlds']
 export type JobState = Schemas['JobState']
 export type JobSummary = Schemas['JobSummaryView']

@@ -88,7 +88,8 @@ function formField(field: string, draft: Draft, searched: readonly string[]): st
   return field
 }
 
-function robotOf({ robot }: Draft): JobSpec['robot'] {
+/** The robot that a draft says, as jobs and walks name it. */
+export function robotOf({ robot }: Pick<Draft, 'robot'>): JobSpec['robot'] {
   if (robot.kind === 'shipped') return robot.name as JobSpec['robot']
   if (robot.kind === 'files') return { toml: robot.toml, urdf: robot.urdf }
   return {
@@ -137,7 +138,8 @@ function object(text: string): unknown {
   }
 }
 
-function number(text: string): number | string {
+/** The text itself where it is no number. */
+export function number(text: string): number | string {
   const value = Number(text)
   return text.trim() === '' || Number.isNaN(value) ? text : value
 }

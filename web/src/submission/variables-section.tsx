@@ -130,10 +130,12 @@ function modeInWords(mode: VariableMode, { default: value, choices }: Variable):
   return `default: ${inWords(choices?.[value] ?? String(value))}`
 }
 
-function VariableTable({
+/** words: of a treatment, where it is not called by its own name. */
+export function VariableTable({
   title,
   variables,
   modes,
+  words = modeInWords,
   drafts,
   errors,
   onChange,
@@ -141,6 +143,7 @@ function VariableTable({
   title: string
   variables: readonly Variable[]
   modes: readonly VariableMode[]
+  words?: (mode: VariableMode, variable: Variable) => string
   drafts: Readonly<Record<string, VariableDraft>>
   errors: FieldErrors
   onChange: (name: string, changes: Partial<VariableDraft>) => void
@@ -169,6 +172,7 @@ function VariableTable({
                 variable={variable}
                 draft={draft}
                 modes={modes}
+                words={words}
                 problems={errorsUnder(errors, `variables.${variable.name}`)}
                 onChange={change}
               />
@@ -184,12 +188,14 @@ function VariableRow({
   variable,
   draft,
   modes,
+  words,
   problems,
   onChange,
 }: {
   variable: Variable
   draft: VariableDraft
   modes: readonly VariableMode[]
+  words: (mode: VariableMode, variable: Variable) => string
   problems: readonly string[]
   onChange: (changes: Partial<VariableDraft>) => void
 }) {
@@ -224,7 +230,7 @@ function VariableRow({
         >
           {modes.map((mode) => (
             <option key={mode} value={mode}>
-              {modeInWords(mode, variable)}
+              {words(mode, variable)}
             </option>
           ))}
         </select>

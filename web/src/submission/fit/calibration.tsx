@@ -1,12 +1,15 @@
 /** The form of a new calibration: which parameters are fitted to what measured walks came to. */
 
 import { useMemo, useState } from 'preact/hooks'
-import type { RecordingView } from '../../api/types'
+import type { Controller, RecordingView, Variable } from '../../api/types'
 import { EMPTY_FIT, type FitDraft } from './fit'
 import { FitForm } from './fit-form'
 import type { FitProps } from './page'
 import { calibrationSpec, shown, type TargetDraft, withRecordings } from './targets'
 import { TargetsTable } from './targets-table'
+
+/** Parameters that are fitted at first. */
+const USUAL = ['battery_voltage', 'efficiency']
 
 interface Targets {
   /** Recordings whose own targets have been put in: what is removed stays so. */
@@ -17,13 +20,12 @@ interface Targets {
 export function CalibrationForm({
   catalogue,
   robot,
-  onRobot,
+  known,
   recordings,
 }: FitProps & { recordings: readonly RecordingView[] }) {
   const [draft, setDraft] = useState<FitDraft>({
     ...EMPTY_FIT,
     name: 'calibration',
-    variables: 'battery_voltage, efficiency',
     iterations: '60',
   })
   const [typed, setTyped] = useState<Targets>({ seen: [], rows: [] })
@@ -32,20 +34,29 @@ export function CalibrationForm({
     rows: withRecordings(typed.rows, typed.seen, recordings),
   }
   const rows = shown(targets.rows, recordings)
+  const controllers = [...new Set(recordings.map(({ controller }) => controller))]
+  const parameters = {
+    known: [
+      ...known.conventions,
+      ...known.parameters,
+      ...ofWalks(catalogue.controllers, controllers),
+    ],
+    usual: USUAL,
+    said: draft.said,
+  }
   const spec = useMemo(
-    () => calibrationSpec(draft, rows, robot, recordings, catalogue.optimizers),
-    [draft, JSON.stringify(rows), robot, recordings, catalogue],
+    () => calibrationSpec(draft, parameters, rows, robot, recordings, catalogue.optimizers),
+    [draft, known, JSON.stringify(rows), robot, recordings, catalogue],
   )
   return (
     <FitForm
       title="Calibration"
       catalogue={catalogue}
-      robot={robot}
-      onRobot={onRobot}
+      parameters={parameters}
       draft={draft}
       onDraft={(changes) => setDraft((old) => ({ ...old, ...changes }))}
       spec={spec}
-      parts={['walks', 'targets', '']}
+      parts={['robot', 'walks', 'targets', '']}
       before={
         <TargetsTable
           catalogue={catalogue}
@@ -56,4 +67,14 @@ export function CalibrationForm({
       }
     />
   )
+}
+
+/** Conventions of the controllers that drive the walks, and what their gaits may be; each once. */
+function ofWalks(all: readonly Controller[], driving: readonly string[]): readonly Variable[] {
+  const found = new Map<string, Variable>()
+  for (const { name, conventions, gait_variables } of all) {
+    if (!driving.includes(name)) continue
+    for (const variable of [...conventions, ...gait_variables]) found.set(variable.name, variable)
+  }
+  return [...found.values()]
 }

@@ -12,12 +12,13 @@ import { SubmitPanel } from '../submit-panel'
 import { TextField } from '../text-field'
 import { useSubmission } from '../use-submission'
 import { errorsByPart, type FitDraft, hasParticles } from './fit'
+import { type Parameters, parameterErrors } from './parameters'
+import { ParametersTable } from './parameters-table'
 
 export function FitForm({
   title,
   catalogue,
-  robot,
-  onRobot,
+  parameters,
   draft,
   onDraft,
   spec,
@@ -27,8 +28,7 @@ export function FitForm({
 }: {
   title: string
   catalogue: Catalogue
-  robot: string
-  onRobot: (name: string) => void
+  parameters: Parameters
   draft: FitDraft
   onDraft: (changes: Partial<FitDraft>) => void
   spec: AnySpec
@@ -42,16 +42,19 @@ export function FitForm({
   const [asJson, setAsJson] = useState(false)
   const submission = useSubmission(spec)
   const { problem } = submission
-  const errors = errorsByPart(problem instanceof ApiProblem ? problem.errors : [])
+  const told = problem instanceof ApiProblem ? problem.errors : []
+  const errors = errorsByPart(told)
+  const placed = parameterErrors(told, parameters)
+  // What is wrong with all of them, or with one that is not in the table.
+  const unplaced = placed.size === 0 && errors.variables ? [errors.variables] : []
   useFirstProblem(submission.attempts)
   if (asJson) return <JsonForm spec={spec} onBack={() => setAsJson(false)} />
-  const field = (name: Exclude<keyof FitDraft, 'method'>, label: string, hint: string) => (
+  const field = (name: Exclude<keyof FitDraft, 'method' | 'said'>, label: string, hint: string) => (
     <TextField
       label={label}
       value={draft[name]}
       hint={hint}
       error={errors[name]}
-      wide={name === 'variables'}
       onChange={(value) => onDraft({ [name]: value })}
     />
   )
@@ -70,18 +73,6 @@ export function FitForm({
         {before}
         <div class="fields">
           {field('name', 'Name', 'shown in the list of jobs')}
-          <ChoiceField
-            label="Robot"
-            choices={catalogue.robots.map(({ name }) => name)}
-            value={robot}
-            error={errors.robot}
-            onChange={onRobot}
-          />
-          {field(
-            'variables',
-            'Parameters',
-            'names, separated by commas; body_mass=3:5 for bounds, contact_law=stick:dead_zone for choices; empty: all of the robot’s',
-          )}
           {children?.(errors)}
           <ChoiceField
             label="Method"
@@ -95,6 +86,12 @@ export function FitForm({
           {field('iterations', 'Iterations', 'of the search')}
           {field('seed', 'Seed', 'only runs of different seeds show what can be trusted')}
         </div>
+        <Problems messages={unplaced} />
+        <ParametersTable
+          parameters={parameters}
+          errors={placed}
+          onSaid={(said) => onDraft({ said })}
+        />
       </section>
       <SubmitPanel spec={spec} submission={submission} onJson={() => setAsJson(true)} />
     </form>

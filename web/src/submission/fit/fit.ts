@@ -2,11 +2,15 @@
 
 import type { FieldError } from '../../api/problem'
 import type { OptimizerPreset } from '../../api/types'
+import { number } from '../build-spec'
+import type { VariableDraft } from '../draft'
+import { fittedVariables, type Parameters } from './parameters'
 
 /** Everything as it was typed; the robot is that of the measured walk. */
 export interface FitDraft {
   readonly name: string
-  readonly variables: string
+  /** What was said of parameters; all others are as usual. */
+  readonly said: Readonly<Record<string, VariableDraft>>
   readonly method: string
   readonly particles: string
   readonly iterations: string
@@ -15,7 +19,7 @@ export interface FitDraft {
 
 export const EMPTY_FIT: FitDraft = {
   name: '',
-  variables: '',
+  said: {},
   method: 'pso',
   particles: '48',
   iterations: '120',
@@ -23,11 +27,14 @@ export const EMPTY_FIT: FitDraft = {
 }
 
 /** The parts of a spec that the draft says. What is no number is sent as typed, to be refused. */
-export function fitOf(draft: FitDraft, methods: readonly OptimizerPreset[]) {
-  const variables = words(draft.variables).map(variableOf)
+export function fitOf(
+  draft: FitDraft,
+  parameters: Parameters,
+  methods: readonly OptimizerPreset[],
+) {
   return {
     name: draft.name,
-    ...(variables.length > 0 && { variables }),
+    variables: fittedVariables(parameters),
     optimizer: methodOf(draft, methods),
     iterations: number(draft.iterations),
     seed: number(draft.seed),
@@ -54,24 +61,6 @@ export function errorsByPart(errors: readonly FieldError[]): Readonly<Record<str
 
 export function words(text: string): string[] {
   return text.split(/[\s,]+/).filter((word) => word !== '')
-}
-
-/** The text itself where it is no number. */
-export function number(text: string): number | string {
-  const value = Number(text)
-  return text.trim() === '' || Number.isNaN(value) ? text : value
-}
-
-/** `body_mass`, `body_mass=3:5` with bounds, `contact_law=stick:dead_zone` with some choices. */
-function variableOf(word: string) {
-  const [, name, range] = /^([^=]+)=(.+)$/.exec(word) ?? []
-  if (name === undefined) return word
-  const parts = range.split(':')
-  const [low, high, ...more] = parts.map(number)
-  if (typeof low === 'number' && typeof high === 'number' && more.length === 0) {
-    return { name, low, high }
-  }
-  return { name, kind: 'categorical', choices: parts }
 }
 
 /** Wide at first and narrow at last: there are many parameters, and one valley. */

@@ -1,17 +1,20 @@
 /** The form of a new identification: which parameters are fitted to which recordings. */
 
 import { useMemo, useState } from 'preact/hooks'
-import type { IdentificationSpec, OptimizerPreset } from '../../api/types'
+import type { IdentificationSpec, OptimizerPreset, RobotSource } from '../../api/types'
+import { number } from '../build-spec'
 import { TextField } from '../text-field'
-import { EMPTY_FIT, type FitDraft, fitOf, number, words } from './fit'
+import { EMPTY_FIT, type FitDraft, fitOf, words } from './fit'
 import { FitForm } from './fit-form'
 import type { FitProps } from './page'
+import type { Parameters } from './parameters'
 
 /** The spec of what was typed. */
 export function identificationSpec(
   draft: FitDraft,
+  parameters: Parameters,
   links: string,
-  robot: string,
+  robot: RobotSource,
   recordings: readonly string[],
   methods: readonly OptimizerPreset[],
 ): IdentificationSpec {
@@ -20,27 +23,27 @@ export function identificationSpec(
     robot,
     recordings,
     links: words(links).map(number),
-    ...fitOf(draft, methods),
+    ...fitOf(draft, parameters, methods),
   } as unknown as IdentificationSpec
 }
 
-export function IdentificationForm({ catalogue, robot, onRobot, ids }: FitProps) {
+export function IdentificationForm({ catalogue, robot, known, ids }: FitProps) {
   const [draft, setDraft] = useState<FitDraft>({ ...EMPTY_FIT, name: 'identification' })
   const [links, setLinks] = useState('1, 2, 3')
+  const parameters = { known: known.parameters, usual: null, said: draft.said }
   const spec = useMemo(
-    () => identificationSpec(draft, links, robot, ids, catalogue.optimizers),
-    [draft, links, robot, ids.join(), catalogue],
+    () => identificationSpec(draft, parameters, links, robot, ids, catalogue.optimizers),
+    [draft, known, links, robot, ids.join(), catalogue],
   )
   return (
     <FitForm
       title="Identification"
       catalogue={catalogue}
-      robot={robot}
-      onRobot={onRobot}
+      parameters={parameters}
       draft={draft}
       onDraft={(changes) => setDraft((old) => ({ ...old, ...changes }))}
       spec={spec}
-      parts={['recordings', '']}
+      parts={['robot', 'recordings', '']}
     >
       {(errors) => (
         <TextField

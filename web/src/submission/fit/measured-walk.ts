@@ -1,7 +1,7 @@
 /** The walk that a measured log is of, as it was typed, and the request that it becomes. */
 
 import type { FieldError } from '../../api/problem'
-import type { MeasuredWalkRequest } from '../../api/types'
+import type { MeasuredWalkRequest, RobotSource } from '../../api/types'
 import type { Catalogue } from '../catalogue'
 
 /** Everything as it was typed. */
@@ -36,7 +36,7 @@ export function publishedDesign({ published }: Catalogue['controllers'][number],
 /** What is no JSON object is sent as typed, and so is a number of cycles: the API refuses it. */
 export function measuredRequest(
   draft: WalkDraft,
-  robot: string,
+  robot: RobotSource,
   log: string,
   catalogue: Catalogue,
 ): MeasuredWalkRequest {

@@ -1,17 +1,22 @@
 /** New jobs that fit a robot to measured walks: the walk, the recordings, and the form of the job. */
 
-import { useRef, useState } from 'preact/hooks'
+import { useMemo, useRef, useState } from 'preact/hooks'
 import { get } from '../../api/client'
 import { useResource } from '../../api/resource'
+import type { RobotSource } from '../../api/types'
 import { ALL_JOBS, Breadcrumbs } from '../../components/breadcrumbs'
 import { ErrorNotice, Loading } from '../../components/feedback'
 import { setQuery } from '../../router/navigation'
 import { idsOf } from '../../router/query-value'
 import { withQuery } from '../../router/routes'
+import { type FieldErrors, robotOf } from '../build-spec'
 import { type Catalogue, loadCatalogue } from '../catalogue'
+import { emptyDraft } from '../draft'
+import { RobotSection } from '../robot/section'
 import { CalibrationForm } from './calibration'
 import { ChosenCard } from './chosen-card'
 import { IdentificationForm } from './identification'
+import { type KnownParameters, useKnownParameters } from './known-parameters'
 import { UploadCard } from './upload-card'
 
 export type FitKind = 'identification' | 'calibration'
@@ -20,6 +25,9 @@ const TITLES: Readonly<Record<FitKind, string>> = {
   identification: 'New identification',
   calibration: 'New calibration',
 }
+
+/** The forms below tell them. */
+const NO_ERRORS: FieldErrors = new Map()
 
 const WORDS = {
   tuning: 'a search for designs',
@@ -30,8 +38,9 @@ const WORDS = {
 /** What the form of a kind needs. */
 export interface FitProps {
   readonly catalogue: Catalogue
-  readonly robot: string
-  readonly onRobot: (name: string) => void
+  readonly robot: RobotSource
+  /** What may be fitted of it. */
+  readonly known: KnownParameters
   /** Of the recordings that were chosen. */
   readonly ids: readonly string[]
 }
@@ -70,8 +79,9 @@ function Fit({
   catalogue: Catalogue
   ids: readonly string[]
 }) {
-  const usual = catalogue.fields.variant.get('name')?.default
-  const [robot, setRobot] = useState(typeof usual === 'string' ? usual : catalogue.robots[0].name)
+  const [draft, setDraft] = useState(() => emptyDraft(catalogue))
+  const robot = useMemo(() => robotOf(draft) as RobotSource, [draft.robot])
+  const known = useKnownParameters(draft.robot, catalogue)
   const recordings = useResource(ids.length === 0 ? null : ids.join(), (signal) =>
     Promise.all(
       ids.map((id) =>
@@ -83,10 +93,16 @@ function Fit({
     const text = idsOf(chosen.join()).join()
     setQuery({ recordings: text === '' ? null : text })
   }
-  const parts = { catalogue, robot, onRobot: setRobot, ids }
+  const parts = { catalogue, robot, known, ids }
   const shown = useLast(recordings.data)?.filter(({ id }) => ids.includes(id)) ?? []
   return (
     <div class="stack">
+      <RobotSection
+        draft={draft}
+        catalogue={catalogue}
+        errors={NO_ERRORS}
+        onChange={(changes) => setDraft((old) => ({ ...old, ...changes }))}
+      />
       <UploadCard {...parts} onRead={({ recording }) => choose([...chosenNow(), recording.id])} />
       <ChosenCard ids={ids} recordings={recordings} onChange={choose} />
       {/* Nothing is fitted to nothing: what the job costs cannot be asked before. */}

@@ -1,7 +1,9 @@
 /** What measured walks came to, as targets of a calibration. Pure. */
 
-import type { CalibrationSpec, OptimizerPreset, RecordingView } from '../../api/types'
-import { type FitDraft, fitOf, number } from './fit'
+import type { CalibrationSpec, OptimizerPreset, RecordingView, RobotSource } from '../../api/types'
+import { number } from '../build-spec'
+import { type FitDraft, fitOf } from './fit'
+import type { Parameters } from './parameters'
 
 /** One target as it was typed. */
 export interface TargetDraft {
@@ -62,8 +64,9 @@ export function walkName(index: number): string {
 /** Of the targets only those whose recording is chosen count. */
 export function calibrationSpec(
   draft: FitDraft,
+  parameters: Parameters,
   targets: readonly TargetDraft[],
-  robot: string,
+  robot: RobotSource,
   recordings: readonly RecordingView[],
   methods: readonly OptimizerPreset[],
 ): CalibrationSpec {
@@ -84,7 +87,7 @@ export function calibrationSpec(
       tolerance: number(tolerance),
       use,
     })),
-    ...fitOf(draft, methods),
+    ...fitOf(draft, parameters, methods),
   } as unknown as CalibrationSpec
 }
 

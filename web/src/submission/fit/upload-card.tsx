@@ -3,10 +3,10 @@
 import { useId, useState } from 'preact/hooks'
 import { post } from '../../api/client'
 import { ApiProblem } from '../../api/problem'
-import type { MeasuredWalk } from '../../api/types'
+import type { MeasuredWalk, RobotSource } from '../../api/types'
 import { ErrorNotice } from '../../components/feedback'
 import type { Catalogue } from '../catalogue'
-import { ChoiceField } from '../number-field'
+import { ChoiceField, Problems } from '../number-field'
 import { TextField } from '../text-field'
 import {
   emptyWalk,
@@ -20,12 +20,10 @@ import { ReadLog } from './read-log'
 export function UploadCard({
   catalogue,
   robot,
-  onRobot,
   onRead,
 }: {
   catalogue: Catalogue
-  robot: string
-  onRobot: (name: string) => void
+  robot: RobotSource
   onRead: (read: MeasuredWalk) => void
 }) {
   const [draft, setDraft] = useState(() => emptyWalk(catalogue))
@@ -68,6 +66,7 @@ export function UploadCard({
       }}
     >
       <h2 id="part-measured">Measured walk</h2>
+      <Problems messages={errors.robot === undefined ? [] : [errors.robot]} />
       <div class="fields">
         <div class="field">
           <label for={`${id}-log`}>Log</label>
@@ -83,13 +82,6 @@ export function UploadCard({
             {errors.log ?? 'CSV, 500 rows a second, units in the headings'}
           </span>
         </div>
-        <ChoiceField
-          label="Robot that walked"
-          choices={catalogue.robots.map(({ name }) => name)}
-          value={robot}
-          error={errors.robot}
-          onChange={onRobot}
-        />
         <ChoiceField
           label="Scenario that it walked through"
           choices={catalogue.scenarios.map(({ name }) => name)}

@@ -10,6 +10,7 @@ from typing import Any, TypeAlias, TypedDict, cast
 from pydantic import ValidationError
 
 from gaitswarm.errors import InvalidRequest, invalid_request
+from gaitswarm.robot_defaults import robot_defaults
 from gaitswarm.start import StartFile, start_from
 from services.optimizer.jobs.documents import SPECS, AnySpec
 from services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
@@ -52,7 +53,7 @@ class SpecOptions(TypedDict, total=False):
     Attributes:
         name: Name of the job, for people.
         robot: Robot to simulate: a shipped one by name, a `RobotVariant`, or the folder that holds
-            robot.toml and robot.urdf of another.
+            robot.toml and robot.urdf of another. What its job.json says is what is not given.
         controller: Motor controller to tune.
         scenarios: Walks in which every design is judged; one, or several.
         variables: What may be searched: names, with the catalogue's bounds, or `Variable` with
@@ -162,6 +163,7 @@ def chosen_spec(spec: SpecInput | None, options: SpecOptions) -> AnySpec:
     if "particles" in given:
         settings = given.get("optimizer", document.get("optimizer", {}))
         given["optimizer"] = with_settings(settings, {"particles": given.pop("particles")})
+    document = _folder_defaults(options.get("robot"), document | given) | document
     file = None
     if isinstance(given.get("start"), str | os.PathLike):
         source = start_from(given["start"])
@@ -173,6 +175,15 @@ def chosen_spec(spec: SpecInput | None, options: SpecOptions) -> AnySpec:
     except ValidationError as error:
         refused = invalid_request(error, document, AnySpec)
         raise (refused if file is None else file.located(refused)) from error
+
+
+def _folder_defaults(robot: RobotInput | None, document: Mapping[str, Any]) -> dict[str, Any]:
+    """What the folder of a robot says of jobs that tune a drive; nothing for other robots."""
+    if not isinstance(robot, str | os.PathLike) or robot in SHIPPED:
+        return {}
+    if document.get("kind", "tuning") != "tuning":
+        return {}
+    return robot_defaults(robot).of_controller(document.get("controller"))
 
 
 def scenario_entries(

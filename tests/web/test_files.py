@@ -9,7 +9,7 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Locator, Page, expect
 
 from tests.examples.servers import ServerProcess
 from tests.web.visit import Visit
@@ -29,6 +29,13 @@ def save(page: Page, chart: str, entry: str, folder: Path) -> Path:
     target = folder / download.value.suggested_filename
     download.value.save_as(target)
     return target
+
+
+def opaque(canvas: Locator, x: float, y: float) -> bool:
+    """Whether something stronger than a grid's line is painted at a place [px]."""
+    taken = "(c, [x, y]) => [...c.getContext('2d').getImageData(x, y, 1, 1).data]"
+    red, green, blue, alpha = canvas.evaluate(taken, [x, y])
+    return bool(alpha > 200 and max(red, green, blue) < 160)
 
 
 def test_a_chart_gives_its_numbers_in_full_and_its_picture(
@@ -55,12 +62,22 @@ def test_a_chart_gives_its_numbers_in_full_and_its_picture(
     # What is over the lines on the screen is over them here: words, and marks of what lies above.
     best, published = told[-1]["best_so_far"], server.job(finished_job)["reference"]["fitness"]
     assert {f"best {best:#.4g}", f"published A {published:#.4g}"} <= set(words)
-    places = r"M\S+ (\S+)L\S+ (\S+)L\S+ (\S+)Z"
-    marks = [found.groups() for found in map(re.compile(places).fullmatch, lines) if found]
+    places = re.compile(r"M(\S+) (\S+)L(\S+) (\S+)L\S+ (\S+)Z")
+    marks = [
+        [float(at) for at in found.groups()] for found in map(places.fullmatch, lines) if found
+    ]
     assert len(marks) == int(page.locator("[data-above]").get_attribute("data-above") or 0) > 0
     # They point up, as in the legend.
-    assert all(float(tip) < float(foot) == float(other) for foot, other, tip in marks)
+    assert all(tip < foot == other for _, foot, _, other, tip in marks)
     assert "▴ worse designs lie above what is shown" in words
+    # And they are where they are on the screen, to the pixel.
+    canvas = page.locator(".uplot canvas").first
+    for left, foot, right, _, tip in marks:
+        assert opaque(canvas, (left + right) / 2, (2 * foot + tip) / 3)
+    [dashed] = [line for line in drawing.iter(f"{SVG}path") if line.get("stroke-dasharray")]
+    left, y, right, _ = map(float, re.findall(r"[-\d.]+", dashed.get("d", "")))
+    along = [opaque(canvas, left + (right - left) * step / 60, y) for step in range(1, 60)]
+    assert 20 < sum(along) < 60
     assert not list(drawing.iter(f"{SVG}image"))
 
     picture = save(page, "Convergence", "Picture (PNG)", tmp_path).read_bytes()

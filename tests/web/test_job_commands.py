@@ -92,6 +92,38 @@ def test_a_job_under_way_and_one_that_is_kept_offer_no_deletion(
     assert not server.job(job_id)["kept"]
 
 
+STUB = """() => {
+    window.notices = []
+    window.Notification = class {
+        static permission = 'default'
+        static requestPermission = () => Promise.resolve('granted')
+        constructor(title, { body }) { window.notices.push(`${title}; ${body}`) }
+    }
+}"""
+"""A browser that allows notices, and keeps them: one without a screen refuses them all."""
+
+
+def test_the_browser_tells_that_a_job_has_ended_if_it_was_asked_to(
+    start_server: Callable[..., Server], visit: Callable[..., Visit]
+) -> None:
+    server = start_server()
+    told, untold = (server.submit(SMALL_SPEC | {"name": name}) for name in ("told", "untold"))
+    page = visit(server.url).go("/jobs")
+    page.evaluate(STUB)
+    for name, job_id in (("untold", untold), ("told", told)):
+        page.get_by_role("link", name=name, exact=True).click()
+        if job_id == told:
+            named(page, "Tell me when it ends")
+            expect(page.get_by_text("as long as this page is open")).to_be_visible()
+        expect(page.get_by_role("button", name="Cancel…")).to_be_visible()
+        server.client.post(f"/v1/jobs/{job_id}/cancel")
+        expect(page.get_by_role("status").get_by_text("cancelled", exact=True)).to_be_visible()
+        page.get_by_role("link", name="All jobs").click()
+    assert page.evaluate("window.notices") == [
+        "told: cancelled; 0 iterations, no design walks in every scenario"
+    ]
+
+
 def test_a_webhook_is_named_in_the_form_and_one_that_is_not_allowed_is_refused_there(
     start_server: Callable[..., Server], visit: Callable[..., Visit]
 ) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final
+from typing import Final, Literal
 
 import pytest
 from playwright.sync_api import Page, ViewportSize, expect
@@ -25,6 +25,8 @@ RUN_AXE = """async (rules) => {
         .map(({ id, help, nodes }) => `${id}: ${help}: ${nodes.map((n) => n.html).join(' | ')}`)
 }"""
 
+RUN_AXE_IN_DIALOG = RUN_AXE.replace("axe.run(document", "axe.run('dialog[open]'")
+
 RULES_OF_COLOURS: Final = ("color-contrast", "link-in-text-block")
 """All others find the same in dark colours as in light ones."""
 
@@ -45,8 +47,8 @@ BACKGROUND = "getComputedStyle(document.body).backgroundColor"
 
 PHONE: Final[ViewportSize] = {"width": 360, "height": 740}
 
-MISSING = "status of 404"
-"""What the console says of the view of a job that is not there."""
+REFUSED: Final = {"nothing there": "status of 404", "jobs": "status of 422"}
+"""What the console says by kind of view: of a job that is not there, and of one without a robot."""
 
 TOO_WIDE = """() => {
     const width = document.documentElement.clientWidth
@@ -84,8 +86,7 @@ def test_every_eye_hand_and_width_can_use_it(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit], kind: str
 ) -> None:
     # The checker is no part of the page, whose policy would keep it out.
-    allowed = MISSING if kind == "nothing there" else "$^"
-    visited = visit(server.url, viewport=PHONE, bypass_csp=True, allowed=allowed)
+    visited = visit(server.url, viewport=PHONE, bypass_csp=True, allowed=REFUSED.get(kind, "$^"))
     found = {}
     for name in VIEWS[kind]:
         # The view before this one is not to be drawn once more for its sake.
@@ -95,6 +96,40 @@ def test_every_eye_hand_and_width_can_use_it(
         if of_view := findings(open_view(visited, name, finished_job)):
             found[name] = of_view
     assert found == {}
+
+
+DIALOGS: Final = ("Extend…", "Label…", "Fork…", "Delete…")
+"""Buttons of a job that has ended, and the dialogs behind them."""
+
+
+def test_every_eye_and_hand_can_use_the_palette_and_dialogs(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+) -> None:
+    # A part of the job without charts, which would be drawn anew in each colour.
+    visited = visit(server.url, viewport=PHONE, bypass_csp=True)
+    page = visited.go(f"/jobs/{finished_job}/reproduce")
+    commands = page.get_by_role("region", name="The job", exact=True)
+    dialog = page.get_by_role("dialog")
+    expect(commands.get_by_role("button", name="Extend…")).to_be_visible()
+    page.add_script_tag(path=AXE)
+    found = {}
+    schemes: dict[Literal["light", "dark"], tuple[str, ...] | None]
+    schemes = {"light": None, "dark": RULES_OF_COLOURS}
+    for scheme, rules in schemes.items():
+        page.emulate_media(color_scheme=scheme)
+        page.wait_for_function(AT_REST)
+        for name in ("Control+k", "?", *DIALOGS):
+            if name in DIALOGS:
+                commands.get_by_role("button", name=name, exact=True).click()
+            else:
+                page.get_by_role("main").focus()
+                page.keyboard.press(name)
+            expect(dialog).to_be_visible()
+            found[f"{name} in {scheme} colours"] = page.evaluate(RUN_AXE_IN_DIALOG, rules)
+            found[f"{name} too wide"] = page.evaluate(TOO_WIDE)
+            page.keyboard.press("Escape")
+            expect(dialog).to_have_count(0)
+    assert {check: elements for check, elements in found.items() if elements} == {}
 
 
 def test_colours_follow_the_system_until_the_button_chooses(

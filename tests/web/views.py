@@ -14,6 +14,7 @@ VIEWS: Final[Mapping[str, Mapping[str, str]]] = {
         "jobs": "/jobs",
         "new-job": "/jobs/new",
         "new-identification": "/jobs/new?kind=identification",
+        "own-robot": "/jobs/new?robot=own",
         "compare": "/compare?jobs={job}",
     },
     "a job": {

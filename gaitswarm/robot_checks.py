@@ -20,9 +20,9 @@ from sim.proposal.gait import walk_of_robot
 from sim.proposal.legs import reach_below
 from sim.robot import Robot, RobotFiles, load_robot
 from sim.robot.identifiable import identifiable_variables
-from sim.robot.inertia import unphysical
 from sim.robot.legs import ChainLeg
 from sim.robot.posture import feet_and_centre_of_mass, leg_points
+from sim.robot.unphysical import unphysical
 from sim.scenario import Scenario
 from sim.simulate import simulate
 
@@ -95,7 +95,7 @@ def check_robot(
         centre_of_mass=mass.tolist(),
         standing=standing,
         meshes=[] if folder is None else _meshes(files.urdf, Path(folder), map(Path, packages)),
-        warnings=[*warnings, *unphysical(robot.urdf.bodies)],
+        warnings=[*warnings, *unphysical(robot.urdf, files.urdf)],
     )
 
 

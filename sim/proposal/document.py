@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import takewhile
 from typing import Any, Final
-from xml.etree import ElementTree as ET
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
@@ -29,7 +29,8 @@ from sim.proposal.drive import (
 from sim.proposal.gait import alternating_phases, propose_scenarios
 from sim.proposal.legs import FoundLeg, FoundLegs, chain_leg, find_legs
 from sim.proposal.stance import Stance, choose_stance
-from sim.robot.inertia import unphysical
+from sim.proposal.xml_text import fixed_joint, with_elements
+from sim.robot.unphysical import unphysical
 from sim.robot.urdf import parse_urdf
 from sim.robot.urdf_errors import by_line
 
@@ -113,7 +114,7 @@ def propose_robot(urdf: str, name: str, actuator: ActuatorChoice = "auto") -> Pr
     notes += sorted({drive.note for of_leg in drives for drive in of_leg})
     notes.append(ACTUATOR_NOTES[kind])
     notes += [f"joint {joint!r} is held at {at:g} rad" for joint, at in found.held.items()]
-    notes += unphysical(tree.bodies)
+    notes += [f"warning: {problem}" for problem in unphysical(tree, urdf)]
     return Proposal(toml + "\n", text, job, tuple(dict.fromkeys(notes)))
 
 
@@ -123,14 +124,13 @@ def _with_feet(urdf: str, legs: Sequence[FoundLeg]) -> tuple[str, list[str]]:
     missing = [(leg, foot) for leg, foot in zip(legs, feet, strict=True) if leg.foot is None]
     if not missing:
         return urdf, feet
-    root = ET.fromstring(urdf)  # noqa: S314 - it was checked when it was parsed
+    lines = []
     for leg, foot in missing:
-        ET.SubElement(root, "link", {"name": foot})
-        joint = ET.SubElement(root, "joint", {"name": f"{foot}_fixed", "type": "fixed"})
-        ET.SubElement(joint, "parent", {"link": leg.link})
-        ET.SubElement(joint, "child", {"link": foot})
-        ET.SubElement(joint, "origin", {"xyz": " ".join(map(repr, leg.end))})
-    return ET.tostring(root, encoding="unicode"), feet
+        lines += [
+            f"  <link name={quoteattr(foot)}/>",
+            *fixed_joint(f"{foot}_fixed", leg.link, foot, " ".join(map(repr, leg.end))),
+        ]
+    return with_elements(urdf, lines), feet
 
 
 def _head(name: str, legs: int, mass: float) -> list[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -64,31 +63,6 @@ class BodyInertia:
 
 NO_INERTIA: Final = BodyInertia(0.0, np.zeros(3), np.zeros((3, 3)))
 """Of a link that has none."""
-
-
-def unphysical(bodies: Mapping[str, BodyInertia]) -> Iterator[str]:
-    """Look for masses and inertias that no body has.
-
-    Args:
-        bodies: Rigid bodies by the name of their first link.
-
-    Yields:
-        A sentence for each, with the way out.
-    """
-    for name, body in bodies.items():
-        if body.mass == 0.0:
-            yield (
-                f"link {name!r} and what is fixed to it have no mass: give it an <inertial>, or"
-                " joints beyond it are moved by nothing but their rotors' inertia"
-            )
-            continue
-        moments = np.linalg.eigvalsh(body.rotational)
-        if moments[0] <= 0.0 or moments[2] > (moments[0] + moments[1]) * (1.0 + 1e-6):
-            yield (
-                f"link {name!r}: no body of {body.mass:g} kg has the principal moments"
-                f" {', '.join(f'{moment:.3g}' for moment in moments)} kg m2: none may be negative,"
-                " nor larger than both others together; look at its <inertia>"
-            )
 
 
 def parallel_axis(offset: Floats) -> Floats:

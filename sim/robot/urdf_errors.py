@@ -32,13 +32,26 @@ def by_line(text: str) -> Iterator[None]:
     try:
         yield
     except RobotFileError as error:
-        said = str(error)
-        line = _line(text, said)
-        if line is None:
+        said = with_line(text, str(error))
+        if said == str(error):
             raise
-        raise RobotFileError(said.replace("robot.urdf: ", f"robot.urdf, line {line}: ", 1)) from (
-            error.__cause__ or error
-        )
+        raise RobotFileError(said) from (error.__cause__ or error)
+
+
+def with_line(text: str, said: str) -> str:
+    """Add the line to a sentence that begins with a link or a joint of a URDF.
+
+    Args:
+        text: Of the file, which keeps the bounds of `sim.robot.bounds`.
+        said: The sentence.
+
+    Returns:
+        The same, with the line if that part is in the text.
+    """
+    line = _line(text, said)
+    if line is None:
+        return said
+    return said.replace("robot.urdf: ", f"robot.urdf, line {line}: ", 1)
 
 
 def _line(text: str, said: str) -> int | None:

@@ -209,18 +209,6 @@ def test_a_file_without_legs_is_refused_by_name_and_leaves_nothing(
     assert [p.name for p in tmp_path.iterdir() if p.suffix != ".urdf"] == []
 
 
-def test_check_warns_of_inertia_that_no_body_has(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    for name in ("robot.toml", "robot.urdf"):
-        text = (folder / name).read_text(encoding="utf-8")
-        changed = text.replace('izz="1e-4"', 'izz="1e-2"', 2)
-        (tmp_path / name).write_text(changed, encoding="utf-8")
-    assert run(["robot", "check", str(tmp_path), "--json"]) == 0
-    warnings = json.loads(capsys.readouterr().out)["warnings"]
-    assert any("'FL_hip'" in text and "principal moments" in text for text in warnings)
-
-
 def test_a_damaged_job_file_is_named(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -1,0 +1,53 @@
+"""Elements that are added to a URDF's text, of which all else stays as its author has it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from xml.parsers import expat
+from xml.sax.saxutils import quoteattr
+
+
+def fixed_joint(name: str, parent: str, child: str, xyz: str, rpy: str = "0 0 0") -> list[str]:
+    """A joint that never moves.
+
+    Args:
+        name: Of the joint.
+        parent: Link that carries it.
+        child: Link that it carries.
+        xyz: Where the child is in the parent's frame [m].
+        rpy: How it is turned there [rad].
+
+    Returns:
+        Its lines.
+    """
+    return [
+        f'  <joint name={quoteattr(name)} type="fixed">',
+        f"    <parent link={quoteattr(parent)}/>",
+        f"    <child link={quoteattr(child)}/>",
+        f'    <origin xyz="{xyz}" rpy="{rpy}"/>',
+        "  </joint>",
+    ]
+
+
+def with_elements(urdf: str, lines: Sequence[str]) -> str:
+    """Add elements at the end of a URDF, so that the lines of all others stay.
+
+    Args:
+        urdf: Text of the file, which has been parsed before.
+        lines: Of the elements.
+
+    Returns:
+        The text with them.
+    """
+    # Bytes as the parser counts them, whatever encoding the text says it once had.
+    content, end = urdf.encode(), 0
+    parser = expat.ParserCreate("utf-8")
+
+    def closed(_tag: str) -> None:
+        nonlocal end
+        end = parser.CurrentByteIndex
+
+    parser.EndElementHandler = closed
+    parser.Parse(content, True)
+    added = "".join(f"{line}\n" for line in ("", *lines))
+    return (content[:end] + added.encode() + content[end:]).decode()

@@ -20,6 +20,7 @@ from sim.errors import RobotFileError
 from sim.proposal.apart import walking_proposal
 from sim.proposal.document import Proposal
 from sim.proposal.drive import ActuatorChoice
+from sim.proposal.frame import Axis, Frame
 from sim.robot.bounds import LONGEST_URDF
 
 _NAME: Final = re.compile(r"\w[^/\\]{0,99}")
@@ -46,6 +47,8 @@ def init_robot(
     *,
     name: str | None = None,
     actuator: ActuatorChoice = "auto",
+    up: Axis | None = None,
+    forward: Axis | None = None,
     meshes: bool = True,
     packages: Sequence[str | os.PathLike[str]] = (),
 ) -> MadeRobot:
@@ -60,6 +63,9 @@ def init_robot(
         name: Of the robot; default the file's.
         actuator: Kind of its actuators: DC motors, torque-controlled ones, or those that the limits
             of the URDF's joints speak for.
+        up: Axis of the URDF's first link that points up; default z, and an error if the legs speak
+            against it.
+        forward: Axis that points ahead; default x, and a warning if the legs speak against it.
         meshes: Whether to copy meshes.
         packages: Folders in which `package://` is looked for, before those of ROS_PACKAGE_PATH.
 
@@ -81,8 +87,9 @@ def init_robot(
         raise InvalidRequest(f"cannot read {source}: {error}", field="urdf") from error
     chosen = source.stem if name is None else name
     check_name(chosen)
+    frame = frame_of(up, forward)
     try:
-        proposal = walking_proposal(text, chosen, actuator)
+        proposal = walking_proposal(text, chosen, actuator, frame)
     except RobotFileError as error:
         said = str(error).replace("robot.urdf", source.name, 1)
         raise InvalidRequest(said, field="urdf") from error
@@ -123,6 +130,29 @@ def check_name(name: str) -> None:
             " a letter or digit and have no / and no \\",
             field="name",
         )
+
+
+def frame_of(up: Axis | None, forward: Axis | None) -> Frame:
+    """Axes of a URDF's first link.
+
+    Args:
+        up: That points up; None for z.
+        forward: That points ahead; None for x.
+
+    Returns:
+        Both.
+
+    Raises:
+        InvalidRequest: They are along the same line.
+    """
+    frame = Frame(up, forward)
+    if not frame.right_angled:
+        raise InvalidRequest(
+            f"{forward or 'x'} cannot point ahead where {up or 'z'} points up; name an axis at"
+            " right angles to it",
+            field="forward",
+        )
+    return frame
 
 
 def _check_free(folder: Path) -> None:

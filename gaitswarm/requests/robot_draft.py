@@ -5,10 +5,11 @@ from __future__ import annotations
 from pydantic import BaseModel, ConfigDict, Field
 
 from gaitswarm.errors import simulation_errors
-from gaitswarm.robots import check_name
+from gaitswarm.robots import check_name, frame_of
 from gaitswarm.views.robot_draft import RobotDraftView
 from sim.proposal.apart import propose_apart
 from sim.proposal.drive import ActuatorChoice
+from sim.proposal.frame import Axis
 from sim.robot.bounds import LONGEST_NAME, LONGEST_URDF, MOST_ELEMENTS, MOST_LINKS
 
 
@@ -34,6 +35,16 @@ class RobotDraftRequest(BaseModel):
         description="Kind of its actuators: DC motors with gearheads, or torque-controlled ones;"
         " `auto` decides by the torques and rates of the URDF.",
     )
+    up: Axis | None = Field(
+        default=None,
+        description="Axis of the URDF's first link that points up; null for z, which is refused if"
+        " the legs speak against it.",
+    )
+    forward: Axis | None = Field(
+        default=None,
+        description="Axis of its first link that points ahead, at right angles to `up`; null for x,"
+        " with a warning if the legs speak against it.",
+    )
 
 
 def run_robot_draft(request: RobotDraftRequest) -> RobotDraftView:
@@ -51,8 +62,9 @@ def run_robot_draft(request: RobotDraftRequest) -> RobotDraftView:
         EvaluatorUnavailable: No process can be started.
     """
     check_name(request.name)
+    frame = frame_of(request.up, request.forward)
     with simulation_errors("urdf"):
-        made = propose_apart(request.urdf, request.name, request.actuator)
+        made = propose_apart(request.urdf, request.name, request.actuator, frame)
     return RobotDraftView(
         name=request.name, toml=made.toml, urdf=made.urdf, job=made.job, guesses=list(made.guesses)
     )

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Final
 
 from sim.errors import ProcessEnded, RobotFileError, SimulationInputError
 from sim.limited_process import Document, LimitedProcesses, serve
 from sim.proposal.document import Proposal, propose_robot
 from sim.proposal.drive import ActuatorChoice
+from sim.proposal.frame import AS_IT_IS, Frame
 from sim.proposal.gait import walk_within_reach
 from sim.robot import bounds
 from sim.robot.robot import parse_robot
@@ -26,13 +27,16 @@ PROCESSES: Final = LimitedProcesses(
 )
 
 
-def walking_proposal(urdf: str, name: str, actuator: ActuatorChoice = "auto") -> Proposal:
+def walking_proposal(
+    urdf: str, name: str, actuator: ActuatorChoice = "auto", frame: Frame = AS_IT_IS
+) -> Proposal:
     """Propose a robot, and make sure that it can be used and that its legs reach.
 
     Args:
         urdf: Text of the file.
         name: Of the robot.
         actuator: Kind of its actuators.
+        frame: Which axes of its first link point up and ahead.
 
     Returns:
         Its files.
@@ -41,7 +45,7 @@ def walking_proposal(urdf: str, name: str, actuator: ActuatorChoice = "auto") ->
         RobotFileError: The URDF cannot be read, no legs are found that can be simulated, or these
             have no room for steps.
     """
-    proposal = propose_robot(urdf, name, actuator)
+    proposal = propose_robot(urdf, name, actuator, frame)
     robot = parse_robot(proposal.toml, proposal.urdf)
     fitted = [walk_within_reach(robot, walk) for walk in proposal.job["scenarios"]]
     return replace(
@@ -51,13 +55,16 @@ def walking_proposal(urdf: str, name: str, actuator: ActuatorChoice = "auto") ->
     )
 
 
-def propose_apart(urdf: str, name: str, actuator: ActuatorChoice = "auto") -> Proposal:
+def propose_apart(
+    urdf: str, name: str, actuator: ActuatorChoice = "auto", frame: Frame = AS_IT_IS
+) -> Proposal:
     """The same, in another process with limits of time, processor and memory.
 
     Args:
         urdf: Text of the file, by anybody.
         name: Of the robot.
         actuator: Kind of its actuators.
+        frame: Which axes of its first link point up and ahead.
 
     Returns:
         Its files.
@@ -67,7 +74,9 @@ def propose_apart(urdf: str, name: str, actuator: ActuatorChoice = "auto") -> Pr
     """
     bounds.check_urdf(urdf)
     try:
-        made = PROCESSES.ask({"urdf": urdf, "name": name, "actuator": actuator})
+        made = PROCESSES.ask(
+            {"urdf": urdf, "name": name, "actuator": actuator, "frame": asdict(frame)}
+        )
     except ProcessEnded as error:
         raise RobotFileError(
             f"robot.urdf: no robot.toml can be proposed: that {error}; write one by hand, as"
@@ -79,7 +88,9 @@ def propose_apart(urdf: str, name: str, actuator: ActuatorChoice = "auto") -> Pr
 
 
 def _answer(request: Document) -> Document:
-    made = walking_proposal(request["urdf"], request["name"], request["actuator"])
+    made = walking_proposal(
+        request["urdf"], request["name"], request["actuator"], Frame(**request["frame"])
+    )
     return {"toml": made.toml, "urdf": made.urdf, "job": made.job, "guesses": list(made.guesses)}
 
 

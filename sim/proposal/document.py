@@ -26,6 +26,7 @@ from sim.proposal.drive import (
     propose_drives,
     propose_sole,
 )
+from sim.proposal.frame import AS_IT_IS, Frame, sideways, turned
 from sim.proposal.gait import alternating_phases, propose_scenarios
 from sim.proposal.legs import FoundLeg, FoundLegs, chain_leg, find_legs
 from sim.proposal.stance import Stance, choose_stance
@@ -49,6 +50,11 @@ _TWO_LEGS: Final = (
     " balance: expect it to fall"
 )
 
+_SIDEWAYS: Final = (
+    "warning: it faces y, it seems, and would walk sideways: name the axis that points ahead as"
+    " `forward` (`--forward=y` or `--forward=-y`), or x if it does"
+)
+
 
 @dataclass(frozen=True, slots=True)
 class Proposal:
@@ -67,13 +73,16 @@ class Proposal:
     guesses: tuple[str, ...]
 
 
-def propose_robot(urdf: str, name: str, actuator: ActuatorChoice = "auto") -> Proposal:
+def propose_robot(
+    urdf: str, name: str, actuator: ActuatorChoice = "auto", frame: Frame = AS_IT_IS
+) -> Proposal:
     """Make a robot of a URDF.
 
     Args:
         urdf: Text of the file.
         name: Of the robot.
         actuator: Kind of its actuators.
+        frame: Which axes of its first link point up and ahead.
 
     Returns:
         Its files.
@@ -82,7 +91,9 @@ def propose_robot(urdf: str, name: str, actuator: ActuatorChoice = "auto") -> Pr
         RobotFileError: The URDF cannot be read, or no legs are found that can be simulated.
     """
     with by_line(urdf):
-        found = find_legs(parse_urdf(urdf))
+        tree = parse_urdf(urdf)
+        urdf = turned(urdf, next(iter(tree.links)), list(tree.links), frame)
+        found = find_legs(parse_urdf(urdf), upright=frame != AS_IT_IS)
     text, feet = _with_feet(urdf, found.legs)
     tree, names = parse_urdf(text, found.held), _leg_names(found.legs)
     joints = [leg.joints for leg in found.legs]
@@ -110,6 +121,8 @@ def propose_robot(urdf: str, name: str, actuator: ActuatorChoice = "auto") -> Pr
         "scenarios": propose_scenarios(stance, sole.length, names),
     }
     notes = [_TWO_LEGS] if len(legs) == 2 else []
+    if frame.forward is None and sideways(legs, stance.angles):
+        notes.append(_SIDEWAYS)
     notes += [f"leg {leg.joints[0]}: {note}" for leg in found.legs for note in leg.notes]
     notes += sorted({drive.note for of_leg in drives for drive in of_leg})
     notes.append(ACTUATOR_NOTES[kind])

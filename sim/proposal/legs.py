@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
@@ -11,18 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.errors import RobotFileError
+from sim.proposal.feet import end_of
+from sim.proposal.frame import check_upright
+from sim.proposal.look_alikes import check_look_alikes
 from sim.robot.chain import Chain, chain_of
 from sim.robot.description import JOINTS_PER_LEG, Leg
-from sim.robot.joints import Joint
+from sim.robot.joints import TURNS, Joint
 from sim.robot.legs import ChainLeg
 from sim.robot.robot import Robot
-from sim.robot.urdf import Solid, Urdf
+from sim.robot.urdf import Urdf
 
 Floats = NDArray[np.float64]
-
-_FOOT_NAME: Final = re.compile(r"foot|toe|sole|ankle|tip|contact", re.IGNORECASE)
-
-_TURNS: Final = frozenset({"revolute", "continuous"})
 
 _STEPS: Final = 25
 """Angles of each joint that are tried."""
@@ -67,23 +65,30 @@ class FoundLegs:
     held: Mapping[str, float] = field(default_factory=dict)
 
 
-def find_legs(urdf: Urdf) -> FoundLegs:
+def find_legs(urdf: Urdf, *, upright: bool = False) -> FoundLegs:
     """Find the legs: chains of three joints that turn, from the body to a foot that reaches down.
 
     Args:
         urdf: Of the robot, no joint held.
+        upright: Whether z is known to point up.
 
     Returns:
         Legs and all other joints.
 
     Raises:
-        RobotFileError: There are fewer than two; says what there is instead.
+        RobotFileError: There are fewer than two, another axis than z points up, or a chain is built
+            as the legs are and is none; says what there is instead.
     """
     chains = list(_chains(urdf))
     threes = [chain for chain in chains if _is_candidate(chain)]
     if len(threes) < 2:
         raise RobotFileError(_why_none(urdf, chains))
-    drops = [-_lowest(urdf, chain) for chain in threes]
+    reached = [_reached(urdf, chain) for chain in threes]
+    drops = [-float(feet[:, 2].min()) for _, feet in reached]
+    if not upright:
+        hips = np.array([leg.hip for leg, _ in reached])
+        places = [(feet.mean(axis=0) - leg.hip) / sum(leg.lengths) for leg, feet in reached]
+        check_upright(urdf, hips, np.array(places))
     legs = [
         _found(urdf, chain)
         for chain, drop in zip(threes, drops, strict=True)
@@ -92,8 +97,9 @@ def find_legs(urdf: Urdf) -> FoundLegs:
     if len(legs) < 2:
         raise RobotFileError(
             "robot.urdf: fewer than two chains of three joints reach below the body; z must point"
-            " up in the frame of its first link"
+            " up in the frame of its first link, or `up` name the axis that does (`--up=y`)"
         )
+    check_look_alikes(urdf, [leg.link for leg in legs])
     owned = {name for leg in legs for name in leg.joints}
     held = {
         joint.name: _held_at(joint)
@@ -187,14 +193,14 @@ def _chains(urdf: Urdf) -> Iterable[tuple[Joint, ...]]:
 
 
 def _is_candidate(chain: Sequence[Joint]) -> bool:
-    return len(chain) == JOINTS_PER_LEG and all(joint.kind in _TURNS for joint in chain)
+    return len(chain) == JOINTS_PER_LEG and all(joint.kind in TURNS for joint in chain)
 
 
 def _why_none(urdf: Urdf, chains: Sequence[Sequence[Joint]]) -> str:
     if not chains:
         return "robot.urdf: no joint of it moves; legs have three joints that turn"
     counts = sorted({len(chain) for chain in chains})
-    kinds = sorted({j.kind for chain in chains for j in chain} - _TURNS)
+    kinds = sorted({j.kind for chain in chains for j in chain} - TURNS)
     found = f"{len(chains)} chain{'s' * (len(chains) > 1)} of {', '.join(map(str, counts))} joints"
     if kinds:
         found += f", some of them {', '.join(kinds)}"
@@ -204,64 +210,21 @@ def _why_none(urdf: Urdf, chains: Sequence[Sequence[Joint]]) -> str:
     )
 
 
-def _lowest(urdf: Urdf, chain: Sequence[Joint]) -> float:
-    end, *_ = _end_of(urdf, chain[-1].child)
+def _reached(urdf: Urdf, chain: Sequence[Joint]) -> tuple[ChainLeg, Floats]:
+    """A chain as a leg, and where its end gets, (n, 3) [m]."""
+    end, *_ = end_of(urdf, chain[-1].child)
     leg = chain_leg(urdf, [joint.name for joint in chain], end)
-    feet, _ = leg.feet(tried_angles(leg))
-    return float(feet[:, 2].min())
+    return leg, leg.feet(tried_angles(leg))[0]
 
 
 def _found(urdf: Urdf, chain: Sequence[Joint]) -> FoundLeg:
     first, second, third = (joint.name for joint in chain)
     link = chain[-1].child
-    end, foot, sole, notes = _end_of(urdf, link)
+    end, foot, sole, notes = end_of(urdf, link)
     x, y, z = np.asarray(end).tolist()
     return FoundLeg((first, second, third), link, foot, (x, y, z), sole, notes)
 
 
-def _end_of(urdf: Urdf, link: str) -> tuple[Floats, str | None, float | None, tuple[str, ...]]:
-    """Where a leg ends in its last link's frame: a frame that is fixed to it, a sphere, or its end.
-
-    Returns the position, the frame's name, the radius of a sphere there, and what was guessed.
-    """
-    parts = [name for name, place in urdf.places.items() if place.body == link]
-    spheres = [(at, s.size[0]) for part in parts for at, s in _solids(urdf, part, "sphere")]
-    others = [name for name in parts if name != link]
-    named = [name for name in others if _FOOT_NAME.search(name)]
-    if others:
-        far = max(named or others, key=lambda n: float(np.linalg.norm(urdf.places[n].position)))
-        at = urdf.places[far].position
-        if np.linalg.norm(at) > 0.0:
-            near = [float(r) for centre, r in spheres if np.linalg.norm(centre - at) <= r]
-            notes = () if named else (f"its end is the link {far!r}, the farthest one",)
-            return at, far, max(near, default=None), notes
-    if spheres:
-        at, radius = max(spheres, key=lambda s: float(np.linalg.norm(s[0])))
-        return at, None, float(radius), (f"its end is the sphere of the link {link!r}",)
-    corners = [c for part in parts for at, s in _solids(urdf, part) for c in _ends(at, s)]
-    if corners:
-        at = max(corners, key=lambda c: float(np.linalg.norm(c)))
-        return at, None, None, (f"its end is the far end of the shape of the link {link!r}",)
-    raise RobotFileError(
-        f"robot.urdf: link {link!r} has no foot: add a link at its end, joined by a fixed joint"
-    )
-
-
-def _solids(urdf: Urdf, part: str, kind: str | None = None) -> Iterable[tuple[Floats, Solid]]:
-    place = urdf.places[part]
-    for solid in urdf.links[part].solids("collision"):
-        if kind in (None, solid.kind):
-            yield place.rotation @ solid.origin.xyz + place.position, solid
-
-
-def _ends(at: Floats, solid: Solid) -> Iterable[Floats]:
-    half = solid.size / 2.0 if solid.kind == "box" else np.full(3, solid.size[-1] / 2.0)
-    turn = solid.origin.matrix()
-    axes = turn.T * half[:, None] if solid.kind == "box" else (turn.T * half[:, None])[2:]
-    yield from (at + axis for axis in axes)
-    yield from (at - axis for axis in axes)
-
-
 def _held_at(joint: Joint) -> float:
     lower, upper = joint.limits
-    return float(np.clip(0.0, lower, upper)) if joint.kind in _TURNS else 0.0
+    return float(np.clip(0.0, lower, upper)) if joint.kind in TURNS else 0.0

@@ -101,31 +101,26 @@ def _best(leg: ChainLeg, angles: Floats, feet: Floats, slopes: Floats, ground: f
     to_limits = np.minimum(angles - leg.limits[:, 0], leg.limits[:, 1] - angles).min(axis=1)
     tight = np.maximum(0.0, 1.0 - to_limits / _MARGIN)
     # A leg whose hip turns about a vertical axis points where it is mounted.
-    ahead = np.zeros(len(feet)) if _is_upright(leg) else ((feet[:, 0] - leg.hip[0]) / length) ** 2
+    ahead = np.zeros(len(feet)) if leg.is_upright else ((feet[:, 0] - leg.hip[0]) / length) ** 2
     # A hip that is turned from the file's own zero spreads or crosses the legs.
     spread, folded = angles[:, 0] ** 2, (angles[:, 1:] ** 2).sum(axis=1)
     worth = freedom - 20.0 * torque - 5.0 * tight - 20.0 * ahead - 40.0 * spread - 0.02 * folded
     return np.asarray(angles[int(worth.argmax())])
 
 
-def _is_upright(leg: ChainLeg) -> bool:
-    """Whether the first joint's axis is rather vertical than not."""
-    return bool(abs((leg.rotations[0] @ leg.axes[0])[2]) > np.sqrt(0.5))
-
-
 def _beside(
     leg: ChainLeg, angles: Floats, foot: Floats, radius: float, ground: float
 ) -> Floats | None:
     """Angles that put a foot as far aside as all others; None of a leg not mounted for that."""
-    if _is_upright(leg) and abs(abs(foot[1]) - radius) > _SHIFT * sum(leg.lengths):
+    if leg.is_upright and abs(abs(foot[1]) - radius) > _SHIFT * sum(leg.lengths):
         return None
     # First below the hip, where the thesis's and most legs are at rest, else where it was found.
     for x in (leg.hip[0], foot[0]):
         found = _reached(leg, angles, np.array([x, np.copysign(radius, foot[1]), ground]))
-        if found is not None and not (_is_upright(leg) and abs(found[0] - angles[0]) > _TURN):
+        if found is not None and not (leg.is_upright and abs(found[0] - angles[0]) > _TURN):
             return found
     # A leg that hangs keeps the angles that were found for it.
-    return None if _is_upright(leg) else angles
+    return None if leg.is_upright else angles
 
 
 def _reached(leg: ChainLeg, angles: Floats, target: Floats) -> Floats | None:

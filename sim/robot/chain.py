@@ -68,8 +68,8 @@ def chain_of(urdf: Urdf, leg: Leg) -> Chain:
         The leg's joints.
 
     Raises:
-        RobotFileError: A joint or the foot is not there, a joint is not revolute or has its limits
-            in degrees, or they are not a chain from the body to the foot.
+        RobotFileError: A joint or the foot is not there, a joint is not revolute follows another
+            one or has its limits in degrees, or they are not a chain from the body to the foot.
     """
     named = {joint.name: joint for joint in urdf.joints}
     before, placements, limits = next(iter(urdf.links)), [], []
@@ -84,6 +84,12 @@ def chain_of(urdf: Urdf, leg: Leg) -> Chain:
             raise RobotFileError(
                 f"robot.urdf: joint {name!r} of leg {leg.name!r} is not revolute but"
                 f" {joint.kind}; a leg has three joints that turn"
+            )
+        if joint.follows is not None:
+            raise RobotFileError(
+                f"robot.urdf: joint {name!r} of a leg follows the joint {joint.follows!r}"
+                f" (<mimic>), but here each joint of a leg has an actuator of its own: take <mimic>"
+                " out if it has; legs with coupled joints cannot be simulated"
             )
         parent = urdf.place(joint.parent)
         if parent.body != before:

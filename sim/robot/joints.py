@@ -21,6 +21,10 @@ Floats = NDArray[np.float64]
 _KINDS: Final = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 
 
+TURNS: Final = frozenset({"revolute", "continuous"})
+"""Types of joints that turn."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Joint:
     """A joint of any type.
@@ -35,6 +39,7 @@ class Joint:
         limits: least and largest position [rad]; infinite where there are none.
         effort: largest torque [N m]; 0 where the file gives none.
         velocity: largest rate [rad/s]; 0 where the file gives none.
+        follows: joint that it mimics, if it is moved by that alone.
     """
 
     name: str
@@ -46,6 +51,7 @@ class Joint:
     limits: tuple[float, float]
     effort: float
     velocity: float
+    follows: str | None = None
 
     @property
     def fixed(self) -> bool:
@@ -82,7 +88,7 @@ def joint_of(element: ET.Element) -> Joint:
             f" {', '.join(_KINDS)}"
         )
     origin = origin_of(element, whose)
-    limit = element.find("limit")
+    limit, mimic = element.find("limit"), element.find("mimic")
     effort, velocity = (
         0.0 if limit is None else float(numbers_of(limit, attribute, whose, "0", math.inf)[0])
         for attribute in ("effort", "velocity")
@@ -97,6 +103,7 @@ def joint_of(element: ET.Element) -> Joint:
         limits=_limits(limit, kind, whose),
         effort=effort,
         velocity=velocity,
+        follows=None if mimic is None else mimic.get("joint", ""),
     )
 
 
@@ -143,7 +150,7 @@ def standardise(root: ET.Element, held: Mapping[str, float]) -> bool:
 def _hold(element: ET.Element, kind: str, angle: float) -> None:
     """Let a joint be a fixed one, its frame turned by the angle."""
     joint = joint_of(element)
-    if kind not in ("revolute", "continuous", "fixed") and angle:
+    if kind not in (*TURNS, "fixed") and angle:
         raise RobotFileError(
             f"robot.toml: held_joints: joint {joint.name!r} is {kind} and does not turn; hold it"
             " at 0"

@@ -115,6 +115,11 @@ class ChainLeg:
         return 0.0 if abs(lateral) < _MIDDLE else math.copysign(1.0, lateral)
 
     @property
+    def is_upright(self) -> bool:
+        """Whether the first joint's axis is rather vertical than not."""
+        return bool(abs((self.rotations[0] @ self.axes[0])[2]) > np.sqrt(0.5))
+
+    @property
     def lengths(self) -> tuple[float, float, float]:
         """Distances between the joints and from the last one to the foot [m]."""
         first, second, third = (

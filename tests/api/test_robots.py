@@ -13,7 +13,7 @@ from sim.limited_process import LimitedProcesses
 from sim.proposal import apart
 from sim.proposal.document import propose_robot
 from tests.examples.hostile import chain
-from tests.robots.test_proposal import dog
+from tests.robots.test_proposal import STATUE, dog
 
 pytestmark = pytest.mark.slow
 
@@ -48,6 +48,22 @@ def test_a_urdf_becomes_a_robot_that_stands_and_can_be_submitted(client: httpx2.
     assert client.post("/v1/estimates", json=job).status_code == 200
 
 
+def test_a_robot_that_faces_y_is_turned_when_that_is_said(client: httpx2.Client) -> None:
+    quarter = '<joint name="w" type="fixed"><parent link="file"/><child link="trunk"/><origin rpy'
+    left = dog().replace(
+        "</robot>", f'<link name="file"/>{quarter}="0 0 1.570796"/></joint></robot>'
+    )
+    drafts = [
+        client.post("/v1/robots/drafts", json={"urdf": left, **said}).json()
+        for said in ({}, {"forward": "y"})
+    ]
+    assert ["it faces y" in str(draft["guesses"]) for draft in drafts] == [True, False]
+    assert "robot_frame" in drafts[1]["urdf"]
+    feet = [draft["job"]["scenarios"][0]["radius"] for draft in drafts]
+    straight = propose_robot(dog(), "dog").job["scenarios"][0]["radius"]
+    assert feet[1] == pytest.approx(straight, abs=1e-3) != feet[0]
+
+
 def test_what_no_body_has_is_told_by_a_check(client: httpx2.Client) -> None:
     made = propose_robot(dog().replace('ixx="1e-3"', 'ixx="1e-2"'), "dog")
     found = client.post("/v1/robots/checks", json={"toml": made.toml, "urdf": made.urdf}).json()
@@ -60,12 +76,14 @@ def test_what_no_body_has_is_told_by_a_check(client: httpx2.Client) -> None:
         ({"urdf": "<robot"}, "urdf", "not well-formed XML"),
         ({"urdf": " "}, "urdf", "is empty; it must hold the URDF"),
         ({"urdf": chain(4500)}, "urdf", "more than 256 links"),
-        ({"urdf": '<robot name="r"><link name="a"/></robot>'}, "urdf", "no joint of it moves"),
+        ({"urdf": STATUE}, "urdf", "no joint of it moves"),
         ({"urdf": dog(joints=2)}, "urdf", "3 joints|three joints"),
         ({"urdf": dog().replace("-2.7", "-120")}, "urdf", "are degrees"),
         ({"urdf": "x" * 800_001}, "urdf", "800000 characters"),
         ({"name": "../dog"}, "name", "cannot name a robot"),
         ({"actuator": "steam"}, "actuator", "auto"),
+        ({"up": "w"}, "up", "'-z'"),
+        ({"up": "-x", "forward": "x"}, "forward", "at right angles to it"),
     ],
 )
 def test_a_draft_is_refused_by_field_with_the_way_out(

@@ -242,7 +242,7 @@ def test_every_guess_has_a_comment(actuator: ActuatorChoice, fields: list[str]) 
             .replace('<origin xyz="0 0 -0.2"/><geometry>', '<origin xyz="0 0 0.2"/><geometry>')
             .replace('lower="-2.7" upper="-0.8"', 'lower="-0.1" upper="0.1"')
             .replace('lower="-1.0" upper="3.5"', 'lower="-0.1" upper="0.1"'),
-            r"reach below the body",
+            r"-z points up in its frame, it seems, as feet reach above the hips",
         ),
     ],
     ids=["two joints", "no foot", "no joints", "mass of NaN", "upside down"],

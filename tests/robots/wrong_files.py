@@ -133,6 +133,13 @@ WRONG_URDFS: Final = (
     _urdf(
         "limits exchanged", 'lower="-0.8"', 'lower="1.8"', "above the upper one .* exchange", "FL_h"
     ),
+    _urdf(
+        "coupled joints",
+        _LIMIT,
+        f'{_LIMIT}<mimic joint="FL_hip_joint"/>',
+        r"follows the joint 'FL_hip_joint' \(<mimic>\), .* take <mimic> out if it has",
+        "FL_thigh_joint",
+    ),
     _urdf("no axis", 'axis xyz="1 0 0"', 'axis xyz="0 0 0"', "needs a direction", "FL_hip_joint"),
     Wrong("sliders", SOURCE.replace('"revolute"', '"prismatic"'), "prismatic"),
     _urdf(

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
 
 import typer
 
@@ -13,7 +14,10 @@ if TYPE_CHECKING:
     from gaitswarm.mesh_copies import MeshCopies
     from gaitswarm.views.robot_check import RobotCheckView
     from sim.proposal.drive import ActuatorChoice
+    from sim.proposal.frame import Axis
     from sim.robot import RobotFiles
+
+_Choice = TypeVar("_Choice", bound=str)
 
 _NAMED: Final = 5
 """Missing meshes that are named."""
@@ -54,6 +58,22 @@ def init(
             " decides by the torques and rates of the URDF.",
         ),
     ] = "auto",
+    up: Annotated[
+        str | None,
+        typer.Option(
+            metavar="AXIS",
+            help="Of its first link, that points up: x, y, z, -x, -y, -z [default: z; refused if"
+            " the legs speak against it].",
+        ),
+    ] = None,
+    forward: Annotated[
+        str | None,
+        typer.Option(
+            metavar="AXIS",
+            help="Of its first link, that points ahead [default: x; a warning if the legs speak"
+            " against it].",
+        ),
+    ] = None,
     meshes: Annotated[
         bool,
         typer.Option(
@@ -78,6 +98,8 @@ def init(
         output,
         name=name,
         actuator=_kind(actuator),
+        up=_axis(up, "up"),
+        forward=_axis(forward, "forward"),
         meshes=meshes,
         packages=package_path or [],
     )
@@ -132,13 +154,24 @@ def check(
 
 
 def _kind(text: str) -> ActuatorChoice:
-    from services.optimizer.errors import InvalidRequest
     from sim.proposal.drive import ACTUATOR_CHOICES
 
-    for kind in ACTUATOR_CHOICES:
-        if kind == text:
-            return kind
-    raise InvalidRequest(f"{text!r} is none of {', '.join(ACTUATOR_CHOICES)}", field="actuator")
+    return _one_of(text, ACTUATOR_CHOICES, "actuator")
+
+
+def _axis(text: str | None, field: str) -> Axis | None:
+    from sim.proposal.frame import AXES
+
+    return None if text is None else _one_of(text, AXES, field)
+
+
+def _one_of(text: str, choices: Sequence[_Choice], field: str) -> _Choice:
+    from services.optimizer.errors import InvalidRequest
+
+    for choice in choices:
+        if choice == text:
+            return choice
+    raise InvalidRequest(f"{text!r} is none of {', '.join(choices)}", field=field)
 
 
 def _copied(meshes: MeshCopies) -> str:

@@ -1,0 +1,69 @@
+"""Where a leg of a URDF ends."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.errors import RobotFileError
+from sim.robot.urdf import Solid, Urdf
+
+Floats = NDArray[np.float64]
+
+_FOOT_NAME: Final = re.compile(r"foot|toe|sole|ankle|tip|contact", re.IGNORECASE)
+
+
+def end_of(urdf: Urdf, link: str) -> tuple[Floats, str | None, float | None, tuple[str, ...]]:
+    """Where a leg ends: at a frame that is fixed to its last link, a sphere, or the link's end.
+
+    Args:
+        urdf: Of the robot.
+        link: The leg's last one.
+
+    Returns:
+        The position in the link's frame, (3,) [m]; the frame's name, None for none; the radius of a
+        sphere there [m], None for none; and what was guessed.
+
+    Raises:
+        RobotFileError: The link has neither; says what to add.
+    """
+    parts = [name for name, place in urdf.places.items() if place.body == link]
+    spheres = [(at, s.size[0]) for part in parts for at, s in _solids(urdf, part, "sphere")]
+    others = [name for name in parts if name != link]
+    named = [name for name in others if _FOOT_NAME.search(name)]
+    if others:
+        far = max(named or others, key=lambda n: float(np.linalg.norm(urdf.places[n].position)))
+        at = urdf.places[far].position
+        if np.linalg.norm(at) > 0.0:
+            near = [float(r) for centre, r in spheres if np.linalg.norm(centre - at) <= r]
+            notes = () if named else (f"its end is the link {far!r}, the farthest one",)
+            return at, far, max(near, default=None), notes
+    if spheres:
+        at, radius = max(spheres, key=lambda s: float(np.linalg.norm(s[0])))
+        return at, None, float(radius), (f"its end is the sphere of the link {link!r}",)
+    corners = [c for part in parts for at, s in _solids(urdf, part) for c in _ends(at, s)]
+    if corners:
+        at = max(corners, key=lambda c: float(np.linalg.norm(c)))
+        return at, None, None, (f"its end is the far end of the shape of the link {link!r}",)
+    raise RobotFileError(
+        f"robot.urdf: link {link!r} has no foot: add a link at its end, joined by a fixed joint"
+    )
+
+
+def _solids(urdf: Urdf, part: str, kind: str | None = None) -> Iterable[tuple[Floats, Solid]]:
+    place = urdf.places[part]
+    for solid in urdf.links[part].solids("collision"):
+        if kind in (None, solid.kind):
+            yield place.rotation @ solid.origin.xyz + place.position, solid
+
+
+def _ends(at: Floats, solid: Solid) -> Iterable[Floats]:
+    half = solid.size / 2.0 if solid.kind == "box" else np.full(3, solid.size[-1] / 2.0)
+    turn = solid.origin.matrix()
+    axes = turn.T * half[:, None] if solid.kind == "box" else (turn.T * half[:, None])[2:]
+    yield from (at + axis for axis in axes)
+    yield from (at - axis for axis in axes)

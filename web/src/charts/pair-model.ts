@@ -126,7 +126,12 @@ export function placeInWords(
       found.bucket === null
         ? 'all failed'
         : `mean rank ${formatNumber(found.bucket + 1, 3)} of ${BUCKETS}`
-    return [across, up, `${formatCount(found.designs)} designs`, rank].join('  ·  ')
+    return [
+      across,
+      up,
+      found.designs === 1 ? '1 design' : `${formatCount(found.designs)} designs`,
+      rank,
+    ].join('  ·  ')
   }
   const row = nearestRow(model, rows, pair, at, reach)
   if (row === null) return null

@@ -34,7 +34,9 @@ export function paintReference(plot: uPlot, reference: ReferenceLine): void {
   ctx.lineTo(bbox.left + bbox.width, y)
   ctx.stroke()
   ctx.textAlign = 'right'
-  ctx.textBaseline = y - bbox.top > 20 * devicePixelRatio ? 'bottom' : 'top'
-  ctx.fillText(lineLabel(reference), bbox.left + bbox.width - 4 * devicePixelRatio, y)
+  const above = y - bbox.top > 20 * devicePixelRatio
+  ctx.textBaseline = above ? 'bottom' : 'top'
+  const right = bbox.left + bbox.width - 4 * devicePixelRatio
+  ctx.fillText(lineLabel(reference), right, y + (above ? -1 : 4) * devicePixelRatio)
   ctx.restore()
 }

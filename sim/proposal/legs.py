@@ -84,7 +84,7 @@ def find_legs(urdf: Urdf, *, upright: bool = False) -> FoundLegs:
     if len(threes) < 2:
         raise RobotFileError(_why_none(urdf, chains))
     reached = [_reached(urdf, chain) for chain in threes]
-    drops = [-float(feet[:, 2].min()) for _, feet in reached]
+    drops = [leg.hip[2] - float(feet[:, 2].min()) for leg, feet in reached]
     if not upright:
         hips = np.array([leg.hip for leg, _ in reached])
         places = [(feet.mean(axis=0) - leg.hip) / sum(leg.lengths) for leg, feet in reached]

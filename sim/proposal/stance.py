@@ -68,12 +68,12 @@ def choose_stance(legs: Sequence[ChainLeg]) -> Stance:
         RobotFileError: No angles within the limits put the feet of all legs on one level.
     """
     tried = [(angles := tried_angles(leg), *leg.feet(angles)) for leg in legs]
-    ground = _HEIGHT * max(float(feet[:, 2].min()) for _, feet, _ in tried)
-    chosen = [_best(leg, *of, ground) for leg, of in zip(legs, tried, strict=True)]
+    hips = max(leg.hip[2] for leg in legs)
+    ground = hips - _HEIGHT * (hips - max(float(feet[:, 2].min()) for _, feet, _ in tried))
+    chosen = [_best(leg, *of, ground, hips - ground) for leg, of in zip(legs, tried, strict=True)]
     feet = np.array([leg.foot(angles.tolist()) for leg, angles in zip(legs, chosen, strict=True)])
     radius = float(np.median(np.abs(feet[:, 1])))
     beside = [_beside(*of, radius, ground) for of in zip(legs, chosen, feet, strict=True)]
-    hips = max(leg.hip[2] for leg in legs)
     if all(angles is not None for angles in beside):
         even = tuple(_rounded(angles) for angles in beside if angles is not None)
         return Stance(even, hips - ground, (radius,) * len(legs))
@@ -85,13 +85,15 @@ def choose_stance(legs: Sequence[ChainLeg]) -> Stance:
     return Stance(tuple(apart), hips - ground, tuple(radii))
 
 
-def _best(leg: ChainLeg, angles: Floats, feet: Floats, slopes: Floats, ground: float) -> Floats:
+def _best(
+    leg: ChainLeg, angles: Floats, feet: Floats, slopes: Floats, ground: float, height: float
+) -> Floats:
     """The best of the tried angles (3,)."""
-    near = np.abs(feet[:, 2] - ground) < _BAND * abs(ground)
+    near = np.abs(feet[:, 2] - ground) < _BAND * height
     if not near.any():
         raise RobotFileError(
             "robot.urdf: the feet cannot be put on one level: a leg's joint limits keep its foot"
-            f" from {ground:.3f} m, three quarters of what all legs reach below the body"
+            f" from {height:.3f} m below the highest hip, three quarters of what all legs reach"
         )
     angles, feet, slopes = angles[near], feet[near], slopes[near]
     length = sum(leg.lengths)

@@ -73,8 +73,7 @@ def joint_of(element: ET.Element) -> Joint:
             its limits are the wrong way round.
     """
     name = element.get("name", "")
-    ends = [element.find(end) for end in ("parent", "child")]
-    parent, child = ("" if end is None else end.get("link", "") for end in ends)
+    parent, child = (_linked(element, end) for end in ("parent", "child"))
     whose = f"joint {name!r}"
     direction = element.find("axis")
     axis = np.array([1.0, 0.0, 0.0]) if direction is None else numbers_of(direction, "xyz", whose)
@@ -108,7 +107,10 @@ def joint_of(element: ET.Element) -> Joint:
 
 
 def standardise(root: ET.Element, held: Mapping[str, float]) -> bool:
-    """Fix joints that are held, and let continuous ones be revolute.
+    """Fix joints that are held and that of a free base, and let continuous ones be revolute.
+
+    A robot's body is free to move anyhow: a floating joint from a massless first link, such as
+    `world`, to it says just that.
 
     Args:
         root: Of the URDF, which is changed.
@@ -121,7 +123,7 @@ def standardise(root: ET.Element, held: Mapping[str, float]) -> bool:
         RobotFileError: A held joint is not there, or does not turn and is held at another position
             than 0; or a joint that is not held lacks the limit that URDF asks for.
     """
-    changed = False
+    changed = _free_base(root)
     missing = set(held)
     for element in root.findall("joint"):
         name, kind = element.get("name", ""), element.get("type", "")
@@ -145,6 +147,32 @@ def standardise(root: ET.Element, held: Mapping[str, float]) -> bool:
             f"robot.toml: held_joints: robot.urdf has no joint {min(missing)!r}; take it out"
         )
     return changed
+
+
+def _free_base(root: ET.Element) -> bool:
+    """Fix the floating joint before a body, if there is one; says whether there is."""
+    links = {link.get("name", ""): link for link in root.findall("link")}
+    joints = [(_linked(e, "parent"), _linked(e, "child"), e) for e in root.findall("joint")]
+    children = {child for _, child, _ in joints}
+    link = next((name for name in links if name not in children), None)
+    while link in links and links[link].find("inertial") is None:
+        after = [(child, joint) for parent, child, joint in joints if parent == link]
+        if len(after) != 1 or (kind := after[0][1].get("type")) not in ("floating", "fixed"):
+            return False
+        link, joint = after[0]
+        if kind == "floating":
+            joint.set("type", "fixed")
+            # Its place is where a simulator would drop the robot.
+            for origin in joint.findall("origin"):
+                origin.set("xyz", "0 0 0")
+            return True
+        joints = [entry for entry in joints if entry[2] is not joint]
+    return False
+
+
+def _linked(joint: ET.Element, end: str) -> str:
+    element = joint.find(end)
+    return "" if element is None else element.get("link", "")
 
 
 def _hold(element: ET.Element, kind: str, angle: float) -> None:

@@ -1,0 +1,77 @@
+"""First links that are no body, as simulators have them: a robot's body is free all the same."""
+
+from __future__ import annotations
+
+import pinocchio as pin
+import pytest
+
+from gaitswarm.robot_checks import check_robot
+from sim.errors import RobotFileError
+from sim.proposal.document import Proposal, propose_robot
+from sim.robot import RobotFiles, parse_robot
+from tests.robots.radial import radial_robot
+from tests.robots.test_proposal import QUADRUPED, dog
+
+
+def in_world(urdf: str, kind: str, first: str, xyz: str = "0 0 0", between: bool = False) -> str:
+    """A robot that a joint of some type hangs on `world`, or on a link that is fixed to it."""
+    place = ""
+    if between:
+        place = (
+            '<link name="place"/><joint name="in_world" type="fixed"><parent link="world"/>'
+            '<child link="place"/></joint>'
+        )
+    return urdf.replace(
+        "</robot>",
+        f'<link name="world"/>{place}<joint name="free" type="{kind}">'
+        f'<parent link="{"place" if between else "world"}"/><child link="{first}"/>'
+        f'<origin xyz="{xyz}"/></joint></robot>',
+    )
+
+
+def stances(made: Proposal) -> list[tuple[float, float, float] | None]:
+    return [leg.stance for leg in parse_robot(made.toml, made.urdf).description.legs]
+
+
+@pytest.mark.parametrize(
+    ("urdf", "first"), [(dog(), "trunk"), (QUADRUPED, "body"), (radial_robot(6), "base")]
+)
+@pytest.mark.parametrize(
+    ("kind", "xyz", "between"),
+    [
+        ("floating", "0 0 0", False),
+        ("floating", "1 0 0.5", False),
+        ("floating", "0 0 0", True),
+        ("fixed", "0 0 0.5", False),
+    ],
+    ids=["floating", "floating, dropped", "floating, in a place", "fixed, above the ground"],
+)
+def test_a_robot_on_a_world_is_the_robot(
+    urdf: str, first: str, kind: str, xyz: str, between: bool
+) -> None:
+    made, free = (
+        propose_robot(in_world(urdf, kind, first, xyz, between), "mine"),
+        propose_robot(urdf, "mine"),
+    )
+    assert stances(made) == stances(free)
+    assert made.job == free.job
+
+
+def test_a_robot_on_a_floating_joint_is_read_as_pinocchio_reads_it_and_stands() -> None:
+    made = propose_robot(in_world(dog(), "floating", "trunk", "0 0 0.5"), "mine")
+    robot = parse_robot(made.toml, made.urdf)
+    model = pin.buildModelFromXML(robot.urdf.text, pin.JointModelFreeFlyer())
+    assert model.nv == 6 + 12
+    assert pin.computeTotalMass(model) == pytest.approx(robot.mass)
+    checked = check_robot(RobotFiles(toml=made.toml, urdf=made.urdf), folder=None)
+    assert checked.warnings == []
+    assert checked.standing.normal_forces == pytest.approx(checked.standing.weight, rel=0.02)
+
+
+def test_a_floating_joint_elsewhere_is_refused_by_name() -> None:
+    loose = dog().replace(
+        '<joint name="FL_calf_joint" type="revolute">',
+        '<joint name="FL_calf_joint" type="floating">',
+    )
+    with pytest.raises(RobotFileError, match="'FL_calf_joint' is floating"):
+        propose_robot(loose, "mine")

@@ -50,6 +50,9 @@ _TWO_LEGS: Final = (
     " balance: expect it to fall"
 )
 
+_LEVEL: Final = 0.2
+"""How far hips may be above or below the body's origin, as a share of the legs' length."""
+
 _SIDEWAYS: Final = (
     "warning: it faces y, it seems, and would walk sideways: name the axis that points ahead as"
     " `forward` (`--forward=y` or `--forward=-y`), or x if it does"
@@ -91,9 +94,7 @@ def propose_robot(
         RobotFileError: The URDF cannot be read, or no legs are found that can be simulated.
     """
     with by_line(urdf):
-        tree = parse_urdf(urdf)
-        urdf = turned(urdf, next(iter(tree.links)), list(tree.links), frame)
-        found = find_legs(parse_urdf(urdf), upright=frame != AS_IT_IS)
+        urdf, found, moved = _stood_up(urdf, frame)
     text, feet = _with_feet(urdf, found.legs)
     tree, names = parse_urdf(text, found.held), _leg_names(found.legs)
     joints = [leg.joints for leg in found.legs]
@@ -120,7 +121,7 @@ def propose_robot(
         "preference": _PREFERENCE,
         "scenarios": propose_scenarios(stance, sole.length, names),
     }
-    notes = [_TWO_LEGS] if len(legs) == 2 else []
+    notes = [*moved, _TWO_LEGS] if len(legs) == 2 else moved
     if frame.forward is None and sideways(legs, stance.angles):
         notes.append(_SIDEWAYS)
     notes += [f"leg {leg.joints[0]}: {note}" for leg in found.legs for note in leg.notes]
@@ -129,6 +130,24 @@ def propose_robot(
     notes += [f"joint {joint!r} is held at {at:g} rad" for joint, at in found.held.items()]
     notes += [f"warning: {problem}" for problem in unphysical(tree, urdf)]
     return Proposal(toml + "\n", text, job, tuple(dict.fromkeys(notes)))
+
+
+def _stood_up(urdf: str, frame: Frame) -> tuple[str, FoundLegs, list[str]]:
+    """The URDF with z up, x ahead and its origin about as high as the hips; its legs; notes.
+
+    What a body does is told by its origin, so one on the ground would always have fallen.
+    """
+    root, *others = parse_urdf(urdf).links
+    text = turned(urdf, root, [root, *others], frame)
+    tree = parse_urdf(text)
+    found = find_legs(tree, upright=frame != AS_IT_IS)
+    legs = [chain_leg(tree, leg.joints, leg.end) for leg in found.legs]
+    level = float(f"{np.mean([leg.hip[2] for leg in legs]):.3g}")
+    if abs(level) <= _LEVEL * max(sum(leg.lengths) for leg in legs):
+        return text, found, []
+    side = "above" if level > 0.0 else "below"
+    note = f"the body's frame is {abs(level):g} m {side} that of {root!r}, as high as the hips"
+    return turned(urdf, root, [root, *others], frame, level), found, [note]
 
 
 def _with_feet(urdf: str, legs: Sequence[FoundLeg]) -> tuple[str, list[str]]:

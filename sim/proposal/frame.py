@@ -58,7 +58,7 @@ AS_IT_IS: Final = Frame()
 """Nothing is known of it but what legs speak for."""
 
 
-def turned(urdf: str, root: str, links: Sequence[str], frame: Frame) -> str:
+def turned(urdf: str, root: str, links: Sequence[str], frame: Frame, level: float = 0.0) -> str:
     """A URDF with z up and x ahead: a first link is added whose frame has them so.
 
     Args:
@@ -66,17 +66,18 @@ def turned(urdf: str, root: str, links: Sequence[str], frame: Frame) -> str:
         root: Its first link.
         links: Names of all.
         frame: Its axes, at right angles.
+        level: Of the new origin above the first link's [m].
 
     Returns:
         The text; the same if it needs no other frame.
     """
     up, ahead = _vector(frame.up or "z"), _vector(frame.forward or "x")
     turn = np.array([ahead, np.cross(up, ahead), up])
-    if (turn == np.eye(3)).all():
+    if (turn == np.eye(3)).all() and level == 0.0:
         return urdf
     name = next(n for n in (_ROOT, *(f"{_ROOT}{k}" for k in range(len(links)))) if n not in links)
     rpy = " ".join(map(repr, _roll_pitch_yaw(turn)))
-    joint = fixed_joint(f"{name}_fixed", name, root, "0 0 0", rpy)
+    joint = fixed_joint(f"{name}_fixed", name, root, f"0 0 {-level!r}", rpy)
     return with_elements(urdf, [f'  <link name="{name}"/>', *joint])
 
 

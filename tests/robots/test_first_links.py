@@ -57,12 +57,21 @@ def test_a_robot_on_a_world_is_the_robot(
     assert made.job == free.job
 
 
-def test_a_robot_on_a_floating_joint_is_read_as_pinocchio_reads_it_and_stands() -> None:
-    made = propose_robot(in_world(dog(), "floating", "trunk", "0 0 0.5"), "mine")
+@pytest.mark.parametrize("kind", ["floating", "fixed"])
+@pytest.mark.parametrize("above", [0.5, -0.3])
+def test_a_robot_on_a_world_is_read_as_pinocchio_reads_it_and_stands(
+    kind: str, above: float
+) -> None:
+    """Its frame is moved up to its hips: a body whose origin is on the ground counts as fallen."""
+    made = propose_robot(in_world(dog(), kind, "trunk", f"0 0 {above}"), "mine")
     robot = parse_robot(made.toml, made.urdf)
     model = pin.buildModelFromXML(robot.urdf.text, pin.JointModelFreeFlyer())
     assert model.nv == 6 + 12
     assert pin.computeTotalMass(model) == pytest.approx(robot.mass)
+    assert [leg.hip[2] for leg in robot.legs] == pytest.approx([0.0] * 4, abs=1e-9)
+    assert any(
+        f"{'above' if above > 0 else 'below'} that of 'world'" in note for note in made.guesses
+    ) == (kind == "fixed")
     checked = check_robot(RobotFiles(toml=made.toml, urdf=made.urdf), folder=None)
     assert checked.warnings == []
     assert checked.standing.normal_forces == pytest.approx(checked.standing.weight, rel=0.02)

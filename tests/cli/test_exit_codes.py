@@ -36,19 +36,24 @@ def writing_commands(finished: Finished) -> dict[str, tuple[str | Path, ...]]:
     where = ("--db", finished.db)
     return {
         "help": ("--help",),
+        "help of a command": ("list", "--help"),
+        "version": ("--version",),
         "JSON, written as it is read": ("history", finished.id, *where, "--json"),
         "a table": ("status", finished.id, *where),
     }
 
 
-WRITING = ["help", "JSON, written as it is read", "a table"]
+WRITING = ["help", "help of a command", "version", "JSON, written as it is read", "a table"]
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("buffered", [BUFFERED, {"PYTHONUNBUFFERED": "1"}], ids=["", "unbuffered"])
 @pytest.mark.parametrize("kind", WRITING)
-def test_a_full_device_is_said_and_exit_code_5(finished: Finished, kind: str) -> None:
+def test_a_full_device_is_said_and_exit_code_5(
+    finished: Finished, kind: str, buffered: dict[str, str]
+) -> None:
     with Path("/dev/full").open("w") as full:
-        done = run(*writing_commands(finished)[kind], stdout=full)
+        done = run(*writing_commands(finished)[kind], stdout=full, environment=buffered)
     assert done.returncode == ExitCode.UNAVAILABLE
     assert done.stderr == "gaitswarm: standard output cannot be written: No space left on device\n"
 

@@ -33,6 +33,8 @@ def test_the_terminal_shows_a_row_for_every_variable(finished: Finished) -> None
     assert told.code == 0, told.err
     rows = [line.split()[0] for line in told.out.splitlines() if line.strip()]
     assert {"variable", "P", "I"} <= set(rows)
-    assert "of 6 in all failed" in " ".join(told.out.split())
+    said = " ".join(told.out.split())
+    assert "of 6 in all failed" in said
+    assert "walk in every case, and indices need 20: `gaitswarm extend`" in said
     document = run_command("importance", finished.id, "--db", finished.db, "--json").json
     assert [variable["name"] for variable in document["variables"]] == ["P", "I"]

@@ -59,7 +59,7 @@ def test_the_published_design_and_the_gain_over_it_are_told_where_they_are_known
     store.note_reference(job.id, Reference("A", 198.0))
     view = client.get(f"/v1/jobs/{job.id}/comparison", params={"also": other.id}).json()
     assert [(found["reference"], found["gain"]) for found in view["jobs"]] == [
-        ({"name": "A", "fitness": 198.0}, 0.5),
+        ({"name": "A", "kind": "published", "fitness": 198.0}, 0.5),
         # Nobody walks for what is not known.
         (None, None),
     ]

@@ -73,9 +73,11 @@ def check_robot(
     angles = desired_angles(robot, scenario).angles[0]
     points = leg_points(robot, angles)
     mass = feet_and_centre_of_mass(robot, angles[None, :], 0.0)[1][0]
+    carried = {joint.name: joint.child for joint in robot.urdf.joints}
     return RobotCheckView(
         name=robot.description.name,
         mass=robot.mass,
+        body_mass=robot.urdf.body.mass,
         parameters=list(identifiable_variables(robot)),
         joints=robot.n_joints,
         legs=[
@@ -84,6 +86,7 @@ def check_robot(
                 joints=list(data.joints),
                 foot=data.foot,
                 length=sum(leg.lengths),
+                mass=sum(robot.urdf.bodies[carried[joint]].mass for joint in data.joints),
                 reach=reach_below(robot, number),
                 points=points[number].tolist(),
             )
@@ -95,6 +98,7 @@ def check_robot(
         centre_of_mass=mass.tolist(),
         standing=standing,
         meshes=[] if folder is None else _meshes(files.urdf, Path(folder), map(Path, packages)),
+        guesses=list(robot.description.guesses),
         warnings=[*warnings, *unphysical(robot.urdf, files.urdf)],
     )
 

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
+from xml.etree import ElementTree as ET
 
 from gaitswarm.errors import simulation_errors
 from gaitswarm.mesh_copies import MeshCopies, copy_meshes
@@ -21,7 +22,7 @@ from sim.proposal.apart import walking_proposal
 from sim.proposal.document import Proposal
 from sim.proposal.drive import ActuatorChoice
 from sim.proposal.frame import Axis, Frame
-from sim.robot.bounds import LONGEST_URDF
+from sim.robot.bounds import LONGEST_URDF, check_urdf
 
 _NAME: Final = re.compile(r"\w[^/\\]{0,99}")
 
@@ -60,7 +61,7 @@ def init_robot(
     Args:
         urdf: File of the robot.
         output: Folder to write, new or empty; as a whole or not at all.
-        name: Of the robot; default the file's.
+        name: Of the robot; default that which the URDF has, else the file's.
         actuator: Kind of its actuators: DC motors, torque-controlled ones, or those that the limits
             of the URDF's joints speak for.
         up: Axis of the URDF's first link that points up; default z, and an error if the legs speak
@@ -85,7 +86,7 @@ def init_robot(
         raise InvalidRequest(not_utf8(source, error), field="urdf") from error
     except OSError as error:
         raise InvalidRequest(f"cannot read {source}: {error}", field="urdf") from error
-    chosen = source.stem if name is None else name
+    chosen = (own_name(text) or source.stem) if name is None else name
     check_name(chosen)
     frame = frame_of(up, forward)
     try:
@@ -95,7 +96,7 @@ def init_robot(
         raise InvalidRequest(said, field="urdf") from error
     with simulation_errors("urdf"):
         copies = _write(folder, proposal, source.parent if meshes else None, packages)
-    return MadeRobot(chosen, proposal.guesses, copies)
+    return MadeRobot(chosen, proposal.notes, copies)
 
 
 def not_utf8(path: Path, error: UnicodeDecodeError) -> str:
@@ -130,6 +131,23 @@ def check_name(name: str) -> None:
             " a letter or digit and have no / and no \\",
             field="name",
         )
+
+
+def own_name(urdf: str) -> str | None:
+    """Name that a URDF gives its robot.
+
+    Args:
+        urdf: Text of the file, by anybody.
+
+    Returns:
+        The name; None if it cannot be one, or if the file cannot be read.
+    """
+    try:
+        check_urdf(urdf)
+    except RobotFileError:
+        return None
+    name = ET.fromstring(urdf).get("name", "").strip()  # noqa: S314 - it has kept all bounds
+    return name if _NAME.fullmatch(name) and name.isprintable() else None
 
 
 def frame_of(up: Axis | None, forward: Axis | None) -> Frame:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pydantic import BaseModel, ConfigDict, Field
 
 from gaitswarm.errors import simulation_errors
-from gaitswarm.robots import check_name, frame_of
+from gaitswarm.robots import check_name, frame_of, own_name
 from gaitswarm.views.robot_draft import RobotDraftView
 from sim.proposal.apart import propose_apart
 from sim.proposal.drive import ActuatorChoice
@@ -18,11 +18,12 @@ class RobotDraftRequest(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    name: str = Field(
-        default="robot",
+    name: str | None = Field(
+        default=None,
         min_length=1,
         max_length=LONGEST_NAME,
-        description="Of the robot: begins with a letter or digit, and has no / and no \\.",
+        description="Of the robot: begins with a letter or digit, and has no / and no \\; null for"
+        " that which the URDF has, or `robot`.",
         examples=["a1"],
     )
     urdf: str = Field(
@@ -61,10 +62,11 @@ def run_robot_draft(request: RobotDraftRequest) -> RobotDraftView:
             much; names the field.
         EvaluatorUnavailable: No process can be started.
     """
-    check_name(request.name)
+    name = request.name or own_name(request.urdf) or "robot"
+    check_name(name)
     frame = frame_of(request.up, request.forward)
     with simulation_errors("urdf"):
-        made = propose_apart(request.urdf, request.name, request.actuator, frame)
+        made = propose_apart(request.urdf, name, request.actuator, frame)
     return RobotDraftView(
-        name=request.name, toml=made.toml, urdf=made.urdf, job=made.job, guesses=list(made.guesses)
+        name=name, toml=made.toml, urdf=made.urdf, job=made.job, guesses=list(made.notes)
     )

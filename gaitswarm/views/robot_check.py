@@ -15,6 +15,7 @@ class CheckedLegView(View):
     joints: list[str] = Field(description="Its joints, from the body on.")
     foot: str = Field(description="Link or fixed joint at its end.")
     length: float = Field(description="From the first joint to the foot, stretched [m].")
+    mass: float = Field(description="Of its three links with what is fixed to them [kg].")
     reach: float = Field(
         description="How far the foot gets below the highest hip within the joints' limits [m]."
     )
@@ -46,6 +47,9 @@ class RobotCheckView(View):
 
     name: str = Field(description="Of the robot.")
     mass: float = Field(description="Without load [kg].")
+    body_mass: float = Field(
+        description="Of the body with all that is held or fixed to it, without legs [kg]."
+    )
     joints: int = Field(description="That move.")
     legs: list[CheckedLegView] = Field(description="In the order of robot.toml.")
     held: dict[str, float] = Field(description="Joints of no leg, each with its angle [rad].")
@@ -54,6 +58,9 @@ class RobotCheckView(View):
     )
     standing: StandingStillView = Field(description="How it stands.")
     meshes: list[MeshView] = Field(description="That the URDF names, in its order.")
+    guesses: list[str] = Field(
+        description="What `robot init` guessed, as robot.toml still has it, one sentence each."
+    )
     warnings: list[str] = Field(description="What is unphysical or was guessed badly.")
     parameters: list[Variable] = Field(
         default_factory=list,

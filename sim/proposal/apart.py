@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import Final
 
 from sim.errors import ProcessEnded, RobotFileError, SimulationInputError
@@ -48,10 +48,9 @@ def walking_proposal(
     proposal = propose_robot(urdf, name, actuator, frame)
     robot = parse_robot(proposal.toml, proposal.urdf)
     fitted = [walk_within_reach(robot, walk) for walk in proposal.job["scenarios"]]
-    return replace(
-        proposal,
+    return proposal.with_guesses(
+        [note for _, note in fitted if note],
         job={**proposal.job, "scenarios": [walk for walk, _ in fitted]},
-        guesses=(*proposal.guesses, *(note for _, note in fitted if note)),
     )
 
 
@@ -84,14 +83,16 @@ def propose_apart(
         ) from error
     except SimulationInputError as error:
         raise RobotFileError(str(error)) from error
-    return Proposal(made["toml"], made["urdf"], made["job"], tuple(made["guesses"]))
+    return Proposal(
+        made["toml"], made["urdf"], made["job"], tuple(made["guesses"]), tuple(made["problems"])
+    )
 
 
 def _answer(request: Document) -> Document:
     made = walking_proposal(
         request["urdf"], request["name"], request["actuator"], Frame(**request["frame"])
     )
-    return {"toml": made.toml, "urdf": made.urdf, "job": made.job, "guesses": list(made.guesses)}
+    return asdict(made)
 
 
 if __name__ == "__main__":

@@ -50,6 +50,8 @@ _TWO_LEGS: Final = (
     " balance: expect it to fall"
 )
 
+_ELSE: Final = "battery, rotors, sensors, ground and load are guessed as robot.toml says"
+
 _LEVEL: Final = 0.2
 """How far hips may be above or below the body's origin, as a share of the legs' length."""
 
@@ -67,13 +69,34 @@ class Proposal:
         toml: text of robot.toml.
         urdf: text of robot.urdf.
         job: what a job of this robot has unless it says otherwise, as a spec.
-        guesses: what to look at, one sentence each.
+        guesses: what to look at, one sentence each, as robot.toml has them too.
+        problems: what no body has in the URDF, one sentence each.
     """
 
     toml: str
     urdf: str
     job: dict[str, Any]
     guesses: tuple[str, ...]
+    problems: tuple[str, ...] = ()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Guesses and problems."""
+        return (*self.guesses, *(f"warning: {problem}" for problem in self.problems))
+
+    def with_guesses(self, more: Sequence[str], **changed: Any) -> Proposal:
+        """The same robot with more guesses, in robot.toml too.
+
+        Args:
+            more: One sentence each.
+            changed: Other attributes.
+
+        Returns:
+            The robot.
+        """
+        guesses = tuple(dict.fromkeys([*self.guesses, *more]))
+        toml = self.toml.replace(_guesses(self.guesses), _guesses(guesses), 1)
+        return replace(self, toml=toml, guesses=guesses, **changed)
 
 
 def propose_robot(
@@ -126,10 +149,15 @@ def propose_robot(
         notes.append(_SIDEWAYS)
     notes += [f"leg {leg.joints[0]}: {note}" for leg in found.legs for note in leg.notes]
     notes += sorted({drive.note for of_leg in drives for drive in of_leg})
-    notes.append(ACTUATOR_NOTES[kind])
+    notes += [
+        ACTUATOR_NOTES[kind],
+        f"feet stand {stance.height:.3g} m below the hips, at three quarters of the legs' reach",
+        f"soles are {sole.length:g} m long: {sole_note}",
+        _ELSE,
+    ]
     notes += [f"joint {joint!r} is held at {at:g} rad" for joint, at in found.held.items()]
-    notes += [f"warning: {problem}" for problem in unphysical(tree, urdf)]
-    return Proposal(toml + "\n", text, job, tuple(dict.fromkeys(notes)))
+    made = Proposal(toml + "\n", text, job, (), tuple(unphysical(tree, urdf)))
+    return made.with_guesses(notes)
 
 
 def _stood_up(urdf: str, frame: Frame) -> tuple[str, FoundLegs, list[str]]:
@@ -174,7 +202,19 @@ def _head(name: str, legs: int, mass: float) -> list[str]:
         f"name = {quoted(name)}",
         f"description = {quoted(f'{legs} legs of three joints, {mass:.3g} kg.')}",
         "load_height = 0.05                  # m, of a load over the body's origin; guessed",
+        _guesses(()),
     ]
+
+
+def _guesses(sentences: Sequence[str]) -> str:
+    return "\n".join(
+        [
+            "# `gaitswarm robot check` tells these; take out what you know better.",
+            "guesses = [",
+            *(f"  {quoted(sentence)}," for sentence in sentences),
+            "]",
+        ]
+    )
 
 
 def _ground(sole: SoleNumbers, note: str, stance: Stance) -> list[str]:

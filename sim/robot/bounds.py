@@ -86,6 +86,11 @@ Number = Annotated[float, AfterValidator(_in_size)]
 PartName = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME), AfterValidator(_printable)]
 """Name of a part of a robot."""
 
+Sentence = Annotated[
+    str, Field(min_length=1, max_length=LONGEST_ATTRIBUTE), AfterValidator(_printable)
+]
+"""What people are told of a robot."""
+
 
 def check_toml(text: str) -> None:
     """Check the size of a robot.toml.

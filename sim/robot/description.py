@@ -24,7 +24,7 @@ from sim.robot.actuators import (
     Motor,
     TorqueCommand,
 )
-from sim.robot.bounds import LONGEST_LEG_NAME, MOST_LEGS, Number, PartName
+from sim.robot.bounds import LONGEST_LEG_NAME, MOST_LEGS, Number, PartName, Sentence
 
 JOINTS_PER_LEG = 3
 """Coxa, femur, tibia."""
@@ -221,6 +221,11 @@ class RobotDescription(Data):
         exclude_if=operator.not_,
         description="groups of legs for gait parameters, beside front, middle, hind, left, right,"
         " all and each leg: names of their legs",
+    )
+    guesses: tuple[Sentence, ...] = Field(
+        default=(),
+        exclude_if=operator.not_,
+        description="what `robot init` guessed, which `robot check` tells; take out what you know",
     )
     held_joints: dict[PartName, Number] = Field(
         default={},

@@ -38,6 +38,7 @@ def test_a_urdf_becomes_a_robot_that_stands_and_can_be_submitted(client: httpx2.
     answer = client.post("/v1/robots/checks", json=robot)
     assert answer.status_code == 200, answer.text
     found = answer.json()
+    assert found["guesses"] == draft["guesses"]
     assert (found["name"], found["joints"], len(found["legs"])) == ("dog", 12, 4)
     standing = found["standing"]
     assert standing["normal_forces"] == pytest.approx(standing["weight"], rel=0.02)
@@ -59,6 +60,7 @@ def test_a_robot_that_faces_y_is_turned_when_that_is_said(client: httpx2.Client)
     ]
     assert ["it faces y" in str(draft["guesses"]) for draft in drafts] == [True, False]
     assert "robot_frame" in drafts[1]["urdf"]
+    assert drafts[1]["name"] == "dog", "as the URDF has it"
     feet = [draft["job"]["scenarios"][0]["radius"] for draft in drafts]
     straight = propose_robot(dog(), "dog").job["scenarios"][0]["radius"]
     assert feet[1] == pytest.approx(straight, abs=1e-3) != feet[0]
@@ -97,7 +99,8 @@ def test_a_draft_is_refused_by_field_with_the_way_out(
 def test_a_check_is_refused_with_file_and_line(client: httpx2.Client) -> None:
     made = propose_robot(dog(), "dog")
     error = refused(client, "checks", toml=made.toml.replace("[contact]", "["), urdf=made.urdf)
-    assert error["field"] == "robot.toml" and "at line 37" in error["message"]
+    line = made.toml.splitlines().index("[contact]") + 1
+    assert error["field"] == "robot.toml" and f"at line {line}" in error["message"]
 
 
 def test_a_robot_that_is_larger_than_walks_may_be_is_refused(client: httpx2.Client) -> None:

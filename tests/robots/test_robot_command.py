@@ -11,8 +11,10 @@ import pinocchio as pin
 import pytest
 
 from cli.main import run
+from sim.proposal.apart import walking_proposal
 from sim.robot import parse_robot
-from tests.robots.test_proposal import dog
+from tests.robots.radial import radial_robot
+from tests.robots.test_proposal import ARM, dog
 
 
 def test_init_makes_the_actuators_that_are_asked_for(
@@ -60,6 +62,53 @@ def test_init_writes_a_folder_that_loads_and_stands(
     assert view["warnings"] == []
     assert run(["robot", "check", str(folder)]) == 0
     assert "soles carry" in capsys.readouterr().out
+
+
+def test_check_tells_masses_by_group_of_links_and_what_init_guessed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "dog.urdf").write_text(dog(arm=ARM), encoding="utf-8")
+    made = str(tmp_path / "made")
+    assert run(["robot", "init", str(tmp_path / "dog.urdf"), "--output", made, "--json"]) == 0
+    guesses = json.loads(capsys.readouterr().out)["guesses"]
+    assert run(["robot", "check", made, "--json"]) == 0
+    view = json.loads(capsys.readouterr().out)
+    assert view["body_mass"] == pytest.approx(8.0 + 3 * 0.3), "with the arm"
+    assert [leg["mass"] for leg in view["legs"]] == pytest.approx([0.9] * 4)
+    assert view["guesses"] == guesses
+    assert "joint 'arm1' is held at 0.5 rad" in guesses
+    below = -view["legs"][0]["points"][3][2]
+    (stands,) = (float(guess.split()[2]) for guess in guesses if guess.startswith("feet stand "))
+    assert stands == pytest.approx(below, rel=0.01)
+    assert any("soles are 0.02 m long: radius of the feet's spheres" in guess for guess in guesses)
+    assert run(["robot", "check", made]) == 0
+    said = capsys.readouterr().out
+    assert all(guess in said for guess in guesses)
+    assert "8.900 kg" in said and said.count("0.900 kg") == 4
+
+
+def test_guesses_of_shorter_walks_are_in_the_folder_too() -> None:
+    proposal = walking_proposal(radial_robot(6, limit=0.15), "round")
+    guessed = parse_robot(proposal.toml, proposal.urdf).description.guesses
+    assert guessed == proposal.guesses
+    assert sum("reach no further" in guess for guess in guessed) == 2
+
+
+@pytest.mark.parametrize(
+    ("given", "name"),
+    [('name="Rex 2"', "Rex 2"), ('name="a/b"', "file"), ("", "file"), ('name=" "', "file")],
+    ids=["its own", "no file's", "none", "blank"],
+)
+def test_a_robot_is_named_as_its_urdf_says_or_else_as_the_file(
+    given: str, name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source = tmp_path / "file.urdf"
+    source.write_text(dog().replace('<robot name="dog"', f"<robot {given}"), encoding="utf-8")
+    for asked, said in (([], name), (["--name", "mine"], "mine")):
+        output = tmp_path / said.replace(" ", "-")
+        assert run(["robot", "init", str(source), "-o", str(output), "--json", *asked]) == 0
+        assert json.loads(capsys.readouterr().out)["name"] == said
+        assert f'name = "{said}"' in (output / "robot.toml").read_text(encoding="utf-8")
 
 
 def test_check_draws_how_it_stands_and_says_the_same(

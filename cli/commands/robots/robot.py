@@ -49,7 +49,9 @@ def init(
     output: Annotated[
         Path, typer.Option("--output", "-o", metavar="FOLDER", help="New, or empty.")
     ],
-    name: Annotated[str | None, typer.Option(help="Of the robot [default: the file's].")] = None,
+    name: Annotated[
+        str | None, typer.Option(help="Of the robot [default: the URDF's, else the file's].")
+    ] = None,
     actuator: Annotated[
         str,
         typer.Option(
@@ -207,15 +209,19 @@ def _told(view: RobotCheckView) -> str:
     lines = [
         f"{view.name}: {len(view.legs)} legs, {view.joints} joints, {view.mass:.3f} kg",
         "",
-        f"{'leg':20} {'joints':52} {'length':>8} {'reach':>8}",
+        f"{'leg':20} {'joints':52} {'mass':>9} {'length':>8} {'reach':>8}",
+        f"{'body, and what is held':73} {view.body_mass:6.3f} kg",
         *(
-            f"{leg.name:20} {', '.join(leg.joints):52} {leg.length:6.3f} m {leg.reach:6.3f} m"
+            f"{leg.name:20} {', '.join(leg.joints):52} {leg.mass:6.3f} kg {leg.length:6.3f} m"
+            f" {leg.reach:6.3f} m"
             for leg in view.legs
         ),
         "",
         stood,
     ]
     lines += [f"held: {name} at {angle:g} rad" for name, angle in view.held.items()]
+    if view.guesses:
+        lines += ["guessed, as robot.toml has it:", *(f"  {guess}" for guess in view.guesses)]
     if view.meshes:
         missing = [mesh.name for mesh in view.meshes if mesh.path is None]
         lines.append(f"meshes: {len(view.meshes) - len(missing)} of {len(view.meshes)} found")

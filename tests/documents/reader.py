@@ -5,8 +5,8 @@ begins a command, and the lines below it are what the command says; without prom
 command. `gaitswarm` and `curl` run in this process, `export` sets a variable of it, all else is for
 the shell. What a block of Python says is in the block of `text` below it.
 
-What is said is compared by words: `...` stands for anything, numbers may differ by 2 %, and `ID` is
-the job that was made last.
+What is said is compared by words: `...` stands for anything, numbers may differ by 2 %, `ID` is the
+job that was made last, forks aside, and `DIGEST` the head of its history.
 """
 
 from __future__ import annotations
@@ -26,13 +26,14 @@ from typing import Any, Final
 import httpx2
 
 from cli.main import run
+from tests.examples.commands import run_command
 from tests.examples.paths import ROOT
 
 ADDRESS: Final = "http://127.0.0.1:8000"
 """Of the server in README and docs/."""
 
-BLOCK: Final = re.compile(r"^```([^\n]*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
-"""A fenced block: its language and its contents."""
+BLOCK: Final = re.compile(r"^ *```([^\n]*)\n(.*?)^ *```", re.MULTILINE | re.DOTALL)
+"""A fenced block, also in a list: its language and its contents."""
 
 SHELL: Final = ("", "sh", "bash", "console", "shell")
 
@@ -73,12 +74,14 @@ class Reader:
     Attributes:
         server: URL of the server in place of the printed one.
         replaced: what is typed otherwise than printed, so that it takes less time.
+        skipped: commands that are not run, by how they begin, each with its reason.
         names: of Python, afterwards.
         answers: to curl.
     """
 
     server: str
     replaced: Mapping[str, str] = field(default_factory=dict)
+    skipped: Mapping[str, str] = field(default_factory=dict)
     names: dict[str, Any] = field(default_factory=lambda: {"__name__": "__main__"})
     answers: list[httpx2.Response] = field(default_factory=list)
     job_id: str = "ID"
@@ -115,8 +118,10 @@ class Reader:
 
     def _console(self, block: Block) -> None:
         for command, expected in commands(block.text):
+            if command.startswith(tuple(self.skipped)):
+                continue
             said = self._command(self._typed(command))
-            for found in _JOB.finditer(said):
+            for found in () if command.startswith("gaitswarm fork ") else _JOB.finditer(said):
                 self.job_id = found[found.lastindex or 0]
             if expected:
                 assert_says(said, self._typed(expected), f"{block.where}: {command}")
@@ -124,6 +129,8 @@ class Reader:
     def _typed(self, text: str) -> str:
         for printed, typed in {ADDRESS: self.server, **self.replaced}.items():
             text = text.replace(printed, typed)
+        if "DIGEST" in text:
+            text = text.replace("DIGEST", run_command("status", self.job_id, "--json").json["head"])
         return re.sub(r"\bID\b", self.job_id, text)
 
     def _command(self, command: str) -> str:

@@ -12,6 +12,7 @@ import pytest
 import gaitswarm
 from services.runtime import open_runtime
 from tests.documents.reader import Reader
+from tests.examples.commands import run_command
 from tests.examples.paths import ROOT
 from tests.examples.servers import Server
 
@@ -48,6 +49,25 @@ def test_the_tutorial_does_what_it_says(reader: Reader) -> None:
     assert '"state":"succeeded"' in submitted.text.split("event: state")[-1]
     assert best.json()["design"].keys() == {"P", "I", "D"}
     assert len(ranking.json()["top"]) == 3
+
+
+def test_the_readmes_tours_with_the_command_line_do_what_they_say(reader: Reader) -> None:
+    other = run_command("submit", "--iterations", "1").out.strip()
+    reader.replaced = {
+        "--iterations 10 ": "--iterations 5 ",
+        "diff ID ID": f"diff ID {other}",
+        "robustness published:A": "robustness published:A --samples 36 --scenarios 1",
+        "preferences ID  ": "preferences ID --drawn 20 --candidates 2 --samples 36 ",
+        "--replay 50": "--replay 5",
+    }
+    reader.skipped = {
+        "gaitswarm certify": "walks in hundreds of worlds, and in MuJoCo, which is not everywhere",
+        "gaitswarm bench": "measures the machine for some time",
+    }
+    reader.read("README.md", "Two minutes with the command line")
+    reader.read("README.md", "The drive that reverses")
+    for written in ("job.parquet", "job.zip", "convergence.png", "walk.npz", "firmware/Makefile"):
+        assert Path(written).stat().st_size > 0
 
 
 def test_the_readmes_tour_over_rest_does_what_it_says(reader: Reader) -> None:

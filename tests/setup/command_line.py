@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import redirect_stdout
 from functools import cache
+from io import StringIO
 from typing import Any
 
 import typer
@@ -14,7 +16,7 @@ from cli.main import app
 @cache
 def commands() -> dict[str, set[str]]:
     """Options of every command, by its full name."""
-    return dict(_leaves(typer.main.get_command(app), ""))
+    return dict(_leaves(_root(), ""))
 
 
 def problem(arguments: Sequence[str]) -> str | None:
@@ -29,6 +31,35 @@ def problem(arguments: Sequence[str]) -> str | None:
     options = [word.partition("=")[0] for word in arguments if word.startswith("-") and word != "-"]
     unknown = [option for option in options if option not in known[name]]
     return f"{name} has no option {', '.join(unknown)}" if unknown else None
+
+
+def refusal(arguments: Sequence[str]) -> str | None:
+    """What the command line says against a command, which is not run; None if it takes it.
+
+    Arguments and options are converted and checked as in a run: their number, kinds and choices.
+    Ids have to be in full, as the beginning of one is looked up.
+    """
+    command, context, rest = _root(), None, list(arguments)
+    name = "gaitswarm"
+    while rest and rest[0] in getattr(command, "commands", {}):
+        context = typer.Context(command, parent=context, info_name=name)
+        name, rest = rest[0], rest[1:]
+        command = command.commands[name]
+    if rest and hasattr(command, "commands") and not rest[0].startswith("-"):
+        return f"no command {rest[0]!r}"
+    try:
+        with redirect_stdout(StringIO()):
+            command.make_context(name, rest, parent=context)
+    except typer.Exit:
+        return None
+    except Exception as error:  # noqa: BLE001 - whatever it is, it is said against the command
+        return str(getattr(error, "message", error)) or repr(error)
+    return None
+
+
+@cache
+def _root() -> Any:
+    return typer.main.get_command(app)
 
 
 def _leaves(command: Any, prefix: str) -> list[tuple[str, set[str]]]:

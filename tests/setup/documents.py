@@ -30,6 +30,11 @@ def shell_commands(program: str) -> list[list[str]]:
     return [*calls(text, program), *(call for line in inline for call in _calls(line, program))]
 
 
+def typed_commands(program: str) -> list[list[str]]:
+    """Arguments of every call of a program in a shell block: whole commands, to be typed."""
+    return calls(documentation(), program)
+
+
 def calls(text: str, program: str) -> list[list[str]]:
     """Arguments of every call of a program in the shell blocks of a text, in their order."""
     shell = [body for language, body in BLOCK.findall(text) if language in SHELL]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from pathlib import Path
 
 import pytest
 
@@ -12,13 +13,39 @@ from sim.scenario import PRESETS, Scenario
 from tests.examples.api_document import api_document
 from tests.examples.paths import ROOT
 from tests.setup import command_line, settings_classes
-from tests.setup.documents import blocks, documentation, shell_commands
+from tests.setup.documents import blocks, documentation, shell_commands, typed_commands
 
 
 def test_every_gaitswarm_command_that_is_written_exists_with_its_options() -> None:
     written = shell_commands("gaitswarm")
     assert len(written) > 20
     assert [p for p in map(command_line.problem, written) if p] == []
+
+
+def test_every_command_of_a_block_is_taken_by_the_command_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for robot in ("a1", "dog"):
+        (tmp_path / robot).mkdir()
+    refused = []
+    typed = typed_commands("gaitswarm")
+    for words in typed:
+        known = [re.sub(r"\b(ID|JOB\d)\b", "k2q7zr5dm9xw", word) for word in words]
+        if words != ["COMMAND"] and (said := command_line.refusal(known)):
+            refused.append(f"{' '.join(words)}: {said}")
+    assert len(typed) > 200
+    assert refused == []
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    ["best", "best ID ID", "list --limit x", "tournament other", "token create ci --scope all",
+     "optimize --iterations", "prioritize ID --priority 11", "plot surfaces", "bench --quick"],
+)  # fmt: skip
+def test_a_command_that_the_command_line_does_not_take_is_seen(wrong: str) -> None:
+    known = wrong.replace("ID", "k2q7zr5dm9xw").split()
+    assert command_line.refusal(known)
 
 
 def test_every_command_is_shown() -> None:

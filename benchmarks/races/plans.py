@@ -62,8 +62,9 @@ PLANS: Final = {
     "chapter-4-tpe": Plan(("optuna-tpe",), ROBOT, 20, 625),
     "chapter-4-bayesian": Plan(("bayesian",), ROBOT, 3, 625),
     "chapter-4-long": Plan(
-        ("cma-es", "de", "pso-ps", "tlbo", "pso-thesis", "pymoo-pso"), ROBOT, 5, 2500
+        ("cma-es", "de", "pso-ps", "tlbo", "pso-thesis", "pymoo-pso"), ROBOT, 20, 2500
     ),
+    "chapter-4-long-rivals": Plan(("cma", "scipy-de"), ROBOT, 20, 2500),
     "chapter-3": Plan(("cma-es", "de", "pso-ps", "pso-thesis", "tlbo"), CHAPTER_3, 20, 625),
     "between": Plan(("cma-es", "de"), BETWEEN, 20, 625),
     "function": Plan(

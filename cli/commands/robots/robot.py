@@ -206,13 +206,14 @@ def _told(view: RobotCheckView) -> str:
         f"standing for {standing.seconds:g} s: soles carry {standing.normal_forces:.1f} N of"
         f" {standing.weight:.1f} N; the body is at {standing.height:.3f} m"
     )
+    width = max(len(", ".join(leg.joints)) for leg in view.legs)
     lines = [
         f"{view.name}: {len(view.legs)} legs, {view.joints} joints, {view.mass:.3f} kg",
         "",
-        f"{'leg':20} {'joints':52} {'mass':>9} {'length':>8} {'reach':>8}",
-        f"{'body, and what is held':73} {view.body_mass:6.3f} kg",
+        f"{'leg':20} {'joints':{width}} {'mass':>9} {'length':>8} {'reach':>8}",
+        f"{'body, and what is held':{21 + width}} {view.body_mass:6.3f} kg",
         *(
-            f"{leg.name:20} {', '.join(leg.joints):52} {leg.mass:6.3f} kg {leg.length:6.3f} m"
+            f"{leg.name:20} {', '.join(leg.joints):{width}} {leg.mass:6.3f} kg {leg.length:6.3f} m"
             f" {leg.reach:6.3f} m"
             for leg in view.legs
         ),

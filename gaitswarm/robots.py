@@ -9,12 +9,18 @@ import shutil
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Final
 from xml.etree import ElementTree as ET
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gaitswarm.errors import simulation_errors
 from gaitswarm.mesh_copies import MeshCopies, copy_meshes
+from gaitswarm.mesh_library import FORMS, LARGEST_MESH
+from gaitswarm.meshes import find_mesh
 from gaitswarm.robot_defaults import JOB_FILE
 from services.optimizer.errors import InvalidRequest
 from sim.errors import RobotFileError
@@ -23,6 +29,7 @@ from sim.proposal.document import Proposal
 from sim.proposal.drive import ActuatorChoice
 from sim.proposal.frame import Axis, Frame
 from sim.robot.bounds import LONGEST_URDF, check_urdf
+from sim.robot.mesh_bounds import mesh_bounds
 
 _NAME: Final = re.compile(r"\w[^/\\]{0,99}")
 
@@ -90,7 +97,8 @@ def init_robot(
     check_name(chosen)
     frame = frame_of(up, forward)
     try:
-        proposal = walking_proposal(text, chosen, actuator, frame)
+        bounds = partial(_bounds, folder=source.parent, packages=[Path(p) for p in packages])
+        proposal = walking_proposal(text, chosen, actuator, frame, bounds)
     except RobotFileError as error:
         said = str(error).replace("robot.urdf", source.name, 1)
         raise InvalidRequest(said, field="urdf") from error
@@ -171,6 +179,14 @@ def frame_of(up: Axis | None, forward: Axis | None) -> Frame:
             field="forward",
         )
     return frame
+
+
+def _bounds(name: str, folder: Path, packages: Sequence[Path]) -> NDArray[np.float64] | None:
+    """Of a mesh that is found and not too large."""
+    path = find_mesh(name, folder, packages)
+    if path is None or path.suffix.lower() not in FORMS or path.stat().st_size > LARGEST_MESH:
+        return None
+    return mesh_bounds(path)
 
 
 def _check_free(folder: Path) -> None:

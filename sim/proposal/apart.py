@@ -9,6 +9,7 @@ from sim.errors import ProcessEnded, RobotFileError, SimulationInputError
 from sim.limited_process import Document, LimitedProcesses, serve
 from sim.proposal.document import Proposal, propose_robot
 from sim.proposal.drive import ActuatorChoice
+from sim.proposal.feet import MeshBounds, no_meshes
 from sim.proposal.frame import AS_IT_IS, Frame
 from sim.proposal.gait import walk_within_reach
 from sim.robot import bounds
@@ -28,7 +29,11 @@ PROCESSES: Final = LimitedProcesses(
 
 
 def walking_proposal(
-    urdf: str, name: str, actuator: ActuatorChoice = "auto", frame: Frame = AS_IT_IS
+    urdf: str,
+    name: str,
+    actuator: ActuatorChoice = "auto",
+    frame: Frame = AS_IT_IS,
+    bounds: MeshBounds = no_meshes,
 ) -> Proposal:
     """Propose a robot, and make sure that it can be used and that its legs reach.
 
@@ -37,6 +42,7 @@ def walking_proposal(
         name: Of the robot.
         actuator: Kind of its actuators.
         frame: Which axes of its first link point up and ahead.
+        bounds: Of meshes, where feet may be known by nothing else.
 
     Returns:
         Its files.
@@ -45,7 +51,7 @@ def walking_proposal(
         RobotFileError: The URDF cannot be read, no legs are found that can be simulated, or these
             have no room for steps.
     """
-    proposal = propose_robot(urdf, name, actuator, frame)
+    proposal = propose_robot(urdf, name, actuator, frame, bounds)
     robot = parse_robot(proposal.toml, proposal.urdf)
     fitted = [walk_within_reach(robot, walk) for walk in proposal.job["scenarios"]]
     return proposal.with_guesses(

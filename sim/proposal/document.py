@@ -26,6 +26,7 @@ from sim.proposal.drive import (
     propose_drives,
     propose_sole,
 )
+from sim.proposal.feet import MeshBounds, no_meshes
 from sim.proposal.frame import AS_IT_IS, Frame, sideways, turned
 from sim.proposal.gait import alternating_phases, propose_scenarios
 from sim.proposal.legs import FoundLeg, FoundLegs, chain_leg, find_legs
@@ -100,7 +101,11 @@ class Proposal:
 
 
 def propose_robot(
-    urdf: str, name: str, actuator: ActuatorChoice = "auto", frame: Frame = AS_IT_IS
+    urdf: str,
+    name: str,
+    actuator: ActuatorChoice = "auto",
+    frame: Frame = AS_IT_IS,
+    bounds: MeshBounds = no_meshes,
 ) -> Proposal:
     """Make a robot of a URDF.
 
@@ -109,6 +114,7 @@ def propose_robot(
         name: Of the robot.
         actuator: Kind of its actuators.
         frame: Which axes of its first link point up and ahead.
+        bounds: Of meshes, where feet may be known by nothing else.
 
     Returns:
         Its files.
@@ -117,7 +123,7 @@ def propose_robot(
         RobotFileError: The URDF cannot be read, or no legs are found that can be simulated.
     """
     with by_line(urdf):
-        urdf, found, moved = _stood_up(urdf, frame)
+        urdf, found, moved = _stood_up(urdf, frame, bounds)
     text, feet = _with_feet(urdf, found.legs)
     tree, names = parse_urdf(text, found.held), _leg_names(found.legs)
     joints = [leg.joints for leg in found.legs]
@@ -160,7 +166,7 @@ def propose_robot(
     return made.with_guesses(notes)
 
 
-def _stood_up(urdf: str, frame: Frame) -> tuple[str, FoundLegs, list[str]]:
+def _stood_up(urdf: str, frame: Frame, bounds: MeshBounds) -> tuple[str, FoundLegs, list[str]]:
     """The URDF with z up, x ahead and its origin about as high as the hips; its legs; notes.
 
     What a body does is told by its origin, so one on the ground would always have fallen.
@@ -168,7 +174,7 @@ def _stood_up(urdf: str, frame: Frame) -> tuple[str, FoundLegs, list[str]]:
     root, *others = parse_urdf(urdf).links
     text = turned(urdf, root, [root, *others], frame)
     tree = parse_urdf(text)
-    found = find_legs(tree, upright=frame != AS_IT_IS)
+    found = find_legs(tree, upright=frame != AS_IT_IS, bounds=bounds)
     legs = [chain_leg(tree, leg.joints, leg.end) for leg in found.legs]
     level = float(f"{np.mean([leg.hip[2] for leg in legs]):.3g}")
     if abs(level) <= _LEVEL * max(sum(leg.lengths) for leg in legs):

@@ -3,26 +3,41 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Final
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.errors import RobotFileError
+from sim.proposal.xml_text import fixed_joint
 from sim.robot.urdf import Solid, Urdf
+from sim.robot.visual_meshes import visual_meshes
 
 Floats = NDArray[np.float64]
+
+MeshBounds = Callable[[str], Floats | None]
+"""Least and largest coordinates of a mesh by its name in the URDF, (2, 3), before it is scaled;
+None where it is not found or cannot be read."""
+
+
+def no_meshes(_name: str) -> None:
+    """No mesh is found: of a URDF that came alone."""
+
 
 _FOOT_NAME: Final = re.compile(r"foot|toe|sole|ankle|tip|contact", re.IGNORECASE)
 
 
-def end_of(urdf: Urdf, link: str) -> tuple[Floats, str | None, float | None, tuple[str, ...]]:
+def end_of(
+    urdf: Urdf, link: str, bounds: MeshBounds = no_meshes
+) -> tuple[Floats, str | None, float | None, tuple[str, ...]]:
     """Where a leg ends: at a frame that is fixed to its last link, a sphere, or the link's end.
 
     Args:
         urdf: Of the robot.
         link: The leg's last one.
+        bounds: Of meshes, which are looked at where there is nothing else.
 
     Returns:
         The position in the link's frame, (3,) [m]; the frame's name, None for none; the radius of a
@@ -49,9 +64,40 @@ def end_of(urdf: Urdf, link: str) -> tuple[Floats, str | None, float | None, tup
     if corners:
         at = max(corners, key=lambda c: float(np.linalg.norm(c)))
         return at, None, None, (f"its end is the far end of the shape of the link {link!r}",)
-    raise RobotFileError(
-        f"robot.urdf: link {link!r} has no foot: add a link at its end, joined by a fixed joint"
+    corners = [c for part in parts for c in _mesh_ends(urdf, part, bounds)]
+    if corners:
+        at = max(corners, key=lambda c: float(np.linalg.norm(c)))
+        return at, None, None, (f"its end is the far end of the mesh of the link {link!r}",)
+    raise RobotFileError(_without_foot(urdf, link, parts))
+
+
+def _without_foot(urdf: Urdf, link: str, parts: Iterable[str]) -> str:
+    meshes = [mesh.name for part in parts for mesh in visual_meshes(urdf.links[part], {})]
+    lost = f", and no mesh {meshes[0]!r} is found (`--package-path`)" if meshes else ""
+    foot = f"{link}_foot"
+    joint = fixed_joint(f"{foot}_fixed", link, foot, "0 0 -0.2")
+    example = "".join([f"<link name={quoteattr(foot)}/>", *map(str.strip, joint)])
+    return (
+        f"robot.urdf: link {link!r} has no foot{lost}: add a link at its end, joined by a fixed"
+        f" joint with its place in the frame of {link!r} [m]: {example}"
     )
+
+
+def _mesh_ends(urdf: Urdf, part: str, bounds: MeshBounds) -> Iterable[Floats]:
+    """Middles of the faces of boxes around a link's meshes, in its body's frame."""
+    place = urdf.places[part]
+    for mesh in visual_meshes(urdf.links[part], {}):
+        found = bounds(mesh.name)
+        if found is None:
+            continue
+        ends = found * mesh.scale
+        middle, half = ends.mean(axis=0), np.ptp(ends, axis=0) / 2.0
+        faces = np.concatenate([middle + np.diag(half), middle - np.diag(half)])
+        # Slow to import; it has been by now, as origins are read by it.
+        from scipy.spatial.transform import Rotation  # noqa: PLC0415
+
+        turn = Rotation.from_quat(mesh.origin[3:]).as_matrix()
+        yield from (faces @ turn.T + mesh.origin[:3]) @ place.rotation.T + place.position
 
 
 def _solids(urdf: Urdf, part: str, kind: str | None = None) -> Iterable[tuple[Floats, Solid]]:

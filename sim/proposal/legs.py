@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.errors import RobotFileError
-from sim.proposal.feet import end_of
+from sim.proposal.feet import MeshBounds, end_of, no_meshes
 from sim.proposal.frame import check_upright
 from sim.proposal.look_alikes import check_look_alikes
 from sim.robot.chain import Chain, chain_of
@@ -65,12 +65,13 @@ class FoundLegs:
     held: Mapping[str, float] = field(default_factory=dict)
 
 
-def find_legs(urdf: Urdf, *, upright: bool = False) -> FoundLegs:
+def find_legs(urdf: Urdf, *, upright: bool = False, bounds: MeshBounds = no_meshes) -> FoundLegs:
     """Find the legs: chains of three joints that turn, from the body to a foot that reaches down.
 
     Args:
         urdf: Of the robot, no joint held.
         upright: Whether z is known to point up.
+        bounds: Of meshes, where feet may be known by nothing else.
 
     Returns:
         Legs and all other joints.
@@ -83,14 +84,14 @@ def find_legs(urdf: Urdf, *, upright: bool = False) -> FoundLegs:
     threes = [chain for chain in chains if _is_candidate(chain)]
     if len(threes) < 2:
         raise RobotFileError(_why_none(urdf, chains))
-    reached = [_reached(urdf, chain) for chain in threes]
+    reached = [_reached(urdf, chain, bounds) for chain in threes]
     drops = [leg.hip[2] - float(feet[:, 2].min()) for leg, feet in reached]
     if not upright:
         hips = np.array([leg.hip for leg, _ in reached])
         places = [(feet.mean(axis=0) - leg.hip) / sum(leg.lengths) for leg, feet in reached]
         check_upright(urdf, hips, np.array(places))
     legs = [
-        _found(urdf, chain)
+        _found(urdf, chain, bounds)
         for chain, drop in zip(threes, drops, strict=True)
         if drop > 0.0 and drop >= _SHARE_OF_THE_LONGEST * max(drops)
     ]
@@ -210,17 +211,17 @@ def _why_none(urdf: Urdf, chains: Sequence[Sequence[Joint]]) -> str:
     )
 
 
-def _reached(urdf: Urdf, chain: Sequence[Joint]) -> tuple[ChainLeg, Floats]:
+def _reached(urdf: Urdf, chain: Sequence[Joint], bounds: MeshBounds) -> tuple[ChainLeg, Floats]:
     """A chain as a leg, and where its end gets, (n, 3) [m]."""
-    end, *_ = end_of(urdf, chain[-1].child)
+    end, *_ = end_of(urdf, chain[-1].child, bounds)
     leg = chain_leg(urdf, [joint.name for joint in chain], end)
     return leg, leg.feet(tried_angles(leg))[0]
 
 
-def _found(urdf: Urdf, chain: Sequence[Joint]) -> FoundLeg:
+def _found(urdf: Urdf, chain: Sequence[Joint], bounds: MeshBounds) -> FoundLeg:
     first, second, third = (joint.name for joint in chain)
     link = chain[-1].child
-    end, foot, sole, notes = end_of(urdf, link)
+    end, foot, sole, notes = end_of(urdf, link, bounds)
     x, y, z = np.asarray(end).tolist()
     return FoundLeg((first, second, third), link, foot, (x, y, z), sole, notes)
 

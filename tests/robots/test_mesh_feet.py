@@ -1,0 +1,112 @@
+"""Feet of robots whose last links have meshes alone, or nothing."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cli.main import run
+from sim.errors import RobotFileError
+from sim.proposal.apart import walking_proposal
+from sim.proposal.document import propose_robot
+from sim.robot import Robot, parse_robot
+from tests.robots.test_proposal import dog
+
+NAME = "package://dog_description/meshes/calf.obj"
+BARE = dog(foot="none")
+
+
+def with_mesh(attributes: str, origin: str = "") -> str:
+    """A dog whose shanks look like a mesh."""
+    mesh = f"<visual>{origin}<geometry><mesh {attributes}/></geometry></visual></link>"
+    return re.sub(r'(<link name="\w\w_calf">.*?)</link>', rf"\1{mesh}", BARE, flags=re.DOTALL)
+
+
+def box(x: float, y: float, z: float, unit: float = 1.0) -> str:
+    """An OBJ of a box from above its origin to z below it."""
+    corners = [(a, b, c) for a in (-x, x) for b in (-y, y) for c in (0.02, -z)]
+    lines = [f"v {unit * a} {unit * b} {unit * c}" for a, b, c in corners]
+    return "\n".join([*lines, "f 1 2 3", "f 4 5 6", "f 6 7 8", ""])
+
+
+Init = Callable[[str], tuple[Robot, list[str]]]
+
+
+@pytest.fixture
+def init(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Init:
+    """Makes a robot of a URDF beside a package with its mesh."""
+
+    def made(urdf: str) -> tuple[Robot, list[str]]:
+        robots = tmp_path / "dog_description" / "robots"
+        robots.mkdir(parents=True, exist_ok=True)
+        (robots / "dog.urdf").write_text(urdf, encoding="utf-8")
+        output = robots / "made"
+        assert run(["robot", "init", str(robots / "dog.urdf"), "-o", str(output), "--json"]) == 0
+        said = json.loads(capsys.readouterr().out)["guesses"]
+        files = [(output / f"robot.{kind}").read_text("utf-8") for kind in ("toml", "urdf")]
+        return parse_robot(*files), said
+
+    (tmp_path / "dog_description" / "meshes").mkdir(parents=True)
+    (tmp_path / "dog_description" / "meshes" / "calf.obj").write_text(box(0.01, 0.02, 0.21))
+    return made
+
+
+@pytest.mark.parametrize(
+    ("urdf", "length"),
+    [
+        (with_mesh(f'filename="{NAME}"'), 0.21),
+        (with_mesh(f'filename="{NAME}" scale="1 1 0.9"'), 0.189),
+        (with_mesh(f'filename="{NAME}"', '<origin xyz="0 0 0.01"/>'), 0.2),
+        (with_mesh(f'filename="{NAME}"', '<origin xyz="0 0 -0.19" rpy="3.14159265 0 0"/>'), 0.21),
+    ],
+    ids=["as it is", "scaled", "moved", "turned"],
+)
+def test_a_leg_ends_where_its_mesh_does(urdf: str, length: float, init: Init) -> None:
+    robot, said = init(urdf)
+    for leg in robot.legs:
+        assert leg.lengths[2] == pytest.approx(length, abs=1e-6)
+    assert "leg FL_hip_joint: its end is the far end of the mesh of the link 'FL_calf'" in said
+    assert sum("its end" in note for note in said) == 4
+
+
+def test_simple_shapes_go_before_meshes(init: Init) -> None:
+    shaped = with_mesh(f'filename="{NAME}"').replace(
+        "</visual></link>",
+        '</visual><collision><origin xyz="0 0 -0.17"/><geometry><sphere radius="0.02"/></geometry>'
+        "</collision></link>",
+    )
+    robot, _ = init(shaped)
+    assert robot.legs[0].lengths[2] == pytest.approx(0.17)
+
+
+@pytest.mark.parametrize("content", [None, "no mesh", ""], ids=["missing", "broken", "empty"])
+def test_a_mesh_that_is_not_at_hand_is_named_with_what_to_add(
+    content: str | None, init: Init, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mesh = tmp_path / "dog_description" / "meshes" / "calf.obj"
+    if content is None:
+        mesh.unlink()
+    else:
+        mesh.write_text(content, encoding="utf-8")
+    source = tmp_path / "dog_description" / "dog.urdf"
+    source.write_text(with_mesh(f'filename="{NAME}"'), encoding="utf-8")
+    assert run(["robot", "init", str(source), "--output", str(tmp_path / "made")]) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert f"'FL_calf' has no foot, and no mesh '{NAME}' is found (`--package-path`)" in said
+    assert not (tmp_path / "made").exists()
+
+
+def test_what_the_message_says_to_add_is_a_foot() -> None:
+    with pytest.raises(RobotFileError, match="link 'FL_calf' has no foot: add a link") as refused:
+        propose_robot(BARE, "dog")
+    example = str(refused.value).split(": ")[-1]
+    legs = "".join(example.replace("FL_", f"{leg}_") for leg in ("FL", "FR", "RL", "RR"))
+    made = walking_proposal(BARE.replace("</robot>", f"{legs}</robot>"), "dog")
+    robot = parse_robot(made.toml, made.urdf)
+    assert robot.description.legs[0].foot == "FL_calf_foot"
+    np.testing.assert_allclose([leg.lengths[2] for leg in robot.legs], 0.2)

@@ -164,6 +164,15 @@ class Variable(BaseModel):
             )
         return self
 
+    @property
+    def range_in_words(self) -> str:
+        """Bounds and unit, `1500 to 6000 counts`; of a categorical variable its choices."""
+        if self.kind == "categorical":
+            return ", ".join(self.choices)
+        whole = "integers, " if self.kind == "integer" else ""
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        return f"{whole}{self.low:g} to {self.high:g}{unit}"
+
     def number(self, value: float | str) -> float:
         """A value as arrays of designs hold it.
 

@@ -21,6 +21,8 @@ from services.optimizer.errors import InvalidRequest, NotFound
 from services.optimizer.jobs.iteration import Iteration
 from services.optimizer.jobs.job import Job
 from services.optimizer.service import JobService
+from sim.scenario import Scenario
+from sim.variables import Variable
 
 MOST_JOBS: Final = 12
 """Jobs that are compared at once."""
@@ -129,24 +131,65 @@ def _iterations(service: JobService, job_id: str) -> Iterator[Iteration]:
 
 
 def _differences(documents: Sequence[dict[str, Any]]) -> Iterator[SpecDifferenceView]:
-    flat = [dict(_leaves(document, "")) for document in documents]
-    for field in dict.fromkeys(name for fields in flat for name in fields):
-        values = [fields.get(field) for fields in flat]
+    items = [set(_items(document, "")) for document in documents]
+    lacked = items[0].union(*items) - items[0].intersection(*items)
+    flat = [dict(_leaves(document, "", lacked)) for document in documents]
+    fields = dict.fromkeys(field for document in flat for field in document)
+    # Names are those of the jobs, which stand beside.
+    fields.pop("name", None)
+    rooms = list(dict.fromkeys(field.split(".")[0] for field in fields))
+    for field in sorted(fields, key=lambda field: rooms.index(field.split(".")[0])):
+        values = [document.get(field) for document in flat]
         if len(set(values)) > 1:
             yield SpecDifferenceView(field=field, values=values)
 
 
-def _leaves(value: Any, path: str) -> Iterator[tuple[str, str]]:
-    """Fields by their paths, as JSON; items of a list by their names, if they have any."""
-    if isinstance(value, dict) and value:
+def _items(value: Any, path: str) -> Iterator[str]:
+    """Paths of the items of lists that have names."""
+    for inner, item, named in _parts(value, path):
+        if named:
+            yield inner
+        yield from _items(item, inner)
+
+
+def _leaves(value: Any, path: str, lacked: set[str]) -> Iterator[tuple[str, str]]:
+    """Fields by their paths; variables, and items at the paths that are lacked, in one piece."""
+    parts = list(_parts(value, path))
+    for inner, item, named in parts:
+        if named and path == "variables":
+            yield inner, Variable.model_validate(item).range_in_words
+        elif named and inner in lacked:
+            yield inner, _json(_said(item, path))
+        else:
+            yield from _leaves(_rest(item) if named else item, inner, lacked)
+    if not parts:
+        yield path, _json(value)
+
+
+def _parts(value: Any, path: str) -> Iterator[tuple[str, Any, bool]]:
+    """(path, part, whether it is of a list) of an object, or of a list of objects with names."""
+    if isinstance(value, dict):
         for name, part in value.items():
-            yield from _leaves(part, f"{path}.{name}" if path else name)
-    elif isinstance(value, list) and value and all(_named(item) for item in value):
+            yield f"{path}.{name}" if path else name, part, False
+    elif isinstance(value, list) and all(_named(item) for item in value):
         for item in value:
-            rest = {name: part for name, part in item.items() if name != "name"}
-            yield from _leaves(rest or item, f"{path}.{item['name']}")
-    else:
-        yield path, json.dumps(value, ensure_ascii=False)
+            yield f"{path}.{item['name']}", item, True
+
+
+def _said(item: dict[str, Any], path: str) -> dict[str, Any]:
+    """What an item of a list says: of a scenario what is not as it is by default."""
+    if path == "scenarios":
+        item = Scenario.model_validate(item).model_dump(mode="json", exclude_defaults=True)
+    return _rest(item)
+
+
+def _rest(item: dict[str, Any]) -> dict[str, Any]:
+    """Of an item of a list what its path does not say."""
+    return {name: part for name, part in item.items() if name != "name"} or item
+
+
+def _json(value: Any) -> str:
+    return json.dumps(value, ensure_ascii=False)
 
 
 def _named(item: Any) -> bool:

@@ -67,11 +67,16 @@ class ComparedJobView(View):
 
 
 class SpecDifferenceView(View):
-    """What the specs of jobs say differently."""
+    """What the specs of jobs say differently, but for their names."""
 
-    field: str = Field(description="Path of the field.", examples=["optimizer.particles"])
+    field: str = Field(
+        description="Path of the field. A variable is one, as is a scenario that some specs lack.",
+        examples=["optimizer.particles"],
+    )
     values: list[str | None] = Field(
-        description="As JSON, of each job in its order; null where a spec has none.",
+        description="As JSON, of each job in its order; null where a spec has none. Of a variable"
+        " its bounds and unit, or its choices, in words, as `1500 to 6000 counts`; of a scenario"
+        " that some specs lack what is not as it is by default.",
         examples=[["25", "50"]],
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import httpx2
@@ -36,7 +37,6 @@ def test_jobs_stand_beside_each_other_with_what_their_specs_say_differently(
     assert [found["id"] for found in view["jobs"]] == [job.id, other.id]
     fields = {difference["field"]: difference["values"] for difference in view["differences"]}
     assert fields == {
-        "name": ['"small"', '"other"'],
         "optimizer.inertia_end": [fields["optimizer.inertia_end"][0], "0.3"],
         "iterations": ["3", "2"],
         "seed": [str(job.spec.seed), "9"],
@@ -74,6 +74,44 @@ def test_another_measure_is_told_and_a_job_without_designs_has_no_distribution(
     assert not view["comparable"]
     assert {d["field"] for d in view["differences"]} == {"preference.bias", "preference.exponent"}
     assert (view["jobs"][1]["fitness"], view["jobs"][1]["convergence"]["iterations"]) == ([], [])
+
+
+def test_jobs_of_different_controllers_differ_by_a_field_for_every_variable(
+    client: httpx2.Client, store: SqlStore, spec: JobSpec
+) -> None:
+    job = store.create_job(spec.resolved())[0]
+    searched = ("P", "I", "fir_ms", "curve")
+    changes = {"controller": "pi", "variables": searched, "name": "other"}
+    pi = store.create_job(spec.model_copy(update=changes).resolved())[0]
+    view = client.get(f"/v1/jobs/{job.id}/comparison", params={"also": pi.id}).json()
+    fields = {difference["field"]: difference["values"] for difference in view["differences"]}
+    assert fields["variables.FI1R"] == ["1500 to 6000 counts", None]
+    assert fields["variables.P"] == [None, "0.05 to 1 PWM counts/count"]
+    assert fields["variables.fir_ms"] == [None, "integers, 4 to 300 ms"]
+    assert fields["variables.curve"][1].startswith("quadratic_spline, ")
+    assert fields["controller"] == ['"fuzzy-pi"', '"pi"']
+    # Variables stay together, whoever has them.
+    rooms = [field.split(".")[0] for field in fields]
+    assert rooms == sorted(rooms, key=rooms.index)
+    assert len(fields) < 20
+
+
+def test_a_scenario_that_one_job_lacks_is_a_field_with_what_is_special_of_it(
+    client: httpx2.Client, store: SqlStore, spec: JobSpec
+) -> None:
+    job = store.create_job(spec.resolved())[0]
+    first, *_ = spec.resolved_scenarios()
+    slower = first.model_copy(update={"cycle_time": 2.5})
+    steep = first.model_copy(update={"name": "steep", "slope": 15.0})
+    changed = store.create_job(spec.model_copy(update={"scenarios": (slower, steep)}))[0]
+    view = client.get(f"/v1/jobs/{job.id}/comparison", params={"also": changed.id}).json()
+    fields = {difference["field"]: difference["values"] for difference in view["differences"]}
+    assert fields[f"scenarios.{first.name}.cycle_time"][1] == "2.5"
+    nothing, said = fields["scenarios.steep"]
+    assert nothing is None
+    assert json.loads(said)["slope"] == 15.0
+    assert "stride" not in json.loads(said)
+    assert not [field for field in fields if field.startswith("scenarios.steep.")]
 
 
 def test_a_job_that_is_named_twice_or_not_there_is_refused(client: httpx2.Client, job: Job) -> None:

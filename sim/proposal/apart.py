@@ -14,6 +14,7 @@ from sim.proposal.frame import AS_IT_IS, Frame
 from sim.proposal.gait import walk_within_reach
 from sim.robot import bounds
 from sim.robot.robot import parse_robot
+from sim.robot.urdf_errors import by_line
 
 SECONDS: Final = 40.0
 """That a proposal may take; it takes some tenths of a second, the first a second more."""
@@ -53,7 +54,8 @@ def walking_proposal(
     """
     proposal = propose_robot(urdf, name, actuator, frame, bounds)
     robot = parse_robot(proposal.toml, proposal.urdf)
-    fitted = [walk_within_reach(robot, walk) for walk in proposal.job["scenarios"]]
+    with by_line(urdf):
+        fitted = [walk_within_reach(robot, walk) for walk in proposal.job["scenarios"]]
     return proposal.with_guesses(
         [note for _, note in fitted if note],
         job={**proposal.job, "scenarios": [walk for walk, _ in fitted]},

@@ -128,7 +128,8 @@ def propose_robot(
     tree, names = parse_urdf(text, found.held), _leg_names(found.legs)
     joints = [leg.joints for leg in found.legs]
     legs = [chain_leg(tree, leg.joints, leg.end) for leg in found.legs]
-    stance = choose_stance(legs)
+    with by_line(urdf):
+        stance = choose_stance(legs)
     standing = [
         replace(leg, stance=np.array(angles))
         for leg, angles in zip(legs, stance.angles, strict=True)

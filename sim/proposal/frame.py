@@ -28,7 +28,7 @@ _ROOT: Final = "robot_frame"
 _FLAT: Final = 3.0
 """Hips lie in a plane whose spread across it is that much less than their spread along z."""
 
-_HANGS: Final = 0.08
+_HANGS: Final = 0.1
 """Mean place of a foot over all angles, as a share of the leg's length, from which on it speaks for
 the side that feet are on."""
 

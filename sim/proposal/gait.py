@@ -100,19 +100,29 @@ def walk_within_reach(robot: Robot, values: Mapping[str, Any]) -> tuple[dict[str
         RobotFileError: The legs reach no steps of a quarter of the length and height either; names
             leg and joint.
     """
-    refused = ""
+    refused: UnreachablePose | BeyondJointLimit | None = None
     for share in _SHARES:
         steps = {name: round(share * values[name], 4) for name in ("stride", "height")}
         try:
             require_reachable(robot, walk_of_robot({**values, **steps}, "robot.urdf"))
         except (UnreachablePose, BeyondJointLimit) as error:
-            refused = error.reason
+            refused = error
             continue
         note = f"the walk {values['name']!r} has {share:.0%} of the usual stride and lift, as legs"
         return {**values, **steps}, "" if share == 1.0 else f"{note} reach no further"
-    raise RobotFileError(
-        "robot.urdf: legs stand, but have no room for steps around their stance, not even of a"
-        f" quarter of the usual length: {refused}; look at this joint's limits"
+    raise RobotFileError(_no_room(robot, refused))
+
+
+def _no_room(robot: Robot, refused: UnreachablePose | BeyondJointLimit | None) -> str:
+    leg = next(leg for leg in robot.description.legs if refused and leg.name == refused.leg)
+    if isinstance(refused, BeyondJointLimit):
+        joint, mend = refused.joint, "this joint's limits"
+    else:
+        joint, mend = leg.joints[0], "the limits and lengths of the leg that it begins"
+    return (
+        f"robot.urdf: joint {joint!r}: legs stand, but have no room for steps around their stance,"
+        f" not even of a quarter of the usual length: {refused.reason if refused else ''}; look at"
+        f" {mend}"
     )
 
 

@@ -119,7 +119,7 @@ def chain_leg(urdf: Urdf, joints: Sequence[str], end: Sequence[float] | Floats) 
         end: Of the leg in the last link's frame, (3,) [m].
 
     Returns:
-        The leg.
+        The leg, named by its first joint.
     """
     last = next(joint.child for joint in urdf.joints if joint.name == joints[-1])
     first, second, third = joints
@@ -133,13 +133,13 @@ def chain_leg(urdf: Urdf, joints: Sequence[str], end: Sequence[float] | Floats) 
             own_foot=last,
         ),
     )
-    return _kinematics(chain, np.asarray(end, dtype=np.float64))
+    return _kinematics(first, chain, np.asarray(end, dtype=np.float64))
 
 
-def _kinematics(chain: Chain, end: Floats) -> ChainLeg:
+def _kinematics(name: str, chain: Chain, end: Floats) -> ChainLeg:
     ends = np.clip(chain.limits, -np.pi, np.pi)
     return ChainLeg(
-        _UNNAMED,
+        name,
         np.array([place.rotation for place in chain.placements]),
         np.array([place.offset for place in chain.placements]),
         np.array([place.axis for place in chain.placements]),
@@ -160,7 +160,7 @@ def reach_below(robot: Robot, number: int) -> float:
         The distance within the joints' limits [m].
     """
     leg = robot.description.legs[number]
-    kinematics = _kinematics(chain_of(robot.urdf, leg), chain_of(robot.urdf, leg).foot)
+    kinematics = _kinematics(leg.name, (chain := chain_of(robot.urdf, leg)), chain.foot)
     feet, _ = kinematics.feet(tried_angles(kinematics))
     return max(leg.hip[2] for leg in robot.legs) - float(feet[:, 2].min())
 

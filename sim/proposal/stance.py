@@ -92,8 +92,9 @@ def _best(
     near = np.abs(feet[:, 2] - ground) < _BAND * height
     if not near.any():
         raise RobotFileError(
-            "robot.urdf: the feet cannot be put on one level: a leg's joint limits keep its foot"
-            f" from {height:.3f} m below the highest hip, three quarters of what all legs reach"
+            f"robot.urdf: joint {leg.name!r} begins a leg whose foot cannot be put on one level"
+            f" with the others: its joint limits keep it from {height:.3f} m below the highest hip,"
+            " three quarters of what all legs reach; look at these, and at where it is mounted"
         )
     angles, feet, slopes = angles[near], feet[near], slopes[near]
     length = sum(leg.lengths)

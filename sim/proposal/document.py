@@ -56,6 +56,9 @@ _ELSE: Final = "battery, rotors, sensors, ground and load are guessed as robot.t
 _LEVEL: Final = 0.2
 """How far hips may be above or below the body's origin, as a share of the legs' length."""
 
+_LOWER: Final = 0.02
+"""By how much another end has to be lower than the farthest one, as a share of the leg's length."""
+
 _SIDEWAYS: Final = (
     "warning: it faces y, it seems, and would walk sideways: name the axis that points ahead as"
     " `forward` (`--forward=y` or `--forward=-y`), or x if it does"
@@ -124,6 +127,7 @@ def propose_robot(
     """
     with by_line(urdf):
         urdf, found, moved = _stood_up(urdf, frame, bounds)
+        found = _at_their_lowest(urdf, found)
     text, feet = _with_feet(urdf, found.legs)
     tree, names = parse_urdf(text, found.held), _leg_names(found.legs)
     joints = [leg.joints for leg in found.legs]
@@ -183,6 +187,24 @@ def _stood_up(urdf: str, frame: Frame, bounds: MeshBounds) -> tuple[str, FoundLe
     side = "above" if level > 0.0 else "below"
     note = f"the body's frame is {abs(level):g} m {side} that of {root!r}, as high as the hips"
     return turned(urdf, root, [root, *others], frame, level), found, [note]
+
+
+def _at_their_lowest(urdf: str, found: FoundLegs) -> FoundLegs:
+    """Legs that end where they are lowest as they stand, if only shapes say where they end."""
+    if not any(len(leg.ends) for leg in found.legs):
+        return found
+    tree = parse_urdf(urdf)
+    legs = [chain_leg(tree, leg.joints, leg.end) for leg in found.legs]
+    lowered = []
+    for leg, chain, angles in zip(found.legs, legs, choose_stance(legs).angles, strict=True):
+        low = chain.foot(angles)[2] - _LOWER * sum(chain.lengths)
+        heights = [replace(chain, end=end).foot(angles)[2] for end in leg.ends]
+        end = leg.end
+        if heights and min(heights) < low:
+            x, y, z = leg.ends[int(np.argmin(heights))].tolist()
+            end = (x, y, z)
+        lowered.append(replace(leg, end=end))
+    return replace(found, legs=tuple(lowered))
 
 
 def _with_feet(urdf: str, legs: Sequence[FoundLeg]) -> tuple[str, list[str]]:

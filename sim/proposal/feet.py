@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
 from typing import Final
 from xml.sax.saxutils import quoteattr
 
@@ -29,9 +30,26 @@ def no_meshes(_name: str) -> None:
 _FOOT_NAME: Final = re.compile(r"foot|toe|sole|ankle|tip|contact", re.IGNORECASE)
 
 
-def end_of(
-    urdf: Urdf, link: str, bounds: MeshBounds = no_meshes
-) -> tuple[Floats, str | None, float | None, tuple[str, ...]]:
+@dataclass(frozen=True, slots=True, eq=False)
+class LegEnd:
+    """Where a leg ends, in its last link's frame.
+
+    Attributes:
+        at: position, (3,) [m].
+        foot: name of the frame there; None for none.
+        sole: radius of a sphere there [m]; None for none.
+        notes: what was guessed.
+        others: where it ends as well as the shapes say, (n, 3) [m]; none if these were not asked.
+    """
+
+    at: Floats
+    foot: str | None = None
+    sole: float | None = None
+    notes: tuple[str, ...] = ()
+    others: Floats = field(default_factory=lambda: np.empty((0, 3)))
+
+
+def end_of(urdf: Urdf, link: str, bounds: MeshBounds = no_meshes) -> LegEnd:
     """Where a leg ends: at a frame that is fixed to its last link, a sphere, or the link's end.
 
     Args:
@@ -40,8 +58,7 @@ def end_of(
         bounds: Of meshes, which are looked at where there is nothing else.
 
     Returns:
-        The position in the link's frame, (3,) [m]; the frame's name, None for none; the radius of a
-        sphere there [m], None for none; and what was guessed.
+        The end: of shapes and meshes that which is farthest from the last joint.
 
     Raises:
         RobotFileError: The link has neither; says what to add.
@@ -56,18 +73,18 @@ def end_of(
         if np.linalg.norm(at) > 0.0:
             near = [float(r) for centre, r in spheres if np.linalg.norm(centre - at) <= r]
             notes = () if named else (f"its end is the link {far!r}, the farthest one",)
-            return at, far, max(near, default=None), notes
+            return LegEnd(at, far, max(near, default=None), notes)
     if spheres:
         at, radius = max(spheres, key=lambda s: float(np.linalg.norm(s[0])))
-        return at, None, float(radius), (f"its end is the sphere of the link {link!r}",)
-    corners = [c for part in parts for at, s in _solids(urdf, part) for c in _ends(at, s)]
-    if corners:
-        at = max(corners, key=lambda c: float(np.linalg.norm(c)))
-        return at, None, None, (f"its end is the far end of the shape of the link {link!r}",)
-    corners = [c for part in parts for c in _mesh_ends(urdf, part, bounds)]
-    if corners:
-        at = max(corners, key=lambda c: float(np.linalg.norm(c)))
-        return at, None, None, (f"its end is the far end of the mesh of the link {link!r}",)
+        note = f"its end is the sphere of the link {link!r}"
+        return LegEnd(at, sole=float(radius), notes=(note,))
+    of_shapes = [end for part in parts for at, s in _solids(urdf, part) for end in _ends(at, s)]
+    ends = of_shapes or [end for part in parts for end in _mesh_ends(urdf, part, bounds)]
+    if ends:
+        kind = "shape" if of_shapes else "mesh"
+        note = f"its end is the lowest one of the {kind} of the link {link!r} when it stands"
+        at = max(ends, key=lambda end: float(np.linalg.norm(end)))
+        return LegEnd(at, notes=(note,), others=np.array(ends))
     raise RobotFileError(_without_foot(urdf, link, parts))
 
 

@@ -31,7 +31,7 @@ _SHARE_OF_THE_LONGEST: Final = 0.5
 """How far down a chain has to reach to be a leg, of what the one that reaches furthest does."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class FoundLeg:
     """A leg of a URDF.
 
@@ -42,6 +42,7 @@ class FoundLeg:
         end: of the leg in the last link's frame [m].
         sole: radius of the sphere at its end [m]; None if there is none.
         notes: what was guessed.
+        ends: others that it may have, by its shapes, (n, 3) [m].
     """
 
     joints: tuple[str, str, str]
@@ -50,6 +51,7 @@ class FoundLeg:
     end: tuple[float, float, float]
     sole: float | None
     notes: tuple[str, ...] = ()
+    ends: Floats = field(default_factory=lambda: np.empty((0, 3)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,7 +215,7 @@ def _why_none(urdf: Urdf, chains: Sequence[Sequence[Joint]]) -> str:
 
 def _reached(urdf: Urdf, chain: Sequence[Joint], bounds: MeshBounds) -> tuple[ChainLeg, Floats]:
     """A chain as a leg, and where its end gets, (n, 3) [m]."""
-    end, *_ = end_of(urdf, chain[-1].child, bounds)
+    end = end_of(urdf, chain[-1].child, bounds).at
     leg = chain_leg(urdf, [joint.name for joint in chain], end)
     return leg, leg.feet(tried_angles(leg))[0]
 
@@ -221,9 +223,11 @@ def _reached(urdf: Urdf, chain: Sequence[Joint], bounds: MeshBounds) -> tuple[Ch
 def _found(urdf: Urdf, chain: Sequence[Joint], bounds: MeshBounds) -> FoundLeg:
     first, second, third = (joint.name for joint in chain)
     link = chain[-1].child
-    end, foot, sole, notes = end_of(urdf, link, bounds)
-    x, y, z = np.asarray(end).tolist()
-    return FoundLeg((first, second, third), link, foot, (x, y, z), sole, notes)
+    end = end_of(urdf, link, bounds)
+    x, y, z = end.at.tolist()
+    return FoundLeg(
+        (first, second, third), link, end.foot, (x, y, z), end.sole, end.notes, end.others
+    )
 
 
 def _held_at(joint: Joint) -> float:

@@ -15,6 +15,7 @@ from sim.errors import RobotFileError
 from sim.proposal.apart import walking_proposal
 from sim.proposal.document import propose_robot
 from sim.robot import Robot, parse_robot
+from sim.robot.legs import ChainLeg
 from tests.robots.test_proposal import dog
 
 NAME = "package://dog_description/meshes/calf.obj"
@@ -23,8 +24,12 @@ BARE = dog(foot="none")
 
 def with_mesh(attributes: str, origin: str = "") -> str:
     """A dog whose shanks look like a mesh."""
-    mesh = f"<visual>{origin}<geometry><mesh {attributes}/></geometry></visual></link>"
-    return re.sub(r'(<link name="\w\w_calf">.*?)</link>', rf"\1{mesh}", BARE, flags=re.DOTALL)
+    return on_shanks(f"<visual>{origin}<geometry><mesh {attributes}/></geometry></visual>")
+
+
+def on_shanks(shapes: str) -> str:
+    found = r'(<link name="\w\w_calf">.*?)</link>'
+    return re.sub(found, rf"\1{shapes}</link>", BARE, flags=re.DOTALL)
 
 
 def box(x: float, y: float, z: float, unit: float = 1.0) -> str:
@@ -70,8 +75,21 @@ def test_a_leg_ends_where_its_mesh_does(urdf: str, length: float, init: Init) ->
     robot, said = init(urdf)
     for leg in robot.legs:
         assert leg.lengths[2] == pytest.approx(length, abs=1e-6)
-    assert "leg FL_hip_joint: its end is the far end of the mesh of the link 'FL_calf'" in said
+    end = "its end is the lowest one of the mesh of the link 'FL_calf' when it stands"
+    assert f"leg FL_hip_joint: {end}" in said
     assert sum("its end" in note for note in said) == 4
+
+
+def test_a_leg_stands_on_its_lowest_end_not_on_its_farthest() -> None:
+    """A skid far ahead of the shank is farther from the knee than the heel, which carries."""
+    skid = '<origin xyz="0.1 0 -0.16"/><geometry><box size="0.2 0.02 0.02"/></geometry>'
+    shank = '<origin xyz="0 0 -0.1"/><geometry><box size="0.02 0.02 0.2"/></geometry>'
+    both = "".join(f"<collision>{shape}</collision>" for shape in (skid, shank))
+    made = propose_robot(on_shanks(both), "dog")
+    robot = parse_robot(made.toml, made.urdf)
+    for leg in robot.legs:
+        assert isinstance(leg, ChainLeg)
+        np.testing.assert_allclose(leg.end, [0.0, 0.0, -0.2])
 
 
 def test_simple_shapes_go_before_meshes(init: Init) -> None:

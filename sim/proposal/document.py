@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import takewhile
 from typing import Any, Final
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
@@ -27,11 +26,11 @@ from sim.proposal.drive import (
     propose_sole,
 )
 from sim.proposal.feet import MeshBounds, no_meshes
-from sim.proposal.frame import AS_IT_IS, Frame, sideways, turned
+from sim.proposal.frame import AS_IT_IS, Frame, sideways
 from sim.proposal.gait import alternating_phases, propose_scenarios
-from sim.proposal.legs import FoundLeg, FoundLegs, chain_leg, find_legs
+from sim.proposal.legs import FoundLeg, FoundLegs, chain_leg
+from sim.proposal.prepared import stood_up, with_feet
 from sim.proposal.stance import Stance, choose_stance
-from sim.proposal.xml_text import fixed_joint, with_elements
 from sim.robot.unphysical import unphysical
 from sim.robot.urdf import parse_urdf
 from sim.robot.urdf_errors import by_line
@@ -52,12 +51,6 @@ _TWO_LEGS: Final = (
 )
 
 _ELSE: Final = "battery, rotors, sensors, ground and load are guessed as robot.toml says"
-
-_LEVEL: Final = 0.2
-"""How far hips may be above or below the body's origin, as a share of the legs' length."""
-
-_LOWER: Final = 0.02
-"""By how much another end has to be lower than the farthest one, as a share of the leg's length."""
 
 _SIDEWAYS: Final = (
     "warning: it faces y, it seems, and would walk sideways: name the axis that points ahead as"
@@ -126,9 +119,8 @@ def propose_robot(
         RobotFileError: The URDF cannot be read, or no legs are found that can be simulated.
     """
     with by_line(urdf):
-        urdf, found, moved = _stood_up(urdf, frame, bounds)
-        found = _at_their_lowest(urdf, found)
-    text, feet = _with_feet(urdf, found.legs)
+        urdf, found, moved = stood_up(urdf, frame, bounds)
+    text, feet = with_feet(urdf, found.legs)
     tree, names = parse_urdf(text, found.held), _leg_names(found.legs)
     joints = [leg.joints for leg in found.legs]
     legs = [chain_leg(tree, leg.joints, leg.end) for leg in found.legs]
@@ -169,57 +161,6 @@ def propose_robot(
     notes += [f"joint {joint!r} is held at {at:g} rad" for joint, at in found.held.items()]
     made = Proposal(toml + "\n", text, job, (), tuple(unphysical(tree, urdf)))
     return made.with_guesses(notes)
-
-
-def _stood_up(urdf: str, frame: Frame, bounds: MeshBounds) -> tuple[str, FoundLegs, list[str]]:
-    """The URDF with z up, x ahead and its origin about as high as the hips; its legs; notes.
-
-    What a body does is told by its origin, so one on the ground would always have fallen.
-    """
-    root, *others = parse_urdf(urdf).links
-    text = turned(urdf, root, [root, *others], frame)
-    tree = parse_urdf(text)
-    found = find_legs(tree, upright=frame != AS_IT_IS, bounds=bounds)
-    legs = [chain_leg(tree, leg.joints, leg.end) for leg in found.legs]
-    level = float(f"{np.mean([leg.hip[2] for leg in legs]):.3g}")
-    if abs(level) <= _LEVEL * max(sum(leg.lengths) for leg in legs):
-        return text, found, []
-    side = "above" if level > 0.0 else "below"
-    note = f"the body's frame is {abs(level):g} m {side} that of {root!r}, as high as the hips"
-    return turned(urdf, root, [root, *others], frame, level), found, [note]
-
-
-def _at_their_lowest(urdf: str, found: FoundLegs) -> FoundLegs:
-    """Legs that end where they are lowest as they stand, if only shapes say where they end."""
-    if not any(len(leg.ends) for leg in found.legs):
-        return found
-    tree = parse_urdf(urdf)
-    legs = [chain_leg(tree, leg.joints, leg.end) for leg in found.legs]
-    lowered = []
-    for leg, chain, angles in zip(found.legs, legs, choose_stance(legs).angles, strict=True):
-        low = chain.foot(angles)[2] - _LOWER * sum(chain.lengths)
-        heights = [replace(chain, end=end).foot(angles)[2] for end in leg.ends]
-        end = leg.end
-        if heights and min(heights) < low:
-            x, y, z = leg.ends[int(np.argmin(heights))].tolist()
-            end = (x, y, z)
-        lowered.append(replace(leg, end=end))
-    return replace(found, legs=tuple(lowered))
-
-
-def _with_feet(urdf: str, legs: Sequence[FoundLeg]) -> tuple[str, list[str]]:
-    """The URDF with a frame at the end of every leg that has none, and the names of the feet."""
-    feet = [leg.foot or f"{leg.link}_foot" for leg in legs]
-    missing = [(leg, foot) for leg, foot in zip(legs, feet, strict=True) if leg.foot is None]
-    if not missing:
-        return urdf, feet
-    lines = []
-    for leg, foot in missing:
-        lines += [
-            f"  <link name={quoteattr(foot)}/>",
-            *fixed_joint(f"{foot}_fixed", leg.link, foot, " ".join(map(repr, leg.end))),
-        ]
-    return with_elements(urdf, lines), feet
 
 
 def _head(name: str, legs: int, mass: float) -> list[str]:

@@ -24,7 +24,11 @@ None where it is not found or cannot be read."""
 
 
 def no_meshes(_name: str) -> None:
-    """No mesh is found: of a URDF that came alone."""
+    """Find no mesh: of a URDF that came alone.
+
+    Args:
+        _name: Of the mesh, as the URDF has it.
+    """
 
 
 _FOOT_NAME: Final = re.compile(r"foot|toe|sole|ankle|tip|contact", re.IGNORECASE)

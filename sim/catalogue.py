@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from sim.controllers import CONTROLLERS
 from sim.errors import SimulationInputError
 from sim.gait_variables import GAIT_VARIABLES
+from sim.near_names import instead_of
 from sim.variables import VariableCatalogue
 
 
@@ -39,7 +40,7 @@ def check_design(controller: str, design: Mapping[str, float | str]) -> None:
     for name in design:
         if name not in known:
             raise SimulationInputError(
-                f"design: unknown variable {name!r}; known are {', '.join(known)}"
+                f"design: unknown variable {name!r}; {instead_of(name, known)}"
             )
     needed = [variable.name for variable in CONTROLLERS[controller].variables]
     missing = [name for name in needed if name not in design]

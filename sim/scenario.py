@@ -21,6 +21,7 @@ from sim import former_names
 from sim.choice import NAME, OWN, alternatives
 from sim.errors import SimulationInputError
 from sim.former_names import current_names
+from sim.near_names import instead_of
 from sim.usual_duty import USUAL_SUPPORT, with_duty_factor
 from sim.variables import VariableName, split_name
 from sim.wording import message_of
@@ -377,8 +378,9 @@ def find_scenario(name: str) -> Scenario:
     for number, scenario in enumerate(PRESETS, start=1):
         if name in (scenario.name, str(number)):
             return scenario
-    known = ", ".join(f"{k} {s.name}" for k, s in enumerate(PRESETS, start=1))
-    raise SimulationInputError(f"unknown scenario {name!r}; known are {known}")
+    names = [scenario.name for scenario in PRESETS]
+    listed = (f"{k} {known}" for k, known in enumerate(names, start=1))
+    raise SimulationInputError(f"unknown scenario {name!r}; {instead_of(name, names, listed)}")
 
 
 def _preset_exists(name: str) -> str:

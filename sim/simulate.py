@@ -31,6 +31,7 @@ from sim.kernel.batch import Walking, WantedWalk, walk_together
 from sim.kernel.gains import NO_JOINT_PD
 from sim.kernel.observation import WalkLog, walk_log
 from sim.kernel.walk import Kernel, Precision, WalkSetup
+from sim.near_names import instead_of
 from sim.noise import LinkNoise
 from sim.outcome import N_MEASUREMENTS, N_OBJECTIVES, Measurements, Outcome, Status
 from sim.robot import DEFAULT_ROBOT, Robot, RobotChoice, load_robot
@@ -334,7 +335,7 @@ def _check_arguments(
         if name not in own and name not in GAIT_CATALOGUE:
             known = own | set(GAIT_CATALOGUE)
             raise SimulationInputError(
-                f"{name}: not a variable of {controller}; known are {', '.join(sorted(known))}"
+                f"{name}: not a variable of {controller}; {instead_of(name, sorted(known))}"
             )
     if designs.ndim != 2 or designs.shape[1] != len(variables):
         raise SimulationInputError(

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
-from difflib import get_close_matches
 from types import UnionType
 from typing import Annotated, Any, Final, Union, get_args, get_origin
 
 from pydantic import BaseModel, Tag
 
 from sim.choice import is_tag
+from sim.near_names import instead_of, nearest
 
 _PLAIN: Final = {
     "missing": "is missing",
@@ -51,10 +52,6 @@ _PLAIN: Final = {
 """By pydantic's type of error; in braces what its context holds."""
 
 
-_LONGEST_KEY: Final = 100
-"""That is compared with the known ones; comparing takes time by its length."""
-
-
 def message_of(error: Mapping[str, Any]) -> str:
     """What is wrong with a value, and what it must be.
 
@@ -66,7 +63,15 @@ def message_of(error: Mapping[str, Any]) -> str:
     """
     kind, context = error["type"], error.get("ctx", {})
     if kind == "extra_forbidden" and "known" in context:
-        return f"unknown key; {_hint(str(error['loc'][-1]), context['known'])}"
+        key, inner = str(error["loc"][-1]), context["inner"]
+        own = nearest(key, context["known"])
+        elsewhere = inner.get(key if key in inner or own else nearest(key, inner))
+        if elsewhere is not None:
+            return f"unknown key; did you mean {elsewhere!r}?"
+        return f"unknown key; {instead_of(key, context['known'])}"
+    if kind == "literal_error" and isinstance(error.get("input"), str):
+        near = nearest(error["input"], re.findall(r"'([^']*)'", context["expected"]))
+        return f"must be {context['expected']}{f'; did you mean {near!r}?' if near else ''}"
     if kind in _PLAIN:
         return _PLAIN[kind].format_map({name: _number(value) for name, value in context.items()})
     said = str(error["msg"]).removeprefix("Value error, ")
@@ -86,7 +91,7 @@ def with_known_keys(
         The errors, in their order, for `message_of`.
     """
     return tuple(
-        {**error, "ctx": {"known": known}}
+        {**error, "ctx": {"known": [*known], "inner": _inner_keys(known)}}
         if error["type"] == "extra_forbidden" and (known := _known_keys(model, error["loc"]))
         else error
         for error in errors
@@ -97,18 +102,28 @@ def _number(value: object) -> object:
     return f"{value:g}" if isinstance(value, float) else value
 
 
-def _hint(key: str, known: Sequence[str]) -> str:
-    near = get_close_matches(key, known, n=1, cutoff=0.7) if len(key) <= _LONGEST_KEY else []
-    return f"did you mean {near[0]!r}?" if near else f"known are {', '.join(known)}"
-
-
-def _known_keys(model: Any, location: Sequence[str | int]) -> list[str]:
-    """Names of the fields of the models that hold the last part of a location."""
+def _known_keys(model: Any, location: Sequence[str | int]) -> dict[str, Any]:
+    """Fields of the models that hold the last part of a location, with what they are."""
     reached = [model]
     for part in location[:-1]:
         reached = [inner for one in reached for inner in _inner(one, part)]
-    models = [one for node in reached for _, one in _alternatives(node) if _is_model(one)]
-    return list(dict.fromkeys(name for one in models for name in one.model_fields))
+    return {name: kind for node in reached for name, kind in _fields(node)}
+
+
+def _inner_keys(known: Mapping[str, Any]) -> dict[str, str]:
+    """Paths of the fields of fields that are objects, by their names; of some with a name one."""
+    found: dict[str, str] = {}
+    for outer, annotation in known.items():
+        for name, _ in _fields(annotation):
+            found.setdefault(name, f"{outer}.{name}")
+    return found
+
+
+def _fields(annotation: Any) -> Iterator[tuple[str, Any]]:
+    """(name, annotation) of the fields of a model, or of every model of a union."""
+    for _, one in _alternatives(annotation):
+        if _is_model(one):
+            yield from ((name, field.annotation) for name, field in one.model_fields.items())
 
 
 def _inner(annotation: Any, part: str | int) -> Iterator[Any]:

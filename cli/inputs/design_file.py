@@ -13,6 +13,7 @@ from cli.inputs.spec_file import json_object, read_json_object
 from services.optimizer.errors import InvalidRequest, NotFound
 from sim.controllers import CONTROLLERS, Controller, ControllerName
 from sim.gait_variables import GAIT_VARIABLES
+from sim.near_names import instead_of
 from sim.variables import Variable, VariableCatalogue
 
 if TYPE_CHECKING:
@@ -164,9 +165,9 @@ def _read_values(design: str, controller: str) -> dict[str, Any]:
                 field="design",
             )
         if name not in published:
-            known = ", ".join(published)
             raise InvalidRequest(
-                f"no published design {name!r} of {controller}; known are {known}", field="design"
+                f"no published design {name!r} of {controller}; {instead_of(name, published)}",
+                field="design",
             )
         return dict(published[name])
     if design.startswith(_JOB):
@@ -198,7 +199,7 @@ def _checked(values: dict[str, Any], known: Sequence[Variable], field: str) -> d
     for name, value in values.items():
         if name not in variables:
             raise InvalidRequest(
-                f"unknown variable; known are {', '.join(sorted(variables))}",
+                f"unknown variable; {instead_of(name, sorted(variables))}",
                 field=f"{field}.{name}",
             )
         if variables[name].kind == "categorical" and isinstance(value, str):

@@ -16,6 +16,7 @@ from sim.calibration.catalogue import ROBOT
 from sim.calibration.targets import TargetWalk
 from sim.calibration.walk import RESULTS, CalibrationWalk
 from sim.controllers import CONTROLLERS, ControllerName
+from sim.near_names import instead_of
 from sim.outcome import Outcome
 from sim.robot import load_robot
 from sim.scenario import SCENARIOS, Scenario, find_scenario
@@ -97,7 +98,7 @@ def alternatives(
     for name in names or ():
         if name not in variables:
             raise InvalidRequest(
-                f"unknown convention {name!r}; known are {', '.join(variables)}", field="change"
+                f"unknown convention {name!r}; {instead_of(name, variables)}", field="change"
             )
     default = default_choice(spec, _CHAPTER_4)
     return tuple(

@@ -26,6 +26,7 @@ from services.optimizer.tournament.methods import (
 )
 from services.optimizer.tournament.race import default_checkpoints
 from services.optimizer.tournament.rivals import RIVALS
+from sim.near_names import instead_of
 
 PresetName = Literal["thesis", "robot"]
 
@@ -235,6 +236,6 @@ def _check(chosen: Sequence[str], known: Sequence[str], field: str) -> None:
         raise InvalidRequest(f"one at least; known are {', '.join(known)}", field=field)
     for name in chosen:
         if name not in known:
-            raise InvalidRequest(f"unknown {name!r}; known are {', '.join(known)}", field=field)
+            raise InvalidRequest(f"unknown {name!r}; {instead_of(name, known)}", field=field)
         if chosen.count(name) > 1:
             raise InvalidRequest(f"{name!r} is named twice", field=field)

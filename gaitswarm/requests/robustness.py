@@ -19,6 +19,7 @@ from sim.case import Walk
 from sim.catalogue import design_catalogue
 from sim.controllers import CONTROLLERS, ControllerName
 from sim.kernel.walk import Precision
+from sim.near_names import instead_of
 from sim.outcome import Outcome, Status
 from sim.provenance import provenance_of
 from sim.variables import Variable, VariableChoice
@@ -110,8 +111,9 @@ class RobustnessRequest(WalksRequest):
                 raise ValueError(f"variables.{index}: {name!r} is named twice")
             seen.add(name)
             if name not in catalogue:
-                known = ", ".join(catalogue)
-                raise ValueError(f"variables.{index}: unknown variable {name!r}; known are {known}")
+                raise ValueError(
+                    f"variables.{index}: unknown variable {name!r}; {instead_of(name, catalogue)}"
+                )
             if name not in self.design:
                 raise ValueError(f"variables.{index}: the design gives no {name}")
             yield catalogue[name] if isinstance(entry, str) else entry

@@ -14,6 +14,7 @@ from types import MappingProxyType
 from typing import Final
 
 from sim.errors import SimulationInputError
+from sim.near_names import instead_of
 from sim.robot import Robot
 from sim.robot.leg_groups import rows_of
 from sim.robot.legs import LegKinematics
@@ -168,7 +169,7 @@ def find_gait(name: str) -> Gait:
     for gait in _GAITS:
         if gait.name == name:
             return gait
-    raise SimulationInputError(f"gait: unknown {name!r}; known are {', '.join(GAITS)}")
+    raise SimulationInputError(f"gait: unknown {name!r}; {instead_of(name, GAITS)}")
 
 
 def suits(gait: Gait, legs: Sequence[LegKinematics]) -> bool:

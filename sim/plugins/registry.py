@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator, Mapping, MutableMapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping
 from typing import Any, Protocol, TypeVar
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
+from sim.near_names import instead_of, nearest
 from sim.plugins.entry_points import Kind, Plugin, PluginError, find_plugins
 
 T = TypeVar("T")
@@ -117,23 +118,26 @@ class Registry(MutableMapping[str, T]):
         Returns:
             For people: the names that there are, and what is known of a plug-in of that name.
         """
-        known = ", ".join(self) or "none"
-        return f"unknown {self._kind} {name!r}; known are {known}{self.hint(name)}"
+        return f"unknown {self._kind} {name!r}; {self.instead_of(name, self)}"
 
-    def hint(self, name: str) -> str:
+    def instead_of(self, name: str, known: Iterable[str]) -> str:
         """What may help whoever gave a name that is none.
 
         Args:
             name: That was given.
+            known: Names that there are, of the registry and others.
 
         Returns:
-            To be appended to a message: why plug-ins of that name cannot be used.
+            The nearest or all of these, and why plug-ins of that name cannot be used.
         """
+        known = list(known)
         found = [self.problem(plugin) for plugin in self.plugins() if plugin.name == name]
         reasons = [reason for reason in found if reason is not None]
-        return "".join(f"; {reason}" for reason in reasons) or (
-            "; that of a plug-in is known where its package is installed (gaitswarm plugins)"
-        )
+        if not reasons and nearest(name, known) is None:
+            reasons = [
+                "that of a plug-in is known where its package is installed (gaitswarm plugins)"
+            ]
+        return "; ".join([instead_of(name, known), *reasons])
 
     def _check_name(self, plugin: Plugin) -> None:
         if plugin.name in self._built_in:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.errors import RobotFileError
+from sim.near_names import nearest
 from sim.robot.description import Leg
 from sim.robot.elements import MOST_TURNED
 from sim.robot.inertia import BodyInertia, product
@@ -129,8 +129,8 @@ def _foot(urdf: Urdf, leg: Leg) -> Place:
 
 
 def _meant(name: str, known: Iterable[str]) -> str:
-    nearest = difflib.get_close_matches(name, list(known), n=1)
-    return f" (did you mean {nearest[0]!r}?)" if nearest else ""
+    near = nearest(name, known)
+    return f" (did you mean {near!r}?)" if near else ""
 
 
 def _check_limits(joint: Joint) -> None:

@@ -13,6 +13,7 @@ from sim.controllers import CONTROLLERS, ControllerName
 from sim.errors import SimulationInputError
 from sim.gait.driving_2011 import driven_as_in_2011
 from sim.gait_variables import GAIT_CATALOGUE, with_gait
+from sim.near_names import instead_of
 from sim.outcome import Status
 from sim.robot import DEFAULT_ROBOT, RobotChoice
 from sim.scenario import Scenario
@@ -114,7 +115,7 @@ def find_drive(name: str) -> NamedDrive:
         SimulationInputError: There is none of that name; names those that there are.
     """
     if name not in DRIVES:
-        raise SimulationInputError(f"drive: unknown {name!r}; known are {', '.join(DRIVES)}")
+        raise SimulationInputError(f"drive: unknown {name!r}; {instead_of(name, DRIVES)}")
     return DRIVES[name]
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from sim.errors import SimulationInputError
 from sim.kernel.sensors import LARGEST_DELAY
+from sim.near_names import instead_of
 from sim.variables import Variable
 
 Floats = NDArray[np.float64]
@@ -237,7 +238,7 @@ def check_worlds(variables: Sequence[str], worlds: Floats) -> None:
     """
     for name in variables:
         if name not in LIMITS:
-            raise SimulationInputError(f"{name}: no perturbation; known are {', '.join(LIMITS)}")
+            raise SimulationInputError(f"{name}: no perturbation; {instead_of(name, LIMITS)}")
     if worlds.ndim != 2 or worlds.shape[1] != len(variables):
         raise SimulationInputError(
             f"worlds: shape {worlds.shape} does not match {len(variables)} perturbations"

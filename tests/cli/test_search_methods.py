@@ -64,7 +64,7 @@ def test_settings_are_laid_over_those_of_a_spec(
         (["--optimizer", "swarm"], "optimizer: unknown optimizer 'swarm'; known are auto,"),
         (
             ["--optimizer-settings", '{"sigam": 1}'],
-            "optimizer.sigam: no setting of cma-es; it has particles,",
+            "optimizer.sigam: no setting of cma-es; did you mean 'sigma'?",
         ),
         (
             ["--optimizer-settings", '{"sigma": 3}'],

@@ -96,5 +96,5 @@ def test_a_stored_job_names_the_method(store: SqlStore) -> None:
 
 
 def test_it_has_no_settings_of_a_method() -> None:
-    with pytest.raises(ValidationError, match="no setting of auto; it has particles"):
+    with pytest.raises(ValidationError, match="no setting of auto; known are particles"):
         JobSpec.model_validate({"optimizer": {"name": "auto", "inertia_end": 0.5}})

@@ -42,6 +42,7 @@ def said(document: Any, model: Any = Leg) -> list[str]:
         ({"name": "x" * 9}, "must have at most 8 characters"),
         ({"name": "LEFT"}, "must match the pattern ^[a-z]+$"),
         ({"side": "up"}, "must be 'left' or 'right'"),
+        ({"side": "rigth"}, "must be 'left' or 'right'; did you mean 'right'?"),
         ({"joints": 3}, "must be a list"),
         ({"joints": []}, "must have at least 1 items, not 0"),
         ({"joints": [1.5]}, "must be a whole number"),
@@ -67,12 +68,23 @@ def test_a_wrong_value_is_answered_with_what_it_must_be(
         ({"feet": {"front": {"raduis": 1}}}, Leg, "unknown key; did you mean 'radius'?"),
         ({"shape": {"raduis": 1}}, Leg, "unknown key; did you mean 'radius'?"),
         ([{"foot": {"wheels": 1}}], tuple[Leg, ...], "unknown key; known are radius"),
+        # Of an object within, and by its name exactly before one that is only alike.
+        ({"radius": 1}, Leg, "unknown key; did you mean 'foot.radius'?"),
+        ({"raduis": 1}, Leg, "unknown key; did you mean 'foot.radius'?"),
+        ({"Joints": 1}, Leg, "unknown key; did you mean 'joints'?"),
     ],
 )
 def test_an_unknown_key_is_answered_with_the_nearest_or_with_all(
     document: Any, model: Any, message: str
 ) -> None:
     assert said(document, model) == [message]
+
+
+def test_a_value_that_is_kept_back_is_not_compared_with_those_that_may_be() -> None:
+    with pytest.raises(ValidationError) as refused:
+        Leg.model_validate({"side": "rigth"})
+    (error,) = refused.value.errors(include_input=False)
+    assert message_of(error) == "must be 'left' or 'right'"
 
 
 def test_what_no_plain_word_is_known_for_keeps_pydantics() -> None:

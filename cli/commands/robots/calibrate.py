@@ -17,6 +17,7 @@ from cli.inputs.options import (
     WorkerOptions,
     with_groups,
 )
+from sim.near_names import instead_of
 
 if TYPE_CHECKING:
     from gaitswarm.jobs.port import Jobs
@@ -177,7 +178,9 @@ def _variables(document: dict[str, Any], text: str) -> list[Any]:
             continue
         name, value = _pair(entry, "variables")
         if name not in known:
-            raise InvalidRequest(f"unknown variable {name!r}", field="variables")
+            raise InvalidRequest(
+                f"unknown variable {name!r}; {instead_of(name, known)}", field="variables"
+            )
         parts = [part.strip() for part in value.split(":")]
         if known[name].kind == "categorical":
             own: dict[str, Any] = {"choices": parts}

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.search.space import Axis, Space
 from sim.errors import SimulationInputError
+from sim.near_names import instead_of
 from sim.variables import Variable, VariableCatalogue
 
 
@@ -58,7 +59,6 @@ class DesignSpace:
             ValueError: the choice makes no sense; names the variable and the way out.
         """
         catalogue = VariableCatalogue((*required, *optional))
-        known = ", ".join(catalogue)
         held = _held(fixed, catalogue)
         if chosen is None:
             chosen = [variable for variable in required if variable.name not in fixed]
@@ -66,7 +66,9 @@ class DesignSpace:
         for entry in chosen:
             name = entry if isinstance(entry, str) else entry.name
             if name not in catalogue:
-                raise ValueError(f"variables: unknown variable {name!r}; known are {known}")
+                raise ValueError(
+                    f"variables: unknown variable {name!r}; {instead_of(name, catalogue)}"
+                )
             if any(variable.name == name for variable in variables):
                 raise ValueError(f"variables: {name!r} is named twice")
             if name in fixed:
@@ -230,7 +232,7 @@ def _held(
     held = []
     for name, value in fixed.items():
         if name not in catalogue:
-            raise ValueError(f"fixed: unknown variable {name!r}; known are {', '.join(catalogue)}")
+            raise ValueError(f"fixed: unknown variable {name!r}; {instead_of(name, catalogue)}")
         try:
             held.append((name, catalogue[name].number(value)))
         except ValueError as error:

@@ -18,6 +18,7 @@ from services.optimizer.search.automatic import (
 from services.optimizer.search.method import settings_of
 from services.optimizer.search.optimizer import SearchSettings
 from services.optimizer.search.registry import DEFAULT_METHOD, METHODS
+from sim.near_names import instead_of, nearest
 from sim.plugins import PluginSettings
 
 _BUILT_IN: Final[dict[str, type[SearchSettings]]] = {
@@ -33,8 +34,7 @@ def _model(name: str) -> type[SearchSettings]:
         return _BUILT_IN[name]
     if name in METHODS:
         return METHODS[name].settings
-    known = ", ".join(("auto", *METHODS))
-    raise ValueError(f"unknown method {name!r}; known are {known}{METHODS.hint(name)}")
+    raise ValueError(f"unknown method {name!r}; {METHODS.instead_of(name, ('auto', *METHODS))}")
 
 
 def optimizer_settings(choice: object) -> object:
@@ -59,7 +59,9 @@ def optimizer_settings(choice: object) -> object:
         return choice
     if choice in CHOICES:
         return CHOICES[choice]
-    raise ValueError(f"{CHOICES.unknown(choice)}; or give an object: settings of your own")
+    near = nearest(choice, CHOICES)
+    otherwise = "; or give an object: settings of your own" if near is None else ""
+    raise ValueError(f"{CHOICES.unknown(choice)}{otherwise}")
 
 
 def with_settings(choice: object, settings: Mapping[str, Any]) -> object:
@@ -90,8 +92,11 @@ def _check_known(settings: Mapping[Any, Any], model: type[SearchSettings]) -> No
         InitErrorDetails(
             type=PydanticCustomError(
                 "unknown_setting",
-                "no setting of {method}; it has {known}",
-                {"method": model.model_fields["name"].default, "known": ", ".join(known)},
+                "no setting of {method}; {known}",
+                {
+                    "method": model.model_fields["name"].default,
+                    "known": instead_of(str(key), known),
+                },
             ),
             loc=(str(key),),
             input=value,

@@ -261,7 +261,7 @@ class NamedSettings(Mapping[str, SearchSettings]):
         Returns:
             For people, with those that there are.
         """
-        return f"unknown optimizer {name!r}; known are {', '.join(self)}{METHODS.hint(name)}"
+        return f"unknown optimizer {name!r}; {METHODS.instead_of(name, self)}"
 
 
 OPTIMIZERS: Final = NamedSettings()

@@ -13,6 +13,7 @@ from services.optimizer.search.registry import METHODS, create_search
 from services.optimizer.search.space import Space
 from services.optimizer.tournament.race import Evaluate, Search
 from services.optimizer.tournament.rivals import RIVALS
+from sim.near_names import instead_of
 from sim.variables import Variable
 
 _UNBOUNDED: Final = 1e9
@@ -54,7 +55,7 @@ def why_unknown(name: str, known: Iterable[str]) -> str:
     """
     if is_multi_objective(name):
         return f"{name} is multi-objective; a tournament ranks methods by a single number"
-    return f"unknown method {name!r}; known are {', '.join(known)}"
+    return f"unknown method {name!r}; {instead_of(name, known)}"
 
 
 def named_settings(name: str) -> SearchSettings:

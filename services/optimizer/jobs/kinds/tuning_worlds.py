@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from services.optimizer.jobs.judgement import Judgement
 from services.optimizer.jobs.preference import Preference, geometric_mean, log_utilities
+from sim.near_names import instead_of
 from sim.variables import Variable, VariableChoice
 from sim.wording import message_of
 from sim.worlds import PERTURBATIONS, sample_worlds
@@ -76,7 +77,7 @@ class TuningWorlds(BaseModel):
         for entry in chosen:
             name = entry if isinstance(entry, str) else entry.name
             if name not in known:
-                raise ValueError(f"ranges: no perturbation {name!r}; known are {', '.join(known)}")
+                raise ValueError(f"ranges: no perturbation {name!r}; {instead_of(name, known)}")
             if name in found:
                 raise ValueError(f"ranges: {name!r} is named twice")
             found[name] = known[name] if isinstance(entry, str) else _bounded(known[name], entry)

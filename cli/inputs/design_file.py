@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from cli.inputs.job_ids import full_id
-from cli.inputs.robots import robot_defaults
+from cli.inputs.robots import chosen_robot, robot_defaults
 from cli.inputs.spec_file import json_object, read_json_object
 from services.optimizer.errors import InvalidRequest, NotFound
 from sim.controllers import CONTROLLERS, Controller, ControllerName
@@ -18,6 +18,7 @@ from sim.variables import Variable, VariableCatalogue
 
 if TYPE_CHECKING:
     from services.optimizer.jobs.kinds.tuning import JobSpec
+    from sim.robot import RobotFiles, RobotVariant
 
 _PUBLISHED: Final = "published:"
 _JOB: Final = "job:"
@@ -39,6 +40,19 @@ class GivenDesign:
     controller: ControllerName
     values: dict[str, float]
     spec: JobSpec | None = None
+
+    def robot(self, option: str | None) -> str | RobotVariant | RobotFiles:
+        """The robot to walk on: that of the option, else the job's, else the default.
+
+        Args:
+            option: as for `chosen_robot`.
+
+        Returns:
+            As `chosen_robot`, which raises the errors as well.
+        """
+        if option is None and self.spec is not None:
+            return self.spec.robot
+        return chosen_robot(option)
 
 
 def given_design(

@@ -50,14 +50,21 @@ def read_walk(
     trajectory: Path | None,
     cycles: int | None,
     robot: str | None,
+    *,
+    server: str | None,
+    db: str | None,
 ) -> MeasuredWalk:
-    """Raises InvalidRequest or SimulationInputError that names what is wrong."""
+    """The walk of a design; of a job's best on the job's robot, unless another is named.
+
+    server, db: Where the job is, if the design is of one.
+    Raises InvalidRequest or SimulationInputError that names what is wrong, NotFound.
+    """
     from cli.inputs.design_file import given_design
-    from cli.inputs.robots import chosen_robot, chosen_scenarios
+    from cli.inputs.robots import chosen_scenarios
     from sim.measurement.walk import MeasuredWalk
     from sim.robot import load_robot
 
-    given = given_design(design, controller, trajectory, robot=robot, server=None, db=None)
+    given = given_design(design, controller, trajectory, robot=robot, server=server, db=db)
     unchecked: Mapping[str, Any] = given.values
     for name, value in unchecked.items():
         number = isinstance(value, int | float) and not isinstance(value, bool)
@@ -69,7 +76,7 @@ def read_walk(
     (chosen,) = scenarios
     if cycles is not None:
         chosen = chosen.model_copy(update={"cycles": float(cycles)})
-    return MeasuredWalk.of(load_robot(chosen_robot(robot)), chosen, given.controller, given.values)
+    return MeasuredWalk.of(load_robot(given.robot(robot)), chosen, given.controller, given.values)
 
 
 def synchronised(

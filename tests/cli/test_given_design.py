@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from cli.inputs.design_file import GivenDesign, given_design
 from services.optimizer.errors import InvalidRequest, NotFound
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.store.sql_store import SqlStore
+from sim.robot import DEFAULT_ROBOT
 from tests.calibration.conftest import spec as calibration
 from tests.cli.conftest import Finished, WriteJson
 from tests.examples.walks import PUBLISHED_A
+from tests.setup import command_line
 
 
 def given(text: str, db: Path | None = None, controller: str | None = None) -> GivenDesign:
@@ -71,3 +75,20 @@ def test_a_job_that_tunes_no_drive_has_no_design(store: SqlStore, database: Path
     job, _ = store.create_job(calibration())
     with pytest.raises(InvalidRequest, match="kind calibration, which tunes no drive"):
         given(job.id, database)
+
+
+def test_a_jobs_best_walks_on_the_jobs_robot_unless_another_is_named() -> None:
+    spec = JobSpec(controller="pi", robot="szabadka2")
+    best = GivenDesign("a job", "pi", {"P": 0.2, "I": 0.1}, spec)
+    assert best.robot(None) == "szabadka2"
+    assert best.robot("szabadka2-identified") == "szabadka2-identified"
+    assert replace(best, spec=None).robot(None) == DEFAULT_ROBOT
+
+
+def test_every_command_that_takes_a_design_can_be_told_where_its_job_is() -> None:
+    options = command_line.commands()
+    taking = command_line.taking(r"job:ID|DESIGN")
+    assert len(taking) > 10
+    assert [name for name in taking if "--db" not in options[name]] == []
+    # A certificate is computed where its job is stored.
+    assert {name for name in taking if "--server" not in options[name]} == {"certify"}

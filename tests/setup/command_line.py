@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from contextlib import redirect_stdout
 from functools import cache
@@ -16,7 +17,16 @@ from cli.main import app
 @cache
 def commands() -> dict[str, set[str]]:
     """Options of every command, by its full name."""
-    return dict(_leaves(_root(), ""))
+    return {name: _options(command) for name, command in _leaves(_root(), "")}
+
+
+def taking(metavar: str) -> set[str]:
+    """Full names of the commands with an argument or option of a metavar, a regular expression."""
+    return {
+        name
+        for name, command in _leaves(_root(), "")
+        if any(re.search(metavar, str(parameter.metavar)) for parameter in command.params)
+    }
 
 
 def problem(arguments: Sequence[str]) -> str | None:
@@ -62,13 +72,14 @@ def _root() -> Any:
     return typer.main.get_command(app)
 
 
-def _leaves(command: Any, prefix: str) -> list[tuple[str, set[str]]]:
+def _leaves(command: Any, prefix: str) -> list[tuple[str, Any]]:
+    """(full name, command) of every command that is no group of some."""
     children = getattr(command, "commands", None)
     if children is None:
-        options = {
-            option
-            for parameter in command.params
-            for option in (*parameter.opts, *parameter.secondary_opts)
-        }
-        return [(prefix.strip(), options | {"--help", "-h"})]
+        return [(prefix.strip(), command)]
     return [leaf for name, child in children.items() for leaf in _leaves(child, f"{prefix} {name}")]
+
+
+def _options(command: Any) -> set[str]:
+    named = (option for p in command.params for option in (*p.opts, *p.secondary_opts))
+    return {*named, "--help", "-h"}

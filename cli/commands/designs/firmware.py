@@ -52,7 +52,7 @@ def firmware(
 ) -> None:
     """Write a design as C for the robot's microcontrollers, with a test that repeats its walks."""
     from cli.inputs.design_file import given_design
-    from cli.inputs.robots import chosen_robot, chosen_scenarios
+    from cli.inputs.robots import chosen_scenarios
     from cli.output import print_json
     from gaitswarm.firmware import write_firmware
 
@@ -61,13 +61,12 @@ def firmware(
         walks = chosen_scenarios(scenarios or "all", robot)
     else:
         walks = given.spec.resolved_scenarios()
-    chosen = None if given.spec is None else given.spec.robot
     view = write_firmware(
         given.values,
         output,
         scenarios=walks,
         controller=given.controller,
-        robot=chosen_robot(robot) if robot is not None or chosen is None else chosen,
+        robot=given.robot(robot),
         label=given.label,
         table_bits=None if table_bits is None else _bits(table_bits),
     )

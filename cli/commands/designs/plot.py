@@ -73,18 +73,20 @@ def surface(
             help="Design as for `simulate`, or as published:A.",
         ),
     ] = "published:A",
+    server: Server = None,
+    db: Db = None,
 ) -> None:
     """Draw the output of a Fuzzy-PI design over angle error and motor current, as quantised."""
-    from cli.inputs.design_file import read_design
+    from cli.inputs.design_file import given_design
     from cli.output import note
     from cli.pictures.plots import draw_surface, save
     from sim.controllers import CONTROLLERS
     from sim.controllers.surface import surface as surface_of
 
-    (inference,) = CONTROLLERS["fuzzy-pi"].inferences(read_design(design, "fuzzy-pi"))
-    title = f"Fuzzy-P of design {design.rpartition(':')[2] if ':' in design else Path(design).stem}"
+    given = given_design(design, "fuzzy-pi", server=server, db=db)
+    (inference,) = CONTROLLERS["fuzzy-pi"].inferences(given.values)
     drawn = surface_of(inference, error_points=129, current_points=65)
-    save(draw_surface(drawn, title=title), output)
+    save(draw_surface(drawn, title=f"Fuzzy-P of {given.label}"), output)
     note(f"picture written to {output}")
 
 

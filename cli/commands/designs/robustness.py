@@ -95,7 +95,7 @@ def robustness_request(
     """
     from pydantic import ValidationError
 
-    from cli.inputs.robots import chosen_robot, robot_defaults, scenario_data
+    from cli.inputs.robots import robot_defaults, scenario_data
     from gaitswarm.errors import invalid_request
     from gaitswarm.requests.robustness import RobustnessRequest
 
@@ -107,7 +107,7 @@ def robustness_request(
         "seed": seed,
         "precision": precision or "double",
         "scenarios": scenario_data(scenarios or "all", robot),
-        "robot": chosen_robot(robot),
+        "robot": given.robot(robot),
     }
     if given.spec is None:
         data["variables"] = robot_defaults(robot).of_controller(given.controller).get("variables")
@@ -115,8 +115,6 @@ def robustness_request(
         data["variables"] = given.spec.design_space().variables
         if scenarios is None:
             data["scenarios"] = given.spec.resolved_scenarios()
-        if robot is None:
-            data["robot"] = given.spec.robot
     try:
         return RobustnessRequest.model_validate(data)
     except ValidationError as error:

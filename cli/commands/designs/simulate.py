@@ -70,7 +70,7 @@ def simulate(
     from pydantic import ValidationError
 
     from cli.inputs.design_file import given_design
-    from cli.inputs.robots import chosen_robot, robot_defaults, scenario_data
+    from cli.inputs.robots import robot_defaults, scenario_data
     from cli.inputs.spec_file import json_object
     from cli.output import note
     from gaitswarm.errors import invalid_request
@@ -78,7 +78,7 @@ def simulate(
 
     given = given_design(design, controller, trajectory, robot=robot, server=server, db=db)
     data: dict[str, Any] = {
-        "robot": chosen_robot(robot),
+        "robot": given.robot(robot),
         "controller": given.controller,
         "design": given.values,
         "scenarios": scenario_data(scenario or "all", robot),
@@ -86,8 +86,6 @@ def simulate(
         "precision": precision or "double",
         "log": log is not None,
     }
-    if given.spec is not None and robot is None:
-        data["robot"] = given.spec.robot
     if given.spec is not None and scenario is None:
         data["scenarios"] = given.spec.resolved_scenarios()
     if given.spec is not None and preference is None:

@@ -63,7 +63,7 @@ def record(
     from gaitswarm.jobs.open import open_jobs
     from sim.identification.recorded_walk import record as recorded
 
-    walk = read_walk(scenario, controller, design, trajectory, cycles, robot)
+    walk = read_walk(scenario, controller, design, trajectory, cycles, robot, server=server, db=db)
     log = read_measured(measured, walk.robot)
     pair = synchronised(measured, log, walk.simulated(), walk)
     taken = recorded(pair, walk.scenario, walk.controller, walk.design)

@@ -13,7 +13,7 @@ from cli.inputs.measured_walk import (
     ScenarioOption,
     TrajectoryOption,
 )
-from cli.inputs.options import ControllerOption, RobotOption
+from cli.inputs.options import ControllerOption, Db, RobotOption, Server
 
 
 def register(app: typer.Typer) -> None:
@@ -41,6 +41,8 @@ def synthesize(
             help="Values of single parameters by name: the twin then differs in these alone.",
         ),
     ] = None,
+    server: Server = None,
+    db: Db = None,
 ) -> None:
     """Write a SYNTHETIC log: a perturbed twin of the robot, with sensor noise. No measurement."""
     from cli.atomic_file import replacing
@@ -54,7 +56,7 @@ def synthesize(
 
     if output.suffix != ".csv":
         raise InvalidRequest(f"{output} must end in .csv", field="output")
-    walk = read_walk(scenario, controller, design, trajectory, cycles, robot)
+    walk = read_walk(scenario, controller, design, trajectory, cycles, robot, server=server, db=db)
     twin = None
     if parameters is not None:
         known = {variable.name for variable in identifiable_variables(walk.robot)}

@@ -13,7 +13,7 @@ from cli.inputs.measured_walk import (
     ScenarioOption,
     TrajectoryOption,
 )
-from cli.inputs.options import ControllerOption, Json, RobotOption
+from cli.inputs.options import ControllerOption, Db, Json, RobotOption, Server
 
 
 def register(app: typer.Typer) -> None:
@@ -42,6 +42,8 @@ def validate(
         Path | None,
         typer.Option(metavar="DIR", help="Write a report in Markdown, with pictures, to DIR."),
     ] = None,
+    server: Server = None,
+    db: Db = None,
     as_json: Json = False,
 ) -> None:
     """Simulate the walk that was measured, and judge the differences by tolerance classes."""
@@ -51,7 +53,7 @@ def validate(
     from cli.validation_report import write_report
     from sim.validation.comparison import compare_synchronised
 
-    walk = read_walk(scenario, controller, design, trajectory, cycles, robot)
+    walk = read_walk(scenario, controller, design, trajectory, cycles, robot, server=server, db=db)
     logs = {path: read_measured(path, walk.robot) for path in (measured, *(repeat or ()))}
     simulated = walk.simulated()
     pairs = [synchronised(path, log, simulated, walk) for path, log in logs.items()]

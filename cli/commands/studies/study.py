@@ -9,7 +9,7 @@ import typer
 from cli.commands.studies.study_controllers import controllers
 from cli.commands.studies.study_precision import precision
 from cli.commands.studies.study_worlds import worlds
-from cli.inputs.options import ControllerOption, Json, RobotOption
+from cli.inputs.options import ControllerOption, Db, Json, RobotOption, Server
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -43,20 +43,19 @@ def tables(
     design: Design = "published:A",
     scenario: Scenario = "all",
     robot: RobotOption = None,
+    server: Server = None,
+    db: Db = None,
     as_json: Json = False,
 ) -> None:
     """Compare a Fuzzy-PI's tables of 6 x 6, 8 x 8 and 10 x 6 bits with full inference."""
-    from cli.inputs.design_file import read_design
-    from cli.inputs.robots import chosen_robot, chosen_scenarios
+    from cli.inputs.design_file import given_design
+    from cli.inputs.robots import chosen_scenarios
     from sim.studies.accuracy import tables_against_inference
 
-    values = read_design(design, "fuzzy-pi")
-    _show(
-        tables_against_inference(
-            values, chosen_scenarios(scenario, robot), robot=chosen_robot(robot)
-        ),
-        as_json=as_json,
-    )
+    given = given_design(design, "fuzzy-pi", robot=robot, server=server, db=db)
+    chosen = chosen_scenarios(scenario, robot)
+    machine = given.robot(robot)
+    _show(tables_against_inference(given.values, chosen, robot=machine), as_json=as_json)
 
 
 def steps(
@@ -64,16 +63,18 @@ def steps(
     controller: ControllerOption = None,
     scenario: Scenario = "all",
     robot: RobotOption = None,
+    server: Server = None,
+    db: Db = None,
     as_json: Json = False,
 ) -> None:
     """Compare physics at 2.5, 5, 10 and 20 kHz with 40 kHz."""
     from cli.inputs.design_file import given_design
-    from cli.inputs.robots import chosen_robot, chosen_scenarios
+    from cli.inputs.robots import chosen_scenarios
     from sim.studies.accuracy import step_halving
 
-    given = given_design(design, controller, robot=robot, server=None, db=None)
+    given = given_design(design, controller, robot=robot, server=server, db=db)
     chosen = chosen_scenarios(scenario, robot)
-    machine = chosen_robot(robot)
+    machine = given.robot(robot)
     _show(step_halving(given.controller, given.values, chosen, robot=machine), as_json=as_json)
 
 
@@ -91,16 +92,18 @@ def noise(
         ),
     ] = None,
     robot: RobotOption = None,
+    server: Server = None,
+    db: Db = None,
     as_json: Json = False,
 ) -> None:
     """Put noise on one kind of link after the other; ratios to the noiseless walk (table 2.9)."""
     from cli.inputs.design_file import given_design
-    from cli.inputs.robots import chosen_robot, chosen_scenarios
+    from cli.inputs.robots import chosen_scenarios
     from sim.studies.accuracy import noise_on_links
 
-    given = given_design(design, controller, robot=robot, server=None, db=None)
+    given = given_design(design, controller, robot=robot, server=server, db=db)
     chosen = chosen_scenarios(scenario, robot)
-    machine = chosen_robot(robot)
+    machine = given.robot(robot)
     found = noise_on_links(
         given.controller, given.values, chosen, robot=machine, kind=kind, deviation=deviation
     )

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any, Final, cast
 
 from cli.inputs.design_file import given_design, may_be_file
+from cli.inputs.job_ids import full_id
 from cli.inputs.robots import chosen_robot, chosen_scenarios, robot_defaults, scenario_data
 from cli.inputs.spec_file import parse_spec
 from services.optimizer.errors import InvalidRequest, NotFound
@@ -58,7 +59,7 @@ def _earlier(design: str, db: str | None, options: Mapping[str, Any]) -> dict[st
         return None
     with open_jobs(None, db) as jobs:
         try:
-            spec = jobs.job(design).spec
+            spec = jobs.job(full_id(jobs, design)).spec
         except NotFound:
             return None
     if not isinstance(spec, CertificateSpec):

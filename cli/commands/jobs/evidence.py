@@ -46,7 +46,9 @@ def evidence(
 def verify(
     source: Annotated[
         str,
-        typer.Argument(metavar="FILE|ID", help="File of `evidence`, or a job's id."),
+        typer.Argument(
+            metavar="FILE|ID", help="File of `evidence`, or a job's id or its beginning."
+        ),
     ],
     replay: Annotated[
         int,
@@ -78,6 +80,7 @@ def verify(
     iterations are computed again from what is stored, and the first that differs is named.
     """
     from cli.exit_codes import CheckFailed
+    from cli.inputs.job_ids import full_id
     from cli.output import print_json
     from gaitswarm.evidence.verify import verify as verified
     from gaitswarm.jobs.open import open_jobs
@@ -87,6 +90,7 @@ def verify(
         found = verified(source, replay=replay, seed=seed, head=head)
     else:
         with open_jobs(server, db) as jobs:
+            source = full_id(jobs, source)
             found = jobs.verify(source, head=head)
             if found.verified:
                 found = _in_full(jobs, source, found, replay=replay, seed=seed, head=head)

@@ -15,17 +15,22 @@ class Table(RichTable):
     """As Rich's, but ids and numbers stay whole on a console of any width.
 
     Cells break between words only. Where even so a row does not fit on a line, every row becomes a
-    block of lines, each with a heading and a cell; empty cells have none.
+    block of lines, each with a heading and a cell; empty cells have none. A first cell without a
+    heading, or with nothing beside it, is the heading of its block or of those below. Of a table
+    without headings every row is a line that the terminal breaks. Brackets in a cell are no markup.
     """
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         """The table, or its rows as blocks. Called by Rich."""
+        options = options.update(markup=False)
         for column in self.columns:
             column.min_width = _longest_word(console, options, column)
         if self._narrowest() <= options.max_width:
             yield from super().__rich_console__(console, options)
-        else:
+        elif self.show_header:
             yield from self._blocks()
+        else:
+            yield from self._lines()
 
     def _narrowest(self) -> int:
         """Characters that the table takes when all columns are as narrow as their words."""
@@ -37,17 +42,35 @@ class Table(RichTable):
         """One block a row, with an empty line between two."""
         if self.title:
             yield Text(str(self.title), style="italic")
-        rows = list(zip(*(column.cells for column in self.columns), strict=True))
-        for number, row in enumerate(rows):
+        for number, row in enumerate(self._rows()):
             if number:
                 yield Text()
+            said = [pair for pair in zip(self.columns, row, strict=True) if str(pair[1])]
+            if said and (len(said) == 1 or not str(said[0][0].header)):
+                yield Text(str(said.pop(0)[1]), style="bold")
             block = RichTable(box=None, show_header=False, padding=(0, 2, 0, 0))
             block.add_column(overflow="fold", no_wrap=True)
             block.add_column(overflow="fold")
-            for column, cell in zip(self.columns, row, strict=True):
-                if str(cell):
-                    block.add_row(_on_one_line(column.header), cell)
-            yield block
+            for column, cell in said:
+                block.add_row(_on_one_line(column.header), _text(cell))
+            if said:
+                yield block
+
+    def _lines(self) -> Iterator[Text]:
+        """One line a row, cells below each other but for the last."""
+        rows = [[_text(cell) for cell in row] for row in self._rows()]
+        widths = [max(cell.cell_len for cell in column) for column in zip(*rows, strict=True)]
+        for row in rows:
+            for cell, width in zip(row[:-1], widths, strict=False):
+                cell.pad_right(width - cell.cell_len + 2)
+            yield Text(" ").join([Text(), Text.assemble(*row)])
+
+    def _rows(self) -> list[tuple[RenderableType, ...]]:
+        return list(zip(*(column.cells for column in self.columns), strict=True))
+
+
+def _text(cell: RenderableType) -> Text:
+    return cell.copy() if isinstance(cell, Text) else Text(str(cell))
 
 
 def _longest_word(console: Console, options: ConsoleOptions, column: Column) -> int:

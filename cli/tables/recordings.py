@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from rich.table import Table
 from rich.text import Text
 
+from cli.tables.fitted import Table
 from cli.tables.views import MISSING, number
 
 if TYPE_CHECKING:

@@ -15,10 +15,10 @@ def register(app: typer.Typer) -> None:
 
 def plugins(as_json: Json = False) -> None:
     """List plug-ins: controllers, cases and search methods of other packages that are installed."""
-    from rich.table import Table
     from rich.text import Text
 
     from cli.output import print_json_list, stdout_console
+    from cli.tables.fitted import Table
     from gaitswarm.views import plugin_views
 
     if as_json:
@@ -33,10 +33,10 @@ def plugins(as_json: Json = False) -> None:
 
 def cases(as_json: Json = False) -> None:
     """List cases of plug-ins, which evaluate designs in place of walks, with their settings."""
-    from rich.table import Table
     from rich.text import Text
 
     from cli.output import print_json_list, stdout_console
+    from cli.tables.fitted import Table
     from gaitswarm.views import case_views
 
     if as_json:

@@ -46,6 +46,8 @@ def test_the_terminal_writes_and_finds_them(finished: Finished) -> None:
     assert [job["name"] for job in listed] == ["renamed"]
     assert run_command("list", "--db", finished.db, "--json").json == []
     assert "no job fits; --all lists archived ones" in run_command("list", "--db", finished.db).err
+    nothing = run_command("list", "--db", finished.db, "--all", "--search", "nowhere")
+    assert (nothing.out, nothing.err) == ("", "no job fits\n")
     everything = run_command("list", "--db", finished.db, "--all")
     assert {"#a", "archived"} <= set(everything.out.split())
     emptied = run_command("label", finished.id, "--db", finished.db, "--no-tags", "--json").json

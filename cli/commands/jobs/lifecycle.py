@@ -147,7 +147,7 @@ def list_jobs(
     if rows:
         stdout_console().print(jobs_table(rows[:limit]))
     else:
-        note("no job fits; --all lists archived ones, too")
+        note("no job fits" if everything else "no job fits; --all lists archived ones, too")
     if len(rows) > limit:
         note(f"there are more than {limit}: see them by --limit, or fewer by --search or --tag")
 

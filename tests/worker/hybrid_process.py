@@ -47,12 +47,9 @@ def take_over() -> str:
         if "gcs_server" in process.title:
             os.kill(process.pid, signal.SIGKILL)
 
-    def lost() -> bool:
-        assert bits(evaluator.evaluate(WANTED, never)) == expected
-        return not evaluator.on_ray
-
+    # Not asked of `on_ray`, which may say so between two requests and be true again at the next.
     with patch("services.worker.cluster.pump.PULSE_SECONDS", 0.3):
-        eventually(lost)
+        eventually(lambda: walked_here() > 0)
     eventually(lambda: evaluator.on_ray)
     assert walked_here() == 0
     return f"took over\n{left_by(evaluator)}"

@@ -1,11 +1,17 @@
-"""Runs one stored job to its end, as `gaitswarm optimize` does; a process made to be killed."""
+"""Runs one stored job to its end, or several at once to their middle; processes to be killed."""
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Callable, Mapping
 from multiprocessing.connection import Connection
 
+from services.optimizer.run.evaluator import EvaluationRequest
+from services.optimizer.run.runner import Runner
 from services.runtime import open_evaluator, open_store, run_embedded
+from services.worker.in_process import InProcessEvaluator
 from services.worker.ray_evaluator import RayEvaluator
+from sim.outcome import Outcome
 
 
 def main(url: str, job_id: str, kind: str, told: Connection) -> None:
@@ -16,3 +22,28 @@ def main(url: str, job_id: str, kind: str, told: Connection) -> None:
     run_embedded(store, evaluator, job_id, on_commit=lambda _, state: told.send(str(state)))
     evaluator.close()
     store.close()
+
+
+def run_to_the_middle(url: str, middles: Mapping[str, int], told: Connection) -> None:
+    """Run jobs at once, each up to an iteration whose walks never end; send its id then."""
+    evaluator = _Halting(middles, told.send)
+    Runner(open_store(url), evaluator, concurrency=len(middles), poll_seconds=0.01).start()
+    threading.Event().wait()
+
+
+class _Halting(InProcessEvaluator):
+    """Runs walks, but those of an iteration of each job for ever."""
+
+    def __init__(self, middles: Mapping[str, int], on_halt: Callable[[str], None]) -> None:
+        super().__init__(2)
+        self._middles, self._on_halt, self._one = middles, on_halt, threading.Lock()
+
+    def evaluate(
+        self, request: EvaluationRequest, should_stop: Callable[[], bool]
+    ) -> tuple[Outcome, ...]:
+        outcomes = super().evaluate(request, should_stop)
+        if request.iteration == self._middles[request.job_id]:
+            with self._one:
+                self._on_halt(request.job_id)
+            threading.Event().wait()
+        return outcomes

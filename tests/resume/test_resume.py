@@ -18,6 +18,7 @@ from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.run.evaluator import Evaluator
 from services.optimizer.run.runner import Runner
 from services.optimizer.search.evolution.hype import HypeSettings
+from services.optimizer.search.registry import METHODS
 from services.optimizer.store.port.base import Store
 from services.runtime import open_evaluator, open_store, run_embedded
 from tests.examples.forked import PROCESSES
@@ -160,6 +161,35 @@ def test_resumed_job_equals_one_never_killed(
     assert store.job(job_id).state is JobState.SUCCEEDED
     assert len(progress) >= 2 and progress[0] >= 1 and progress == sorted(progress)
     assert walked(store, job_id) == walked(store, whole)
+
+
+def test_a_job_of_any_method_killed_in_its_middle_equals_one_never_killed(
+    store: Store, url: str, evaluator: Evaluator
+) -> None:
+    jobs: dict[str, tuple[str, str]] = {}
+    middles: dict[str, int] = {}
+    for name, method in METHODS.built_in.items():
+        if method.missing:
+            continue
+        search = method.settings.model_validate({"name": name, "particles": 5})
+        shorter = {"scenarios": SPEC.scenarios[:1], "optimizer": search, "iterations": 6}
+        spec = SPEC.model_copy(update=shorter)
+        jobs[name] = run_alone(store, evaluator, spec), queue(store, spec)
+        whole, killed = jobs[name]
+        middles[killed] = store.job(whole).progress.iterations // 2
+    halted, told = PROCESSES.Pipe(duplex=False)
+    life = PROCESSES.Process(target=job_process.run_to_the_middle, args=(url, middles, told))
+    life.start()
+    told.close()
+    assert {halted.recv() for _ in middles} == set(middles)
+    life.kill()
+    life.join()
+    halted.close()
+
+    for name, (whole, killed) in jobs.items():
+        assert store.job(killed).progress.iterations == middles[killed], name
+        assert run_embedded(store, evaluator, killed).state is JobState.SUCCEEDED
+        assert walked(store, killed) == walked(store, whole), name
 
 
 def test_a_job_that_is_extended_and_killed_equals_one_that_is_only_extended(

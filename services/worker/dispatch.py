@@ -83,11 +83,16 @@ class Work:
         batch: Which it belongs to.
         chunk: Some of the batch's designs in some of its cases.
         taken: When it was taken to be run; monotonic [s].
+        node: Id of the node that it was sent to; "" where there is only one, or until it is sent.
+        avoid: Ids of nodes that it is sent to only if there are no others: there a worker has died
+            of it, or it takes too long.
     """
 
     batch: Batch
     chunk: Chunk
     taken: float = 0.0
+    node: str = ""
+    avoid: frozenset[str] = frozenset()
 
     @property
     def costs(self) -> dict[str, float]:
@@ -185,8 +190,8 @@ class Dispatcher:
             if found is None:
                 return None
             batch, chunk = out[found].batch, out[found].chunk
-            batch.tries[chunk] = replace(batch.tries[chunk], copied=True)
-            work = Work(batch, chunk)
+            tries = batch.tries[chunk] = replace(batch.tries[chunk], copied=True)
+            work = Work(batch, chunk, avoid=tries.died_on | {out[found].node})
             self._hand_out(work)
             return work
 
@@ -247,11 +252,13 @@ class Dispatcher:
             batch, chunk = work.batch, work.chunk
             if not batch.awaits(chunk):
                 return
-            batch.tries[chunk], verdict = batch.tries.get(chunk, Tries(1)).lost(suspect=suspect)
+            before = batch.tries.get(chunk, Tries(1))
+            tries, verdict = before.lost(suspect=suspect, node=work.node)
+            batch.tries[chunk] = tries
             if verdict is Verdict.GIVEN_UP:
-                self._end(batch, killed_workers(batch.request, chunk, batch.tries[chunk].killed))
+                self._end(batch, killed_workers(batch.request, chunk, tries.killed))
             elif verdict is Verdict.AGAIN:
-                self._queue_up(Work(batch, chunk))
+                self._queue_up(Work(batch, chunk, avoid=tries.died_on))
                 self._changed.notify_all()
 
     def fail(self, work: Work, error: BaseException) -> None:

@@ -32,9 +32,10 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Tries:
-    """How often one task is under way, and how many workers died while they had it.
+    """How often one task is under way, and how many workers died while they had it, and where.
 
-    A worker that dies takes its task along, so that every try is on another process.
+    A worker that dies takes its task along, so that every try is on another process; nodes on which
+    one died are left out of the next tries, as long as there are others.
 
     lost(suspect) with under_way, killed   ->  under_way, killed, verdict
     1, 0   suspect                         ->  0, 1, again
@@ -46,27 +47,33 @@ class Tries:
         under_way: Workers that have it now.
         killed: Workers that have died while they had it.
         copied: Whether it was run a second time because the first took too long.
+        died_on: Ids of the nodes of those workers.
     """
 
     under_way: int = 0
     killed: int = 0
     copied: bool = False
+    died_on: frozenset[str] = frozenset()
 
     def sent(self) -> Tries:
         """After it was handed to a worker."""
         return replace(self, under_way=self.under_way + 1)
 
-    def lost(self, *, suspect: bool) -> tuple[Tries, Verdict]:
+    def lost(self, *, suspect: bool, node: str = "") -> tuple[Tries, Verdict]:
         """After a worker that had it was lost.
 
         Args:
             suspect: Whether the task may be what ended the worker; not so if its whole node went.
+            node: Id of the worker's node; "" where there is only one.
 
         Returns:
             The tries, and what becomes of the task.
         """
         after = replace(
-            self, under_way=max(0, self.under_way - 1), killed=self.killed + int(suspect)
+            self,
+            under_way=max(0, self.under_way - 1),
+            killed=self.killed + int(suspect),
+            died_on=self.died_on | {node} if suspect and node else self.died_on,
         )
         if after.killed >= MOST_KILLED:
             return after, Verdict.GIVEN_UP

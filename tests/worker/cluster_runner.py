@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import logging
 import os
+import signal
 import threading
 import time
 from contextlib import suppress
 from dataclasses import dataclass
 from io import StringIO
+from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
@@ -55,6 +57,36 @@ class Sleep:
         while time.monotonic() < until:
             time.sleep(0.01)  # at most so long a cancellation waits, as between steps of a search
         raise AssertionError("it was not cancelled")
+
+
+@dataclass(frozen=True, slots=True)
+class Deadly:
+    """A case that ends its process, and leaves the id of its node in a file."""
+
+    walk: Walk
+    deaths: Path
+    name = "deadly"
+    duration = 1.0
+
+    @property
+    def robots(self) -> tuple[RobotSource, ...]:
+        return self.walk.robots
+
+    @property
+    def precision(self) -> Precision:
+        return self.walk.precision
+
+    @property
+    def objectives(self) -> tuple[Objective, ...]:
+        return self.walk.objectives
+
+    def run(self, designs: NDArray[np.float64]) -> Outcome:
+        import ray
+
+        with self.deaths.open("a") as file:
+            file.write(f"{ray.get_runtime_context().get_node_id()}\n")
+        os.kill(os.getpid(), signal.SIGKILL)
+        raise AssertionError(designs)
 
 
 def connect(address: str, patience: float = nodes.PATIENCE_SECONDS) -> None:

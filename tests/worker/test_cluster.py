@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from services.optimizer.errors import InvalidRequest
+from services.optimizer.errors import InvalidRequest, KilledWorker
 from services.optimizer.jobs.priority import weight
 from services.runtime import open_evaluator
 from services.worker.cluster.handshake import Introduction, fingerprint, introducer
@@ -23,7 +23,7 @@ from tests.examples.paths import ROOT
 from tests.examples.processes import eventually, within
 from tests.worker import cluster_host, cluster_runner
 from tests.worker.cluster_host import Process
-from tests.worker.cluster_runner import Sleep
+from tests.worker.cluster_runner import Deadly, Sleep
 from tests.worker.requests import bits, request, walked_at_once
 
 WANTED = request(300)
@@ -119,6 +119,22 @@ def test_walks_of_a_node_that_is_lost_are_walked_by_others_to_the_same_bits(
     host.run(cluster_host.lose, two_nodes[0])
     assert walked() == alone
     eventually(lambda: runner.run(cluster_runner.slots) == 1)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(120)
+def test_walks_that_kill_their_worker_are_tried_on_another_node_before_they_are_on_the_same(
+    runner: Process, two_nodes: list[str], tmp_path: Path
+) -> None:
+    case = SMALL.cases[0]
+    assert isinstance(case, Walk)
+    deadly = Deadly(case, tmp_path / "deaths")
+    wanted = replace(SMALL, job_id="deadly", cases=(deadly,), designs=SMALL.designs[:1])
+    with pytest.raises(KilledWorker, match="3 worker processes died"):
+        runner.run(cluster_runner.evaluate, wanted)
+    first, second, third = deadly.deaths.read_text().split()
+    assert first != second
+    assert third in {first, second}
 
 
 @pytest.mark.slow

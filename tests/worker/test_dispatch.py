@@ -121,6 +121,21 @@ def test_a_chunk_that_three_workers_died_of_fails_the_request_and_names_its_walk
         results.result(PATIENCE)
 
 
+def test_a_chunk_is_to_avoid_the_nodes_on_which_workers_died_of_it(
+    dispatcher: Dispatcher, results: Future[Results]
+) -> None:
+    work, *_ = taken(dispatcher)
+    avoided = []
+    for node, suspect in (("a", True), ("gone", False), ("b", True)):
+        work.node = node
+        dispatcher.again(work, suspect=suspect)
+        again = dispatcher.take(0.0)
+        assert again is not None and again.chunk == work.chunk
+        avoided.append(again.avoid)
+        work = again
+    assert avoided == [{"a"}, {"a"}, {"a", "b"}]
+
+
 def test_a_chunk_whose_nodes_go_is_run_again_for_ever(
     dispatcher: Dispatcher, results: Future[Results]
 ) -> None:
@@ -186,6 +201,16 @@ def test_a_chunk_that_takes_far_too_long_is_copied_once_and_the_first_answer_win
     for part, expected in zip(copy.chunk.parts, results_of(copy), strict=True):
         rows = outcomes[part.case].objectives[part.start : part.stop]
         np.testing.assert_array_equal(rows, expected.objectives)
+
+
+def test_a_copy_is_to_avoid_the_node_on_which_its_chunk_takes_too_long(late: Late) -> None:
+    late.late.node = "a"
+    for work in late.others:
+        work.node = "b"
+        late.end(work)
+    late.now += 4.0 * late.late.chunk.cost
+    copy = late.dispatcher.copy()
+    assert copy is not None and copy.avoid == {"a"}
 
 
 def test_no_chunk_is_copied_while_no_slot_is_free(late: Late) -> None:

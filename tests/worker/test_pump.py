@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import threading
 import time
 from collections.abc import Iterator
@@ -12,14 +13,16 @@ from typing import Any, cast
 
 import pytest
 
+from services.optimizer.errors import KilledWorker
 from services.optimizer.run.evaluator import EvaluationStopped
 from services.worker.cluster import pump
-from services.worker.cluster.nodes import OwnNode
+from services.worker.cluster.nodes import LOOK_AHEAD, Node, OwnNode, Wanted, chosen
 from services.worker.cluster.pump import Pump
 from services.worker.dispatch import Dispatcher
 from services.worker.ray_session import RaySession
+from services.worker.tries import MOST_KILLED
 from tests.examples.processes import eventually
-from tests.worker.requests import request
+from tests.worker.requests import SCENARIOS, request
 
 SLOTS = 2
 
@@ -35,6 +38,7 @@ class MadeUpRay:
         self.sent: list[object] = []
         self.ended: set[object] = set()
         self.cancelled: dict[object, float] = {}
+        self.error: Exception = exceptions.TaskCancelledError()
 
     def remote(self, **_: object) -> Any:
         return lambda _function: SimpleNamespace(remote=self._send)
@@ -54,7 +58,7 @@ class MadeUpRay:
         return done, [reference for reference in references if reference not in self.ended]
 
     def get(self, reference: object) -> object:
-        raise self.exceptions.TaskCancelledError
+        raise self.error
 
     def cancel(self, reference: object, *, force: bool) -> None:
         assert not force
@@ -67,12 +71,28 @@ def made_up() -> MadeUpRay:
     return MadeUpRay()
 
 
+class TwoNodes(OwnNode):
+    """One with room, and one that is busy with walks of others."""
+
+    def __init__(self) -> None:
+        super().__init__(SLOTS)
+        self.nodes = [Node("free", "", 1, ("", 0)), Node("busy", "", 1, ("", 0), flying=LOOK_AHEAD)]
+
+    def place(self, _wanted: Wanted, avoid: frozenset[str]) -> Node | None:
+        return chosen(self.nodes, avoid)
+
+
 @pytest.fixture
-def dispatcher(made_up: MadeUpRay) -> Iterator[Dispatcher]:
+def nodes() -> OwnNode:
+    return OwnNode(SLOTS)
+
+
+@pytest.fixture
+def dispatcher(made_up: MadeUpRay, nodes: OwnNode) -> Iterator[Dispatcher]:
     """Of a pump that runs."""
     opened = Dispatcher(slots=SLOTS, lanes=lambda _: 4)
     session = SimpleNamespace(ray=made_up, directory=Path(), head_answers=lambda: True)
-    pumped = Pump(cast(RaySession, session), opened, OwnNode(SLOTS), threading.Event())
+    pumped = Pump(cast(RaySession, session), opened, nodes, threading.Event())
     with ThreadPoolExecutor(1) as pool:
         running = pool.submit(pumped.run)
         yield opened
@@ -100,3 +120,25 @@ def test_tasks_that_nobody_waits_for_may_end_before_they_are_cancelled_once(
     time.sleep(0.2)
     assert set(made_up.cancelled) == set(lasting)
     made_up.ended.update(lasting)
+
+
+@pytest.mark.parametrize("nodes", [TwoNodes()], ids=["two nodes"])
+def test_a_busy_node_is_waited_for_rather_than_one_on_which_a_worker_died_but_not_for_ever(
+    made_up: MadeUpRay, dispatcher: Dispatcher, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pump, "PATIENCE_SECONDS", 1.0)
+    made_up.error = made_up.exceptions.WorkerCrashedError()
+    wanted, stop = request(1, scenarios=SCENARIOS[:1]), threading.Event()
+    died: list[float] = []
+    with ThreadPoolExecutor(1) as pool:
+        evaluated = pool.submit(dispatcher.evaluate, wanted, stop.is_set)
+        try:
+            for _ in range(MOST_KILLED):
+                eventually(lambda: len(made_up.sent) == SLOTS + len(died) + 1)
+                died.append(time.monotonic())
+                made_up.ended.add(made_up.sent[-1])
+            with pytest.raises(KilledWorker):
+                evaluated.result()
+        finally:
+            stop.set()
+    assert all(after - before > 0.9 for before, after in itertools.pairwise(died))

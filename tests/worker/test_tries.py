@@ -23,6 +23,13 @@ def test_a_task_is_not_blamed_for_nodes_that_go() -> None:
     assert tries.killed == 0
 
 
+def test_nodes_are_kept_in_mind_on_which_workers_died_of_a_task_and_no_others() -> None:
+    tries = Tries()
+    for node, suspect in (("a", True), ("b", False), ("", True), ("c", True)):
+        tries, _ = tries.sent().lost(suspect=suspect, node=node)
+    assert tries.died_on == {"a", "c"}
+
+
 def test_a_task_with_a_copy_is_not_queued_a_third_time() -> None:
     tries, verdict = Tries().sent().sent().lost(suspect=True)
     assert (tries.under_way, verdict) == (1, Verdict.GOES_ON)

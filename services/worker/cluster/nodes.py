@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from concurrent.futures import Future
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
@@ -81,6 +81,23 @@ class Node:
         return LOOK_AHEAD - self.flying / self.cpus
 
 
+def chosen(ready: Iterable[Node], avoid: frozenset[str]) -> Node | None:
+    """The node that a task is sent to.
+
+    Args:
+        ready: Nodes that are prepared for it, busy or not.
+        avoid: Ids of nodes that get it only if no other is ready. One that is ready and busy is
+            waited for.
+
+    Returns:
+        The one with most room for its size; None if none has any.
+    """
+    known = tuple(ready)
+    others = [node for node in known if node.id not in avoid] or known
+    free = [node for node in others if node.room > 0.0]
+    return max(free, key=lambda node: node.room, default=None)
+
+
 class Nodes(Protocol):
     """Where tasks are sent. All but `wanted` is called by one thread."""
 
@@ -110,14 +127,15 @@ class Nodes(Protocol):
             Nodes that were lost: what they were sent will not come back.
         """
 
-    def place(self, wanted: Wanted, /) -> Node | None:
+    def place(self, wanted: Wanted, avoid: frozenset[str], /) -> Node | None:
         """The node that a task is sent to.
 
         Args:
             wanted: What it needs.
+            avoid: As for `chosen`.
 
         Returns:
-            Of the nodes that are ready, the one with most room; None if none has any.
+            The node that is `chosen`; None if one has to be waited for.
         """
 
     def can_serve(self, wanted: Wanted, /) -> bool:
@@ -206,9 +224,9 @@ class OwnNode:
         """It is not lost before its cluster is."""
         return ()
 
-    def place(self, _wanted: Wanted) -> Node | None:
+    def place(self, _wanted: Wanted, avoid: frozenset[str]) -> Node | None:
         """This machine, if it has room."""
-        return self._node if self._node.room > 0.0 else None
+        return chosen([self._node], avoid)
 
     def can_serve(self, _wanted: Wanted) -> bool:
         """It is ready for all."""

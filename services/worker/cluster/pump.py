@@ -133,11 +133,14 @@ class Pump:
     def _sent(self, work: Work, wanted: Wanted) -> bool:
         """Send a task to a node; false if none has room for it now."""
         request = work.batch.request
-        node = self._nodes.place(wanted)
+        # Others may be busy for hours, with walks that are whole searches.
+        is_patient = time.monotonic() - work.taken < PATIENCE_SECONDS
+        node = self._nodes.place(wanted, work.avoid if is_patient else frozenset())
         if node is None:
             self._note_absence(work, wanted)
             return False
         self._absent.pop(wanted, None)
+        work.node = node.id
         chosen = [part.case for part in work.chunk.parts]
         task = sent(work.task, chosen, self._shelf.shared(request.cases))
         self._flying[self._nodes.on(node, self._walk).remote(task)] = (work, node)

@@ -14,7 +14,7 @@ from typing import Any, Final
 from services.optimizer.errors import EvaluatorUnavailable
 from services.optimizer.run.evaluator import EvaluationRequest
 from services.worker.cluster.handshake import Introduction, introducer
-from services.worker.cluster.nodes import PATIENCE_SECONDS, Node, Wanted
+from services.worker.cluster.nodes import PATIENCE_SECONDS, Node, Wanted, chosen
 from services.worker.ray_session import RaySession, listens
 from sim import simulate
 from sim.provenance import Provenance, provenance_of
@@ -163,10 +163,9 @@ class ClusterNodes:
         self._next_look = 0.0
         return True
 
-    def place(self, wanted: Wanted) -> Node | None:
-        """The node with most room, for its size."""
-        ready = [n for n in self._nodes.values() if wanted in n.prepared and n.room > 0.0]
-        return max(ready, key=lambda node: node.room, default=None)
+    def place(self, wanted: Wanted, avoid: frozenset[str]) -> Node | None:
+        """Of those that are prepared."""
+        return chosen((n for n in self._nodes.values() if wanted in n.prepared), avoid)
 
     def can_serve(self, wanted: Wanted) -> bool:
         """Whether one was prepared, or was asked to be, or to introduce itself."""

@@ -1,0 +1,50 @@
+"""Which node of a cluster a task is sent to."""
+
+from __future__ import annotations
+
+import pytest
+
+from services.worker.cluster.nodes import Node, OwnNode, Wanted, chosen
+
+WANTED = Wanted(frozenset(), "")
+
+
+def node(name: str, *, cpus: int = 1, flying: int = 0) -> Node:
+    return Node(name, name, cpus, ("", 0), flying=flying)
+
+
+@pytest.mark.parametrize(
+    ("ready", "avoid", "expected"),
+    [
+        ([node("a", flying=1), node("b")], "", "b"),
+        ([node("a", flying=1), node("b", cpus=4, flying=3)], "", "b"),
+        ([node("a", flying=2), node("b", flying=2)], "", None),
+        ([node("a"), node("b", flying=1)], "a", "b"),
+        ([node("a"), node("b", flying=2)], "a", None),
+        ([node("a"), node("b", flying=1), node("c")], "ac", "b"),
+        ([node("a", flying=1), node("b")], "ab", "b"),
+        ([node("a")], "a", "a"),
+        ([], "a", None),
+    ],
+    ids=[
+        "with more room",
+        "with more room for its size",
+        "no room",
+        "not where a worker died",
+        "busy for a while, so that it is waited for",
+        "the last that is not avoided",
+        "all are avoided",
+        "the only one",
+        "none is ready",
+    ],
+)
+def test_a_task_is_sent_to_the_node(ready: list[Node], avoid: str, expected: str | None) -> None:
+    found = chosen(ready, frozenset(avoid))
+    assert (found and found.id) == expected
+
+
+def test_the_only_machine_of_an_embedded_cluster_is_never_avoided() -> None:
+    nodes = OwnNode(1)
+    only = nodes.place(WANTED, frozenset())
+    assert only is not None
+    assert nodes.place(WANTED, frozenset([only.id])) is only

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import pickle
 import shutil
@@ -10,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -20,6 +22,7 @@ import pytest
 from numpy.typing import NDArray
 
 from services.optimizer.errors import EvaluatorUnavailable, KilledWorker
+from services.optimizer.run.evaluator import EvaluationStopped
 from services.worker.ray_evaluator import RayEvaluator
 from services.worker.tasks import transportable
 from sim.case import Case
@@ -82,6 +85,58 @@ def test_walks_that_kill_their_workers_are_tried_on_three_and_then_given_up(
     assert len(died) == len(set(died)) == 3
     assert not ray_evaluator.lost
     assert bits(ray_evaluator.evaluate(sound, never)) == bits(walked_at_once(sound))
+
+
+class Importing:
+    """A case that imports a module, whose import takes long."""
+
+    def __init__(self, like: Case, folder: Path) -> None:
+        self.name, self.duration, self.robots = "importing", like.duration, like.robots
+        self.objectives, self.precision = like.objectives, like.precision
+        self.folder = folder
+        (folder / "gaitswarm_slow_module.py").write_text(
+            "import pathlib, time\n"
+            f"log = pathlib.Path({str(folder / 'imported')!r}).open('a', buffering=1)\n"
+            "print('begun', file=log)\n"
+            "until = time.monotonic() + 4.0\n"
+            "while time.monotonic() < until:\n"
+            "    time.sleep(0.01)\n"
+            "print('ended', file=log)\n"
+        )
+
+    @property
+    def imported(self) -> list[str]:
+        """What became of each import."""
+        log = self.folder / "imported"
+        return log.read_text().split() if log.exists() else []
+
+    def run(self, designs: NDArray[np.float64]) -> Outcome:
+        sys.path.append(str(self.folder))
+        importlib.import_module("gaitswarm_slow_module")
+        until = time.monotonic() + 60.0
+        while time.monotonic() < until:
+            time.sleep(0.01)
+        raise AssertionError(designs)
+
+
+@pytest.mark.slow
+def test_a_worker_whose_task_is_cancelled_in_an_import_ends_that_first_and_walks_on(
+    ray_evaluator: RayEvaluator, tmp_path: Path
+) -> None:
+    sound = request(2)
+    ray_evaluator.evaluate(sound, never)
+    before = {worker.pid for worker in walkers(os.getpid())}
+    importing = Importing(sound.cases[0], tmp_path)
+    # A second after it is let go it is cancelled.
+    with pytest.raises(EvaluationStopped):
+        ray_evaluator.evaluate(
+            replace(sound, job_id="importing", cases=(importing,), designs=sound.designs[:1]),
+            lambda: bool(importing.imported),
+        )
+    assert within(30.0, lambda: importing.imported == ["begun", "ended"]), importing.imported
+    assert within(30.0, lambda: ray_evaluator.loads["ray"].used == 0)
+    assert bits(ray_evaluator.evaluate(sound, never)) == bits(walked_at_once(sound))
+    assert {worker.pid for worker in walkers(os.getpid())} >= before
 
 
 @pytest.mark.slow

@@ -87,7 +87,8 @@ class ClusterNodes:
         self._here = Introduction.of(introducer()())
         self._introduce = session.ray.remote(num_cpus=0, max_retries=0)(introducer())
         self._prepare = session.ray.remote(num_cpus=0, max_retries=0)(prepare_node)
-        self._any_cpu = session.ray.remote(num_cpus=1, max_retries=0)(introducer())
+        # It is cancelled, perhaps when it has begun, and must not be in an import then.
+        self._any_cpu = session.ray.remote(num_cpus=1, max_retries=0)(lambda: None)
         self._demand: list[Any] = []
         self._next_demand = 0.0
         self._needs: dict[Wanted, Any] = {}

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-import signal
 import sys
-import threading
 import uuid
 from collections import OrderedDict
 from collections.abc import Sequence
@@ -15,6 +13,7 @@ from dataclasses import dataclass, replace
 from types import ModuleType
 from typing import Any, Final
 
+from services.worker.cluster.interrupts import interrupted_outside_imports
 from services.worker.tasks import Answer, Failure, Task, run_in_worker
 from sim.case import Case
 
@@ -137,13 +136,13 @@ def run_sent(sent_task: SentTask) -> Answer | Failure:
         sent_task: What is to be run.
 
     Returns:
-        As of `run_in_worker`; nothing where the process has to end, as one does whose modules a
-        cancellation has left half imported. Ray then reports that the worker has died.
+        As of `run_in_worker`; nothing where the process has to end, as one does in which a module
+        is half imported all the same. Ray then reports that the worker has died.
     """
-    _heed_interrupts()
-    cases = sent_task.shared.receive()
-    chosen = tuple(cases[index] for index in sent_task.chosen)
-    answer = run_in_worker(replace(sent_task.task, cases=chosen))
+    with interrupted_outside_imports():
+        cases = sent_task.shared.receive()
+        chosen = tuple(cases[index] for index in sent_task.chosen)
+        answer = run_in_worker(replace(sent_task.task, cases=chosen))
     if isinstance(answer, Failure) and is_half_imported(answer.error):
         note = f"gaitswarm: this worker ends, since a module is half imported: {answer.error}\n"
         sys.stderr.write(note)
@@ -165,15 +164,3 @@ def is_half_imported(error: Exception) -> bool:
     return isinstance(error, AttributeError | ImportError) and (
         "partially initialized module" in said or _MISSING_IN_MODULE.match(said) is not None
     )
-
-
-def _heed_interrupts() -> None:
-    """Let SIGINT interrupt this process, as it does by default. Only in a process's main thread.
-
-    Ray cancels a task by it. A shell's script makes what it starts in the background ignore it,
-    which Ray's workers inherit: Ray would then raise a TypeError in place of the cancellation.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        return
-    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
-        signal.signal(signal.SIGINT, signal.default_int_handler)

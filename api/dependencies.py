@@ -6,78 +6,23 @@ import asyncio
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dataclasses import dataclass
-from typing import Annotated, Final, TypedDict, TypeVar, cast
+from typing import Annotated, Final, TypedDict, cast
 
 import anyio
-from anyio.to_thread import run_sync
 from fastapi import Depends, FastAPI, Path, Query, Request
 from pydantic import Field
 from starlette.types import Scope
 
 from api.answers import Answers
 from api.rates import OpenStreams
+from api.slots import AskersSlots, ComputingSlots
 from api.topics import Topics
 from gaitswarm.settings import Settings
 from services.monitoring.activity import Activity
 from services.monitoring.metrics import Metrics
-from services.optimizer.errors import EvaluatorUnavailable, InvalidRequest
+from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.job import Job
 from services.optimizer.service import JobService
-
-T = TypeVar("T")
-
-
-class ComputingSlots:
-    """Lets only so many requests of a kind compute at the same time. Of one event loop."""
-
-    def __init__(self, what: str, workers: int, queue: int) -> None:
-        """Start without any at work.
-
-        Args:
-            what: they compute, for messages.
-            workers: how many compute at the same time, each in a thread.
-            queue: how many more may wait.
-        """
-        self._what = what
-        self._limiter = anyio.CapacityLimiter(workers)
-        self._queue = queue
-
-    async def run(self, work: Callable[[], T]) -> T:
-        """Compute in a thread, as soon as there is a slot.
-
-        Args:
-            work: called in the thread, without arguments.
-
-        Returns:
-            What `work` returns.
-
-        Raises:
-            EvaluatorUnavailable: too many are waiting already.
-        """
-        self._check_queue()
-        return await run_sync(work, limiter=self._limiter)
-
-    @asynccontextmanager
-    async def one(self) -> AsyncIterator[None]:
-        """Have a slot while the block runs, which may compute in any one thread.
-
-        Yields:
-            Nothing.
-
-        Raises:
-            EvaluatorUnavailable: too many are waiting already.
-        """
-        self._check_queue()
-        async with self._limiter:
-            yield
-
-    def _check_queue(self) -> None:
-        waiting = self._limiter.statistics().tasks_waiting
-        if self._limiter.available_tokens == 0 and waiting >= self._queue:
-            raise EvaluatorUnavailable(
-                f"too many {self._what} are waiting; try again in a few seconds"
-            )
-
 
 _VALIDATIONS: Final = 2
 """Bodies that are validated at once: threads of Python take turns, the event loop's among them."""
@@ -211,13 +156,13 @@ async def settings(request: Request) -> Settings:
     return cast(Settings, request.state.settings)
 
 
-async def slots(request: Request) -> ComputingSlots:
-    """The application's room for walks on request.
+async def slots(request: Request) -> AskersSlots:
+    """The application's room for walks on request, as whoever asks may use it.
 
     Args:
         request: under way.
     """
-    return cast(ComputingSlots, request.state.slots)
+    return AskersSlots(cast(ComputingSlots, request.state.slots), request.state.asker)
 
 
 async def activity(request: Request) -> Activity | None:
@@ -247,7 +192,7 @@ async def counted_stream(request: Request) -> AsyncIterator[None]:
 
 async def _analysing(request: Request) -> AsyncIterator[None]:
     """A slot for a question about whole histories, until the answer is there."""
-    async with cast(ComputingSlots, request.state.analyses).one():
+    async with cast(ComputingSlots, request.state.analyses).one(request.state.asker):
         yield
 
 
@@ -293,7 +238,7 @@ async def answers(request: Request) -> Answers:
 
 Service = Annotated[JobService, Depends(service)]
 ServerSettings = Annotated[Settings, Depends(settings)]
-Slots = Annotated[ComputingSlots, Depends(slots)]
+Slots = Annotated[AskersSlots, Depends(slots)]
 JobActivities = Annotated[Activity | None, Depends(activity)]
 Stopping = Annotated[asyncio.Event, Depends(stopping)]
 FollowedJobs = Annotated[Topics, Depends(topics)]

@@ -16,9 +16,12 @@ import pytest
 from api.dependencies import check_length
 from gaitswarm.requests.walk import SimulationRequest, run_simulation
 from gaitswarm.views import SimulationView
+from services.optimizer.access import Scope as TokenScope
+from services.optimizer.store.sql_store import SqlStore
 from sim.outcome import OBJECTIVE_NAMES, Status
 from sim.scenario import find_scenario
 from tests.api.conftest import Serve
+from tests.examples.processes import eventually
 from tests.examples.walks import PUBLISHED_A, SHORT_WALK, short_walk, walk
 
 pytestmark = pytest.mark.slow
@@ -193,6 +196,38 @@ def test_when_too_many_walks_wait_the_next_is_told_to_come_later(serve: Serve, g
     assert answer.status_code == 503
     assert "Retry-After" in answer.headers
     assert first.result()["scenarios"]["short"]["status"] == "ok"
+
+
+def test_a_token_that_asks_for_very_many_walks_does_not_keep_another_one_waiting(
+    serve: Serve, store: SqlStore, gate: Gate
+) -> None:
+    client = serve(api_access="token", api_simulation_workers=1, api_simulation_queue=3).client
+    greedy, modest = (
+        {"Authorization": f"Bearer {store.tokens.create(name, TokenScope.READ)[1]}"}
+        for name in ("greedy", "modest")
+    )
+    ended: list[str] = []
+
+    def ask(headers: dict[str, str], name: str) -> int:
+        body = {**REQUEST, "scenarios": [SHORT_WALK]}
+        answer = client.post("/v1/simulations", json=body, headers=headers)
+        if answer.status_code == 429:
+            assert int(answer.headers["Retry-After"]) > 0
+            assert "yours" in answer.json()["detail"]
+        ended.append(name)
+        return answer.status_code
+
+    with ThreadPoolExecutor(5) as pool:
+        many = [pool.submit(ask, greedy, "greedy") for _ in range(4)]
+        for _ in many:
+            assert gate.arrived.acquire(timeout=20.0)
+        other = pool.submit(ask, modest, "modest")
+        # The queue is full, and the newest of those who fill it goes.
+        eventually(lambda: ended == ["greedy"], seconds=20.0)
+        gate.opened.set()
+    assert other.result() == 200
+    assert sorted(answer.result() for answer in many) == [200, 200, 200, 429]
+    assert ended.index("modest") <= 3
 
 
 def test_a_stopping_server_answers_what_was_asked_before(serve: Serve, gate: Gate) -> None:

@@ -13,9 +13,11 @@ from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from api.dependencies import ExistingJob, ServerSettings
+from api.monitoring import METRICS_PATH
 from api.problems import problem, too_many_requests, unauthorized
 from api.rates import RequestRate, address_of, is_local
 from gaitswarm.views import PREFIX
+from services.monitoring.exposition import REFUSAL
 from services.optimizer.access import Scope as TokenScope
 from services.optimizer.access import Token, Tokens
 from services.optimizer.errors import Forbidden, StoreUnavailable
@@ -47,6 +49,9 @@ _MOST_REMEMBERED: Final = 1024
 class AccessMiddleware:
     """Finds the token of every request under /v1, and refuses those without one, and too many.
 
+    And of those for metrics, for which every token will do. While the database is away, one that
+    was valid when it was last looked up still is there: metrics are needed most then.
+
     `request.state.token` is what it found: None where none is required and none was given. A token
     that is not valid is refused, whether one is required or not. Tokens are remembered for a few
     seconds, so that one that was revoked is refused after these.
@@ -75,7 +80,8 @@ class AccessMiddleware:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """One ASGI exchange."""
         path = scope.get("path", "").removeprefix(scope.get("root_path", ""))
-        if scope["type"] != "http" or not path.startswith(f"{PREFIX}/") or path in _PROBES:
+        is_asked = path.startswith(f"{PREFIX}/") or path == METRICS_PATH
+        if scope["type"] != "http" or not is_asked or path in _PROBES:
             await self.app(scope, receive, send)
             return
         try:
@@ -97,15 +103,22 @@ class AccessMiddleware:
         token = known if until > time.monotonic() else None
         if path != _SESSION:
             if token is None and secret is not None:
-                token = await self._look_up(secret)
+                token = await self._look_up(secret, known if path == METRICS_PATH else None)
             if token is None and (secret is not None or self.required):
-                return unauthorized(scope["path"], _NONE if secret is None else _UNKNOWN)
+                missing = REFUSAL if path == METRICS_PATH else _NONE
+                return unauthorized(scope["path"], missing if secret is None else _UNKNOWN)
         asker = address if token is None else f"token {token.name}"
         scope.setdefault("state", {}).update(token=token, asker=asker)
         return None
 
-    async def _look_up(self, secret: str) -> Token | None:
-        token = await run_sync(self._tokens().find, secret)
+    async def _look_up(self, secret: str, otherwise: Token | None) -> Token | None:
+        """otherwise: what is taken for the token while the database is away, if anything."""
+        try:
+            token = await run_sync(self._tokens().find, secret)
+        except StoreUnavailable:
+            if otherwise is None:
+                raise
+            return otherwise
         self._remembered.pop(secret, None)
         if token is not None:
             if len(self._remembered) >= _MOST_REMEMBERED:

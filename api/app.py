@@ -25,7 +25,7 @@ from api.middleware import (
     SecurityHeadersMiddleware,
 )
 from api.monitoring import MetricsMiddleware, add_metrics
-from api.origin import HostMiddleware, SameOriginMiddleware, names_of_server
+from api.origin import HostMiddleware, SameOriginMiddleware
 from api.page import FOLDER, add_page
 from api.problems import add_problem_handlers
 from api.rates import RequestRate
@@ -58,7 +58,7 @@ from api.routes import (
 from gaitswarm.settings import Settings
 from services.monitoring.activity import Activity
 from services.monitoring.collectors import QueueCollector
-from services.monitoring.exposition import MetricsAccess
+from services.monitoring.hosts import HostNames
 from services.monitoring.metrics import Metrics
 from services.optimizer.service import JobService
 
@@ -140,8 +140,7 @@ def create_app(
     ):
         app.include_router(module.router)
     health.add_short_paths(app)
-    access = MetricsAccess(lambda: service.store.tokens, required=settings.tokens_required)
-    add_metrics(app, metrics, access)
+    add_metrics(app, metrics)
     add_documentation(app)
     add_page(app, page_folder)
     add_manual(app, manual_folder)
@@ -167,7 +166,7 @@ def create_app(
     )
     allowed = settings.api_allowed_hosts
     app.add_middleware(SameOriginMiddleware, allowed=allowed)
-    app.add_middleware(HostMiddleware, names=names_of_server(settings.api_host, allowed))
+    app.add_middleware(HostMiddleware, names=HostNames(settings.api_host, allowed))
     app.add_middleware(HeaderLimitMiddleware, max_bytes=settings.api_max_header_bytes)
     app.add_middleware(RequestIdMiddleware)
     app.add_middleware(MetricsMiddleware, metrics=metrics)

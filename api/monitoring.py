@@ -8,10 +8,7 @@ from typing import Final
 from fastapi import FastAPI, Request, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from api.problems import problem, unauthorized
-from services.monitoring.exposition import REFUSAL, MetricsAccess
 from services.monitoring.metrics import Metrics
-from services.optimizer.errors import StoreUnavailable
 
 METRICS_PATH: Final = "/metrics"
 
@@ -49,22 +46,15 @@ class MetricsMiddleware:
         self._metrics.http_seconds.labels(method, route).observe(seconds)
 
 
-def add_metrics(app: FastAPI, metrics: Metrics, access: MetricsAccess) -> None:
-    """Answer GET /metrics.
+def add_metrics(app: FastAPI, metrics: Metrics) -> None:
+    """Answer GET /metrics to whomever `AccessMiddleware` lets through.
 
     Args:
         app: takes on the route.
         metrics: of this process.
-        access: who may read them.
     """
 
     def answer(request: Request) -> Response:
-        try:
-            allowed = access.allows(request.headers.get("authorization", ""))
-        except StoreUnavailable as error:
-            return problem(request.url.path, "unavailable", str(error))
-        if not allowed:
-            return unauthorized(request.url.path, REFUSAL)
         text, media_type = metrics.exposition(request.headers.get("accept", ""))
         return Response(text, headers={"Content-Type": media_type, "Cache-Control": "no-store"})
 

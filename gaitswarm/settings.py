@@ -161,8 +161,9 @@ class Settings(BaseSettings):
     )
     api_allowed_hosts: Annotated[tuple[HostName, ...], NoDecode, BeforeValidator(_parts)] = Field(
         default=(),
-        description="Names, each with or without port and with commas between, that the server is"
-        " reached by beside its addresses, `localhost`, its host and the machine's name.",
+        description="Names, each with or without port and with commas between, that the server, or"
+        " a runner's port of metrics, is reached by beside its addresses, `localhost`, its host and"
+        " the machine's name.",
     )
     api_max_body_bytes: int = Field(
         default=1 << 20, ge=1, description="Largest request body that is read [B]."

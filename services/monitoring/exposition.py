@@ -12,6 +12,7 @@ from threading import Thread
 from typing import Any, Final
 from wsgiref.simple_server import WSGIRequestHandler, WSGIServer, make_server
 
+from services.monitoring.hosts import HostNames
 from services.monitoring.metrics import Metrics
 from services.optimizer.access import Tokens, secret_digest
 from services.optimizer.errors import EvaluatorUnavailable, StoreUnavailable
@@ -87,6 +88,7 @@ def metrics_server(
     metrics: Metrics,
     access: MetricsAccess,
     *,
+    names: HostNames,
     trouble: Callable[[], str | None],
     host: str,
     port: int,
@@ -96,6 +98,7 @@ def metrics_server(
     Args:
         metrics: What is served, on the path /metrics.
         access: Who may read them.
+        names: That the port goes by; requests for another one are refused.
         trouble: Why this process has to be started anew, None while it works: for /healthz, which
             everybody may ask, and which asks no database.
         host: Address to listen on.
@@ -114,6 +117,9 @@ def metrics_server(
             start(f"{status.value} {status.phrase}", [media_type, *headers])
             return [text.encode()]
 
+        unknown = names.refusal(environ.get("HTTP_HOST"))
+        if unknown is not None:
+            return plain(HTTPStatus.MISDIRECTED_REQUEST, f"{unknown}\n")
         path = environ.get("PATH_INFO")
         if path not in ("/metrics", "/healthz") or environ["REQUEST_METHOD"] != "GET":
             return plain(HTTPStatus.NOT_FOUND, "there are GET /metrics and GET /healthz here\n")

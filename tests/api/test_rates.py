@@ -98,6 +98,22 @@ def test_who_guesses_tokens_is_stopped_before_any_is_looked_up(
     assert client.get("/v1/jobs", headers=known).status_code == 200
 
 
+def test_metrics_are_counted_as_other_requests_are(serve: Serve, store: SqlStore) -> None:
+    client = serve(api_access="token", **SELDOM).client
+    known = {"Authorization": f"Bearer {store.tokens.create('known', Scope.READ)[1]}"}
+    assert client.get("/metrics", headers=known).status_code == 200
+    guesses = [
+        client.get("/metrics", headers={"Authorization": f"Bearer {n}"}).status_code
+        for n in range(4)
+    ]
+    assert guesses == [401, 401, 429, 429]
+    refused = client.get("/metrics")
+    assert refused.status_code == 429 and refused.headers["Retry-After"]
+    # Nor does a Prometheus suffer from others at its address.
+    statuses = [client.get("/metrics", headers=known).status_code for _ in range(4)]
+    assert statuses == [200, 200, 200, 429]
+
+
 def test_probes_are_answered_during_a_flood(serve: Serve) -> None:
     client = serve(api_access="token", **SELDOM).client
     assert {client.get("/v1/jobs").status_code for _ in range(9)} == {401, 429}

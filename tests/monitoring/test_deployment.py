@@ -81,7 +81,8 @@ def test_prometheus_reads_what_docker_compose_opens() -> None:
     )
     command = services[api]["command"]
     assert command[command.index("--port") + 1] == api_port
-    assert services[api]["environment"]["GAITSWARM_API_ALLOWED_HOSTS"] == api
+    for name in (api, runner):
+        assert services[name]["environment"]["GAITSWARM_API_ALLOWED_HOSTS"] == name
     assert services[runner]["environment"]["GAITSWARM_METRICS_PORT"] == runner_port
     assert not is_loopback(services[runner]["environment"]["GAITSWARM_METRICS_HOST"])
     assert f":{runner_port}/healthz" in str(services[runner]["healthcheck"]["test"])

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from unittest.mock import Mock
 
 import httpx2
 import pytest
 
 from gaitswarm.settings import Settings
 from services.monitoring.exposition import MetricsAccess, metrics_server
+from services.monitoring.hosts import HostNames
 from services.monitoring.metrics import Metrics
 from services.optimizer.access import Scope, Token
 from services.optimizer.errors import EvaluatorUnavailable, StoreUnavailable
@@ -101,7 +103,14 @@ def served(
     port: int = 0,
 ) -> None:
     access = MetricsAccess(_Tokens, required=required)  # type: ignore[arg-type]
-    with metrics_server(Metrics(), access, trouble=trouble, host="127.0.0.1", port=port) as url:
+    with metrics_server(
+        Metrics(),
+        access,
+        names=HostNames("127.0.0.1", ["optimizer", "proxy:9000"]),
+        trouble=trouble,
+        host="127.0.0.1",
+        port=port,
+    ) as url:
         check(url)
 
 
@@ -127,6 +136,40 @@ def test_a_port_of_its_own_refuses_whoever_has_no_token_and_stops() -> None:
     served(check, required=True)
     with pytest.raises(httpx2.ConnectError):
         httpx2.get(ended[0])
+
+
+@pytest.mark.parametrize("path", ["/metrics", "/healthz", "/other"])
+def test_a_site_whose_name_is_made_to_resolve_to_a_port_of_its_own_sees_nothing(path: str) -> None:
+    def check(url: str) -> None:
+        def status(host: str) -> int:
+            return httpx2.get(url.replace("/metrics", path), headers={"Host": host}).status_code
+
+        own = 404 if path == "/other" else 200
+        for host in ("localhost:9464", "192.0.2.7", "[::1]:1", "Optimizer:9464", "proxy:9000"):
+            assert status(host) == own
+        for host in ("evil.example:9464", "proxy:9001"):
+            assert status(host) == 421
+
+    served(check)
+
+
+def test_a_known_token_reads_metrics_of_a_server_while_its_database_is_away(
+    store: SqlStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("api.access.REMEMBERED_SECONDS", 0.0)
+    headers = {"Authorization": f"Bearer {store.tokens.create('prometheus', Scope.READ)[1]}"}
+    server = Server(JobService(store), api_access="token")
+    try:
+        assert server.client.get("/metrics", headers=headers).status_code == 200
+        away = Mock(side_effect=StoreUnavailable("the database is away"))
+        monkeypatch.setattr(type(store.tokens), "find", away)
+        assert server.client.get("/metrics", headers=headers).status_code == 200
+        assert server.client.get("/v1/jobs", headers=headers).status_code == 503
+        other = {"Authorization": "Bearer other"}
+        assert server.client.get("/metrics", headers=other).status_code == 503
+        assert away.call_count == 3
+    finally:
+        server.close()
 
 
 def test_a_port_that_is_taken_is_named() -> None:

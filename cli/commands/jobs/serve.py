@@ -279,11 +279,13 @@ def _served(metrics: Metrics | None, settings: Settings, opened: Runtime) -> Ite
         yield None
         return
     from services.monitoring.exposition import MetricsAccess, metrics_server
+    from services.monitoring.hosts import HostNames
 
     access = MetricsAccess(
         lambda: opened.service.store.tokens, required=settings.metrics_need_token
     )
     host, port = settings.metrics_host, settings.metrics_port
+    names = HostNames(host, settings.api_allowed_hosts)
     trouble = opened.runner.trouble if opened.runner is not None else lambda: None
-    with metrics_server(metrics, access, trouble=trouble, host=host, port=port) as url:
+    with metrics_server(metrics, access, names=names, trouble=trouble, host=host, port=port) as url:
         yield url

@@ -8,7 +8,7 @@ import { ChartFrame, LegendEntry } from '../components/chart-frame'
 import { Check } from '../components/check'
 import { Table } from '../components/table'
 import { formatNumber } from '../format/number'
-import { fittedRange } from '../job/convergence-model'
+import { fittedRange } from '../job/overview/convergence-model'
 import { flag, oneOf, RANGE, useQueryValue } from '../router/query-value'
 import { type Axis, type ComparedJob, colourOf, convergences, dashOf, referencesOf } from './series'
 

@@ -5,8 +5,8 @@ import { type Column, Table } from '../components/table'
 import { formatExact, writtenUnit } from '../format/number'
 import { formatExactValue, type Value } from '../format/value'
 import { inWords } from '../format/words'
-import { ofLegGroups, variablesOf } from '../submission/catalogue'
-import type { ResolvedDesign } from '../walk/resolve-design'
+import { ofLegGroups, variablesOf } from '../submission/draft/catalogue'
+import type { ResolvedDesign } from '../walk/design/resolve-design'
 
 interface Row {
   readonly variable: Variable

@@ -1,7 +1,7 @@
 /** What a controller without rules does: its law and its gains. */
 
 import { formatExactValue } from '../format/value'
-import type { ResolvedDesign } from '../walk/resolve-design'
+import type { ResolvedDesign } from '../walk/design/resolve-design'
 
 interface Term {
   readonly gain: string

@@ -8,7 +8,7 @@ import { describeCanvas } from '../export/canvas-source'
 import { quantity, withUnit } from '../format/number'
 import { oneOf, useQueryValue } from '../router/query-value'
 import { useTheme } from '../theme'
-import { CAMERA } from '../walk/view-words'
+import { CAMERA } from '../walk/player/view-words'
 import { type Cell, cells, extent, type Layer, layerData } from './surface'
 import type { SurfaceScene } from './surface-scene'
 

@@ -11,11 +11,11 @@ import { jobPath, withQuery } from '../router/routes'
 import { budgetSpent } from './budget'
 import { caseWords } from './fitness'
 import { type Gain, useGain } from './gain'
-import { JobHeader } from './header'
+import { JobHeader } from './header/header'
 import './job.css'
-import { OverviewPanel } from './overview-panel'
-import { SHARED } from './selection'
-import { type LiveJob, useJob } from './use-job'
+import { SHARED } from './designs/selection'
+import { type LiveJob, useJob } from './live/use-job'
+import { OverviewPanel } from './overview/panel'
 
 // Only the overview's code comes with the page.
 const ActivityPanel = lazyPart('the activity', 'ActivityPanel', () => import('./activity/panel'))
@@ -23,41 +23,41 @@ const AnalysisPanel = lazyPart('the analysis', 'AnalysisPanel', () => import('./
 const CertificatePanel = lazyPart(
   'the certificate',
   'CertificatePanel',
-  () => import('./certificate-panel'),
+  () => import('./certificate/panel'),
 )
-const FirmwarePanel = lazyPart('the firmware', 'FirmwarePanel', () => import('./firmware-panel'))
+const FirmwarePanel = lazyPart('the firmware', 'FirmwarePanel', () => import('./firmware/panel'))
 const IterationPanel = lazyPart(
   'the iteration',
   'IterationPanel',
-  () => import('./iteration-panel'),
+  () => import('./iterations/iteration-panel'),
 )
 const IterationsPanel = lazyPart(
   'the iterations',
   'IterationsPanel',
-  () => import('./iterations-panel'),
+  () => import('./iterations/panel'),
 )
 const ParametersPanel = lazyPart(
   'the parameters',
   'ParametersPanel',
-  () => import('./parameters/parameters-panel'),
+  () => import('./parameters/panel'),
 )
 const PreferencesPanel = lazyPart(
   'the preferences',
   'PreferencesPanel',
-  () => import('./preferences-panel'),
+  () => import('./preferences/panel'),
 )
-const ReproducePanel = lazyPart('the spec', 'ReproducePanel', () => import('./reproduce-panel'))
+const ReproducePanel = lazyPart('the spec', 'ReproducePanel', () => import('./reproduce/panel'))
 const RobustnessPanel = lazyPart(
   'the robustness',
   'RobustnessPanel',
-  () => import('./robustness-panel'),
+  () => import('./robustness/panel'),
 )
 const ScenariosPanel = lazyPart(
   'the scenarios',
   'ScenariosPanel',
-  () => import('./scenarios-panel'),
+  () => import('./scenarios/panel'),
 )
-const TargetsPanel = lazyPart('the targets', 'TargetsPanel', () => import('./targets-panel'))
+const TargetsPanel = lazyPart('the targets', 'TargetsPanel', () => import('./targets/panel'))
 const TradeOffsPanel = lazyPart(
   'the trade-offs',
   'TradeOffsPanel',
@@ -66,7 +66,7 @@ const TradeOffsPanel = lazyPart(
 const VariablesPanel = lazyPart(
   'the variables',
   'VariablesPanel',
-  () => import('./variables-panel'),
+  () => import('./variables/panel'),
 )
 
 const TABS = [

@@ -7,7 +7,7 @@ import { ErrorNotice } from '../components/feedback'
 import { formatCount } from '../format/number'
 import { formatDuration } from '../format/time'
 import { HIGHEST, isPriority, LOWEST, PRIORITY_HELP } from '../job/priority'
-import { TextField } from './text-field'
+import { TextField } from './fields/text-field'
 import { NOTIFY, type Submission } from './use-submission'
 
 export function SubmitPanel({

@@ -4,8 +4,8 @@ import { Table } from '../components/table'
 import { Unit } from '../components/unit'
 import { change, formatNumber, NONE } from '../format/number'
 import { inWords, sentence } from '../format/words'
-import type { Recorded } from './recorded'
-import type { Replay } from './replay'
+import type { Recorded } from './replay/recorded'
+import type { Replay } from './replay/replay'
 
 /** What the objectives of a walk mean (thesis table 4.1). */
 const MEANINGS: Readonly<Record<string, string>> = {

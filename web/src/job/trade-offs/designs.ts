@@ -3,7 +3,7 @@
 import type { Front, ScenarioResult } from '../../api/types'
 import type { Cloud, Mark } from '../../charts/scatter'
 import { placeWord } from '../../format/place'
-import { columnNamed, type Particles } from '../particles'
+import { columnNamed, type Particles } from '../designs/particles'
 import type { Reference } from '../reference'
 
 /** Axes at first: shaking less costs speed. */

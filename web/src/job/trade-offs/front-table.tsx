@@ -6,7 +6,7 @@ import { formatNumber, NONE } from '../../format/number'
 import { type Place, placeWord } from '../../format/place'
 import { inWords } from '../../format/words'
 import { PAGE_NUMBER, useQueryValue } from '../../router/query-value'
-import { Where } from '../selected-designs'
+import { Where } from '../designs/selected-designs'
 import type { PublishedDesign } from './designs'
 
 /** What every design of a front is told by. */

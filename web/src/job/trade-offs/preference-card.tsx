@@ -9,8 +9,8 @@ import { formatCount, formatExact, formatNumber, NONE, percent } from '../../for
 import { type Place, placeWord } from '../../format/place'
 import { inWords } from '../../format/words'
 import { jobPath, withQuery } from '../../router/routes'
+import { Where } from '../designs/selected-designs'
 import { preferenceQuery, weighed } from '../preference'
-import { Where } from '../selected-designs'
 import { ownerWords } from './designs'
 
 export function PreferenceCard({ job, chosen }: { job: Job; chosen: Place | null }) {

@@ -13,9 +13,9 @@ import { type Place, placeWord } from '../../format/place'
 import { capitalized, inWords } from '../../format/words'
 import { setQuery, usePlace } from '../../router/navigation'
 import { flag, useQueryValue } from '../../router/query-value'
-import type { Particles } from '../particles'
+import type { Particles } from '../designs/particles'
+import { selectedRows } from '../designs/selection'
 import { publishedWalks } from '../reference'
-import { selectedRows } from '../selection'
 import {
   allCloud,
   axesOf,

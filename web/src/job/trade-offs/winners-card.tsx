@@ -5,7 +5,7 @@ import { Table } from '../../components/table'
 import { formatCount, percent } from '../../format/number'
 import { type Place, placeWord } from '../../format/place'
 import { capitalized } from '../../format/words'
-import { Where } from '../selected-designs'
+import { Where } from '../designs/selected-designs'
 import { ownerWords } from './designs'
 import { chooseColumn, objectiveColumns } from './front-table'
 

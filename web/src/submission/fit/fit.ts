@@ -2,8 +2,8 @@
 
 import type { FieldError } from '../../api/problem'
 import type { OptimizerPreset } from '../../api/types'
-import { number } from '../build-spec'
-import type { VariableDraft } from '../draft'
+import { number } from '../draft/build-spec'
+import type { VariableDraft } from '../draft/draft'
 import { fittedVariables, type Parameters } from './parameters'
 
 /** Everything as it was typed; the robot is that of the measured walk. */

@@ -3,8 +3,8 @@
 import { post } from '../../api/client'
 import { useResource } from '../../api/resource'
 import type { RobotPreset } from '../../api/types'
-import type { Catalogue } from '../catalogue'
-import type { RobotDraft } from '../draft'
+import type { Catalogue } from '../draft/catalogue'
+import type { RobotDraft } from '../draft/draft'
 
 export type KnownParameters = Pick<RobotPreset, 'parameters' | 'conventions'>
 

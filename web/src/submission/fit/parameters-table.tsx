@@ -2,9 +2,9 @@
 
 import type { Variable } from '../../api/types'
 import { inWords } from '../../format/words'
-import type { FieldErrors } from '../build-spec'
-import type { VariableDraft, VariableMode } from '../draft'
-import { VariableTable } from '../variables-section'
+import type { FieldErrors } from '../draft/build-spec'
+import type { VariableDraft, VariableMode } from '../draft/draft'
+import { VariableTable } from '../sections/variables-section'
 import { allSaid, fittedNames, type Parameters, parameterDrafts } from './parameters'
 
 const MODES: readonly VariableMode[] = ['default', 'searched']

@@ -2,8 +2,8 @@
 
 import type { FieldError } from '../../api/problem'
 import type { Variable } from '../../api/types'
-import { type FieldErrors, number } from '../build-spec'
-import { type VariableDraft, variableDraft } from '../draft'
+import { type FieldErrors, number } from '../draft/build-spec'
+import { type VariableDraft, variableDraft } from '../draft/draft'
 
 export interface Parameters {
   /** All that may be fitted. */

@@ -2,7 +2,7 @@
 
 import type { RecordingView } from '../../api/types'
 import { inWords } from '../../format/words'
-import type { Catalogue } from '../catalogue'
+import type { Catalogue } from '../draft/catalogue'
 import { nextKey, type TargetDraft, walkName } from './targets'
 
 type Change = (targets: readonly TargetDraft[]) => readonly TargetDraft[]

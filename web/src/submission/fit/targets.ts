@@ -1,7 +1,7 @@
 /** What measured walks came to, as targets of a calibration. Pure. */
 
 import type { CalibrationSpec, OptimizerPreset, RecordingView, RobotSource } from '../../api/types'
-import { number } from '../build-spec'
+import { number } from '../draft/build-spec'
 import { type FitDraft, fitOf } from './fit'
 import type { Parameters } from './parameters'
 

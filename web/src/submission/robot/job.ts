@@ -1,9 +1,9 @@
 /** What a robot's own folder says of its jobs: `job.json`, as `gaitswarm robot init` writes it. */
 
 import type { JobSpec } from '../../api/types'
-import { specOf } from '../build-spec'
-import type { Catalogue } from '../catalogue'
-import { type Draft, draftOf } from '../draft'
+import { specOf } from '../draft/build-spec'
+import type { Catalogue } from '../draft/catalogue'
+import { type Draft, draftOf } from '../draft/draft'
 
 /**
  * The draft with what the robot says of scenarios, controller, variables and all else; its name and

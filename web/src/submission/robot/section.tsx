@@ -1,10 +1,10 @@
 /** The robot: as it is, a variant of it, or one's own from its files. */
 
 import { Segmented } from '../../components/segmented'
-import { errorsUnder } from '../build-spec'
-import { emptyDraft, type RobotDraft } from '../draft'
-import { ChoiceField, NumberField, Problems } from '../number-field'
-import type { SectionProps } from '../section'
+import { errorsUnder } from '../draft/build-spec'
+import { emptyDraft, type RobotDraft } from '../draft/draft'
+import { ChoiceField, NumberField, Problems } from '../fields/number-field'
+import type { SectionProps } from '../sections/section'
 import { ofKind } from './job'
 import { OwnRobot } from './own-robot'
 

@@ -2,7 +2,7 @@
 
 import type { JobSpec, Variable } from '../../api/types'
 import type { Design } from '../../format/value'
-import { middle } from '../draft'
+import { middle } from '../draft/draft'
 
 /** What is fixed stays; of a choice the first. known: by name, for whole numbers. */
 export function startDesign(spec: JobSpec, known: readonly Variable[]): Design {

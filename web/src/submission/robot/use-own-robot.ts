@@ -3,8 +3,8 @@
 import { useEffect, useRef, useState } from 'preact/hooks'
 import { post } from '../../api/client'
 import type { RobotCheck, RobotDraftRequest } from '../../api/types'
-import type { Catalogue } from '../catalogue'
-import type { Draft, RobotDraft } from '../draft'
+import type { Catalogue } from '../draft/catalogue'
+import type { Draft, RobotDraft } from '../draft/draft'
 import { robotName, textOf } from './files'
 import { withJob, withRobotJob } from './job'
 

@@ -10,9 +10,9 @@ import {
   Quaternion,
   Vector3,
 } from 'three'
-import { CONTACT_FORCE } from '../contact'
-import { sampleChannel } from '../pose'
-import type { Replay } from '../replay'
+import { CONTACT_FORCE } from '../replay/contact'
+import { sampleChannel } from '../replay/pose'
+import type { Replay } from '../replay/replay'
 import type { Palette } from './palette'
 
 /** Radii, and the length of an arrow's head, in spans of the robot. */

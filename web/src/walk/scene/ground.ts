@@ -9,7 +9,7 @@ import {
   ShadowMaterial,
   Vector2,
 } from 'three'
-import type { Extent } from '../extent'
+import type { Extent } from '../replay/extent'
 import { lyingText } from './label'
 import type { Palette } from './palette'
 

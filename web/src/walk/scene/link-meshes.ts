@@ -14,7 +14,7 @@ import { ColladaLoader } from 'three/examples/jsm/loaders/ColladaLoader.js'
 import { OBJLoader } from 'three/examples/jsm/loaders/OBJLoader.js'
 import { STLLoader } from 'three/examples/jsm/loaders/STLLoader.js'
 import { get } from '../../api/client'
-import type { LinkMesh, ReplayHeader } from '../replay'
+import type { LinkMesh, ReplayHeader } from '../replay/replay'
 import { disposeTree } from './dispose'
 
 export interface LoadedMesh {

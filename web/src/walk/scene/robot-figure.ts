@@ -13,8 +13,8 @@ import {
   SphereGeometry,
 } from 'three'
 import { RoundedBoxGeometry } from 'three/examples/jsm/geometries/RoundedBoxGeometry.js'
-import { POSE, samplePoses } from '../pose'
-import type { Replay, Role, Shape } from '../replay'
+import { POSE, samplePoses } from '../replay/pose'
+import type { Replay, Role, Shape } from '../replay/replay'
 import type { FigurePalette, Palette } from './palette'
 
 /** Parts of one colour. */

@@ -10,7 +10,7 @@ import {
   SpriteMaterial,
   Vector3,
 } from 'three'
-import type { Replay } from '../replay'
+import type { Replay } from '../replay/replay'
 import { proportion, textTexture } from './label'
 
 type Ground = Replay['header']['ground']

@@ -1,7 +1,7 @@
 /** The way that the body came. */
 
 import { BufferAttribute, BufferGeometry, type Color, Line, LineBasicMaterial } from 'three'
-import type { Replay } from '../replay'
+import type { Replay } from '../replay/replay'
 
 export class Trail {
   readonly object: Line<BufferGeometry, LineBasicMaterial>

@@ -9,8 +9,8 @@ import {
   Vector3,
   type WebGLRenderer,
 } from 'three'
-import type { Extent } from '../extent'
-import { hasMeshes, type Replay } from '../replay'
+import type { Extent } from '../replay/extent'
+import { hasMeshes, type Replay } from '../replay/replay'
 import { type CameraPlace, CameraRig, type ViewName } from './camera-rig'
 import { disposeTree } from './dispose'
 import { FootMarks } from './foot-marks'

@@ -1,0 +1,31 @@
+/** A selection over axes as a part of an address: `FI1R:1500:3000,fitness:10:12`. Pure. */
+
+import type { Brushes } from '../../charts/parallel-coordinates'
+import { type Axis, type Brush, placeOf, valueAt } from '../../charts/parallel-model'
+
+/** Axes by value rather than by place, so that a link means the same when bounds have moved. */
+export function brushWords(axes: readonly Axis[], brushes: Brushes): string | null {
+  const words = [...brushes].map(([index, brush]) => {
+    const ends = brush.map((place) => Number(valueAt(axes[index], place).toPrecision(6)))
+    return [axes[index].name, ...ends].join(':')
+  })
+  return words.length === 0 ? null : words.join(',')
+}
+
+/** Axes that are not shown, and what means nothing, are told by `unknown`. */
+export function brushesOf(
+  axes: readonly Axis[],
+  text: string | null,
+): { readonly brushes: Brushes; readonly unknown: readonly string[] } {
+  const brushes = new Map<number, Brush>()
+  const unknown: string[] = []
+  for (const word of (text ?? '').split(',').filter((part) => part !== '')) {
+    const parts = word.split(':')
+    const [high, low] = [parts.pop(), parts.pop()].map((part) => Number(part || Number.NaN))
+    const index = axes.findIndex(({ name }) => name === parts.join(':'))
+    const places = index < 0 ? [Number.NaN] : [low, high].map((v) => placeOf(axes[index], v))
+    if (places.some(Number.isNaN) || places[0] > places[1]) unknown.push(word)
+    else brushes.set(index, places.map((p) => Math.min(1, Math.max(0, p))) as unknown as Brush)
+  }
+  return { brushes, unknown }
+}

@@ -1,0 +1,89 @@
+/** Some designs of a job as a table, each with the way to its walk. */
+
+import type { Job } from '../../api/types'
+import { type Column, Table } from '../../components/table'
+import { placeWord } from '../../format/place'
+import { formatValue, named } from '../../format/value'
+import { inWords } from '../../format/words'
+import { PAGE_NUMBER, useQueryValue } from '../../router/query-value'
+import { jobPath, withQuery } from '../../router/routes'
+import { caseWords } from '../fitness'
+import { columnNamed, type ParticleColumn, type Particles } from './particles'
+
+const DIGITS: Readonly<Record<string, number>> = { integer: 1, continuous: 4 }
+
+export function SelectedDesigns({
+  job,
+  particles,
+  rows,
+  marked = null,
+}: {
+  job: Job
+  particles: Particles
+  /** Rows of `particles`, in the order wanted. */
+  rows: readonly number[]
+  /** Row that stands out. */
+  marked?: number | null
+}) {
+  const iteration = columnNamed(particles, 'iteration')!.values
+  const particle = columnNamed(particles, 'particle')!.values
+  const numbers = particles.columns.filter(({ kind }) => kind !== 'index')
+  const paging = useQueryValue('page', PAGE_NUMBER, 0)
+  return (
+    <Table
+      caption="Designs"
+      rows={rows}
+      rowKey={(row) => `${iteration[row]} ${particle[row]}`}
+      paging={paging}
+      order={{ column: 'fitness', descending: false }}
+      rowData={(row) => ({ 'data-marked': String(row === marked) })}
+      columns={[
+        {
+          key: 'design',
+          label: 'Design',
+          header: true,
+          value: (row) => iteration[row] * 1e5 + particle[row],
+          cell: (row) => <Where job={job} iteration={iteration[row]} particle={particle[row]} />,
+        },
+        ...numbers.map(
+          (column): Column<number> => ({
+            key: column.name,
+            label: labelOf(column, job),
+            unit: column.unit,
+            numeric: column.kind !== 'categorical',
+            value: (row) => (Number.isNaN(column.values[row]) ? null : column.values[row]),
+            cell: (row) =>
+              formatValue(named(column.values[row], column.choices), DIGITS[column.kind] ?? 5),
+          }),
+        ),
+      ]}
+    />
+  )
+}
+
+/** Place of a design, leading to its walk; where nothing walks, to its iteration. */
+export function Where({
+  job,
+  iteration,
+  particle,
+}: {
+  job: Job
+  iteration: number
+  particle: number
+}) {
+  const scenario = job.scenarios[0]
+  const target =
+    job.kind === 'tuning'
+      ? withQuery('/walk', { job: job.id, iteration, particle, scenario })
+      : jobPath(job.id, `iterations/${iteration}`)
+  return (
+    <a href={target} class="nowrap">
+      design {placeWord({ iteration, particle })}
+    </a>
+  )
+}
+
+function labelOf({ name, kind }: ParticleColumn, job: Job): string {
+  if (kind === 'utility') return name.replace(/^utility:/, `${caseWords(job.kind).worth} `)
+  return kind === 'objective' ? inWords(name.replace(/^objective:/, '')) : name
+}

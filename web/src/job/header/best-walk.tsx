@@ -1,0 +1,30 @@
+/** The best design of a job, walking in the first of its scenarios. */
+
+import type { Job } from '../../api/types'
+import { resolveDesign } from '../../walk/design/resolve-design'
+import { RATE, WalkStage } from '../../walk/player/walk-stage'
+import { recordWalk } from '../../walk/replay/recorded'
+
+export default function BestWalk({
+  job,
+  best,
+  visible,
+}: {
+  job: Job
+  /** Iteration of the best design that is to be seen. */
+  best: number
+  visible: boolean
+}) {
+  const record = async (signal: AbortSignal) => {
+    const design = await resolveDesign({ kind: 'best', job: job.id }, signal)
+    return recordWalk(design, design.scenarios[0] ?? 'normal-fast', RATE, signal)
+  }
+  return (
+    <WalkStage
+      name={`walk ${job.id} ${best}`}
+      record={record}
+      label="The best design walking"
+      visible={visible}
+    />
+  )
+}

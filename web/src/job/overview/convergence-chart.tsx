@@ -1,0 +1,216 @@
+/** Best, median and quantiles of fitness over the iterations. */
+
+import { useCallback, useMemo, useRef } from 'preact/hooks'
+import type uPlot from 'uplot'
+import { getBytes } from '../../api/client'
+import { useResource, useSlowly } from '../../api/resource'
+import type { Iteration, Job } from '../../api/types'
+import { type Band, LineChart, type Series } from '../../charts/line-chart'
+import { lineLabel, type ReferenceLine } from '../../charts/reference-line'
+import { ChartFrame, LegendEntry } from '../../components/chart-frame'
+import { Check } from '../../components/check'
+import { formatCount, formatNumber, withUnit } from '../../format/number'
+import { flag, RANGE, useQueryValue } from '../../router/query-value'
+import { ByIteration } from '../by-iteration'
+import { decodeParticles } from '../designs/particles'
+import { fitnessUnit } from '../fitness'
+import {
+  type Dots,
+  dotsOf,
+  fittedRange,
+  iterationsAbove,
+  type Line,
+  MOST_DOTS,
+} from './convergence-model'
+import { type Painted, paintDots, paintOver } from './convergence-painter'
+import type { Distribution } from './use-distribution'
+
+/** How often the single designs of a running job are asked for again [ms]. */
+const RENEW_MS = 8000
+
+export function ConvergenceChart({
+  job,
+  iterations,
+  distribution,
+  reference,
+}: {
+  job: Job
+  iterations: readonly Iteration[]
+  distribution: Distribution
+  /** What the best is measured against. */
+  reference: ReferenceLine | null
+}) {
+  const [logarithmic, setLogarithmic] = useQueryValue('log', flag(true), true)
+  const [zoom, setZoom] = useQueryValue('zoom', RANGE, null)
+  const [single, setSingle] = useQueryValue('dots', flag(false), false)
+  const dots = useDots(job, iterations.length, single)
+  const drawn = useMemo(() => content(iterations, distribution), [iterations, distribution])
+  const unit = fitnessUnit(job)
+  const best = iterations.at(-1)?.best_so_far ?? null
+  const { range, painted } = useMemo(() => {
+    const [bests, medians] = drawn.series.slice(-2).map(({ values }) => values)
+    const range = fittedRange([bests, medians], reference ? [reference.fitness] : [], logarithmic)
+    const highest = drawn.bands.length > 0 ? drawn.series[0].values : null
+    return { range, painted: paintedOf({ drawn, best, dots, range, highest, reference }) }
+  }, [drawn, dots, reference, logarithmic, best])
+  const paint = useCallback((plot: uPlot) => paintDots(plot, painted), [painted])
+  const over = useCallback((plot: uPlot) => paintOver(plot, painted), [painted])
+  return (
+    <ChartFrame
+      title="Convergence"
+      note="Fitness over the iterations; less is better. Drag to zoom, double-click to see all."
+      tools={
+        <>
+          <Check label="single designs" checked={single} onChange={setSingle} />
+          <Check label="logarithmic" checked={logarithmic} onChange={setLogarithmic} />
+        </>
+      }
+      legend={
+        <>
+          <LegendEntry colour="--series-1" label="best so far" />
+          <LegendEntry colour="--series-2" label="median" />
+          {drawn.bands.length > 0 && (
+            <>
+              <LegendEntry colour="--fan-inner" label="25 % to 75 % of the designs" area />
+              <LegendEntry colour="--fan-outer" label="5 % to 95 %" area />
+            </>
+          )}
+          {dots && <span data-dots={dots.fitness.length}>{dotsInWords(dots)}</span>}
+          {painted.above.size > 0 && (
+            <span data-above={painted.above.size}>▴ worse designs lie above what is shown</span>
+          )}
+        </>
+      }
+      table={() => <IterationTable iterations={iterations} unit={unit} />}
+    >
+      <LineChart
+        label={describe(iterations.length, best, painted)}
+        x={drawn.x}
+        xLabel="iteration"
+        counted
+        yLabel="fitness"
+        yUnit={unit}
+        series={drawn.series}
+        bands={drawn.bands}
+        logarithmic={logarithmic}
+        zoom={zoom}
+        onZoom={setZoom}
+        yRange={range}
+        paint={paint}
+        paintOver={over}
+        height={320}
+      />
+    </ChartFrame>
+  )
+}
+
+function describe(iterations: number, best: number | null, { reference }: Painted): string {
+  const beside = reference ? `, ${lineLabel(reference)}` : ''
+  return `Convergence over ${iterations} iterations; best fitness ${formatNumber(best)}${beside}`
+}
+
+function dotsInWords({ fitness, total }: Dots): string {
+  const drawn = formatCount(fitness.length)
+  return fitness.length < total
+    ? `dots: ${drawn} of ${formatCount(total)} designs`
+    : `dots: ${drawn} designs`
+}
+
+/** Single designs, asked for when they are wanted, of a job under way now and then. */
+function useDots(job: Job, committed: number, wanted: boolean): Dots | null {
+  const renewed = useSlowly(committed, RENEW_MS)
+  const found = useResource(wanted ? `dots ${job.id} ${renewed}` : null, (signal) =>
+    getBytes('/v1/jobs/{job_id}/particles', {
+      path: { job_id: job.id },
+      query: { max_points: MOST_DOTS },
+      signal,
+    }).then((bytes) => dotsOf(decodeParticles(bytes))),
+  )
+  const shown = useRef<Dots | null>(null)
+  if (found.data) shown.current = found.data
+  return wanted ? shown.current : null
+}
+
+function paintedOf({
+  drawn,
+  best,
+  dots,
+  range,
+  highest,
+  reference,
+}: {
+  drawn: { readonly x: readonly number[] }
+  best: number | null
+  dots: Dots | null
+  range: readonly [number, number] | null
+  /** Of the spread that is drawn. */
+  highest: Line | null
+  reference: ReferenceLine | null
+}): Painted {
+  const last = drawn.x.at(-1)
+  return {
+    dots,
+    reference,
+    end:
+      best === null || last === undefined
+        ? null
+        : { x: last, y: best, label: `best ${formatNumber(best)}` },
+    above: iterationsAbove(range, drawn.x, highest, dots),
+  }
+}
+
+function content(iterations: readonly Iteration[], { quantiles, items }: Distribution) {
+  const x = iterations.map((i) => i.index)
+  const lines: Series[] = [
+    {
+      label: 'best so far',
+      values: iterations.map((i) => i.best_so_far),
+      colour: '--series-1',
+      width: 2.2,
+    },
+    { label: 'median', values: iterations.map((i) => i.median), colour: '--series-2' },
+  ]
+  const edge = (share: number): Series => {
+    const column = quantiles.indexOf(share)
+    const byIndex = new Map(items.map((item) => [item.index, item.fitness[column]]))
+    return {
+      label: `${share * 100} %`,
+      values: iterations.map((i) => byIndex.get(i.index) ?? null),
+      colour: '--series-1',
+      width: 0,
+    }
+  }
+  if (![0.05, 0.25, 0.75, 0.95].every((share) => quantiles.includes(share))) {
+    return { x, series: lines, bands: [] }
+  }
+  const edges = [edge(0.95), edge(0.75), edge(0.25), edge(0.05)]
+  const bands: Band[] = [
+    { upper: 0, lower: 3, colour: '--series-1', opacity: 0.13 },
+    { upper: 1, lower: 2, colour: '--series-1', opacity: 0.22 },
+  ]
+  return { x, series: [...edges, ...lines], bands }
+}
+
+function IterationTable({ iterations, unit }: { iterations: readonly Iteration[]; unit: string }) {
+  const fitness = (key: 'best_so_far' | 'best' | 'median' | 'mean' | 'worst', label: string) => ({
+    key,
+    label,
+    unit,
+    numeric: true,
+    value: (i: Iteration) => i[key],
+    cell: (i: Iteration) => formatNumber(i[key], 5),
+  })
+  return (
+    <ByIteration
+      caption={withUnit('Fitness by iteration', unit)}
+      rows={iterations}
+      columns={[
+        fitness('best_so_far', 'Best so far'),
+        fitness('best', 'Best'),
+        fitness('median', 'Median'),
+        fitness('mean', 'Mean'),
+        fitness('worst', 'Worst'),
+      ]}
+    />
+  )
+}

@@ -1,0 +1,117 @@
+/** The distribution of fitness, iteration by iteration (fig. 4.6 of the thesis). */
+
+import { useMemo } from 'preact/hooks'
+import type uPlot from 'uplot'
+import type { DistributionItem, Iteration, Job } from '../../api/types'
+import { withAlpha } from '../../charts/line-chart'
+import { LinkedChart } from '../../charts/linked-chart'
+import { ChartFrame, LegendEntry } from '../../components/chart-frame'
+import { formatNumber, percent } from '../../format/number'
+import { themeColour } from '../../theme'
+import { ByIteration } from '../by-iteration'
+import { fitnessUnit } from '../fitness'
+import { grouped, type Strip } from './grouped'
+import type { Distribution } from './use-distribution'
+
+/** More could not be told apart on a common screen. */
+const MOST_STRIPS = 250
+
+export function DistributionChart({
+  job,
+  iterations,
+  distribution,
+}: {
+  job: Job
+  iterations: readonly Iteration[]
+  distribution: Distribution
+}) {
+  const { quantiles, items } = distribution
+  const unit = fitnessUnit(job)
+  const drawn = useMemo(() => {
+    const strips = grouped(items, MOST_STRIPS)
+    const at = (share: number) => strips.map((strip) => strip.fitness[quantiles.indexOf(share)])
+    return {
+      strips,
+      x: strips.map((strip) => strip.middle),
+      series: [
+        { label: 'worst', values: at(1), colour: '--series-6', width: 0 },
+        { label: 'median', values: at(0.5), colour: '--series-2', width: 1.5 },
+        { label: 'best', values: at(0), colour: '--series-1', width: 0 },
+      ] as const,
+    }
+  }, [items, quantiles])
+  const last = iterations.at(-1)
+  return (
+    <ChartFrame
+      title="Distribution of fitness"
+      note="Every iteration is a strip; the darker, the more of the designs have that fitness."
+      legend={
+        <>
+          <LegendEntry colour="--series-2" label="median" />
+          <LegendEntry colour="--series-1" label="density of the designs" area />
+          <span>
+            {last?.failed ?? 0} of {last?.designs ?? 0} failed in the last iteration
+          </span>
+        </>
+      }
+      table={() => (
+        <ByIteration
+          caption="Quantiles of fitness by iteration"
+          rows={items}
+          columns={[
+            ...quantiles.map((share, column) => ({
+              key: String(share),
+              label: share === 0 ? 'best' : share === 1 ? 'worst' : percent(share, 2),
+              unit,
+              numeric: true,
+              value: (item: DistributionItem) => item.fitness[column],
+              cell: (item: DistributionItem) => formatNumber(item.fitness[column], 5),
+            })),
+            { key: 'failed', label: 'Failed', numeric: true, value: (i) => i.failed },
+          ]}
+        />
+      )}
+    >
+      <LinkedChart
+        zoomName="zoom-distribution"
+        label={`Distribution of fitness over ${items.length} iterations`}
+        x={drawn.x}
+        xLabel="iteration"
+        counted
+        yLabel="fitness"
+        yUnit={unit}
+        series={drawn.series}
+        logarithmic
+        xMargin={0.5}
+        paint={(plot) => paintStrips(plot, quantiles, drawn.strips)}
+      />
+    </ChartFrame>
+  )
+}
+
+/** Between two quantiles lies a known share of the designs: the closer they are, the darker. */
+function paintStrips(plot: uPlot, quantiles: readonly number[], strips: readonly Strip[]): void {
+  const { ctx, bbox } = plot
+  const colour = themeColour('--series-1')
+  const pixel = devicePixelRatio
+  ctx.save()
+  ctx.beginPath()
+  ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height)
+  ctx.clip()
+  for (const strip of strips) {
+    const left = plot.valToPos(strip.from - 0.5, 'x', true)
+    const right = plot.valToPos(strip.to + 0.5, 'x', true)
+    const gap = right - left > 6 * pixel ? pixel : 0
+    for (let q = 0; q + 1 < quantiles.length; q++) {
+      const [low, high] = [strip.fitness[q], strip.fitness[q + 1]]
+      if (low === null || high === null || low <= 0) continue
+      const bottom = plot.valToPos(low, 'y', true)
+      const top = plot.valToPos(high, 'y', true)
+      const tall = Math.max(bottom - top, pixel)
+      const density = (quantiles[q + 1] - quantiles[q]) / (tall / bbox.height)
+      ctx.fillStyle = withAlpha(colour, 0.1 + 0.8 * (1 - Math.exp(-density / 4)))
+      ctx.fillRect(left + gap, bottom - tall, right - left - gap, tall)
+    }
+  }
+  ctx.restore()
+}

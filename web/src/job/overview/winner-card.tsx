@@ -1,0 +1,132 @@
+/** The winner: each variable's value, and where in its bounds it lies. */
+
+import type { Job } from '../../api/types'
+import { BrokenName } from '../../components/broken-name'
+import { ChartFrame } from '../../components/chart-frame'
+import { Table } from '../../components/table'
+import { formatExact, percent } from '../../format/number'
+import { placeWord } from '../../format/place'
+import { exactValueQuantity } from '../../format/value'
+import { withQuery } from '../../router/routes'
+import { searchedVariables } from '../designs/variables'
+import { type Placed, placed } from './winner-model'
+
+export function WinnerCard({ job }: { job: Job }) {
+  const best = job.best!
+  const rows = placed(best.design, searchedVariables(job.spec))
+  const held = rows.filter(({ at }) => at !== null)
+  const place = { job: job.id, iteration: best.iteration, particle: best.particle }
+  return (
+    <ChartFrame
+      title="The winner"
+      note={`Design ${placeWord(best)}. Each bar is the range that was searched.${
+        held.length > 0 ? ` At a bound: ${held.map(({ name }) => name).join(', ')}.` : ''
+      }`}
+      tools={
+        job.kind === 'tuning' && (
+          <>
+            <a class="button compact" href={withQuery('/walk', place)}>
+              See it walk
+            </a>
+            <a class="button compact" href={withQuery('/controller', place)}>
+              Its controller
+            </a>
+          </>
+        )
+      }
+      table={() => <WinnerTable rows={rows} />}
+    >
+      <dl class="design" data-held={held.map(({ name }) => name).join(' ')}>
+        {rows.map((row) => (
+          <div key={row.name}>
+            <dt>
+              <BrokenName name={row.name} />
+            </dt>
+            <dd>{exactValueQuantity(row.value, row.unit)}</dd>
+            <dd class="in-bounds">
+              {row.share === null ? <Unplaced row={row} /> : <RangeBar row={row} />}
+            </dd>
+          </div>
+        ))}
+      </dl>
+    </ChartFrame>
+  )
+}
+
+function Unplaced({ row }: { row: Placed }) {
+  return <span class="muted small">{row.fixed ? 'held fixed' : 'chosen among names'}</span>
+}
+
+function RangeBar({ row }: { row: Placed }) {
+  return (
+    <>
+      <div class="range-bar" role="img" aria-label={inWords(row)} data-at={row.at ?? undefined}>
+        <i style={{ width: `${100 * row.share!}%` }} />
+        <b style={{ left: `${100 * row.share!}%` }} />
+      </div>
+      <span class="range-ends muted small" aria-hidden="true">
+        <span>{formatExact(row.low, 4)}</span>
+        {row.at !== null && <strong>at its bound</strong>}
+        <span>{formatExact(row.high, 4)}</span>
+      </span>
+    </>
+  )
+}
+
+function inWords({ low, high, share, at }: Placed): string {
+  const range = `of the range from ${formatExact(low)} to ${formatExact(high)}`
+  return `at ${percent(share, 3)} ${range}${at === null ? '' : `, its ${at === 'low' ? 'lower' : 'upper'} bound`}`
+}
+
+function WinnerTable({ rows }: { rows: readonly Placed[] }) {
+  return (
+    <Table
+      caption="The winner in its bounds"
+      rows={rows}
+      rowKey={({ name }) => name}
+      pageSize={60}
+      columns={[
+        {
+          key: 'name',
+          label: 'Variable',
+          header: true,
+          value: ({ name }) => name,
+          cell: ({ name }) => <BrokenName name={name} />,
+        },
+        {
+          key: 'value',
+          label: 'Value',
+          numeric: true,
+          value: ({ value }) => value,
+          cell: ({ value, unit }) => exactValueQuantity(value, unit),
+        },
+        {
+          key: 'low',
+          label: 'From',
+          numeric: true,
+          value: ({ low }) => low,
+          cell: ({ low }) => formatExact(low),
+        },
+        {
+          key: 'high',
+          label: 'To',
+          numeric: true,
+          value: ({ high }) => high,
+          cell: ({ high }) => formatExact(high),
+        },
+        {
+          key: 'share',
+          label: 'Place in the range',
+          numeric: true,
+          value: ({ share }) => share,
+          cell: ({ share }) => percent(share, 3),
+        },
+        {
+          key: 'at',
+          label: 'Bound',
+          value: ({ at, fixed }) => (fixed ? 'held fixed' : (at ?? '–')),
+        },
+      ]}
+    />
+  )
+}

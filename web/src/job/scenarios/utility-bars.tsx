@@ -1,0 +1,83 @@
+/** Utilities of the winner by scenario as bars, beside those of a reference. */
+
+import type { ComponentChildren } from 'preact'
+import { ChartFrame, LegendEntry } from '../../components/chart-frame'
+import { quantity } from '../../format/number'
+import { capitalized } from '../../format/words'
+import type { CaseWords } from '../fitness'
+
+interface Bar {
+  readonly name: string
+  readonly own: number | null
+  readonly other: number | null
+}
+
+export function UtilityBars({
+  rows,
+  unit,
+  words,
+  label,
+  table,
+}: {
+  rows: readonly Bar[]
+  unit: string
+  words: CaseWords
+  /** Name of the reference; null if there is none. */
+  label: string | null
+  table: () => ComponentChildren
+}) {
+  const most = Math.max(...rows.flatMap((row) => [row.own ?? 0, row.other ?? 0]), 1e-12)
+  return (
+    <ChartFrame
+      title={`${capitalized(words.worth)} by ${words.one}`}
+      note={`${words.bars}; less is better. The longest bar is the ${words.one} that limits the winner.`}
+      legend={
+        <>
+          <LegendEntry colour="--series-1" label="winner" area />
+          {label !== null && <LegendEntry colour="--series-6" label={label} area />}
+        </>
+      }
+      table={table}
+    >
+      <ul class="bars">
+        {rows.map((row) => (
+          <li key={row.name}>
+            <span class="bar-name">{row.name}</span>
+            <span class="bar-lines">
+              <BarLine value={row.own} most={most} unit={unit} colour="--series-1" />
+              {label !== null && (
+                <BarLine value={row.other} most={most} unit={unit} colour="--series-6" />
+              )}
+            </span>
+          </li>
+        ))}
+      </ul>
+    </ChartFrame>
+  )
+}
+
+function BarLine({
+  value,
+  most,
+  unit,
+  colour,
+}: {
+  value: number | null
+  most: number
+  unit: string
+  colour: string
+}) {
+  const width = value === null ? 0 : (value / most) * 100
+  return (
+    <span class="bar">
+      <span class="bar-track">
+        <i
+          class="bar-fill"
+          style={{ width: `${width}%`, background: `var(${colour})` }}
+          aria-hidden="true"
+        />
+      </span>
+      <span class="bar-value">{value === null ? 'not walked' : quantity(value, unit)}</span>
+    </span>
+  )
+}

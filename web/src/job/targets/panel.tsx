@@ -1,0 +1,181 @@
+/** How near the best design of a calibration comes to its targets. */
+
+import { get } from '../../api/client'
+import { usePolling, useResource } from '../../api/resource'
+import type { Job, TargetResult, Targets } from '../../api/types'
+import { Empty, ErrorNotice, Loading } from '../../components/feedback'
+import { type Column, Table } from '../../components/table'
+import { change, formatExact, formatNumber, percent, quantity } from '../../format/number'
+import { placeWord } from '../../format/place'
+import { inWords } from '../../format/words'
+import { setQuery, usePlace } from '../../router/navigation'
+import { isWithin, LEFT_OUT, type LeaveOut, leaveOutOf, withinCount } from './targets'
+
+/** How often the targets of a job that runs are asked for again [ms]. */
+const RENEW_MS = 15_000
+
+export function TargetsPanel({ job }: { job: Job }) {
+  if (!job.best) {
+    return (
+      <section class="card">
+        <Empty title="Nothing to compare yet">
+          <p>No design has walked every walk so far. The first one that does appears here.</p>
+        </Empty>
+      </section>
+    )
+  }
+  return <Compared job={job} />
+}
+
+function Compared({ job }: { job: Job }) {
+  const leaveOut = leaveOutOf(usePlace().query)
+  const found = useResource(`${job.id} ${leaveOut}`, (signal) =>
+    get('/v1/jobs/{job_id}/targets', {
+      path: { job_id: job.id },
+      query: leaveOut === null ? {} : { leave_out: leaveOut },
+      signal,
+    }),
+  )
+  usePolling(found.reload, RENEW_MS, job.state === 'running' || job.state === 'pausing')
+  return (
+    <section class="card" aria-labelledby="targets">
+      <header class="row spread">
+        <h2 id="targets">Targets</h2>
+        <LeaveOutPicker chosen={leaveOut} />
+      </header>
+      {found.error && (
+        <ErrorNotice what="The targets cannot be shown." error={found.error} retry={found.reload} />
+      )}
+      {found.loading && !found.data && <Loading what="the targets" />}
+      {found.data && <TargetsTable found={found.data} predicts={leaveOut !== null} />}
+    </section>
+  )
+}
+
+function LeaveOutPicker({ chosen }: { chosen: LeaveOut | null }) {
+  return (
+    <label class="row">
+      <span class="label">Predict each target without</span>
+      <select
+        value={chosen ?? ''}
+        onChange={(event) => setQuery({ leave_out: event.currentTarget.value || null })}
+      >
+        <option value="">nothing: compare only</option>
+        {LEFT_OUT.map(({ what, words }) => (
+          <option key={what} value={what}>
+            {words}
+          </option>
+        ))}
+      </select>
+    </label>
+  )
+}
+
+function TargetsTable({ found, predicts }: { found: Targets; predicts: boolean }) {
+  const { within, fitted } = withinCount(found)
+  return (
+    <>
+      <p data-within={within} data-fitted={fitted}>
+        The best design, {placeWord(found)}, meets{' '}
+        <strong>
+          {within} of {fitted}
+        </strong>{' '}
+        fitted targets within their tolerance. Its misfit, the root mean square over them, is{' '}
+        {formatNumber(found.fitness)} tolerances.
+      </p>
+      <Table
+        caption="Targets and what the best design comes to"
+        rows={found.targets}
+        rowKey={({ walk, relative_to, quantity }) => `${walk} ${relative_to} ${quantity}`}
+        columns={columns(predicts)}
+        rowData={({ walk, quantity, use }) => ({
+          'data-target': `${walk} ${quantity}`,
+          'data-use': use,
+        })}
+        pageSize={60}
+      />
+      {predicts && (
+        <p class="muted small table-note">
+          Left out: what the design comes to that is best without that target, among all that were
+          tried. Nothing is simulated anew.
+        </p>
+      )}
+    </>
+  )
+}
+
+function columns(predicts: boolean): readonly Column<TargetResult>[] {
+  return [
+    {
+      key: 'walk',
+      label: 'Walk',
+      header: true,
+      value: ({ walk }) => walk,
+      cell: ({ walk, relative_to }) => (relative_to ? `${walk} / ${relative_to}` : walk),
+    },
+    {
+      key: 'quantity',
+      label: 'Quantity',
+      value: (t) => t.quantity,
+      cell: (t) => inWords(t.quantity),
+    },
+    {
+      key: 'value',
+      label: 'Target',
+      numeric: true,
+      cell: (t) => quantity(t.value, t.unit),
+    },
+    {
+      key: 'tolerance',
+      label: 'Tolerance',
+      numeric: true,
+      minor: true,
+      cell: (t) =>
+        t.quantity === 'height_loss' ? `${formatExact(t.tolerance)} m` : percent(t.tolerance, 2),
+    },
+    {
+      key: 'simulated',
+      label: 'Simulated',
+      numeric: true,
+      cell: (t) => quantity(t.simulated, t.unit),
+    },
+    {
+      key: 'off',
+      label: 'Off, in tolerances',
+      numeric: true,
+      value: (t) => (t.difference === null ? null : Math.abs(t.difference)),
+      cell: (t) => <Off difference={t.difference} />,
+    },
+    ...(predicts
+      ? ([
+          {
+            key: 'left-out',
+            label: 'Left out',
+            numeric: true,
+            cell: (t) => quantity(t.left_out?.simulated, t.unit),
+          },
+          {
+            key: 'left-out-off',
+            label: 'Off then',
+            numeric: true,
+            cell: (t) => <Off difference={t.left_out?.difference ?? null} />,
+          },
+        ] satisfies Column<TargetResult>[])
+      : []),
+    {
+      key: 'use',
+      label: 'Use',
+      value: ({ use }) => use,
+      cell: ({ use }) => (use === 'fit' ? 'fitted' : 'predicted'),
+    },
+  ]
+}
+
+function Off({ difference }: { difference: number | null }) {
+  if (difference === null) return <>–</>
+  return (
+    <span class="off" data-within={isWithin(difference)}>
+      {change(difference)}
+    </span>
+  )
+}

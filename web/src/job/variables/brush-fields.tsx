@@ -1,0 +1,91 @@
+/** The same selection by numbers, for keyboards and for exact bounds. */
+
+import { type Brushes, withBrush } from '../../charts/parallel-coordinates'
+import { type Axis, type ParallelModel, placeOf, valueAt } from '../../charts/parallel-model'
+import { BrokenName } from '../../components/broken-name'
+import { NumberField } from '../../components/number-field'
+import { Unit } from '../../components/unit'
+import { inWords } from '../../format/words'
+
+export function BrushFields({
+  model,
+  brushes,
+  onBrush,
+}: {
+  model: ParallelModel
+  brushes: Brushes
+  onBrush: (brushes: Brushes) => void
+}) {
+  return (
+    <details class="brush-fields">
+      <summary>Select by numbers</summary>
+      <div class="brush-grid">
+        {model.axes.map((axis, index) => {
+          const [low, high] = brushes.get(index) ?? [0, 1]
+          const change = (end: 'low' | 'high', text: string) => {
+            const place = text === '' ? (end === 'low' ? 0 : 1) : placeOf(axis, Number(text))
+            if (Number.isNaN(place)) return
+            // Bounds in the wrong order are those of the same stretch.
+            const ends = end === 'low' ? [place, high] : [low, place]
+            const brush = [Math.min(...ends), Math.max(...ends)] as const
+            const whole = brush[0] <= 0 && brush[1] >= 1
+            onBrush(withBrush(brushes, index, whole ? null : brush))
+          }
+          return (
+            <fieldset key={axis.name}>
+              <legend>
+                <BrokenName name={axis.name} />
+                <Unit unit={axis.unit} />
+              </legend>
+              <Bound axis={axis} name="from" place={low} onChange={(text) => change('low', text)} />
+              <Bound axis={axis} name="to" place={high} onChange={(text) => change('high', text)} />
+            </fieldset>
+          )
+        })}
+      </div>
+    </details>
+  )
+}
+
+function Bound({
+  axis,
+  name,
+  place,
+  onChange,
+}: {
+  axis: Axis
+  name: 'from' | 'to'
+  place: number
+  onChange: (text: string) => void
+}) {
+  const label = `${axis.name} ${name}`
+  if (axis.choices.length > 0) {
+    return (
+      <label class="row small">
+        {name}
+        <select
+          aria-label={label}
+          value={Math.round(valueAt(axis, place))}
+          onChange={(event) => onChange(event.currentTarget.value)}
+        >
+          {axis.choices.map((choice, index) => (
+            <option key={choice} value={index}>
+              {inWords(choice)}
+            </option>
+          ))}
+        </select>
+      </label>
+    )
+  }
+  return (
+    <div class="row small">
+      {name}
+      <NumberField
+        label={label}
+        value={Number(valueAt(axis, place).toPrecision(4))}
+        narrow
+        onChange={onChange}
+      />
+    </div>
+  )
+}

@@ -1,0 +1,206 @@
+/** All designs of a job across their variables, coloured by fitness; brushing selects some. */
+
+import { useMemo, useRef, useState } from 'preact/hooks'
+import { getBytes } from '../../api/client'
+import { useResource, useSlowly } from '../../api/resource'
+import type { Job } from '../../api/types'
+import { type Brushes, ParallelCoordinates } from '../../charts/parallel-coordinates'
+import { bestRows, buildModel, type ParallelModel, selectRows } from '../../charts/parallel-model'
+import { ChartFrame, LegendEntry } from '../../components/chart-frame'
+import { Empty, ErrorNotice, Loading } from '../../components/feedback'
+import { formatCount } from '../../format/number'
+import { type Place, placeOf, placeWord } from '../../format/place'
+import { ignore } from '../../router/ignored'
+import { type Codec, flag, useDelayedQuery, useQueryValue } from '../../router/query-value'
+import { brushesOf, brushWords } from '../designs/brush-words'
+import { columnNamed, decodeParticles, type Particles, particlesTable } from '../designs/particles'
+import { SelectedDesigns } from '../designs/selected-designs'
+import { axesOf } from '../designs/selection'
+import { caseWords } from '../fitness'
+import { BrushFields } from './brush-fields'
+import { PairCard } from './pair-card'
+
+const NONE: Brushes = new Map()
+/** How often a running job's designs are asked for again [ms]. */
+const RENEW_MS = 8000
+
+export function VariablesPanel({ job }: { job: Job }) {
+  const wanted = useSlowly(job.iterations, RENEW_MS)
+  const particles = useResource(`${job.id} ${wanted}`, (signal) =>
+    getBytes('/v1/jobs/{job_id}/particles', {
+      path: { job_id: job.id },
+      query: { objectives: job.kind === 'tuning' },
+      signal,
+    }).then(decodeParticles),
+  )
+  // While newer ones are on their way, those before stay to be looked at.
+  const shown = useRef<Particles | null>(null)
+  if (particles.data) shown.current = particles.data
+  if (particles.error && !shown.current) {
+    return (
+      <ErrorNotice
+        what="The designs cannot be shown."
+        error={particles.error}
+        retry={particles.reload}
+      />
+    )
+  }
+  if (!shown.current) return <Loading what="all designs" />
+  if (shown.current.rows === 0) {
+    return (
+      <section class="card">
+        <Empty title="No designs yet">
+          <p>They appear here with the first committed iteration.</p>
+        </Empty>
+      </section>
+    )
+  }
+  return <Designs job={job} particles={shown.current} />
+}
+
+function Designs({ job, particles }: { job: Job; particles: Particles }) {
+  const words = caseWords(job.kind)
+  const [utilities, setUtilities] = useQueryValue('utilities', flag(false), false)
+  const [objectives, setObjectives] = useQueryValue('objectives', flag(false), false)
+  const [chosen, setChosen] = useQueryValue('design', DESIGN, null)
+  const sources = useMemo(
+    () => axesOf(particles, { utility: utilities, objective: objectives }),
+    [particles, utilities, objectives],
+  )
+  const model = useMemo(
+    () => buildModel(sources, columnNamed(particles, 'fitness')!.values),
+    [sources, particles],
+  )
+  const [brushes, setBrushes] = useBrushes(model)
+  const selected = useMemo(() => selectRows(model, brushes), [model, brushes])
+  const marked = useMemo(() => rowOf(particles, chosen), [particles, chosen])
+  const best = useMemo(() => {
+    const rows = bestRows(model, selected, 20)
+    return marked === null || rows.includes(marked) ? rows : [marked, ...rows]
+  }, [model, selected, marked])
+  const thinned = particles.rows < particles.total
+  const count = `${formatCount(selected.length)} of ${formatCount(particles.rows)} designs`
+  return (
+    <div class="stack" data-selected={selected.length}>
+      <ChartFrame
+        title="Designs by their variables"
+        note={`Each line is a design. Drag along axes to select; click an axis to let go.${
+          thinned ? ` Thinned from ${formatCount(particles.total)} designs, the best kept.` : ''
+        }`}
+        tools={
+          <>
+            <label class="check small">
+              <input
+                type="checkbox"
+                checked={utilities}
+                onChange={(event) => {
+                  setUtilities(event.currentTarget.checked)
+                  setBrushes(NONE)
+                }}
+              />
+              {words.worths} by {words.one} too
+            </label>
+            {job.kind === 'tuning' && (
+              <label class="check small">
+                <input
+                  type="checkbox"
+                  checked={objectives}
+                  onChange={(event) => {
+                    setObjectives(event.currentTarget.checked)
+                    setBrushes(NONE)
+                  }}
+                />
+                objectives too
+              </label>
+            )}
+            <button
+              type="button"
+              class="compact"
+              disabled={brushes.size === 0}
+              onClick={() => setBrushes(NONE)}
+            >
+              Select all
+            </button>
+          </>
+        }
+        legend={
+          <>
+            <LegendEntry colour="--rank-best" label="best" />
+            <LegendEntry colour="--rank-middle" label="middle" />
+            <LegendEntry colour="--rank-worst" label="worst, by rank of fitness" />
+            <strong aria-live="polite">{count} selected</strong>
+          </>
+        }
+        table={() => <SelectedDesigns job={job} particles={particles} rows={best} />}
+        data={() => particlesTable(particles, selected)}
+      >
+        <ParallelCoordinates
+          model={model}
+          brushes={brushes}
+          onBrush={setBrushes}
+          label={`Parallel coordinates of ${count}`}
+        />
+        <BrushFields model={model} brushes={brushes} onBrush={setBrushes} />
+      </ChartFrame>
+      <PairCard
+        model={model}
+        selected={selected}
+        brushes={brushes}
+        onBrush={setBrushes}
+        chosen={marked}
+        onChoose={(row) => setChosen(placeIn(particles, row))}
+      />
+      <section class="card" aria-labelledby="selected">
+        <h2 id="selected">The best of those selected</h2>
+        {best.length === 0 ? (
+          <Empty title="No design with a fitness is selected">
+            <button type="button" onClick={() => setBrushes(NONE)}>
+              Select all
+            </button>
+          </Empty>
+        ) : (
+          <SelectedDesigns job={job} particles={particles} rows={best} marked={marked} />
+        )}
+      </section>
+    </div>
+  )
+}
+
+/** The selection, which is part of the address; it holds for as long as its axes are there. */
+function useBrushes(model: ParallelModel): readonly [Brushes, (brushes: Brushes) => void] {
+  const write = useDelayedQuery('brush')
+  const [brushes, setBrushes] = useState<Brushes>(() => {
+    const text = new URLSearchParams(location.search).get('brush')
+    const read = brushesOf(model.axes, text)
+    if (read.unknown.length > 0) ignore('brush', read.unknown.join())
+    return read.brushes
+  })
+  const change = (next: Brushes) => {
+    setBrushes(next)
+    write(brushWords(model.axes, next))
+  }
+  return [brushes, change]
+}
+
+const DESIGN: Codec<Place | null> = {
+  read: (text) => placeOf(text) ?? undefined,
+  write: (place) => place && placeWord(place),
+}
+
+/** Rows change when newer designs come; places do not. */
+function placeIn(particles: Particles, row: number): Place {
+  const [iteration, particle] = ['iteration', 'particle'].map(
+    (name) => columnNamed(particles, name)!.values[row],
+  )
+  return { iteration, particle }
+}
+
+function rowOf(particles: Particles, place: Place | null): number | null {
+  if (place === null) return null
+  const iterations = columnNamed(particles, 'iteration')!.values
+  const numbers = columnNamed(particles, 'particle')!.values
+  const row = iterations.findIndex(
+    (iteration, k) => iteration === place.iteration && numbers[k] === place.particle,
+  )
+  return row < 0 ? null : row
+}

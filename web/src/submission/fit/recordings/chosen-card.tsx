@@ -1,0 +1,61 @@
+/** The recordings that a robot is fitted to: those that were read here, and others that are kept. */
+
+import type { Resource } from '../../../api/resource'
+import type { RecordingView } from '../../../api/types'
+import { ChosenList } from '../../../components/chosen-list'
+import { Combobox } from '../../../components/combobox'
+import { ErrorNotice, Loading } from '../../../components/feedback'
+import { formatNumber } from '../../../format/number'
+import { foundRecordings, idsIn, shortId } from './found-recordings'
+
+export function ChosenCard({
+  ids,
+  recordings,
+  onChange,
+}: {
+  ids: readonly string[]
+  recordings: Resource<readonly RecordingView[]>
+  onChange: (ids: readonly string[]) => void
+}) {
+  return (
+    <section class="card stack" aria-labelledby="part-recordings">
+      <h2 id="part-recordings">Recordings to fit to</h2>
+      {ids.length === 0 && (
+        <p class="muted">None yet: read a measured walk above, or choose one that is kept.</p>
+      )}
+      {recordings.loading && <Loading what="the recordings" />}
+      {recordings.error && (
+        <ErrorNotice
+          what="A recording cannot be looked at."
+          error={recordings.error}
+          retry={recordings.reload}
+        />
+      )}
+      <ChosenList ids={ids} short={shortId} onChange={onChange}>
+        {(id) => inWords(recordings.data?.find((recording) => recording.id === id))}
+      </ChosenList>
+      <div class="fields">
+        <Combobox
+          label="Recordings that are kept"
+          shown=""
+          placeholder="scenario, controller or id"
+          found={{ label: 'Recordings, the newest first', search: foundRecordings(ids) }}
+          hint="Ids of several can be pasted at once."
+          onChoose={(id) => onChange([...ids, id])}
+          onPaste={(text) => {
+            const pasted = idsIn(text).filter((id) => !ids.includes(id))
+            if (pasted.length > 0) onChange([...ids, ...pasted])
+            return pasted.length > 0
+          }}
+        />
+      </div>
+    </section>
+  )
+}
+
+function inWords(recording: RecordingView | undefined): string {
+  if (!recording) return ''
+  const { scenario, controller, seconds, mean_current, synthetic } = recording
+  const length = `${formatNumber(seconds, 3)} s of ${scenario} with ${controller}`
+  return `${length}, ${formatNumber(mean_current, 3)} A${synthetic ? ', synthetic' : ''}`
+}

@@ -1,0 +1,12 @@
+/** What every section of the form is given. */
+
+import type { FieldErrors } from '../draft/build-spec'
+import type { Catalogue } from '../draft/catalogue'
+import type { Draft } from '../draft/draft'
+
+export interface SectionProps {
+  readonly draft: Draft
+  readonly catalogue: Catalogue
+  readonly errors: FieldErrors
+  readonly onChange: (changes: Partial<Draft>) => void
+}

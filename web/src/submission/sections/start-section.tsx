@@ -1,0 +1,81 @@
+/** Designs that the search begins with: the best of earlier jobs, or those of a cloned one. */
+
+import { useId } from 'preact/hooks'
+import { get } from '../../api/client'
+import { foundJobs } from '../../api/found-jobs'
+import { useResource } from '../../api/resource'
+import { ChosenList } from '../../components/chosen-list'
+import { Combobox } from '../../components/combobox'
+import { formatCount, formatNumber } from '../../format/number'
+import { errorsUnder } from '../draft/build-spec'
+import { NO_START, type StartDraft } from '../draft/start'
+import { Problems } from '../fields/number-field'
+import type { SectionProps } from './section'
+
+export function StartSection({ draft, errors, onChange }: SectionProps) {
+  const id = useId()
+  const { start } = draft
+  const problems = errorsUnder(errors, 'start')
+  const wrong = problems.length > 0
+  const change = (changes: Partial<StartDraft>) => onChange({ start: { ...start, ...changes } })
+  return (
+    <section class="card stack-tight" aria-labelledby="part-start">
+      <h2 id="part-start">Start</h2>
+      <ChosenList ids={start.jobs} onChange={(jobs) => change({ jobs })}>
+        {(job) => <JobWords id={job} />}
+      </ChosenList>
+      <div class="fields">
+        <Combobox
+          label="From the best of jobs"
+          shown=""
+          placeholder={start.jobs.length === 0 ? 'none: the search begins anywhere' : 'another one'}
+          hint="Their best designs are judged first, as part of the budget."
+          wrong={wrong}
+          found={{
+            label: 'Jobs, the newest first',
+            search: foundJobs('tuning', {
+              without: start.jobs,
+              note: ({ controller }) =>
+                controller === draft.controller ? '' : `tunes ${controller}`,
+            }),
+          }}
+          onChoose={(job) => change({ jobs: [...start.jobs, job] })}
+        />
+        {start.jobs.length > 0 && (
+          <div class="field">
+            <label for={`${id}-count`}>Designs in all</label>
+            <input
+              id={`${id}-count`}
+              inputMode="numeric"
+              value={start.count}
+              aria-invalid={wrong}
+              onInput={(event) => change({ count: event.currentTarget.value })}
+            />
+          </div>
+        )}
+      </div>
+      {start.designs.length > 0 && start.jobs.length === 0 && (
+        <p class="row">
+          <span>
+            It begins with the {formatCount(start.designs.length)} designs that the cloned job began
+            with.
+          </span>
+          <button type="button" class="compact" onClick={() => onChange({ start: NO_START })}>
+            Leave them out
+          </button>
+        </p>
+      )}
+      <Problems messages={problems} />
+    </section>
+  )
+}
+
+/** Its name and how good its best is; nothing of a job that is not there, which the estimate tells. */
+function JobWords({ id }: { id: string }) {
+  const { data } = useResource(id, (signal) =>
+    get('/v1/jobs/{job_id}', { path: { job_id: id }, signal }),
+  )
+  if (data === null) return null
+  const fitness = data.best_fitness === null ? '' : `fitness ${formatNumber(data.best_fitness, 4)}`
+  return <span class="muted">{[data.name, fitness].filter(Boolean).join(' · ')}</span>
+}

@@ -1,0 +1,51 @@
+/** Choosing a design: published ones, and the best ones of jobs. */
+
+import { get } from '../../api/client'
+import { foundJobs } from '../../api/found-jobs'
+import { useResource } from '../../api/resource'
+import { type ChoiceGroup, Combobox } from '../../components/combobox'
+import { type DesignSource, sourceOfWord, wordOf } from './design-source'
+
+export function DesignPicker({
+  label,
+  chosen,
+  chosenLabel,
+  none,
+  note,
+  onChoose,
+}: {
+  label: string
+  chosen: DesignSource | null
+  /** How to call what is chosen. */
+  chosenLabel: string
+  /** What the choice of no design is called; without it there must be one. */
+  none?: string
+  /** Why published designs are not offered; without it they are. */
+  note?: string
+  onChoose: (source: DesignSource | null) => void
+}) {
+  const controllers = useResource('controllers', (signal) => get('/v1/controllers', { signal }))
+  const published = (controllers.data?.items ?? []).flatMap((controller) =>
+    Object.keys(controller.published).map((study) => ({
+      value: wordOf({ kind: 'published', controller: controller.name, study }),
+      label: `${controller.name}: ${study}`,
+    })),
+  )
+  const groups: ChoiceGroup[] = []
+  if (none !== undefined) groups.push({ label: '', choices: [{ value: '', label: none }] })
+  if (note === undefined) groups.push({ label: 'Published designs', choices: published })
+  const word = chosen ? wordOf(chosen) : ''
+  const known = published.find(({ value }) => value === word)?.label
+  return (
+    <Combobox
+      label={label}
+      shown={chosen ? (known ?? chosenLabel) : (none ?? '')}
+      hint={note}
+      groups={groups}
+      found={{ label: 'Best of a job', search: bestOfJobs }}
+      onChoose={(value) => onChoose(sourceOfWord(value))}
+    />
+  )
+}
+
+const bestOfJobs = foundJobs('tuning', { value: (job) => wordOf({ kind: 'best', job }) })

@@ -1,0 +1,62 @@
+/** Choosing the scenario of a walk: those of its job, and the presets. */
+
+import { useId } from 'preact/hooks'
+import type { Scenario, ScenarioPreset } from '../../api/types'
+import { formatExact } from '../../format/number'
+
+export function ScenarioPicker({
+  own,
+  presets,
+  chosen,
+  onChoose,
+}: {
+  /** Scenarios of the job that the design is of. */
+  own: readonly Scenario[]
+  presets: readonly ScenarioPreset[]
+  /** Name of one. */
+  chosen: string
+  onChoose: (name: string) => void
+}) {
+  const id = useId()
+  const names = new Set(own.map(({ name }) => name))
+  const others = presets.filter(({ name }) => !names.has(name))
+  return (
+    <div class="field">
+      <label for={id}>Scenario</label>
+      <select id={id} value={chosen} onChange={(event) => onChoose(event.currentTarget.value)}>
+        {own.length > 0 && (
+          <optgroup label="Of the job">
+            {own.map((scenario) => (
+              <option key={scenario.name} value={scenario.name}>
+                {described(scenario)}
+              </option>
+            ))}
+          </optgroup>
+        )}
+        {others.length > 0 && (
+          <optgroup label={own.length > 0 ? 'Other presets' : 'Presets'}>
+            {others.map((scenario) => (
+              <option key={scenario.name} value={scenario.name}>
+                {described(scenario)}
+              </option>
+            ))}
+          </optgroup>
+        )}
+      </select>
+    </div>
+  )
+}
+
+/** A scenario's name with what sets it apart. */
+function described(scenario: Scenario | ScenarioPreset): string {
+  const { name, cycle_time, load, slope, turn, direction, drop, stuck_leg, shove } = scenario
+  const parts = [`cycle ${formatExact(cycle_time)} s`]
+  if (load) parts.push(`load ${formatExact(load)} kg`)
+  if (slope) parts.push(`slope ${formatExact(slope)}°`)
+  if (direction === 'backward') parts.push('backward')
+  if (drop) parts.push(`drop ${formatExact(drop * 1e3)} mm`)
+  if (stuck_leg) parts.push(`${stuck_leg.replaceAll('_', ' ')} leg stuck`)
+  if (shove) parts.push(`shove ${formatExact(shove)} N s`)
+  if (turn) parts.push(`turn ${formatExact(turn)}`)
+  return `${name} (${parts.join(', ')})`
+}

@@ -1,0 +1,246 @@
+/** The replay: a scene in three dimensions with its controls. */
+
+import { useEffect, useMemo, useRef, useState } from 'preact/hooks'
+import { messageOf } from '../../api/problem'
+import { fileStem } from '../../export/csv'
+import { saveFile } from '../../export/save'
+import { useTheme } from '../../theme'
+import { pageName } from '../../title'
+import { film } from '../film/film'
+import { FilmDialog, type FilmSize } from '../film/film-dialog'
+import { extentOf } from '../replay/extent'
+import { newtonsPerCell, typicalLargest } from '../replay/force-scale'
+import { type Recorded, replaysOf } from '../replay/recorded'
+import { hasMeshes, type Replay } from '../replay/replay'
+import type { CameraPlace, ViewName } from '../scene/camera-rig'
+import type { WalkScene } from '../scene/walk-scene'
+import type { Playback } from './playback'
+import { PlayerControls, type ViewChoices } from './player-controls'
+import { pressed } from './player-keys'
+import { LONGEST_STEP, LONGEST_STEP_OF_FILM, ReplayDriver } from './replay-driver'
+import { SceneLegend } from './scene-legend'
+
+/** Of a saved picture, for one of the page. */
+const PIXELS = 2
+
+export function Player({
+  walks,
+  playback,
+  choices,
+  onChoose,
+  camera,
+  onCamera,
+}: {
+  /** One walk, or two to be compared. */
+  walks: readonly Recorded[]
+  playback: Playback
+  choices: ViewChoices
+  onChoose: (choices: ViewChoices) => void
+  /** Where it is at first; null for the usual place. */
+  camera: CameraPlace | null
+  onCamera: (camera: CameraPlace | null) => void
+}) {
+  const player = useRef<HTMLElement>(null)
+  const stage = useRef<HTMLDivElement>(null)
+  const scene = useRef<WalkScene | null>(null)
+  const driver = useRef<ReplayDriver | null>(null)
+  const [failure, setFailure] = useState<string | null>(null)
+  const [drawn, setDrawn] = useState(false)
+  const [filming, setFilming] = useState(false)
+  /** Why a picture could not be saved. */
+  const [unsaved, setUnsaved] = useState<string | null>(null)
+  /** Meshes that were loaded, and why there are none of a robot that should have some. */
+  const [meshes, setMeshes] = useState(0)
+  const [lost, setLost] = useState<string | null>(null)
+  const [asked, setAsked] = useState(false)
+  /** Choices as they are when something is loaded later. */
+  const shown = useRef(choices)
+  shown.current = choices
+  const placed = useRef({ camera, onCamera })
+  placed.current = { camera, onCamera }
+  const theme = useTheme()
+  const extent = useMemo(() => extentOf(replaysOf(walks)), [walks])
+  const newtons = useMemo(
+    () => newtonsPerCell(Math.max(...walks.map(({ replay }) => largestForce(replay))), extent),
+    [walks, extent],
+  )
+
+  useEffect(() => {
+    const replayDriver = new ReplayDriver(playback, walks[0].replay, player.current!)
+    driver.current = replayDriver
+    const container = stage.current!
+    const leave = new AbortController()
+    let observer: ResizeObserver | null = null
+    setFailure(null)
+    setDrawn(false)
+    setMeshes(0)
+    setLost(null)
+    setAsked(false)
+    import('../scene/walk-scene').then(
+      ({ WalkScene }) => {
+        if (leave.signal.aborted) return
+        try {
+          const built = new WalkScene(replaysOf(walks), extent, newtons, choices, () =>
+            replayDriver.request(),
+          )
+          scene.current = built
+          setDrawn(true)
+          observer = shownIn(container, built, () => replayDriver.request())
+          built.placeCamera(placed.current.camera, (place) => placed.current.onCamera(place))
+          replayDriver.attach(built)
+          built
+            .loadMeshes(() => shown.current.meshes, leave.signal)
+            .then((count) => {
+              setMeshes(count)
+              setAsked(true)
+              replayDriver.request()
+            })
+            .catch((error: unknown) => !leave.signal.aborted && setLost(messageOf(error)))
+        } catch (error) {
+          setFailure(messageOf(error))
+        }
+      },
+      (error: unknown) => !leave.signal.aborted && setFailure(messageOf(error)),
+    )
+    return () => {
+      leave.abort()
+      observer?.disconnect()
+      replayDriver.dispose()
+      scene.current?.dispose()
+      scene.current = null
+    }
+  }, [walks, playback])
+
+  useEffect(() => {
+    scene.current?.setOptions(choices)
+    driver.current?.request()
+  }, [choices])
+
+  useEffect(() => {
+    scene.current?.recolour()
+    driver.current?.request()
+  }, [theme])
+
+  useEffect(() => {
+    if (filming) return
+    const onKey = (event: KeyboardEvent) => {
+      if (event.ctrlKey || event.metaKey || event.altKey) return
+      const target = event.target as Element
+      const idle = target === document.body || target.id === 'main'
+      if (!idle && !player.current?.contains(target)) return
+      if (pressed(event.key, event.shiftKey, target, playback, scene.current)) {
+        event.preventDefault()
+      }
+    }
+    addEventListener('keydown', onKey)
+    return () => removeEventListener('keydown', onKey)
+  }, [playback, filming])
+
+  const look = (view: ViewName) => {
+    scene.current?.look(view)
+    driver.current?.request()
+  }
+  const record = async (size: FilmSize, type: string, signal: AbortSignal) => {
+    const [shot, drive, before] = [scene.current!, driver.current!, playback.time]
+    shot.film(size)
+    drive.longestStep = LONGEST_STEP_OF_FILM
+    try {
+      return await film(shot.canvas, playback, type, signal)
+    } finally {
+      drive.longestStep = LONGEST_STEP
+      shot.film(null)
+      playback.pause()
+      playback.seek(before)
+    }
+  }
+  const picture = async () => {
+    setUnsaved(null)
+    const shot = scene.current!
+    const { clientWidth, clientHeight } = shot.canvas
+    const still = shot.picture([PIXELS * clientWidth, PIXELS * clientHeight])
+    saveFile(await still, `${fileStem(pageName(), `${playback.time.toFixed(2)} s`)}.png`)
+    driver.current?.request()
+  }
+  return (
+    <section class="card player" ref={player} aria-label="Replay" data-player data-meshes={meshes}>
+      <div class="player-stage" ref={stage}>
+        {failure !== null && <NoScene reason={failure} />}
+      </div>
+      <SceneLegend walks={walks} cell={extent.cell} newtons={newtons} choices={choices} />
+      {unsaved !== null && <p class="wrong small">The picture was not saved: {unsaved}</p>}
+      {lost !== null && <p class="muted small">Meshes cannot be loaded: {lost}</p>}
+      {asked && meshes === 0 && walks.some(({ replay }) => hasMeshes(replay.header)) && (
+        <NoMeshes />
+      )}
+      <PlayerControls
+        playback={playback}
+        comparing={walks.length > 1}
+        meshed={meshes > 0}
+        choices={choices}
+        onChoose={onChoose}
+        onLook={look}
+        onFilm={drawn ? () => setFilming(true) : null}
+        onPicture={drawn ? () => picture().catch((error) => setUnsaved(messageOf(error))) : null}
+      />
+      {filming && (
+        <FilmDialog playback={playback} onRecord={record} onClose={() => setFilming(false)} />
+      )}
+    </section>
+  )
+}
+
+function NoMeshes() {
+  return (
+    <p class="muted small">
+      Simple solids: the server has none of the meshes that the robot's URDF names.{' '}
+      <code>gaitswarm serve --robots FOLDER</code> shows those in the robot's folder.
+    </p>
+  )
+}
+
+function NoScene({ reason }: { reason: string }) {
+  return (
+    <div class="notice" data-tone="warn" role="alert">
+      <strong>The walk cannot be drawn in three dimensions here.</strong>
+      <p>
+        {reason} Switch on hardware acceleration or WebGL in the browser's settings. The clock and
+        the plots below work without it.
+      </p>
+    </div>
+  )
+}
+
+/** Size of the forces that arrows must show [N]. */
+function largestForce(replay: Replay): number {
+  const legs = replay.header.robot.legs.length
+  const sizes = new Float32Array(legs * replay.frames)
+  for (let leg = 0; leg < legs; leg++) {
+    for (let frame = 0; frame < replay.frames; frame++) {
+      const force = [0, 1, 2].map((i) => replay.value('foot_force', frame, 3 * leg + i))
+      sizes[leg * replay.frames + frame] = Math.hypot(...force)
+    }
+  }
+  return typicalLargest(sizes)
+}
+
+/** Put a scene's canvas into a box and keep it as large as that. */
+function shownIn(box: HTMLElement, scene: WalkScene, redraw: () => void): ResizeObserver {
+  const { canvas } = scene
+  canvas.tabIndex = 0
+  canvas.setAttribute('role', 'application')
+  canvas.setAttribute(
+    'aria-label',
+    'The robot in three dimensions. Space plays, arrow keys step by frame, shift with arrow keys' +
+      ' turns the view, plus and minus zoom. The same numbers are in the charts below.',
+  )
+  box.append(canvas)
+  const fill = () => {
+    if (box.clientWidth === 0 || box.clientHeight === 0) return
+    scene.resize(box.clientWidth, box.clientHeight)
+    redraw()
+  }
+  fill()
+  const observer = new ResizeObserver(fill)
+  observer.observe(box)
+  return observer
+}

@@ -1,0 +1,57 @@
+/** What a replay shows, as parts of an address. Pure. */
+
+import { type Codec, numbersOf } from '../../router/query-value'
+import type { CameraPlace } from '../scene/camera-rig'
+import type { ViewChoices } from './player-controls'
+
+/** What a replay shows where its address says nothing. */
+export const USUAL_VIEW: ViewChoices = {
+  arrangement: 'ghost',
+  follow: true,
+  forces: true,
+  trail: true,
+  meshes: true,
+}
+
+/** What differs from the usual, by its word. */
+const WORDS: Readonly<Record<string, Partial<ViewChoices>>> = {
+  beside: { arrangement: 'beside' },
+  still: { follow: false },
+  'no-forces': { forces: false },
+  'no-trail': { trail: false },
+  'no-meshes': { meshes: false },
+}
+
+/** `beside,no-trail` */
+export const VIEW: Codec<ViewChoices> = {
+  read: (text) => {
+    const words = text.split(',')
+    if (!words.every((word) => Object.hasOwn(WORDS, word))) return undefined
+    return Object.assign({}, USUAL_VIEW, ...words.map((word) => WORDS[word]))
+  },
+  write: (choices) => {
+    const differs = (change: Partial<ViewChoices>) =>
+      Object.entries(change).every(([key, value]) => choices[key as keyof ViewChoices] === value)
+    const words = Object.keys(WORDS).filter((word) => differs(WORDS[word]))
+    return words.join(',') || null
+  },
+}
+
+/** A moment [s]. */
+export const MOMENT: Codec<number | null> = {
+  read: (text) =>
+    text !== '' && Number(text) >= 0 && Number.isFinite(Number(text)) ? Number(text) : undefined,
+  write: (moment) => (moment ? String(Number(moment.toFixed(4))) : null),
+}
+
+/** Place of the camera and what it is turned to [m], to the mm: `0.81:-1.2:0.64:0:0:0.02`; null for the usual. */
+export const CAMERA: Codec<CameraPlace | null> = {
+  read: (text) => {
+    const [x, y, z, u, v, w, ...rest] = numbersOf(text)
+    if (rest.length > 0 || ![x, y, z, u, v, w].every(Number.isFinite)) return undefined
+    return x === u && y === v && z === w ? undefined : { position: [x, y, z], target: [u, v, w] }
+  },
+  write: (place) =>
+    // Adding zero makes the negative zero of rounding a plain one.
+    place && [...place.position, ...place.target].map((at) => Number(at.toFixed(3)) + 0).join(':'),
+}

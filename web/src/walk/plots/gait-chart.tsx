@@ -1,0 +1,120 @@
+/** Which foot stands when: a bar for every stance, a row for every leg. */
+
+import { useMemo, useRef } from 'preact/hooks'
+import { linearTicks } from '../../charts/log-axis'
+import { ChartFrame } from '../../components/chart-frame'
+import { Table } from '../../components/table'
+import { useVisible } from '../../components/use-visible'
+import { formatExact, formatNumber, percent, quantity } from '../../format/number'
+import type { Playback } from '../player/playback'
+import { usePlaybackTime } from '../player/use-playback'
+import { stances } from '../replay/contact'
+import type { Recorded } from '../replay/recorded'
+import { words } from './plot-specs'
+
+interface Row {
+  readonly key: string
+  readonly leg: string
+  readonly walk: number
+  readonly label: string
+  readonly spans: readonly (readonly [number, number])[]
+  /** Share of the time that the foot stands. */
+  readonly share: number
+}
+
+export function GaitChart({ walks, playback }: { walks: readonly Recorded[]; playback: Playback }) {
+  const box = useRef<HTMLDivElement>(null)
+  const visible = useVisible(box)
+  const time = usePlaybackTime(playback, 60, visible)
+  const rows = useMemo(() => rowsOf(walks), [walks])
+  const end = playback.duration || 1
+  const place = (moment: number) => `${(100 * moment) / end}%`
+  return (
+    <div class="plot" ref={box} data-plot="gait">
+      <ChartFrame
+        title="Feet on the ground"
+        note="A bar for every time that a foot stands."
+        table={() => <GaitTable rows={rows} comparing={walks.length > 1} />}
+      >
+        {/* The slider of the replay does the same for keyboards. */}
+        <div class="gait" role="img" aria-label="Which foot stands when; the table has the moments">
+          {rows.map((row) => (
+            <div class="gait-row" key={row.key}>
+              <span class="gait-leg">{row.walk === 0 ? row.leg : ''}</span>
+              {/* biome-ignore lint/a11y/noStaticElementInteractions: the slider is for keyboards */}
+              {/* biome-ignore lint/a11y/useKeyWithClickEvents: the slider is for keyboards */}
+              <span
+                class="gait-bars"
+                onClick={(event) => {
+                  const { left, width } = event.currentTarget.getBoundingClientRect()
+                  playback.seek(((event.clientX - left) / width) * end)
+                }}
+              >
+                {row.spans.map(([from, to]) => (
+                  <i
+                    key={from}
+                    class={`walk-${row.walk + 1}`}
+                    style={{ left: place(from), width: place(to - from) }}
+                  />
+                ))}
+                <b style={{ left: place(time) }} />
+              </span>
+            </div>
+          ))}
+          <div class="gait-row">
+            <span class="gait-leg">time [s]</span>
+            <span class="gait-ticks">
+              {linearTicks(0, end, 5).map((tick) => (
+                <span key={tick} style={{ left: place(tick) }}>
+                  {formatExact(tick, 3)}
+                </span>
+              ))}
+            </span>
+          </div>
+        </div>
+      </ChartFrame>
+    </div>
+  )
+}
+
+function GaitTable({ rows, comparing }: { rows: readonly Row[]; comparing: boolean }) {
+  const text = (spans: Row['spans']) =>
+    spans.map(([from, to]) => `${formatNumber(from, 3)} to ${quantity(to, 's', 3)}`).join('; ')
+  return (
+    <Table<Row>
+      caption="When every foot stands"
+      rows={rows}
+      rowKey={(row) => row.key}
+      columns={[
+        { key: 'leg', label: 'Leg', header: true, value: (row) => row.leg },
+        ...(comparing ? [{ key: 'walk', label: 'Walk', value: (row: Row) => row.label }] : []),
+        {
+          key: 'share',
+          label: 'Stands for',
+          numeric: true,
+          value: (row) => row.share,
+          cell: (row) => percent(row.share),
+        },
+        {
+          key: 'spans',
+          label: 'From, to',
+          data: (row) => row.spans.map((span) => span.join(' to ')).join('; '),
+          cell: (row) => text(row.spans),
+        },
+      ]}
+    />
+  )
+}
+
+/** Legs in the robot's order, the walks of a leg below each other. */
+function rowsOf(walks: readonly Recorded[]): Row[] {
+  const { legs } = walks[0].replay.header.robot
+  return legs.flatMap((leg, k) =>
+    walks.map(({ replay, label }, walk) => {
+      const spans = stances(replay, k)
+      const stood = spans.reduce((sum, [from, to]) => sum + to - from, 0)
+      const share = replay.end > 0 ? stood / replay.end : 0
+      return { key: `${leg} ${walk}`, leg: words(leg), walk, label, spans, share }
+    }),
+  )
+}

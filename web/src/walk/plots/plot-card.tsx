@@ -1,0 +1,143 @@
+/** One chart over time, whose line moves with the replay and whose clicks move the replay. */
+
+import { useMemo, useRef } from 'preact/hooks'
+import type { Series } from '../../charts/line-chart'
+import { LinkedChart } from '../../charts/linked-chart'
+import { ChartFrame } from '../../components/chart-frame'
+import { type Column, Table } from '../../components/table'
+import { useVisible } from '../../components/use-visible'
+import { formatNumber, quantity } from '../../format/number'
+import type { Playback } from '../player/playback'
+import { usePlaybackTime } from '../player/use-playback'
+import type { Recorded } from '../replay/recorded'
+import { moments, seriesOf } from './plot-data'
+import type { PlotSpec } from './plot-specs'
+
+/** Time between two positions of a chart's line while the replay plays [ms]. */
+const RENEWED = 120
+
+export function PlotCard({
+  spec,
+  walks,
+  playback,
+}: {
+  spec: PlotSpec
+  walks: readonly Recorded[]
+  playback: Playback
+}) {
+  const x = useMemo(() => moments(walks), [walks])
+  const series = useMemo(() => seriesOf(spec.curves, walks), [spec, walks])
+  const box = useRef<HTMLDivElement>(null)
+  const visible = useVisible(box)
+  const time = usePlaybackTime(playback, RENEWED, visible)
+  const frame = Math.max(...walks.map(({ replay }) => replay.frameAt(time)))
+  return (
+    <div class="plot" ref={box} data-plot={spec.key}>
+      <ChartFrame
+        title={spec.title}
+        note={spec.note}
+        table={() => <PlotTable spec={spec} x={x} series={series} />}
+        legend={
+          <PlotLegend series={series} curves={spec.curves.length} frame={frame} unit={spec.unit} />
+        }
+      >
+        <LinkedChart
+          label={`${spec.title} over time`}
+          x={x}
+          xLabel="time"
+          xUnit="s"
+          yLabel={spec.quantity}
+          yUnit={spec.unit}
+          series={series}
+          height={220}
+          marker={time}
+          sync="walk"
+          onPick={(moment) => playback.seek(moment)}
+        />
+      </ChartFrame>
+    </div>
+  )
+}
+
+/** Every curve with its value at the moment that is shown, of both walks if there are two. */
+function PlotLegend({
+  series,
+  curves,
+  frame,
+  unit,
+}: {
+  series: readonly Series[]
+  /** Curves of one walk. */
+  curves: number
+  frame: number
+  unit: string
+}) {
+  return series.slice(0, curves).map(({ label, colour, width, values }, k) => {
+    const other = series[k + curves]
+    const value = quantity(rounded(values[frame]), other ? '1' : unit, 3)
+    return (
+      <span key={label}>
+        <svg class="stroke" viewBox="0 0 22 6" aria-hidden="true">
+          <line
+            x1="0"
+            x2="22"
+            y1="3"
+            y2="3"
+            style={{ stroke: `var(${colour})`, strokeWidth: width }}
+          />
+        </svg>
+        {label}
+        <b class="value">
+          {other ? `${value} | ${quantity(rounded(other.values[frame]), unit, 3)}` : value}
+        </b>
+      </span>
+    )
+  })
+}
+
+/** Rounding errors of the simulator are zero to the eye. */
+function rounded(value: number | null): number | null {
+  return value !== null && Math.abs(value) < 1e-6 ? 0 : value
+}
+
+function PlotTable({
+  spec,
+  x,
+  series,
+}: {
+  spec: PlotSpec
+  x: Float32Array
+  series: readonly Series[]
+}) {
+  const columns: Column<number>[] = [
+    {
+      key: 'time',
+      label: 'Time',
+      unit: 's',
+      numeric: true,
+      header: true,
+      value: (frame) => x[frame],
+      cell: (frame) => x[frame].toFixed(3),
+    },
+    ...series.map(
+      ({ label, values }): Column<number> => ({
+        key: label,
+        label,
+        unit: spec.unit,
+        numeric: true,
+        value: (frame) => values[frame],
+        cell: (frame) => formatNumber(rounded(values[frame])),
+      }),
+    ),
+  ]
+  const frames = Array.from(x, (_, frame) => frame)
+  return (
+    <Table
+      caption={`${spec.title} over time`}
+      columns={columns}
+      rows={frames}
+      rowKey={String}
+      tall
+    />
+  )
+}

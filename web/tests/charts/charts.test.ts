@@ -1,0 +1,157 @@
+import { describe, expect, test } from 'vitest'
+import { linearTicks, logRange, logTicks } from '../../src/charts/log-axis'
+import {
+  bestRows,
+  buildModel,
+  FAILED,
+  marksOf,
+  placeOf,
+  selectRows,
+  stretchOf,
+  valueAt,
+} from '../../src/charts/parallel-model'
+import { decodeParticles } from '../../src/job/designs/particles'
+import { grouped } from '../../src/job/overview/grouped'
+
+describe('a logarithmic axis', () => {
+  test('within a decade has round numbers', () => {
+    expect(logTicks(9.9, 54)).toEqual([10, 20, 30, 40, 50])
+  })
+
+  test('over many decades has powers of ten', () => {
+    expect(logTicks(1, 1e6)).toEqual([1, 10, 100, 1000, 10000, 100000, 1000000])
+  })
+
+  test('has a range even where all numbers are the same, or none is', () => {
+    const [low, high] = logRange(5, 5)
+    expect(low).toBeLessThan(5)
+    expect(high).toBeGreaterThan(5)
+    expect(logRange(null, null)).toEqual([1, 10])
+  })
+
+  test('ticks do not carry rounding errors', () => {
+    expect(linearTicks(0, 0.6)).toEqual([0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
+  })
+})
+
+describe('parallel coordinates', () => {
+  const fitness = Float32Array.from([3, 1, Number.NaN, 2])
+  const model = buildModel(
+    [
+      {
+        name: 'P',
+        unit: '1',
+        low: 0,
+        high: 10,
+        logarithmic: false,
+        choices: [],
+        values: Float32Array.from([0, 5, 10, 7.5]),
+      },
+      {
+        name: 'fitness',
+        unit: '1',
+        low: null,
+        high: null,
+        logarithmic: true,
+        choices: [],
+        values: fitness,
+      },
+      {
+        name: 'contact_law',
+        unit: '1',
+        low: 0,
+        high: 2,
+        logarithmic: false,
+        choices: ['linear_zone', 'karnopp', 'stick'],
+        values: Float32Array.from([0, 2, 1, 0]),
+      },
+    ],
+    fitness,
+  )
+
+  test('place values between the bounds, or between the least and the greatest', () => {
+    expect([...model.axes[0].places]).toEqual([0, 0.5, 1, 0.75])
+    expect(model.axes[1]).toMatchObject({ low: 1, high: 3 })
+    expect(model.axes[1].places[2]).toBeNaN()
+  })
+
+  test('find the value of a place again', () => {
+    expect(valueAt(model.axes[1], placeOf(model.axes[1], 2))).toBeCloseTo(2, 12)
+  })
+
+  test('mark an axis with its bounds, or with the names of its choices', () => {
+    expect(marksOf(model.axes[0])).toEqual([0, 10])
+    expect(marksOf(model.axes[2])).toEqual(['linear_zone', 'karnopp', 'stick'])
+    expect([...model.axes[2].places]).toEqual([0, 1, 0.5, 0])
+  })
+
+  test('say which numbers or choices are selected', () => {
+    expect(stretchOf(model.axes[0], [0.2, 0.5])).toBe('2 to 5')
+    expect(stretchOf(model.axes[2], [0, 0.6])).toBe('linear zone, karnopp')
+    expect(stretchOf(model.axes[2], [0.6, 0.9])).toBe('none')
+  })
+
+  test('hold every row once in their order', () => {
+    const many = buildModel([], new Float32Array(1000))
+    expect(new Set(many.order).size).toBe(1000)
+  })
+
+  test('select the rows inside all brushes', () => {
+    expect([...selectRows(model, new Map([[0, [0.4, 0.8]]]))].sort()).toEqual([1, 3])
+    const both = new Map([
+      [0, [0.4, 0.8] as const],
+      [1, [0, 0.3] as const],
+    ])
+    expect([...selectRows(model, both)]).toEqual([1])
+  })
+
+  test('a brush on fitness leaves failed designs out', () => {
+    expect([...selectRows(model, new Map([[1, [0, 1]]]))].sort()).toEqual([0, 1, 3])
+  })
+
+  test('know the best among those selected', () => {
+    expect(bestRows(model, model.order, 2)).toEqual([1, 3])
+  })
+
+  test('colour by rank, with failed designs apart', () => {
+    expect(model.buckets[2]).toBe(FAILED)
+    expect(model.buckets[1]).toBeLessThan(model.buckets[3])
+    expect(model.buckets[3]).toBeLessThan(model.buckets[0])
+  })
+})
+
+test('particles are read as the API frames them', () => {
+  const columns = ['iteration', 'fitness'].map((name) => ({
+    name,
+    unit: '1',
+    low: null,
+    high: null,
+    kind: 'index',
+  }))
+  let header = JSON.stringify({ rows: 3, total: 9, columns })
+  header += ' '.repeat((4 - (header.length % 4)) % 4)
+  const buffer = new ArrayBuffer(4 + header.length + 2 * 3 * 4)
+  new DataView(buffer).setUint32(0, header.length, true)
+  new Uint8Array(buffer).set(new TextEncoder().encode(header), 4)
+  new Float32Array(buffer, 4 + header.length).set([0, 0, 1, 21.5, Number.NaN, 20.25])
+  const particles = decodeParticles(buffer)
+  expect(particles).toMatchObject({ rows: 3, total: 9 })
+  expect([...particles.columns[0].values]).toEqual([0, 0, 1])
+  expect([...particles.columns[1].values]).toEqual([21.5, Number.NaN, 20.25])
+})
+
+test('many iterations are drawn as a few strips of mean quantiles', () => {
+  const items = [1, 2, 3, 4, null].map((best, index) => ({
+    index,
+    fitness: [best, best === null ? null : best * 10],
+    mean: null,
+    failed: 0,
+    diversity: 0,
+  }))
+  expect(grouped(items, 10)).toHaveLength(5)
+  expect(grouped(items, 3)).toEqual([
+    { from: 0, to: 1, middle: 0.5, fitness: [1.5, 15] },
+    { from: 2, to: 3, middle: 2.5, fitness: [3.5, 35] },
+    { from: 4, to: 4, middle: 4, fitness: [null, null] },
+  ])
+})

@@ -1,0 +1,74 @@
+import { describe, expect, test } from 'vitest'
+import {
+  CELLS,
+  cellsOf,
+  dragged,
+  nearestRow,
+  placeInWords,
+  ticksOf,
+} from '../../src/charts/pair-model'
+import { buildModel, selectRows } from '../../src/charts/parallel-model'
+
+const source = (name: string, values: number[]) => ({
+  name,
+  unit: '1',
+  low: 0,
+  high: 10,
+  logarithmic: false,
+  choices: [],
+  values: Float32Array.from(values),
+})
+
+// Two designs in one corner, one in the other, one that fails.
+const model = buildModel(
+  [source('a', [0, 0.1, 10, 5]), source('b', [0, 0.1, 10, 5])],
+  Float32Array.from([1, 2, 3, Number.NaN]),
+)
+const all = selectRows(model, new Map())
+
+describe('two axes', () => {
+  test('are cut into cells with the mean rank of their designs', () => {
+    const cells = cellsOf(model, all, 0, 1)
+    expect(cells).toHaveLength(3)
+    const at = (cell: number) => cells.find(({ column, row }) => column === cell && row === cell)!
+    expect(at(0)).toMatchObject({ designs: 2 })
+    expect(at(0).bucket!).toBeLessThan(at(CELLS - 1).bucket!)
+    expect(at(CELLS / 2).bucket).toBeNull()
+  })
+
+  test('are marked at round numbers, or with the names of choices', () => {
+    expect(ticksOf(model.axes[0]).map(({ text }) => text)).toEqual(['0', '2', '4', '6', '8', '10'])
+    const laws = { ...model.axes[0], high: 1, choices: ['dead_zone', 'stick'] }
+    expect(ticksOf(laws)).toEqual([
+      { place: 0, text: 'dead zone' },
+      { place: 1, text: 'stick' },
+    ])
+    const decades = { ...model.axes[0], low: 3, high: 300, logarithmic: true }
+    expect(ticksOf(decades).every(({ place }) => place >= 0 && place <= 1)).toBe(true)
+  })
+
+  test('tell what is at a place: the nearest design, or the cell', () => {
+    const at = (place: number, asCells: boolean) =>
+      placeInWords(model, all, [0, 1], [place, place], { asCells, reach: 0.05 })
+    expect(at(1, false)).toBe('a 10  ·  b 10  ·  fitness 3.0000')
+    expect(at(0.3, false)).toBeNull()
+    expect(at(0, true)).toContain('2 designs  ·  mean rank')
+    expect(at(0.5, true)).toContain('all failed')
+  })
+
+  test('have a drag select the box between its ends, whatever its direction', () => {
+    expect(dragged([0.8, 0.2], [0.5, 0.6])).toEqual([
+      [0.5, 0.8],
+      [0.2, 0.6],
+    ])
+    expect(dragged([-1, 0.5], [0.5, 2])).toEqual([
+      [0, 0.5],
+      [0.5, 1],
+    ])
+  })
+
+  test('have the nearest design chosen, if it is near enough', () => {
+    expect(nearestRow(model, all, [0, 1], [0.98, 0.98], 0.1)).toBe(2)
+    expect(nearestRow(model, all, [0, 1], [0.75, 0.2], 0.1)).toBeNull()
+  })
+})

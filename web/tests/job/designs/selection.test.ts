@@ -1,0 +1,35 @@
+import { expect, test } from 'vitest'
+import type { Particles } from '../../../src/job/designs/particles'
+import { selectedRows } from '../../../src/job/designs/selection'
+
+const column = (name: string, kind: string, values: readonly number[]) => ({
+  name,
+  unit: '1',
+  low: kind === 'continuous' ? 0 : null,
+  high: kind === 'continuous' ? 10 : null,
+  kind,
+  choices: [],
+  values: Float32Array.from(values),
+})
+
+const designs: Particles = {
+  rows: 3,
+  total: 3,
+  columns: [
+    column('P', 'continuous', [1, 5, 9]),
+    column('objective:energy', 'objective', [10, 20, 30]),
+    column('fitness', 'fitness', [3, 2, 1]),
+  ],
+}
+
+test('a selection means the same designs wherever its address is read', () => {
+  const rows = (words: string | null) => {
+    const found = selectedRows(designs, words)
+    return found && [...found].sort()
+  }
+  expect(rows('P:4:10')).toEqual([1, 2])
+  expect(rows('P:4:10,energy:15:25')).toEqual([1])
+  // Without a stretch that can be read nothing stands out.
+  expect(rows('none:1:2')).toBeNull()
+  expect(rows(null)).toBeNull()
+})

@@ -1,0 +1,10 @@
+import { type Draft, emptyDraft, scenarioDraft } from '../../../src/submission/draft/draft'
+import { CATALOGUE } from '../catalogue-example'
+
+export const EMPTY = emptyDraft(CATALOGUE)
+
+export const withOwnScenario: Draft = {
+  ...EMPTY,
+  presets: ['fast'],
+  own: [scenarioDraft(CATALOGUE.fields.scenario, CATALOGUE.scenarios[1], 'mine')],
+}

@@ -1,0 +1,88 @@
+import { describe, expect, test } from 'vitest'
+import { around } from '../../../src/submission/draft/around-design'
+import { specOf } from '../../../src/submission/draft/build-spec'
+import { draftOf } from '../../../src/submission/draft/draft'
+import { optimizerDraft, settingsOf, withPreset } from '../../../src/submission/draft/optimizer'
+import { boundsInWords } from '../../../src/submission/fields/schema-fields'
+import { CATALOGUE } from '../catalogue-example'
+import { EMPTY } from './drafts'
+
+describe('the optimizer', () => {
+  const { optimizers } = CATALOGUE
+  const [pso, thesis, simplex] = optimizers
+
+  test('is the default method at first, with its settings', () => {
+    expect(EMPTY.optimizer).toEqual({ name: 'pso', particles: '25', inertia_end: '0.7' })
+    expect(specOf(EMPTY).optimizer).toEqual(pso.settings)
+  })
+
+  test('keeps the size of its iterations with a preset or another method', () => {
+    const large = { name: 'pso', particles: '40', inertia_end: '0.7' }
+    expect(withPreset(large, thesis)).toEqual({ name: 'pso', particles: '40', inertia_end: '0.9' })
+    expect(withPreset(large, simplex)).toMatchObject({ name: 'simplex', particles: '40' })
+    expect(withPreset(large, simplex)).not.toHaveProperty('inertia_end')
+  })
+
+  test('offers what the schema of the method has, but its name', () => {
+    const fields = new Map(settingsOf(simplex).map((field) => [field.name, field]))
+    expect([...fields.keys()]).toEqual(['particles', 'restarts', 'steps', 'order'])
+    expect(fields.get('restarts')).toMatchObject({
+      type: 'boolean',
+      description: 'Whether it starts anew.',
+    })
+    expect(fields.get('order')?.choices).toEqual(['1', '2'])
+    expect(boundsInWords(fields.get('particles')!)).toBe('1 to 10\u202f000')
+  })
+
+  test('becomes numbers, truth values and lists again, and nothing where it is left empty', () => {
+    const { optimizer } = draftOf({ ...specOf(EMPTY), optimizer: 'simplex' } as never, CATALOGUE)
+    expect(specOf({ ...EMPTY, optimizer }).optimizer).toEqual({
+      name: 'simplex',
+      particles: 25,
+      restarts: true,
+      steps: [1, 2],
+    })
+    const wrong = { ...optimizer, restarts: 'false', steps: '[1, ', order: 'two' }
+    expect(specOf({ ...EMPTY, optimizer: wrong }).optimizer).toMatchObject({
+      restarts: false,
+      steps: '[1, ',
+      order: 'two',
+    })
+  })
+
+  test('of a job to be cloned may be a name, or settings without their defaults', () => {
+    const named = draftOf({ ...specOf(EMPTY), optimizer: 'pso-thesis' }, CATALOGUE)
+    expect(named.optimizer.inertia_end).toBe('0.9')
+    expect(optimizerDraft(optimizers, { name: 'simplex', particles: 3 }, 'pso')).toMatchObject({
+      particles: '3',
+      restarts: 'true',
+    })
+    expect(optimizerDraft(optimizers, { particles: 3 }, 'pso')).toMatchObject({
+      name: 'pso',
+      inertia_end: '0.7',
+    })
+  })
+})
+
+describe('the neighbourhood of a design', () => {
+  const near = (design: Record<string, number>) =>
+    around(EMPTY, design, new Set(['FOMF'])).variables
+
+  test('is a part of the range around it', () => {
+    expect(near({ P: 0.5 }).P).toMatchObject({ low: '0.35', high: '0.65' })
+  })
+
+  test('stays within the bounds and keeps its width', () => {
+    expect(near({ P: 1 }).P).toMatchObject({ low: '0.7', high: '1' })
+  })
+
+  test('leaves a categorical variable its choices', () => {
+    const window = { ...EMPTY.variables.window, mode: 'searched' as const }
+    const draft = { ...EMPTY, variables: { ...EMPTY.variables, window } }
+    expect(around(draft, { window: 'hamming' }, new Set()).variables.window).toEqual(window)
+  })
+
+  test('of an integer variable has whole bounds that differ', () => {
+    expect(near({ FOMF: 2 }).FOMF).toMatchObject({ low: '1', high: '3' })
+  })
+})

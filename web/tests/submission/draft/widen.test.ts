@@ -1,0 +1,23 @@
+import { describe, expect, test } from 'vitest'
+import { emptyDraft } from '../../../src/submission/draft/draft'
+import { widened } from '../../../src/submission/draft/widen'
+import { CATALOGUE } from '../catalogue-example'
+
+const empty = emptyDraft(CATALOGUE)
+
+describe('other bounds', () => {
+  test('replace those of searched variables alone', () => {
+    const fixed = { ...empty.variables.FOMF, mode: 'fixed' as const }
+    const draft = { ...empty, variables: { ...empty.variables, FOMF: fixed } }
+    const wider = widened(draft, 'P:-1:2.5,FOMF:0:9,unknown:0:1')
+    expect(wider.variables.P).toMatchObject({ low: '-1', high: '2.5' })
+    expect(wider.variables.FOMF).toEqual(fixed)
+    expect(wider.variables.unknown).toBeUndefined()
+  })
+
+  test('that cannot be read change nothing', () => {
+    for (const asked of ['', 'P', 'P:1', 'P:a:b', 'P::2', 'P:1:2:3']) {
+      expect(widened(empty, asked)).toEqual(empty)
+    }
+  })
+})

@@ -1,0 +1,57 @@
+import { describe, expect, test } from 'vitest'
+import type { JobSpec, Variable } from '../../../src/api/types'
+import { robotName, textOf } from '../../../src/submission/robot/files'
+import { startDesign } from '../../../src/submission/robot/start-design'
+
+describe('a file of a robot', () => {
+  test('is read as text', async () => {
+    await expect(textOf(new File(['<robot name="ä"/>'], 'a.urdf'))).resolves.toBe(
+      '<robot name="ä"/>',
+    )
+  })
+
+  test.each([
+    ['is no text', new Uint8Array([0x73, 0xff, 0xfe]), /a\.stl is not UTF-8 text; choose another/],
+    ['is large', new Uint8Array(4_000_001), /a\.stl has 4\.0 MB.*Choose the URDF itself/],
+  ])('is refused where it %s', async (_, bytes, said) => {
+    await expect(textOf(new File([bytes], 'a.stl'))).rejects.toThrow(said)
+  })
+
+  test('that is gone is refused with what to do', async () => {
+    const gone = new File(['x'], 'a.urdf')
+    gone.arrayBuffer = () => Promise.reject(new DOMException('gone', 'NotFoundError'))
+    await expect(textOf(gone)).rejects.toThrow('choose it again')
+  })
+
+  test.each([
+    ['a1.urdf', 'a1'],
+    ['my dog (2).v1.urdf', 'my dog 2.v1'],
+    ['../x/y.urdf', 'xy'],
+    ['.urdf', 'robot'],
+    [`${'n'.repeat(120)}.urdf`, 'n'.repeat(100)],
+  ])('%s names a robot %s', (file, name) => expect(robotName(file)).toBe(name))
+})
+
+test('a start design is the middle of what is searched, with what is fixed', () => {
+  const known = [
+    { name: 'P', low: 0, high: 1, kind: 'continuous' },
+    { name: 'N', low: 0, high: 5, kind: 'integer' },
+    { name: 'feed_forward', low: 0, high: 1, kind: 'continuous' },
+  ] as unknown as Variable[]
+  const spec = {
+    variables: [
+      { name: 'P', low: 0, high: 0.5 },
+      { name: 'N', low: 1, high: 4 },
+      { name: 'gait', kind: 'categorical', choices: ['trot', 'pace'] },
+      'feed_forward',
+    ],
+    fixed: { stride: 0.1 },
+  } as unknown as JobSpec
+  expect(startDesign(spec, known)).toEqual({
+    P: 0.25,
+    N: 3,
+    gait: 'trot',
+    feed_forward: 0.5,
+    stride: 0.1,
+  })
+})

@@ -1,0 +1,56 @@
+import { describe, expect, test } from 'vitest'
+import {
+  AddressError,
+  DEFAULT_SOURCE,
+  type DesignSource,
+  queryOf,
+  sourceOf,
+  sourceOfWord,
+  wordOf,
+} from '../../../src/walk/design/design-source'
+
+const SOURCES: DesignSource[] = [
+  { kind: 'best', job: 'k2q7' },
+  { kind: 'particle', job: 'k2q7', iteration: 24, particle: 0 },
+  { kind: 'published', controller: 'fuzzy-pi', study: 'A' },
+  { kind: 'values', controller: 'p', design: { P: 0.25, fir_window: 'hamming' } },
+]
+
+describe.each(SOURCES)('$kind', (source) => {
+  test('is in the query what it was', () => {
+    const entries = Object.entries(queryOf(source)).filter(([, value]) => value !== null)
+    expect(sourceOf(new URLSearchParams(entries as [string, string][]))).toEqual(source)
+  })
+
+  test('is as a word what it was', () => {
+    expect(sourceOfWord(wordOf(source))).toEqual(source)
+  })
+})
+
+test('an address that names nothing shows the published optimum', () => {
+  expect(sourceOf(new URLSearchParams('scenario=slope-fast'))).toEqual(DEFAULT_SOURCE)
+})
+
+test('a published design may be named without its controller', () => {
+  const source = { kind: 'published', controller: null, study: 'A' }
+  expect(sourceOfWord('published:A')).toEqual(source)
+})
+
+test('no word names no design', () => {
+  expect([sourceOfWord(null), sourceOfWord('')]).toEqual([null, null])
+})
+
+test.each([
+  ['job=k2q7&iteration=3', /both from 0/],
+  ['job=k2q7&iteration=x&particle=1', /both from 0/],
+  ['design={"P":true}', /object of numbers/],
+  ['design=[1]', /object of numbers/],
+  ['design={', /not JSON/],
+])('%s is refused', (query, message) => {
+  expect(() => sourceOf(new URLSearchParams(query))).toThrow(AddressError)
+  expect(() => sourceOf(new URLSearchParams(query))).toThrow(message)
+})
+
+test('a word of another kind is refused', () => {
+  expect(() => sourceOfWord('A')).toThrow(/published:A or job:ID/)
+})

@@ -1,0 +1,36 @@
+import { expect, test } from 'vitest'
+import { moments, seriesOf } from '../../../src/walk/plots/plot-data'
+import { plotSpecs } from '../../../src/walk/plots/plot-specs'
+import { stances } from '../../../src/walk/replay/contact'
+import { parseReplay } from '../../../src/walk/replay/replay'
+import { encoded, frames, header } from '../replay/replay-bytes'
+
+const walk = (count: number, label: string) => ({
+  label,
+  replay: parseReplay(encoded(header(count), frames(count))),
+})
+
+test('charts of channels that were not recorded are left out', () => {
+  const keys = plotSpecs(walk(3, 'A').replay, 0).map(({ key }) => key)
+  expect(keys).toEqual(['leg-force', 'normal-forces'])
+})
+
+test('the second walk has dashed curves, and no values after its end', () => {
+  const walks = [walk(4, 'A'), walk(2, 'B')]
+  const [spec] = plotSpecs(walks[0].replay, 0).filter(({ key }) => key === 'normal-forces')
+  const [first, second] = seriesOf(spec.curves, walks)
+  expect(Array.from(moments(walks))).toHaveLength(4)
+  expect([first.label, first.dash, first.values]).toEqual(['leg', undefined, [0, 10, 20, 30]])
+  expect([second.label, second.values]).toEqual(['leg, B', [0, 10, null, null]])
+  expect(second.dash).toBeDefined()
+})
+
+test('moments are those of the longer walk, whichever it is', () => {
+  expect(moments([walk(2, 'A'), walk(5, 'B')])).toHaveLength(5)
+})
+
+test('a foot stands from its first force to its last', () => {
+  const [[from, to], ...others] = stances(walk(5, 'A').replay, 0)
+  expect([from, to].map((moment) => Number(moment.toFixed(3)))).toEqual([0.1, 0.4])
+  expect(others).toEqual([])
+})

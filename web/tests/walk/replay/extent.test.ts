@@ -1,0 +1,58 @@
+import { expect, test } from 'vitest'
+import { extentOf, lengthInWords, roundLength } from '../../../src/walk/replay/extent'
+import { newtonsPerCell } from '../../../src/walk/replay/force-scale'
+import { parseReplay, type Shape } from '../../../src/walk/replay/replay'
+import { encoded, frames, header } from './replay-bytes'
+
+/** A box of these edges [m] on the body's link, 0.15 m over the ground. */
+function walker(size: readonly number[], turn: readonly number[] = [0, 0, 0, 1]) {
+  const shape: Shape = { type: 'box', size, origin: [0, 0, 0, ...turn], role: 'body' }
+  const load: Shape = { type: 'sphere', size: [9], origin: [0, 0, 0, 0, 0, 0, 1], role: 'load' }
+  const robot = {
+    ...header(2).robot,
+    links: [{ name: 'body', parent: null, shapes: [shape, load], meshes: [] }],
+  }
+  return parseReplay(encoded(header(2, { robot }), frames(2)))
+}
+
+test('the largest robot of a scene sets its lengths, whatever it carries', () => {
+  const small = extentOf([walker([0.4, 0.3, 0.1])])
+  expect(small.span).toBeCloseTo(0.4)
+  // The foot of this walker is at y = 0.2 m.
+  expect(small.width).toBeCloseTo(0.35)
+  expect(small.height).toBeCloseTo(0.2)
+  expect(small.cell).toBe(0.1)
+  const both = extentOf([walker([0.4, 0.3, 0.1]), walker([4, 3, 1])])
+  expect(both.span).toBeCloseTo(4)
+  expect(both.cell).toBe(1)
+})
+
+test('solids are as large as they are turned', () => {
+  const quarter = [0, 0, Math.SQRT1_2, Math.SQRT1_2]
+  const turned = extentOf([walker([0.4, 1, 0.1], quarter)])
+  expect(turned.span).toBeCloseTo(1)
+  expect(turned.width).toBeCloseTo(0.4)
+})
+
+test('a walk without a frame has lengths too', () => {
+  const none = parseReplay(encoded(header(0), frames(0)))
+  expect(extentOf([none]).span).toBeGreaterThan(0)
+})
+
+test('forces are as long beside a large robot as beside a small one', () => {
+  const share = (size: number[]) => {
+    const extent = extentOf([walker(size)])
+    return extent.cell / newtonsPerCell(50, extent) / extent.span
+  }
+  expect(share([4, 3, 1]) / share([0.4, 0.3, 0.1])).toBeCloseTo(1, 0)
+})
+
+test.each([
+  [0.095, 0.1, '10 cm'],
+  [0.16, 0.2, '20 cm'],
+  [0.0021, 0.002, '0.2 cm'],
+  [0.8, 1, '1 m'],
+])('%d m is rounded to %d m', (length, expected, words) => {
+  expect(roundLength(length)).toBeCloseTo(expected, 9)
+  expect(lengthInWords(roundLength(length))).toBe(words)
+})

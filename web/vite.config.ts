@@ -20,5 +20,6 @@ export default defineConfig({
     host: '127.0.0.1',
     proxy: { '/v1': API, '/docs': API, '/docs-assets': API, '/openapi.json': API },
   },
-  test: { include: ['tests/**/*.test.ts', 'tests/**/*.test.tsx'] },
+  // Stylesheets are read by the test of their classes.
+  test: { include: ['tests/**/*.test.ts'], css: true },
 })

@@ -10,6 +10,7 @@ import { CELLS, cellsOf, dragged, nearestRow, placeInWords, sampleOf, ticksOf } 
 import { themePalette } from './parallel-coordinates'
 import { type Brush, FAILED, type ParallelModel } from './parallel-model'
 import type { Palette } from './progressive-painter'
+import './pair-map.css'
 
 const HEIGHT_PX = 340
 /** Shorter drags are clicks, as a share of the box. */

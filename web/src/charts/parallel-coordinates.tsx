@@ -14,6 +14,7 @@ import {
   stretchOf,
 } from './parallel-model'
 import { type Palette, ProgressivePainter } from './progressive-painter'
+import './parallel.css'
 
 export type Brushes = ReadonlyMap<number, Brush>
 
@@ -71,7 +72,7 @@ export function ParallelCoordinates({
   return (
     // A box that scrolls must take the keyboard.
     <section class="parallel-scroll" tabIndex={0} aria-label={`${label}, by axis`}>
-      <div class="parallel" ref={box} style={{ minWidth: `${least}px` }}>
+      <div ref={box} style={{ minWidth: `${least}px` }}>
         <div class="parallel-heads">
           {model.axes.map((axis) => (
             <span key={axis.name} class="small">

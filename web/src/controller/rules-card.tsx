@@ -39,7 +39,7 @@ export function RulesCard({
       value: (row) => row.fires,
       cell: (row) => (
         <span class="firing">
-          <i class="bar" aria-hidden="true">
+          <i class="firing-bar" aria-hidden="true">
             <b style={{ width: `${100 * row.fires}%` }} />
           </i>
           <span>{row.fires.toFixed(3)}</span>

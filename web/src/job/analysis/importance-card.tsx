@@ -8,6 +8,7 @@ import { type Column, Table } from '../../components/table'
 import { formatCount, formatNumber, NONE, percent } from '../../format/number'
 import { setQuery, usePlace } from '../../router/navigation'
 import { byImportance, indexOf, type Output, outputsOf, outputWords } from './outputs'
+import '../bars.css'
 
 export function ImportanceCard({ found }: { found: Importance }) {
   const { query } = usePlace()

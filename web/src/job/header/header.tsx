@@ -18,6 +18,7 @@ import { EndNotice } from './end-notice'
 import { LineageNote } from './lineage'
 import { WalkPreview } from './walk-preview'
 import { WorldsNote } from './worlds-note'
+import './header.css'
 
 export function JobHeader({ live, job, gain }: { live: LiveJob; job: StoredJob; gain: Gain }) {
   const { followed } = live

@@ -10,6 +10,7 @@ import { DiversityChart } from './diversity-chart'
 import { LimitsCard } from './limits-card'
 import { useDistribution } from './use-distribution'
 import { WinnerCard } from './winner-card'
+import './overview.css'
 
 export function OverviewPanel({
   live,

@@ -10,6 +10,7 @@ import { useQueryValue } from '../../router/query-value'
 import { preferenceOf, preferenceQuery } from '../preference'
 import { RankingResult } from './ranking-result'
 import { PreferenceSliders, same } from './sliders'
+import './what-if.css'
 
 export function PreferencesPanel({ job }: { job: Job }) {
   const own = (job.spec as JobSpec).preference as Preference

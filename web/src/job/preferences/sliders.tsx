@@ -51,7 +51,7 @@ export function PreferenceSliders({
           onChoose={(chosen) => onChange(weights(offered.find(([name]) => name === chosen)![1]))}
         />
         {weighed(preference).map((objective, index) => (
-          <fieldset key={objective} class="weights">
+          <fieldset key={objective}>
             <legend>{inWords(objective)}</legend>
             <Weight
               label="b"

@@ -10,6 +10,7 @@ import { formatNumber, NONE, percent } from '../../format/number'
 import { inWords } from '../../format/words'
 import { searchedVariables } from '../designs/variables'
 import { RobustPreferencesCard } from './preferences-card'
+import '../bars.css'
 
 const LEAST_SAMPLES = 128
 

@@ -2,6 +2,7 @@
 
 import type { Job } from '../../api/types'
 import { inWords } from '../../format/words'
+import './notes.css'
 
 export function ObjectiveNotes({ job }: { job: Job }) {
   return (

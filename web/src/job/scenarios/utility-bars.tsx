@@ -5,6 +5,7 @@ import { ChartFrame, LegendEntry } from '../../components/chart-frame'
 import { quantity } from '../../format/number'
 import { capitalized } from '../../format/words'
 import type { CaseWords } from '../fitness'
+import '../bars.css'
 
 interface Bar {
   readonly name: string

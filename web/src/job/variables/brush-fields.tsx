@@ -6,6 +6,7 @@ import { BrokenName } from '../../components/broken-name'
 import { NumberField } from '../../components/number-field'
 import { Unit } from '../../components/unit'
 import { inWords } from '../../format/words'
+import './brush-fields.css'
 
 export function BrushFields({
   model,

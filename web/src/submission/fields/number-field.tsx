@@ -3,6 +3,7 @@
 import { useId } from 'preact/hooks'
 import { Unit } from '../../components/unit'
 import { boundsInWords, describe, type SchemaField } from './schema-fields'
+import './fields.css'
 
 export function NumberField({
   label,

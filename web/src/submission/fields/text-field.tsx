@@ -1,6 +1,7 @@
 /** A labelled line of text, with a hint or what the API has against it. */
 
 import { useId } from 'preact/hooks'
+import './fields.css'
 
 export function TextField({
   label,

@@ -22,7 +22,7 @@ export function ParametersTable({
   const drafts = parameterDrafts(parameters)
   const fitted = fittedNames(parameters).length
   return (
-    <details class="fit-parameters" open={known.length > 0}>
+    <details open={known.length > 0}>
       <summary>
         Parameters: {fitted} of {known.length} fitted
       </summary>

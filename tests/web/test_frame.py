@@ -11,7 +11,7 @@ from playwright.sync_api import Page, expect
 from tests.examples.servers import Server, ServerProcess
 from tests.web.conftest import SMALL_JOB
 from tests.web.job_page import wait_for_iteration
-from tests.web.visit import Visit
+from tests.web.visit import Visit, seen_again
 
 pytestmark = pytest.mark.slow
 
@@ -77,6 +77,34 @@ def test_titles_and_crumbs_name_what_is_shown(
         expect(place).to_have_text(crumbs)
 
 
+@pytest.fixture
+def endless_job(server: ServerProcess) -> Iterator[str]:
+    """A job that runs until the test is over."""
+    job_id = server.submit(SMALL_JOB | {"iterations": 5000})
+    yield job_id
+    server.client.post(f"/v1/jobs/{job_id}/cancel")
+
+
+def test_the_title_of_a_walk_tells_how_far_its_job_is(
+    server: ServerProcess, endless_job: str, visit: Callable[..., Visit]
+) -> None:
+    visited = visit(server.url)
+    wait_for_iteration(visited.go(f"/jobs/{endless_job}"), 3)
+    page = visited.go(f"/walk?job={endless_job}&scenario=loaded")
+    named = "Best of small, scenario loaded"
+    expect(page).to_have_title(re.compile(rf"^{named} · running \d+/5000 · Walk · gaitswarm$"))
+    before = page.title()
+
+    seen_again(page)
+
+    expect(page).not_to_have_title(before)
+    assert "running" in page.title()
+    server.client.post(f"/v1/jobs/{endless_job}/cancel")
+    server.wait_for(endless_job, "cancelled")
+    seen_again(page)
+    expect(page).to_have_title(f"{named} · Walk · gaitswarm")
+
+
 FROM_ZERO = re.compile("^0 ")
 """Range of an axis that begins with the first iteration."""
 
@@ -85,14 +113,6 @@ def chart_range(page: Page) -> list[float]:
     """Of the horizontal axis of the first chart."""
     text = page.locator(".uplot").first.get_attribute("data-range")
     return [float(end) for end in (text or "").split()]
-
-
-@pytest.fixture
-def endless_job(server: ServerProcess) -> Iterator[str]:
-    """A job that runs until the test is over."""
-    job_id = server.submit(SMALL_JOB | {"iterations": 5000})
-    yield job_id
-    server.client.post(f"/v1/jobs/{job_id}/cancel")
 
 
 def test_a_zoom_stays_while_iterations_arrive(

@@ -10,7 +10,7 @@ from playwright.sync_api import Page, expect
 
 from tests.examples.servers import Server, ServerProcess
 from tests.web.conftest import SMALL_JOB
-from tests.web.visit import Visit
+from tests.web.visit import Visit, seen_again
 
 pytestmark = pytest.mark.slow
 
@@ -160,8 +160,7 @@ def test_a_comparison_goes_on_with_its_jobs(
 
     server.client.post(f"/v1/jobs/{job_id}/cancel")
 
-    # As when the tab is seen again: it need not be waited for.
-    page.evaluate("document.dispatchEvent(new Event('visibilitychange'))")
+    seen_again(page)
     expect(compared).to_contain_text("cancelled")
     expect(page).to_have_title("small · compared · gaitswarm")
 

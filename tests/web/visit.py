@@ -15,6 +15,11 @@ expect.set_options(timeout=TIMEOUT_MS)
 WINDOW: Final[ViewportSize] = {"width": 1280, "height": 800}
 
 
+def seen_again(page: Page) -> None:
+    """As when the tab is shown again: what is asked now and then is asked at once."""
+    page.evaluate("document.dispatchEvent(new Event('visibilitychange'))")
+
+
 class Visit:
     """A visit fails, when it ends, if the page asked another host for something, broke its content
     security policy, threw, or logged an error.

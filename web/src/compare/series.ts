@@ -6,11 +6,6 @@ import { referenceLabel } from '../job/gain'
 
 export type ComparedJob = JobComparison['jobs'][number]
 
-/** Whether more is to come of a job without anybody's doing. */
-export function isUnderWay({ state }: ComparedJob): boolean {
-  return ['queued', 'running', 'pausing'].includes(state)
-}
-
 /** What jobs of one measure are compared with, each once. */
 export function referencesOf(jobs: readonly ComparedJob[]): readonly ReferenceLine[] {
   const found = new Map<string, ReferenceLine>()

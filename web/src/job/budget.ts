@@ -10,7 +10,7 @@ export interface Spent {
   readonly unit: 'iterations' | 'designs'
 }
 
-type Counts = Pick<
+export type Counts = Pick<
   JobSummary,
   'iterations' | 'evaluations' | 'particles' | 'iterations_planned' | 'evaluations_planned'
 >

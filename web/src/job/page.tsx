@@ -1,14 +1,13 @@
 /** One job, live: header, commands, and its parts under tabs. */
 
 import { isReadable } from '../api/readable'
-import type { Iteration, Job, StoredJob } from '../api/types'
+import type { Job, StoredJob } from '../api/types'
 import { ALL_JOBS, Breadcrumbs, type Crumb } from '../components/breadcrumbs'
 import { ErrorNotice, Loading } from '../components/feedback'
 import { lazyPart } from '../components/lazy-page'
 import { capitalized } from '../format/words'
 import { usePlace } from '../router/navigation'
 import { jobPath, withQuery } from '../router/routes'
-import { budgetSpent } from './budget'
 import { caseWords } from './fitness'
 import { type Gain, useGain } from './gain'
 import { JobHeader } from './header/header'
@@ -16,6 +15,7 @@ import './job.css'
 import { SHARED } from './designs/selection'
 import { type LiveJob, useJob } from './live/use-job'
 import { OverviewPanel } from './overview/panel'
+import { progressInWords } from './state'
 
 // Only the overview's code comes with the page.
 const ActivityPanel = lazyPart('the activity', 'ActivityPanel', () => import('./activity/panel'))
@@ -138,19 +138,12 @@ function OneJob({ id, tab }: { id: string; tab: string }) {
       <Breadcrumbs
         crumbs={crumbsOf(job, tab)}
         here={hereOf(job, tab)}
-        title={titleOf(job, live.followed.iterations)}
+        title={[job.name || job.id, progressInWords(job, live.followed.iterations)]}
       />
       <JobHeader live={live} job={job} gain={gain} />
       {isReadable(job) && !live.held && <Parts live={live} job={job} tab={tab} gain={gain} />}
     </div>
   )
-}
-
-/** Name and state, of a job under way with its progress. */
-function titleOf(job: StoredJob, iterations: readonly Iteration[]): readonly string[] {
-  const { done, planned } = budgetSpent(job, iterations)
-  const ended = ['succeeded', 'failed', 'cancelled'].includes(job.state)
-  return [job.name || job.id, ended ? job.state : `${job.state} ${done}/${planned}`]
 }
 
 function crumbsOf(job: StoredJob, tab: string): readonly Crumb[] {

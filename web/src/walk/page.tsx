@@ -101,7 +101,7 @@ function Walk({ address, query }: { address: Address; query: URLSearchParams }) 
 
 /** The recorded walk of a design, asked for once it is known. */
 function useWalk(design: ResolvedDesign | null, scenario: string | Scenario, rate: number) {
-  const key = design && JSON.stringify([wordOf(design.source), design, scenario, rate])
+  const key = design && JSON.stringify([wordOf(design.source), design.design, scenario, rate])
   return useResource(key, (signal) => recordWalk(design!, scenario, rate, signal))
 }
 

@@ -16,6 +16,7 @@ import { type Column, Table } from '../../components/table'
 import { change, formatCount, formatNumber, percent } from '../../format/number'
 import { inWords } from '../../format/words'
 import { withQuery } from '../../router/routes'
+import { isComputed } from '../state'
 import { OtherEngine } from './other-engine'
 
 /** How often the certificate of a job that runs is asked for again [ms]. */
@@ -50,7 +51,7 @@ function Certified({ job }: { job: Job }) {
       signal,
     }),
   )
-  usePolling(found.reload, RENEW_MS, job.state === 'running' || job.state === 'pausing')
+  usePolling(found.reload, RENEW_MS, isComputed(job))
   return (
     <div class="stack">
       {found.error && (

@@ -1,6 +1,6 @@
 /** What is said of a notice of the browser. Pure. */
 
-import type { JobState, StoredJob } from '../../api/types'
+import type { StoredJob } from '../../api/types'
 import { formatCount, formatNumber } from '../../format/number'
 
 export interface NoticeState {
@@ -9,10 +9,6 @@ export interface NoticeState {
   readonly on: boolean
   /** What there is to know; null for nothing. */
   readonly hint: string | null
-}
-
-export function hasEnded(state: JobState): boolean {
-  return state === 'succeeded' || state === 'failed' || state === 'cancelled'
 }
 
 export function noticeState(

@@ -2,13 +2,14 @@
 
 import { useEffect, useRef, useState } from 'preact/hooks'
 import type { StoredJob } from '../../api/types'
-import { endInWords, hasEnded, type NoticeState, noticeState } from './end-notice-model'
+import { hasEnded } from '../state'
+import { endInWords, type NoticeState, noticeState } from './end-notice-model'
 
 export function EndNotice({ job }: { job: StoredJob }) {
   const [wanted, setWanted] = useState(false)
   const [permission, setPermission] = useState(permissionNow)
   const before = useRef(job.state)
-  const ended = hasEnded(job.state)
+  const ended = hasEnded(job)
   useEffect(() => {
     const changed = before.current !== job.state
     before.current = job.state

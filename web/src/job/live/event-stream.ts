@@ -1,6 +1,7 @@
 /** A job's events: every committed iteration once and in order, whatever happens to the network. */
 
 import type { Iteration, JobState } from '../../api/types'
+import { hasEnded } from '../state'
 
 export type Connection = 'connecting' | 'open' | 'stale' | 'ended'
 
@@ -31,7 +32,6 @@ export interface StreamPorts {
   later(call: () => void, milliseconds: number): () => void
 }
 
-const ENDINGS: ReadonlySet<string> = new Set(['succeeded', 'failed', 'cancelled'])
 const FIRST_WAIT_MS = 500
 const LONGEST_WAIT_MS = 8000
 /** Events that come together are told together. */
@@ -147,7 +147,7 @@ export class EventStream {
     this.state = news.state
     this.error = news.error
     this.waiting = news.waiting ?? null
-    if (ENDINGS.has(news.state)) {
+    if (hasEnded(news)) {
       this.connection = 'ended'
       this.staleSince = null
       this.drop()

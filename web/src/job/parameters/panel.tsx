@@ -10,6 +10,7 @@ import { Empty, ErrorNotice, Loading } from '../../components/feedback'
 import { matching } from '../../components/rows'
 import { setQuery, usePlace } from '../../router/navigation'
 import { caseWords, fitnessUnit } from '../fitness'
+import { isComputed } from '../state'
 import { ChoicesCard } from './choices-card'
 import { IntervalPanels } from './interval-panels'
 import { DECISIVE, isCategorical, type Trust } from './intervals'
@@ -60,8 +61,7 @@ function Fitted({ job, also }: { job: Job; also: readonly string[] }) {
     }),
   )
   const runs = useResource(key, (signal) => Promise.all(also.map((id) => readableJob(id, signal))))
-  const isMoving = job.state === 'running' || job.state === 'pausing'
-  usePolling(found.reload, RENEW_MS, isMoving)
+  usePolling(found.reload, RENEW_MS, isComputed(job))
   const choose = (ids: readonly string[]) => setQuery({ also: wordOfRuns(ids) })
   const compared = [job, ...(runs.data ?? [])]
   return (

@@ -9,6 +9,7 @@ import { change, formatExact, formatNumber, percent, quantity } from '../../form
 import { placeWord } from '../../format/place'
 import { inWords } from '../../format/words'
 import { setQuery, usePlace } from '../../router/navigation'
+import { isComputed } from '../state'
 import { isWithin, LEFT_OUT, type LeaveOut, leaveOutOf, withinCount } from './targets'
 
 /** How often the targets of a job that runs are asked for again [ms]. */
@@ -36,7 +37,7 @@ function Compared({ job }: { job: Job }) {
       signal,
     }),
   )
-  usePolling(found.reload, RENEW_MS, job.state === 'running' || job.state === 'pausing')
+  usePolling(found.reload, RENEW_MS, isComputed(job))
   return (
     <section class="card" aria-labelledby="targets">
       <header class="row spread">

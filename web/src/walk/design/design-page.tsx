@@ -3,6 +3,7 @@
 import type { ComponentChildren } from 'preact'
 import { ALL_JOBS, Breadcrumbs, type Crumb } from '../../components/breadcrumbs'
 import { ErrorNotice } from '../../components/feedback'
+import { useProgress } from '../../job/live/use-progress'
 import { usePlace } from '../../router/navigation'
 import { jobPath, withQuery } from '../../router/routes'
 import { type DesignSource, queryOf } from './design-source'
@@ -55,9 +56,14 @@ export function DesignHeading({
   /** What is shown of it, for the tab. */
   beside?: readonly string[]
 }) {
+  const progress = useProgress(design?.job)
+  const shown = design ? [[design.label, ...beside].join(', ')] : []
   return (
     <>
-      <Breadcrumbs {...placeOf(title, path, design)} title={titleOf(title, design, beside)} />
+      <Breadcrumbs
+        {...placeOf(title, path, design)}
+        title={[...shown, ...(progress ? [progress] : []), title]}
+      />
       <div class="page-header">
         <h1>{title}</h1>
       </div>
@@ -69,16 +75,12 @@ function placeOf(title: string, path: string, design: ResolvedDesign | null) {
   const { job, source } = design ?? {}
   if (!design || !job)
     return { crumbs: design ? [[title, path] as const] : [], here: design?.label ?? title }
-  const crumbs: Crumb[] = [ALL_JOBS, [job.name, jobPath(job.id)]]
+  const crumbs: Crumb[] = [ALL_JOBS, [job.name || job.id, jobPath(job.id)]]
   if (source?.kind !== 'particle') return { crumbs, here: `${title} of the best` }
   const { iteration, particle } = source
   crumbs.push(['Iterations', jobPath(job.id, 'iterations')])
   crumbs.push([String(iteration), jobPath(job.id, `iterations/${iteration}`)])
   return { crumbs, here: `${title} of design ${particle}` }
-}
-
-function titleOf(title: string, design: ResolvedDesign | null, beside: readonly string[]) {
-  return design ? [[design.label, ...beside].join(', '), title] : [title]
 }
 
 /** The ways to the same design's other page, and to its job. */

@@ -18,8 +18,8 @@ export interface ResolvedDesign {
   readonly design: Design
   /** What is different from the model where it walks: values of perturbations. */
   readonly world?: Readonly<Record<string, number>>
-  /** The job that it is of, with what it is called. */
-  readonly job?: { readonly id: string; readonly name: string }
+  /** The job that it is of. */
+  readonly job?: Job
   /** Scenarios in which its job judges it; none outside a job. */
   readonly scenarios: readonly Scenario[]
 }
@@ -64,7 +64,7 @@ async function ofJob(
   const name = spec.name || job.id
   return {
     source,
-    job: { id: job.id, name },
+    job,
     label: source.kind === 'best' ? `Best of ${name}` : `${name}, design ${placeWord(evaluation)}`,
     // The evaluations of a certificate are worlds, in which its one design walks.
     ...(spec.kind === 'certificate'

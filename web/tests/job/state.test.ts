@@ -1,0 +1,36 @@
+import { expect, test } from 'vitest'
+import type { Iteration } from '../../src/api/types'
+import { hasEnded, isComputed, isUnderWay, progressInWords } from '../../src/job/state'
+
+const STATES = [
+  'queued',
+  'running',
+  'pausing',
+  'paused',
+  'succeeded',
+  'failed',
+  'cancelled',
+] as const
+
+test('states are told apart by what is still to come', () => {
+  const those = (is: (job: { state: (typeof STATES)[number] }) => boolean) =>
+    STATES.filter((state) => is({ state }))
+  expect(those(hasEnded)).toEqual(['succeeded', 'failed', 'cancelled'])
+  expect(those(isUnderWay)).toEqual(['queued', 'running', 'pausing'])
+  expect(those(isComputed)).toEqual(['running', 'pausing'])
+})
+
+test('progress is told until a job has ended', () => {
+  const job = {
+    iterations: 3,
+    evaluations: 12,
+    particles: 4,
+    iterations_planned: 6,
+    evaluations_planned: 24,
+  }
+  const followed = Array.from({ length: 5 }, () => ({ designs: 4 }) as Iteration)
+  expect(progressInWords({ ...job, state: 'running' })).toBe('running 3/6')
+  expect(progressInWords({ ...job, state: 'running' }, followed)).toBe('running 5/6')
+  expect(progressInWords({ ...job, state: 'paused' })).toBe('paused 3/6')
+  expect(progressInWords({ ...job, state: 'failed' })).toBe('failed')
+})

@@ -1,28 +1,34 @@
 """A campaign of random faults against a real deployment on this machine.
 
     python -m benchmarks.faults --faults 300 --seed 1 [--database postgresql] [--evaluator ray]
-        [--kinds kill-api,kill-runner] [--away 600] [--minutes 30] [--report FILE.md] [--json]
+        [--kinds kill-api,kill-gcs=5] [--away 600] [--minutes 30] [--report FILE.md] [--json]
 
 It reports three numbers that should be zero: iterations that were lost, histories that differ from
 those of the same jobs alone, and steps that a person would have had to take. Exit code 1 if one is
 not. As root, the database has a small disk and a network of its own; without, kinds that need these
-are left out, and named.
+are left out, and named. SIGTERM or Ctrl-C ends the faults, and what was found is reported; a second
+one ends the campaign.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import math
 import shutil
 import signal
 import statistics
+import subprocess
 import sys
+import threading
 import time
 from dataclasses import asdict
+from datetime import UTC, datetime
 from pathlib import Path
 
+import gaitswarm
 from benchmarks.faults.campaign import Result, run
-from benchmarks.faults.deployment import Deployment
+from benchmarks.faults.deployment import ROOT, Deployment
 from benchmarks.faults.kinds import KINDS, ClusterAway
 from benchmarks.faults.plan import plan
 
@@ -30,6 +36,8 @@ from benchmarks.faults.plan import plan
 def table(result: Result) -> str:
     """What came of a campaign, in Markdown."""
     lines = [
+        f"{datetime.now(UTC):%Y-%m-%d}, {_version()}, load average {_range(result.loads)}.",
+        "",
         "| fault | times | lasts [s] | next commit after [s], median | longest |",
         "| --- | --- | --- | --- | --- |",
     ]
@@ -37,7 +45,7 @@ def table(result: Result) -> str:
         lasted = [seconds for kind, seconds, _ in result.faults if kind == name]
         after = [seconds for kind, _, seconds in result.faults if kind == name]
         lines.append(
-            f"| {name} | {len(after)} | {min(lasted):.1f} to {max(lasted):.1f}"
+            f"| `{name}` | {len(after)} | {_range(lasted)}"
             f" | {statistics.median(after):.1f} | {max(after):.1f} |"
         )
     restarts = ", ".join(f"{name} {count}" for name, count in result.restarts.items())
@@ -54,6 +62,26 @@ def table(result: Result) -> str:
     return "\n".join(lines) + "\n"
 
 
+def _range(numbers: list[float]) -> str:
+    return f"{min(numbers):.1f} to {max(numbers):.1f}" if numbers else "not known"
+
+
+def _version() -> str:
+    described = subprocess.run(
+        ["git", "describe", "--always", "--dirty"],  # noqa: S607
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    return f"version {gaitswarm.__version__} {described.stdout.strip()}".rstrip()
+
+
+def _kinds(text: str) -> dict[str, int | None]:
+    named = (part.partition("=") for part in text.split(","))
+    return {name: int(times) if equals else None for name, equals, times in named}
+
+
 def main() -> int:
     """Run a campaign; 1 if anything was lost, differs or needed a person."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -61,7 +89,11 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--database", choices=["sqlite", "postgresql"], default="sqlite")
     parser.add_argument("--evaluator", choices=["in-process", "ray"], default="in-process")
-    parser.add_argument("--kinds", help="names with commas between; default: all that are possible")
+    parser.add_argument(
+        "--kinds",
+        type=_kinds,
+        help="names with commas between, NAME=TIMES for how often; default: all that are possible",
+    )
     parser.add_argument("--away", type=float, default=20.0, help="how long the cluster is away [s]")
     parser.add_argument("--minutes", type=float, help="inject no more faults after so long")
     parser.add_argument("--iterations", type=int, default=60, help="of each job")
@@ -72,13 +104,19 @@ def main() -> int:
     options = parser.parse_args()
     ClusterAway.shortest = ClusterAway.longest = options.away
     with_ray = options.evaluator == "ray"
-    # A library for the clock that waits are not told of: Ray's would take an hour longer.
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
-    opened = Deployment(options.database, with_ray, with_clock=not with_ray)
-    until = time.monotonic() + 60.0 * options.minutes if options.minutes else None
-    with opened as deployment:
+    asked_to_end = threading.Event()
+
+    def end(number: int, _: object) -> None:
+        if asked_to_end.is_set():
+            sys.exit(128 + number)
+        asked_to_end.set()
+
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, end)
+    until = time.monotonic() + 60.0 * options.minutes if options.minutes else math.inf
+    with Deployment(options.database, with_ray) as deployment:
         possible = [name for name, kind in KINDS.items() if kind.possible(deployment)]
-        chosen = options.kinds.split(",") if options.kinds else possible
+        chosen = options.kinds or dict.fromkeys(possible)
         impossible = sorted(set(chosen) - set(possible))
         if impossible:
             parser.error(f"not possible here: {', '.join(impossible)}")
@@ -89,7 +127,7 @@ def main() -> int:
             plan(options.seed, options.faults, chosen),
             iterations=options.iterations,
             patience=options.patience,
-            until=until,
+            enough=lambda: asked_to_end.is_set() or time.monotonic() > until,
             say=lambda line: print(line, file=sys.stderr, flush=True),
         )
         if options.logs:

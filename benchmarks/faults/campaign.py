@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import os
 import tempfile
 import threading
 import time
@@ -142,6 +143,7 @@ class Result:
         manual: What a person would have to do, a line each.
         seconds: Of the campaign.
         restarts: Of each service.
+        loads: The machine's load average after each fault.
     """
 
     faults: list[tuple[str, float, float]] = field(default_factory=list)
@@ -152,6 +154,7 @@ class Result:
     manual: list[str] = field(default_factory=list)
     seconds: float = 0.0
     restarts: dict[str, int] = field(default_factory=dict)
+    loads: list[float] = field(default_factory=list)
 
 
 def run(
@@ -160,7 +163,7 @@ def run(
     *,
     iterations: int = 60,
     patience: float = 180.0,
-    until: float | None = None,
+    enough: Callable[[], bool] = lambda: False,
     say: Say = lambda _: None,
 ) -> Result:
     """Run jobs, inject the faults one after the other, and compare the histories.
@@ -174,7 +177,7 @@ def run(
         iterations: Of each job.
         patience: How long nothing may be committed after a fault, before that counts as a need for
             a person [s].
-        until: Monotonic time at which no more faults are injected [s]; None: all of them are.
+        enough: Asked before each fault whether no more are to be injected.
         say: Told of each fault.
 
     Returns:
@@ -187,12 +190,13 @@ def run(
     if not _commits(clients, 0, patience):
         result.manual.append("the deployment did not begin to work")
     for number, fault in enumerate(planned):
-        if result.manual or (until is not None and time.monotonic() > until):
+        if result.manual or enough():
             break
         time.sleep(fault.pause)
         while not all(service.alive for service in deployment.services):
             time.sleep(_GLANCE)
         _inject(deployment, fault, clients, result, patience)
+        result.loads.append(os.getloadavg()[0])
         kind, lasted, recovery = result.faults[-1]
         say(f"{number + 1:4d} {kind:16} {lasted:5.1f} s, next commit after {recovery:5.1f} s")
     open_jobs = clients.finish(patience)

@@ -35,7 +35,7 @@ class Deployment:
     Attributes:
         database: Kind of the database.
         with_ray: Whether walks run on a Ray cluster; else in the runners.
-        with_clock: Whether its processes have a clock that can be stepped.
+        with_clock: Whether its processes, but for Ray's own, have a clock that can be stepped.
         lease_seconds: Of the runners [s].
         folder: Of everything that it writes.
         url: Of the database as the campaign itself reaches it.
@@ -167,14 +167,20 @@ class Deployment:
         command += ["--object-store-memory", str(80 << 20), "--temp-dir", str(files)]
         command += ["--disable-usage-stats"]
         command += ["--node-ip-address", "127.0.0.1"]
-        self.cluster = self._service("cluster", command, {})
+        self.cluster = self._service("cluster", command, {}, with_clock=False)
         while True:
             with suppress(OSError), socket.create_connection(("127.0.0.1", port), timeout=1.0):
                 return f"127.0.0.1:{port}"
             time.sleep(0.2)
 
     def _service(
-        self, name: str, command: list[str], settings: dict[str, str], *, group: bool = False
+        self,
+        name: str,
+        command: list[str],
+        settings: dict[str, str],
+        *,
+        group: bool = False,
+        with_clock: bool = True,
     ) -> Service:
         settings = {
             "LEASE_SECONDS": str(self.lease_seconds),
@@ -188,7 +194,8 @@ class Deployment:
         outside = {k: v for k, v in os.environ.items() if not k.startswith(("GAITSWARM_", "RAY_"))}
         environment = outside | {f"GAITSWARM_{key}": value for key, value in settings.items()}
         environment["PYTHONPATH"] = str(ROOT)
-        environment |= self.clock.variables if self.clock is not None else {}
+        if self.clock is not None and with_clock:
+            environment |= self.clock.variables
         limits = None
         if group and can()["processes"]:
             limits = process_group(name)

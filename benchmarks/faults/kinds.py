@@ -6,6 +6,7 @@ import os
 import resource
 import signal
 import sqlite3
+import time
 from abc import ABC, abstractmethod
 from contextlib import suppress
 from typing import ClassVar, Final
@@ -106,12 +107,29 @@ class KillWorker(_OfRay):
     titles = ("ray::",)
 
 
-class KillRaylet(_OfRay):
+class _OfTheHead(_OfRay):
+    """It takes the head with it, and is over when that is started again."""
+
+    _restarts = 0
+
+    def inject(self) -> None:
+        assert self.deployment.cluster is not None
+        self._restarts = self.deployment.cluster.restarts
+        super().inject()
+
+    def heal(self) -> None:
+        assert self.deployment.cluster is not None
+        ends = time.monotonic() + 30.0
+        while self.deployment.cluster.restarts == self._restarts and time.monotonic() < ends:
+            time.sleep(0.1)
+
+
+class KillRaylet(_OfTheHead):
     name = "kill-raylet"
     titles = ("/raylet/raylet",)
 
 
-class KillGcs(_OfRay):
+class KillGcs(_OfTheHead):
     name = "kill-gcs"
     titles = ("gcs_server",)
 

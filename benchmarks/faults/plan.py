@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 
@@ -24,22 +24,26 @@ class Planned:
     length: float
 
 
-def plan(seed: int, count: int, kinds: Sequence[str], *, pause: float = 1.0) -> list[Planned]:
-    """Draw a campaign: every kind comes as often as any other, give or take one.
+def plan(
+    seed: int, count: int, kinds: Mapping[str, int | None], *, pause: float = 1.0
+) -> list[Planned]:
+    """Draw a campaign. Kinds without a number come as often as each other, give or take one.
 
-    seed 1, 5 faults, kinds a and b  ->  b a b a a, the same at every call
+    seed 1, 5 faults, a and b without a number, c once  ->  c b a b a, the same at every call
 
     Args:
         seed: Of all that is drawn.
         count: Faults.
-        kinds: Their names.
+        kinds: Their names, and how often they come, or None.
         pause: The longest between two faults [s].
 
     Returns:
         The faults in order.
     """
     drawn = random.Random(seed)  # noqa: S311
-    names = [kinds[index % len(kinds)] for index in range(count)]
+    names = [name for name, times in kinds.items() for _ in range(times or 0)][:count]
+    others = [name for name, times in kinds.items() if times is None]
+    names += [others[index % len(others)] for index in range(count - len(names)) if others]
     drawn.shuffle(names)
     return [
         Planned(name, drawn.uniform(0.0, pause), drawn.random(), drawn.random()) for name in names

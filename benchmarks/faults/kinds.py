@@ -90,6 +90,7 @@ class KillPostgres(Fault):
 
 class _OfRay(Fault):
     titles: ClassVar[tuple[str, ...]]
+    not_titles: ClassVar[tuple[str, ...]] = ()
 
     @staticmethod
     def possible(deployment: Deployment) -> bool:
@@ -97,7 +98,9 @@ class _OfRay(Fault):
 
     def inject(self) -> None:
         assert self.deployment.cluster is not None
-        victims = self.deployment.cluster.below(*self.titles)
+        cluster = self.deployment.cluster
+        others = set(cluster.below(*self.not_titles))
+        victims = [pid for pid in cluster.below(*self.titles) if pid not in others]
         if victims:
             _kill(victims[int(self.draw * len(victims))])
 
@@ -105,6 +108,7 @@ class _OfRay(Fault):
 class KillWorker(_OfRay):
     name = "kill-worker"
     titles = ("ray::",)
+    not_titles = ("Agent",)
 
 
 class _OfTheHead(_OfRay):

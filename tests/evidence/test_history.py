@@ -92,6 +92,20 @@ def test_what_was_changed_is_named(
     assert passed is False and detail.startswith(f"iteration 1: {problem}")
 
 
+def test_a_check_of_the_database_names_job_and_iteration_unless_histories_are_skipped(
+    copy: Path, proved: Proved
+) -> None:
+    sound = run_command("db", "check", "--db", copy, "--json")
+    assert (sound.code, sound.json) == (ExitCode.OK, [])
+    execute(copy, "UPDATE evaluations SET fitness = fitness * 1.001 WHERE iteration > 0")
+    broken = run_command("db", "check", "--db", copy, "--json")
+    assert broken.code == ExitCode.JOB_FAILED
+    (finding,) = broken.json
+    assert finding.startswith(f"job {proved.id} is not what was committed: iteration 1: the fit")
+    skipped = run_command("db", "check", "--db", copy, "--skip-histories", "--json")
+    assert (skipped.code, skipped.json) == (ExitCode.OK, [])
+
+
 def test_a_number_that_was_changed_with_its_digests_is_found_by_the_replay(
     copy: Path, proved: Proved
 ) -> None:

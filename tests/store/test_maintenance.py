@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from services.optimizer.analysis.all_histories import check_histories
 from services.optimizer.errors import NotFound, StoreUnavailable
 from services.optimizer.jobs.job import Command, JobState
 from services.optimizer.store.schema.maintenance import Pruned, check, prune
@@ -55,6 +56,19 @@ def test_what_contradicts_itself_is_found(
 ) -> None:
     edit(database_url, damage)
     assert re.search(words, "\n".join(check(database_url)))
+
+
+def test_histories_are_compared_with_their_digests_and_a_deleted_one_is_left_out(
+    job_id: str, store: SqlStore, database_url: str
+) -> None:
+    assert check_histories(store) == []
+    edit(database_url, "UPDATE iterations SET evaluate_seconds = 9")
+    assert check_histories(store) == [], "how long it took is no part of a history"
+    edit(database_url, "UPDATE evaluations SET fitness = 0.5 WHERE iteration = 1")
+    (finding,) = check_histories(store)
+    assert finding.startswith(f"job {job_id} is not what was committed: iteration 1: ")
+    edit(database_url, "UPDATE jobs SET deleted_at = '2026-01-01 00:00:00'")
+    assert check_histories(store) == []
 
 
 def test_a_database_without_schema_is_not_checked(fresh_url: str) -> None:

@@ -36,18 +36,32 @@ def upgrade(db: Db = None) -> None:
         note(f"the database has schema revision {head()} now, after {before or 'none'}")
 
 
-def check(db: Db = None, as_json: Json = False) -> None:
+def check(
+    skip_histories: Annotated[
+        bool,
+        typer.Option("--skip-histories", help="Compute no chain of a history again."),
+    ] = False,
+    db: Db = None,
+    as_json: Json = False,
+) -> None:
     """Read all of the database, and look for what contradicts itself. Jobs may run meanwhile.
 
-    Exit code 1 if there is anything.
+    The history of every job is compared with its digests. Exit code 1 if there is anything.
     """
     import json
+    from contextlib import closing
 
     from cli.exit_codes import CheckFailed
     from cli.output import note, print_text
+    from services.optimizer.analysis.all_histories import check_histories
     from services.optimizer.store.schema import maintenance
+    from services.optimizer.store.sql_store import open_store
 
-    findings = maintenance.check(_database(db))
+    database = _database(db)
+    findings = maintenance.check(database)
+    if not skip_histories:
+        with closing(open_store(database)) as store:
+            findings += check_histories(store)
     if as_json:
         print_text(json.dumps(findings, indent=2) + "\n")
     else:

@@ -134,6 +134,12 @@ class Settings(BaseSettings):
         le=100_000.0,
         description="Jobs that ended longer ago are deleted by `serve` [d]; default: none is.",
     )
+    audit_days: float | None = Field(
+        default=None,
+        gt=0.0,
+        le=100_000.0,
+        description="Older entries of the audit log are removed by `serve` [d]; default: none is.",
+    )
     log_level: LogLevel = Field(default="INFO", description="Least severe message that is logged.")
     log_format: Literal["console", "json"] = Field(
         default="console",

@@ -137,6 +137,7 @@ def open_runtime(
     longest_job: float = math.inf,
     keeps_house: bool = False,
     retention_days: float | None = None,
+    audit_days: float | None = None,
     longest_fork: float = math.inf,
     should_stop: Callable[[], bool] = lambda: False,
     metrics: Metrics | None = None,
@@ -160,6 +161,7 @@ def open_runtime(
         longest_job: Simulated time of all walks of all designs that a new job may have [s].
         keeps_house: Whether rows of deleted jobs are removed, and jobs that ended long ago.
         retention_days: After so long they did [d]; None: none is deleted.
+        audit_days: Older entries of the audit log are removed with them [d]; None: none is.
         longest_fork: Time that bringing a search to where it was may take, for a fork [s].
         should_stop: As for `open_evaluator`.
         metrics: Are told what store, runner and workers do; None: nobody asks.
@@ -195,7 +197,7 @@ def open_runtime(
             notifier.start()
         service = JobService(store, longest_job=longest_job, longest_fork=longest_fork)
         if keeps_house:
-            keeper = Housekeeping(store, retention_days)
+            keeper = Housekeeping(store, retention_days, audit_days)
             keeper.start()
             stack.callback(keeper.stop)
         if evaluator is None:

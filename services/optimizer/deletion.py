@@ -59,16 +59,23 @@ class Deletion:
 
 
 class Housekeeping:
-    """Removes rows of deleted jobs, and jobs that ended long ago, in a thread of its own.
+    """Removes rows of deleted jobs, and what is older than it is kept, in a thread of its own.
 
     Args:
         store: Where the jobs are.
         retention_days: Jobs that ended longer ago than this are deleted [d]; None: none is.
+        audit_days: Entries of the audit log that are older are removed [d]; None: none is.
     """
 
-    def __init__(self, store: Store, retention_days: float | None = None) -> None:
+    def __init__(
+        self,
+        store: Store,
+        retention_days: float | None = None,
+        audit_days: float | None = None,
+    ) -> None:
         self._store = store
         self._retention = None if retention_days is None else timedelta(days=retention_days)
+        self._audited = None if audit_days is None else timedelta(days=audit_days)
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._rounds, name="housekeeping", daemon=True)
 
@@ -86,7 +93,7 @@ class Housekeeping:
         """Do what is to be done now.
 
         Args:
-            retention: Whether jobs that ended long ago are looked for.
+            retention: Whether it is looked for jobs and entries of the audit log that are too old.
 
         Raises:
             StoreUnavailable: The rest is left for the next round.
@@ -95,6 +102,12 @@ class Housekeeping:
             deleted = self._store.delete_ended_before(datetime.now(UTC) - self._retention)
             for job_id in deleted:
                 _log.info("job %s is deleted: it ended more than %s ago", job_id, self._retention)
+        if retention and self._audited is not None:
+            removed = self._store.forget_audit_before(datetime.now(UTC) - self._audited)
+            if removed:
+                _log.info(
+                    "%d entries of the audit log are removed: older than %s", removed, self._audited
+                )
         self._store.purge_deleted(self._stop.is_set)
 
     def _rounds(self) -> None:

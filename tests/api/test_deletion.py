@@ -76,6 +76,19 @@ def test_housekeeping_deletes_what_ended_longer_ago_than_it_is_kept(
     assert [job.id for job in store.jobs().items] == [young.id]
 
 
+def test_housekeeping_removes_old_entries_of_the_audit_log_only_if_it_is_told_to(
+    store: SqlStore, spec: JobSpec
+) -> None:
+    store.create_job(spec)
+    Housekeeping(store, retention_days=1.0).round()
+    Housekeeping(store, audit_days=1.0).round()
+    assert len(store.audit().items) == 1
+    since = datetime.now(UTC)
+    eventually(lambda: datetime.now(UTC) > since + timedelta(seconds=0.2))
+    Housekeeping(store, audit_days=0.1 / 86_400).round()
+    assert store.audit().items == ()
+
+
 def test_housekeeping_that_is_started_does_its_rounds(store: SqlStore, spec: JobSpec) -> None:
     job, _ = store.create_job(spec)
     store.command(job.id, Command.CANCEL)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from datetime import timedelta
 from typing import Any
 
 import pytest
@@ -12,6 +13,7 @@ from services.optimizer.errors import Conflict, InvalidRequest, NotFound
 from services.optimizer.jobs.audit import AuditAction
 from services.optimizer.jobs.job import Command, JobState
 from services.optimizer.store.sql_store import SqlStore
+from services.optimizer.store.transactions import deletion
 from tests.store.examples import LEASE, Clock, ask, begun, completed, spec
 from tests.store.test_recordings import recording
 
@@ -113,6 +115,24 @@ def test_a_recording_is_noted_when_it_is_new(store: SqlStore) -> None:
     name = store.add_recording(recording(), actor="ci")
     store.add_recording(recording(), actor="ann")
     assert noted(store) == [("ci", "add_recording", None, {"recording": name})]
+
+
+def test_old_entries_are_removed_and_their_numbers_not_given_again(
+    store: SqlStore, clock: Clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(deletion, "_PIECE", 2)
+    for _ in range(5):
+        store.create_job(spec())
+    clock.advance(60.0)
+    assert store.forget_audit_before(clock.now - timedelta(seconds=61)) == 0
+    young = store.create_job(spec())[0].id
+    (last,) = store.audit(job_id=young).items
+    assert store.forget_audit_before(clock.now) == 5
+    assert store.audit().items == (last,)
+    assert store.forget_audit_before(clock.now + timedelta(seconds=1)) == 1
+    assert store.audit().items == ()
+    store.create_job(spec())
+    assert store.audit().items[0].index == last.index + 1
 
 
 def test_the_log_is_read_by_pages_and_by_job(store: SqlStore) -> None:

@@ -115,6 +115,10 @@ def prune(
         Literal["succeeded", "failed", "cancelled"] | None,
         typer.Option(help="With --older-than: only jobs that ended so [default: all]."),
     ] = None,
+    audit_older_than: Annotated[
+        float | None,
+        typer.Option(min=0.0, metavar="DAYS", help="Remove older entries of the audit log, too."),
+    ] = None,
     db: Db = None,
 ) -> None:
     """Remove recorded walks that no job refers to, a day after they came, and free their space.
@@ -134,10 +138,12 @@ def prune(
         _database(db),
         older_than=None if older_than is None else timedelta(days=older_than),
         states=ENDED if state is None else {JobState(state)},
+        audit_older_than=None if audit_older_than is None else timedelta(days=audit_older_than),
     )
+    audit = f", {removed.audit} entries of the audit log" if audit_older_than is not None else ""
     note(
-        f"{len(removed.jobs)} jobs and {removed.recordings} recorded walks are removed, and free"
-        " space is given back"
+        f"{len(removed.jobs)} jobs{audit} and {removed.recordings} recorded walks are removed, and"
+        " free space is given back"
     )
 
 

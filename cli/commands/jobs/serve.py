@@ -243,6 +243,7 @@ def _runtime(
         longest_job=settings.api_max_job_seconds,
         keeps_house=keeps_house,
         retention_days=settings.retention_days,
+        audit_days=settings.audit_days,
         longest_fork=settings.api_max_fork_seconds,
         should_stop=should_stop,
         metrics=metrics,

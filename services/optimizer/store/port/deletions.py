@@ -54,6 +54,16 @@ class Deletions(Protocol):
             Their ids.
         """
 
+    def forget_audit_before(self, moment: datetime) -> int:
+        """Remove the oldest entries of the audit log, in many short transactions.
+
+        Args:
+            moment: Entries from before this time, aware, are removed, up to the first that is not.
+
+        Returns:
+            How many are gone.
+        """
+
     def purge_deleted(self, should_stop: Callable[[], bool] = lambda: False) -> None:
         """Remove what is left of deleted jobs, in many short transactions.
 

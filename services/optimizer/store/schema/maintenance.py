@@ -66,22 +66,29 @@ class Pruned:
     Attributes:
         jobs: Ids of jobs that ended long ago.
         recordings: How many recorded walks no job refers to any more.
+        audit: How many entries of the audit log were too old.
     """
 
     jobs: tuple[str, ...]
     recordings: int
+    audit: int = 0
 
 
 def prune(
-    url: str, *, older_than: timedelta | None = None, states: Collection[JobState] = ENDED
+    url: str,
+    *,
+    older_than: timedelta | None = None,
+    states: Collection[JobState] = ENDED,
+    audit_older_than: timedelta | None = None,
 ) -> Pruned:
-    """Remove old jobs, and recorded walks that no job refers to; give free space back.
+    """Remove what is old, and recorded walks that no job refers to; give free space back.
 
     Args:
         url: Of the database, as for `open_store`.
         older_than: Only jobs that ended so long ago; None removes no job. Those that are kept, and
             parents of forks that have not ended, stay in any case.
         states: Only jobs that ended in one of these.
+        audit_older_than: Only entries of the audit log that are so old; None removes none.
 
     Returns:
         What was removed.
@@ -92,16 +99,19 @@ def prune(
     with closing(connect(parse_url(url), for_migration=True)) as database:
         check_revision(database)
         deletion = SqlDeletion(database, database_time)
+        with database.transaction(write=False) as connection:
+            now = database_time(connection)
         removed: tuple[str, ...] = ()
         if older_than is not None:
-            with database.transaction(write=False) as connection:
-                moment = database_time(connection) - older_than
-            removed = deletion.delete_ended_before(moment, states)
+            removed = deletion.delete_ended_before(now - older_than, states)
+        forgotten = 0
+        if audit_older_than is not None:
+            forgotten = deletion.forget_audit_before(now - audit_older_than)
         deletion.purge_deleted()
         with database.transaction(write=True) as connection:
             recorded = _remove_unreferenced(connection)
         _vacuum(database)
-    return Pruned(removed, recorded)
+    return Pruned(removed, recorded, forgotten)
 
 
 def _remove_unreferenced(connection: Connection) -> int:

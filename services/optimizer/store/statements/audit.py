@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from datetime import datetime
+from itertools import takewhile
 from typing import Any
 
-from sqlalchemy import Connection, insert, select
+from sqlalchemy import Connection, delete, insert, select
 
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.jobs.audit import LOCAL, AuditAction, AuditEntry
@@ -81,6 +82,25 @@ def audit_page(
     rows = connection.execute(query).mappings().all()
     found = tuple(map(_entry, rows[:limit]))
     return Page(found, str(found[-1].index) if len(rows) > limit else None)
+
+
+def remove_oldest(connection: Connection, moment: datetime, most: int) -> int:
+    """Remove the first entries, up to the first that is young enough.
+
+    Args:
+        connection: An open transaction that may write.
+        moment: Entries from before are old.
+        most: Entries removed.
+
+    Returns:
+        How many are gone.
+    """
+    query = select(audit.c.id, audit.c.at).order_by(audit.c.id).limit(most)
+    old = takewhile(lambda row: row.at < moment, connection.execute(query))
+    ids = [row.id for row in old]
+    if ids:
+        connection.execute(delete(audit).where(audit.c.id <= ids[-1]))
+    return len(ids)
 
 
 def _from_cursor(text: str) -> int:

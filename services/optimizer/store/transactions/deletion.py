@@ -28,11 +28,11 @@ from services.optimizer.store.rows.tables import (
     metadata,
     notifications,
 )
-from services.optimizer.store.statements.audit import note_change
+from services.optimizer.store.statements.audit import note_change, remove_oldest
 from services.optimizer.store.statements.records import job_row, update_job
 
 _PIECE: Final = 5000
-"""Evaluations removed in one transaction."""
+"""Evaluations, or entries of the audit log, removed in one transaction."""
 
 _JOBS: Final = 500
 """Jobs deleted in one transaction."""
@@ -93,6 +93,16 @@ class SqlDeletion:
             deleted += found
             if len(found) < _JOBS:
                 return tuple(deleted)
+
+    def forget_audit_before(self, moment: datetime) -> int:
+        """Remove entries by pieces, as a log of years has many."""
+        removed = 0
+        while True:
+            with self._database.transaction(write=True) as connection:
+                piece = remove_oldest(connection, moment, _PIECE)
+            removed += piece
+            if piece < _PIECE:
+                return removed
 
     def purge_deleted(self, should_stop: Callable[[], bool] = lambda: False) -> None:
         """Remove rows of deleted jobs, and leave half of the time to other writers."""

@@ -1,4 +1,4 @@
-"""A server that is started while its cluster is away, which then comes, goes and comes back."""
+"""A server is started while its cluster is away, which then comes, is killed and comes back."""
 
 from __future__ import annotations
 
@@ -7,16 +7,24 @@ import signal
 import socket
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
+from typing import Any, Final
 
 import pytest
 
-from tests.examples.jobs import SMALL_SPEC
+from services.optimizer.jobs.kinds.tuning import JobSpec
+from services.optimizer.store.sql_store import open_store
+from services.runtime import run_embedded
+from services.worker.in_process import InProcessEvaluator
+from tests.examples.jobs import LONG_SPEC, SMALL_SPEC
 from tests.examples.processes import COMMAND_LINE, eventually, line_with, start_python
 from tests.examples.servers import ServerProcess
 from tests.worker import cluster_host
 from tests.worker.cluster_host import Process
+
+KILLED: Final = LONG_SPEC | {"iterations": 4}
+"""Long enough that a head is killed in the midst of it."""
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 
@@ -56,8 +64,18 @@ def workers(server: ServerProcess) -> tuple[str, str]:
     return found["status"], found["detail"]
 
 
-def test_a_server_that_is_started_while_its_cluster_is_away_waits_for_it_says_so_and_goes_on(
-    host: Process, database: Path
+def head_alone(spec: dict[str, Any], folder: Path) -> str | None:
+    """The last digest of a job that runs in this process, where nothing goes wrong."""
+    with (
+        closing(open_store(str(folder / "alone.db"))) as store,
+        closing(InProcessEvaluator(1)) as evaluator,
+    ):
+        job, _ = store.create_job(JobSpec.model_validate(spec))
+        return run_embedded(store, evaluator, job.id).progress.head
+
+
+def test_a_server_waits_for_its_cluster_and_a_job_whose_head_is_killed_has_the_same_bits(
+    host: Process, database: Path, tmp_path: Path
 ) -> None:
     with socket.create_server(("127.0.0.1", 0)) as reserved:
         port = reserved.getsockname()[1]
@@ -73,13 +91,16 @@ def test_a_server_that_is_started_while_its_cluster_is_away_waits_for_it_says_so
             ended = server.wait_for(first, "succeeded", seconds=240.0)
             assert ended["waiting"] is None
             assert workers(server) == ("ok", "")
-        second = server.submit(SMALL_SPEC)
+            second = server.submit(KILLED)
+            eventually(lambda: server.job(second)["iterations"] >= 1)
+        # It was killed in the midst of an iteration: there is hardly any time between two.
         eventually(lambda: server.job(second)["waiting"] is not None)
+        assert server.job(second)["iterations"] < KILLED["iterations"]
         # While it is tried again, it may be there.
         eventually(lambda: workers(server)[0] == "degraded")
         with cluster(host, port):
             again = server.wait_for(second, "succeeded", seconds=240.0)
-        assert again["head"] is not None and again["best_fitness"] == ended["best_fitness"]
+        assert again["head"] == head_alone(KILLED, tmp_path)
     finally:
         server.close()
 

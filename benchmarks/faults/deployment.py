@@ -161,7 +161,7 @@ class Deployment:
         port = free_port()
         files = Path(tempfile.mkdtemp(prefix="fr-", dir="/tmp"))
         self._stack.callback(shutil.rmtree, files, ignore_errors=True)
-        command = [str(Path(sys.executable).with_name("ray")), "start", "--head", "--block"]
+        command = [sys.executable, "-m", "services.worker.ray_node", "--head"]
         command += ["--port", str(port), "--num-cpus", "2", "--num-gpus", "0"]
         command += ["--include-dashboard", "false", "--include-log-monitor", "false"]
         command += ["--object-store-memory", str(80 << 20), "--temp-dir", str(files)]

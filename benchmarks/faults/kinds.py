@@ -138,6 +138,13 @@ class KillGcs(_OfTheHead):
     titles = ("gcs_server",)
 
 
+class KillAgent(_OfTheHead):
+    """An agent of a raylet, which ends by itself then, and says that all is well."""
+
+    name = "kill-agent"
+    titles = ("Agent",)
+
+
 class ClusterAway(_OfRay):
     name = "cluster-away"
     shortest = longest = 20.0
@@ -308,7 +315,16 @@ def _kill(pid: int, number: signal.Signals = signal.SIGKILL) -> None:
 KINDS: Final[dict[str, type[Fault]]] = {
     kind.name: kind
     for kind in (
-        *(KillApi, KillRunner, KillPostgres, KillWorker, KillRaylet, KillGcs, StopRunner),
+        *(
+            KillApi,
+            KillRunner,
+            KillPostgres,
+            KillWorker,
+            KillRaylet,
+            KillGcs,
+            KillAgent,
+            StopRunner,
+        ),
         *(DatabaseLocked, DiskFull, ClockStep, ForkRefused, OutOfMemory, Partition, ClusterAway),
     )
 }

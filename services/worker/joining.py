@@ -1,4 +1,9 @@
-"""A node without CPUs, for a process that uses a cluster which has no node on its machine."""
+"""A node without CPUs, for a process that uses a cluster which has no node on its machine.
+
+    python -m services.worker.joining 6379
+
+ends with 0 if a node runs here of a cluster whose head listens at that port, else with 1.
+"""
 
 from __future__ import annotations
 
@@ -99,3 +104,7 @@ class JoinedNode:
     def _output(self) -> str:
         self._said.seek(0)
         return self._said.read()
+
+
+if __name__ == "__main__":
+    sys.exit(not runs_here(int(sys.argv[1])))

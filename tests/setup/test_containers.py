@@ -60,6 +60,14 @@ def test_commands_and_health_checks_are_programs_of_ours_or_ray(name: str) -> No
             assert program in ("ray", "python")
 
 
+def options_of_ray(words: list[str], command: str) -> list[str]:
+    """What is given to a command of Ray's, by itself or as a node of ours."""
+    if words[:2] == ["ray", command]:
+        return words[2:]
+    is_node = command == "start" and words[:3] == ["python", "-m", "services.worker.ray_node"]
+    return words[3:] if is_node else []
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("command", ["start", "health-check"])
 def test_options_given_to_ray_exist(command: str) -> None:
@@ -71,8 +79,7 @@ def test_options_given_to_ray_exist(command: str) -> None:
         word.partition("=")[0]
         for service in OURS.values()
         for words in (_words(service["command"]), _health_command(service))
-        if words[:2] == ["ray", command]
-        for word in words[2:]
+        for word in options_of_ray(words, command)
     }
     assert used
     assert [option for option in used if f"{option} " not in f"{done.stdout} "] == []

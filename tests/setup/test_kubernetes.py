@@ -13,6 +13,7 @@ import pytest
 import yaml
 
 from gaitswarm.settings import Settings, is_loopback
+from services.worker import joining
 from tests.examples.api_document import api_document
 from tests.examples.paths import ROOT
 from tests.setup import command_line, settings_classes
@@ -92,8 +93,18 @@ def test_commands_are_those_of_docker_compose_and_exist() -> None:
         if "exec" in container.get(kind, {})
     ]
     for program, *arguments in [c["command"] for c in OURS.values() if "command" in c] + probes:
-        assert program in ("gaitswarm", "ray")
-        assert program == "ray" or command_line.problem(arguments) is None
+        assert program in ("gaitswarm", "ray", "sh")
+        assert program != "gaitswarm" or command_line.problem(arguments) is None
+
+
+def test_a_node_is_alive_while_its_raylet_is_and_the_head_answers() -> None:
+    (cluster,) = _of_kind("RayCluster")
+    address = f"{cluster}-head-svc:6379"
+    for name in ("head", "walkers"):
+        ready, alive = (OURS[name][kind] for kind in ("readinessProbe", "livenessProbe"))
+        assert ready["exec"]["command"] == ["ray", "health-check", f"--address={address}"]
+        asked = f"python -m {joining.__name__} 6379 && ray health-check --address={address}"
+        assert alive == ready | {"exec": {"command": ["sh", "-c", asked]}}
 
 
 def test_probes_ask_routes_that_exist() -> None:

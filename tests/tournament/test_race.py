@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import product
 
 import numpy as np
 import pytest
@@ -130,12 +131,15 @@ def test_every_rival_finds_more_than_chance_does(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", settings_models())
-def test_every_corner_of_the_ranges_of_a_method_is_taken_by_it(name: str) -> None:
+def test_a_method_takes_what_is_drawn_at_whichever_ends_of_the_ranges(name: str) -> None:
+    """Any two settings at the ends that fit each other least, the rest at either."""
     settings = settings_models()[name].model_validate({"name": name})
     ranges = random_ranges(name)
     assert ranges
-    for pick in range(2 ** min(len(ranges), 8)):
-        drawn = {v.name: v.high if pick >> min(k, 7) & 1 else v.low for k, v in enumerate(ranges)}
+    ends = {variable.name: (variable.low, variable.high) for variable in ranges}
+    for rest, high, low in product((0, 1), ends, ends):
+        drawn = {n: bounds[rest] for n, bounds in ends.items()}
+        drawn |= {high: ends[high][1], low: ends[low][0]}
         taken = drawn_settings(settings, drawn).model_dump()
         assert {n: v for n, v in taken.items() if n not in drawn} == {
             n: v for n, v in settings.model_dump().items() if n not in drawn
@@ -151,6 +155,11 @@ def test_what_is_drawn_becomes_a_setting_of_its_own_kind() -> None:
     }
     sampler = drawn_settings(named_settings("optuna-tpe"), {"multivariate": 1.0})
     assert sampler.model_dump()["multivariate"] is True
+
+
+def test_of_settings_that_do_not_fit_each_other_it_is_said_in_plain_words() -> None:
+    with pytest.raises(ValueError, match=r"^inertia_end must not exceed inertia_start"):
+        drawn_settings(named_settings("pso-ps"), {"inertia_start": 0.5})
 
 
 def test_numbers_are_drawn_from_half_to_twice_their_default_inside_their_bounds() -> None:

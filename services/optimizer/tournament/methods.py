@@ -7,6 +7,8 @@ from collections.abc import Iterable
 from functools import partial
 from typing import Any, Final
 
+from pydantic import ValidationError
+
 from services.optimizer.search.automatic import CHOICES, RULES, AutoSettings, chosen_method
 from services.optimizer.search.optimizer import SearchSettings
 from services.optimizer.search.registry import METHODS, create_search
@@ -15,6 +17,7 @@ from services.optimizer.tournament.race import Evaluate, Search
 from services.optimizer.tournament.rivals import RIVALS
 from sim.near_names import instead_of
 from sim.variables import Variable
+from sim.wording import message_of
 
 _UNBOUNDED: Final = 1e9
 """In place of a bound that a setting does not have."""
@@ -161,7 +164,12 @@ def drawn_settings(settings: SearchSettings, drawn: dict[str, float]) -> SearchS
     """
     known = {variable.name: variable for variable in settings_variables(type(settings))}
     values = {name: _value(known[name], number) for name, number in drawn.items()}
-    return type(settings).model_validate(settings.model_dump() | values)
+    try:
+        return type(settings).model_validate(settings.model_dump() | values)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False)[0]
+        said = [*(str(part) for part in first["loc"]), message_of(first)]
+        raise ValueError(": ".join(said)) from error
 
 
 def random_ranges(name: str) -> tuple[Variable, ...]:
@@ -171,33 +179,32 @@ def random_ranges(name: str) -> tuple[Variable, ...]:
         name: Of the method.
 
     Returns:
-        As `RANGES` says; else every number between half and twice its default and inside its
-        bounds, every choice with an equal share. A setting whose default is 0 or none stays.
+        Of every number from half to twice its default, inside its bounds, unless `RANGES` has it;
+        of every choice all, with equal shares. A setting whose default is 0 or none stays.
     """
     model = settings_models()[name]
-    known = settings_variables(model)
-    if name in RANGES:
-        bounds = RANGES[name]
-        return tuple(
-            v.model_copy(update={"low": float(bounds[v.name][0]), "high": float(bounds[v.name][1])})
-            for v in known
-            if v.name in bounds
-        ) + tuple(v for v in known if v.kind == "categorical")
+    own = RANGES.get(name, {})
     defaults = {key: getattr(model(name=name), key) for key in model.model_fields}
-    found = (v if v.kind == "categorical" else _around(v, defaults[v.name]) for v in known)
+
+    def drawn(variable: Variable) -> Variable | None:
+        if variable.name in own:
+            low, high = own[variable.name]
+            return variable.model_copy(update={"low": low, "high": high})
+        return variable if variable.choices else _around(variable, defaults[variable.name])
+
+    found = map(drawn, settings_variables(model))
     return tuple(variable for variable in found if variable is not None)
 
 
-RANGES: Final[dict[str, dict[str, tuple[float, float]]]] = {
-    "pso": {
-        "particles": (12, 50),
-        "cognitive": (0.25, 2.0),
-        "social": (0.75, 2.5),
-        "inertia_start": (0.7, 1.0),
-        "inertia_end": (0.3, 0.7),
-        "velocity_limit": (0.25, 1.0),
-    },
+_OF_SWARMS: Final = {
+    "particles": (12.0, 50.0),
+    "cognitive": (0.25, 2.0),
+    "social": (0.75, 2.5),
+    "inertia_start": (0.7, 1.0),
+    "inertia_end": (0.3, 0.7),
+    "velocity_limit": (0.25, 1.0),
 }
+RANGES: Final = {"pso": _OF_SWARMS, "pso-ps": _OF_SWARMS}
 """Ranges of settings, by method, where half to twice the default would not do."""
 
 

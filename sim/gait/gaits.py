@@ -169,7 +169,7 @@ def find_gait(name: str) -> Gait:
     for gait in _GAITS:
         if gait.name == name:
             return gait
-    raise SimulationInputError(f"gait: unknown {name!r}; {instead_of(name, GAITS)}")
+    raise SimulationInputError(f"unknown gait {name!r}; {instead_of(name, GAITS)}")
 
 
 def suits(gait: Gait, legs: Sequence[LegKinematics]) -> bool:

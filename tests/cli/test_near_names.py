@@ -64,7 +64,7 @@ def test_in_a_spec(gaitswarm: Gaitswarm, write_json: WriteJson, spec: Any, said:
             "world.friction_facto: no perturbation; did you mean 'friction_factor'?",
         ),
         (("compare", "fuzzy-pi3"), "drive: unknown 'fuzzy-pi3'; did you mean 'fuzzy-pi-3'?"),
-        (("gaits", "crwl"), "gait: gait: unknown 'crwl'; did you mean 'crawl'?"),
+        (("gaits", "crwl"), "gait: unknown gait 'crwl'; did you mean 'crawl'?"),
         (
             ("tournament", "robot", "--methods", "psoo"),
             "methods: unknown 'psoo'; did you mean 'pso'?",

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
+import asyncio
+from collections.abc import Awaitable, Callable
+from functools import partial
 from http.cookies import CookieError, SimpleCookie
-from typing import Annotated, Final
+from typing import Annotated, Final, cast
 
-from anyio.to_thread import run_sync
 from fastapi import Depends, Header, Request, Response
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from api.dependencies import ExistingJob, ServerSettings
+from api.known_tokens import KnownTokens
 from api.monitoring import METRICS_PATH
 from api.problems import problem, too_many_requests, unauthorized
 from api.rates import RequestRate, address_of, is_local
@@ -34,6 +35,8 @@ _PROBES: Final = frozenset(f"{PREFIX}/{name}" for name in ("healthz", "readyz"))
 _SESSION: Final = f"{PREFIX}/session"
 """For whoever has yet to say who they are."""
 
+Revocation = Callable[[], Awaitable[None]]
+
 _UNKNOWN: Final = (
     "the token is unknown or was revoked; `gaitswarm token create NAME` makes a new one"
 )
@@ -41,9 +44,6 @@ _NONE: Final = (
     "this server asks for a token: send `Authorization: Bearer TOKEN`, or set GAITSWARM_TOKEN; its"
     " owner makes one with `gaitswarm token create NAME`"
 )
-
-REMEMBERED_SECONDS: Final = 5.0
-_MOST_REMEMBERED: Final = 1024
 
 
 class AccessMiddleware:
@@ -54,7 +54,8 @@ class AccessMiddleware:
 
     `request.state.token` is what it found: None where none is required and none was given. A token
     that is not valid is refused, whether one is required or not. Tokens are remembered for a few
-    seconds, so that one that was revoked is refused after these.
+    seconds, so that one that was revoked is refused after these. `request.state.until_revoked`
+    returns then, for answers that last longer.
 
     Requests are counted by their token; those whose token is not remembered by their address,
     before anything is looked up. Where no token is required, those of this machine are not counted.
@@ -73,9 +74,8 @@ class AccessMiddleware:
         """
         self.app = app
         self.required = required
-        self._tokens = tokens
+        self._tokens = KnownTokens(tokens)
         self._rate = rate
-        self._remembered: dict[str, tuple[float, Token]] = {}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """One ASGI exchange."""
@@ -93,38 +93,38 @@ class AccessMiddleware:
     async def _refusal(self, scope: Scope, path: str) -> Response | None:
         """The answer to a request that is not let through; the others know who asks then."""
         secret, address = secret_of(Headers(scope=scope)), address_of(scope)
-        until, known = self._remembered.get(secret or "", (0.0, None))
+        known = None if secret is None else self._tokens.last(secret)
         # Others at the same address may be guessing: whoever had a token is not counted with them.
         asker = address if known is None else f"token {known.name}"
         if self.required or secret is not None or not is_local(address):
             seconds = self._rate.seconds_to_wait(asker)
             if seconds > 0.0:
                 return too_many_requests(scope["path"], seconds)
-        token = known if until > time.monotonic() else None
+        token = None if secret is None else self._tokens.lately(secret)
         if path != _SESSION:
             if token is None and secret is not None:
-                token = await self._look_up(secret, known if path == METRICS_PATH else None)
+                token = await self._find(secret, known if path == METRICS_PATH else None)
             if token is None and (secret is not None or self.required):
                 missing = REFUSAL if path == METRICS_PATH else _NONE
                 return unauthorized(scope["path"], missing if secret is None else _UNKNOWN)
         asker = address if token is None else f"token {token.name}"
-        scope.setdefault("state", {}).update(token=token, asker=asker)
+        until_revoked = _never if secret is None else partial(self._tokens.until_revoked, secret)
+        scope.setdefault("state", {}).update(token=token, asker=asker, until_revoked=until_revoked)
         return None
 
-    async def _look_up(self, secret: str, otherwise: Token | None) -> Token | None:
+    async def _find(self, secret: str, otherwise: Token | None) -> Token | None:
         """otherwise: what is taken for the token while the database is away, if anything."""
         try:
-            token = await run_sync(self._tokens().find, secret)
+            return await self._tokens.find(secret)
         except StoreUnavailable:
             if otherwise is None:
                 raise
             return otherwise
-        self._remembered.pop(secret, None)
-        if token is not None:
-            if len(self._remembered) >= _MOST_REMEMBERED:
-                self._remembered.clear()
-            self._remembered[secret] = (time.monotonic() + REMEMBERED_SECONDS, token)
-        return token
+
+
+async def _never() -> None:
+    """Where there is no token, none is revoked."""
+    await asyncio.Event().wait()
 
 
 def secret_of(headers: Headers) -> str | None:
@@ -156,6 +156,18 @@ async def asking(request: Request) -> Token | None:
 
 
 Asking = Annotated[Token | None, Depends(asking)]
+
+
+async def revocation(request: Request) -> Revocation:
+    """What returns when the token of a request was revoked.
+
+    Args:
+        request: under way.
+    """
+    return cast(Revocation, request.state.until_revoked)
+
+
+UntilRevoked = Annotated[Revocation, Depends(revocation)]
 
 
 async def may_submit(token: Asking) -> str | None:

@@ -12,6 +12,7 @@ from fastapi import APIRouter, Depends, Header, Query
 from fastapi.responses import StreamingResponse
 from fastapi.sse import format_sse_event
 
+from api.access import UntilRevoked
 from api.dependencies import (
     LARGEST_INDEX,
     AfterIteration,
@@ -69,6 +70,7 @@ async def stream_events(
     topics: FollowedJobs,
     stopping: Stopping,
     metrics: ServerMetrics,
+    until_revoked: UntilRevoked,
     last_event_id: Annotated[
         int | None,
         Header(
@@ -96,7 +98,8 @@ async def stream_events(
     The stream ends after the event of a final state. A broken stream goes on without gap or repeat
     from `Last-Event-ID` (or `after`). Comments keep idle connections alive. The stream of a job
     that is deleted ends with an event `deleted`, whose data has its `id`. A server that ends says
-    so in a comment, and in a field `retry` when to connect again.
+    so in a comment, and in a field `retry` when to connect again. With a token that is revoked the
+    stream ends within seconds.
     """
     start = after if last_event_id is None else last_event_id
     poll_seconds = settings.api_event_poll_seconds
@@ -119,7 +122,7 @@ async def stream_events(
             async for text in found:
                 yield text
 
-    return EventStream(events())
+    return EventStream(events(), until_revoked)
 
 
 async def _events(

@@ -209,7 +209,7 @@ def test_the_audit_log_names_tokens_and_is_for_administrators(
 def test_a_revoked_token_is_refused_within_seconds(
     guarded: httpx2.Client, bearer: Bearer, store: SqlStore, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("api.access.REMEMBERED_SECONDS", 0.0)
+    monkeypatch.setattr("api.known_tokens.REMEMBERED_SECONDS", 0.0)
     headers = bearer(Scope.READ)
     assert guarded.get("/v1/jobs", headers=headers).status_code == 200
     store.tokens.revoke("read")

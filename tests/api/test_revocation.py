@@ -1,0 +1,99 @@
+"""A token that is revoked is of no use within seconds, whatever it has opened before."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack
+from itertools import takewhile
+from threading import Lock
+from typing import cast
+
+import pytest
+
+from api import known_tokens
+from api.known_tokens import KnownTokens
+from services.optimizer.access import Scope, Token, Tokens
+from services.optimizer.errors import StoreUnavailable
+from services.optimizer.jobs.job import Command, Job
+from services.optimizer.store.sql_store import SqlStore
+from tests.api.conftest import Serve
+
+STREAMS = 40
+
+
+def test_it_is_remembered_for_as_long_as_is_said_in_the_documentation() -> None:
+    assert known_tokens.REMEMBERED_SECONDS == 5.0
+
+
+@pytest.mark.slow
+def test_an_event_stream_ends_with_its_token_and_not_before(
+    serve: Serve, store: SqlStore, job: Job, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(known_tokens, "REMEMBERED_SECONDS", 1.0)
+    client = serve(api_access="token").client
+    with ExitStack() as stack:
+
+        def stream(name: str) -> Iterator[str]:
+            secret = store.tokens.create(name, Scope.READ)[1]
+            opened = client.stream(
+                "GET", f"/v1/jobs/{job.id}/events", headers={"Authorization": f"Bearer {secret}"}
+            )
+            return stack.enter_context(opened).iter_lines()
+
+        leaked, other = stream("leaked"), stream("other")
+        assert "queued" in told(leaked) and "queued" in told(other)
+        time.sleep(2.5)
+        store.command(job.id, Command.PAUSE)
+        assert "paused" in told(leaked) and "paused" in told(other)
+
+        store.tokens.revoke("leaked")
+        until = time.monotonic() + 10.0
+        # Nothing happens to the job meanwhile; a stream that goes on has a comment now and then.
+        said = list(takewhile(lambda _: time.monotonic() < until, leaked))
+        assert ": the token was revoked" in said
+        store.command(job.id, Command.RESUME)
+        assert "queued" in told(other)
+
+
+def told(lines: Iterator[str]) -> str:
+    """Data of the next event."""
+    return next(line for line in lines if line.startswith("data:"))
+
+
+class CountedTokens:
+    """Tokens in a database that may be away."""
+
+    def __init__(self) -> None:
+        self.away = self.revoked = False
+        self.asked = 0
+        self._counting = Lock()
+
+    def find(self, _secret: str) -> Token | None:
+        with self._counting:
+            self.asked += 1
+        if self.away:
+            raise StoreUnavailable("the database is away")
+        return None if self.revoked else cast(Token, object())
+
+
+def test_the_database_is_asked_once_for_all_who_wait_and_while_it_is_away_nothing_is_revoked(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(known_tokens, "REMEMBERED_SECONDS", 0.5)
+    tokens = CountedTokens()
+
+    async def run() -> None:
+        known = KnownTokens(lambda: cast(Tokens, tokens))
+        assert await known.find("secret")
+        waiting = [asyncio.ensure_future(known.until_revoked("secret")) for _ in range(STREAMS)]
+        await asyncio.sleep(1.3)
+        assert 2 <= tokens.asked < STREAMS
+        tokens.away = True
+        await asyncio.sleep(0.8)
+        assert not any(task.done() for task in waiting)
+        tokens.away, tokens.revoked = False, True
+        await asyncio.wait_for(asyncio.gather(*waiting), timeout=20.0)
+
+    asyncio.run(run())

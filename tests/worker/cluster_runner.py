@@ -11,6 +11,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
+from typing import Any
 from unittest.mock import patch
 
 import numpy as np
@@ -24,6 +25,7 @@ from sim.case import Walk
 from sim.kernel.walk import Precision
 from sim.outcome import Objective, Outcome
 from sim.robot import RobotSource
+from tests.examples.processes import eventually
 from tests.worker.requests import bits, never
 
 Bits = list[tuple[bytes, bytes]]
@@ -154,6 +156,32 @@ def least_slots(request: EvaluationRequest, seconds: float) -> int:
     with suppress(EvaluationStopped):
         _evaluator.evaluate(request, look)
     return min(seen)
+
+
+def demand_shown(request: EvaluationRequest | None, expected: int) -> int:
+    """Slots that an autoscaler sees to be wanted, once they are as expected or half a minute later.
+
+    request: what is walked meanwhile.
+    """
+    import ray
+    from ray.autoscaler.v2.sdk import get_cluster_resource_state
+
+    worker: Any = ray._private.worker.global_worker  # noqa: SLF001
+    until = time.monotonic() + 30.0
+    seen = 0
+
+    def look() -> bool:
+        nonlocal seen
+        pending = get_cluster_resource_state(worker.gcs_client).pending_resource_requests
+        seen = sum(asked.count for asked in pending)
+        return seen == expected or time.monotonic() > until
+
+    if request is None:
+        eventually(look)
+    else:
+        with suppress(EvaluationStopped):
+            _evaluator.evaluate(request, look)
+    return seen
 
 
 def logged() -> str:

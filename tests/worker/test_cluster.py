@@ -182,6 +182,16 @@ def test_two_runners_share_the_slots_while_both_have_jobs(
     eventually(lambda: sorted(runner.run(cluster_runner.nodes_of_cluster)) == [0, 1, 1])
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(120)
+def test_an_autoscaler_sees_that_as_many_slots_again_are_wanted_while_all_have_work(
+    runner: Process, two_nodes: list[str]
+) -> None:
+    long = request(20_000, job_id="long")
+    assert runner.run(cluster_runner.demand_shown, long, expected=2) == 2
+    assert runner.run(cluster_runner.demand_shown, None, expected=0) == 0
+
+
 def test_a_node_is_refused_for_other_code_or_other_rounding_and_not_for_another_level() -> None:
     here = Introduction("head", "0.1.0", "c" * 32, "a" * 32, "x86-64-v4")
     assert replace(here, host="node-3", level="x86-64-v3").refusal(here) is None

@@ -8,11 +8,12 @@ import time
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from typing import Any, Final
 
 from services.optimizer.errors import EvaluatorUnavailable
 from services.optimizer.run.evaluator import EvaluationRequest
+from services.worker.cluster.demand import Demand
 from services.worker.cluster.handshake import Introduction, introducer
 from services.worker.cluster.nodes import PATIENCE_SECONDS, Node, Wanted, chosen
 from services.worker.ray_session import RaySession, listens
@@ -30,9 +31,6 @@ _PROBES: Final = 16
 
 _FIRST_LOOK_SECONDS: Final = 0.1
 """Until the next look while a new node is probed."""
-
-_LARGEST_DEMAND: Final = 64
-"""Further slots that an autoscaler is asked for at once, at most."""
 
 _KEPT: Final = 64
 """What a node is known to be prepared for, beyond what is wanted."""
@@ -87,10 +85,7 @@ class ClusterNodes:
         self._here = Introduction.of(introducer()())
         self._introduce = session.ray.remote(num_cpus=0, max_retries=0)(introducer())
         self._prepare = session.ray.remote(num_cpus=0, max_retries=0)(prepare_node)
-        # It is cancelled, perhaps when it has begun, and must not be in an import then.
-        self._any_cpu = session.ray.remote(num_cpus=1, max_retries=0)(lambda: None)
-        self._demand: list[Any] = []
-        self._next_demand = 0.0
+        self._demand = Demand(session.ray)
         self._needs: dict[Wanted, Any] = {}
         self._nodes: dict[str, Node] = {}
         self._probes = ThreadPoolExecutor(_PROBES, thread_name_prefix="ray-probe")
@@ -151,7 +146,8 @@ class ClusterNodes:
         for node in self._nodes.values():
             self._ask(node, wanted)
         self._let_go()
-        self._show_demand(wanted)
+        all_run = not any(node.room > 0.0 for node in self._nodes.values())
+        self._demand.show(max(self.slots, 1) if wanted and all_run else 0)
         return lost
 
     def suspect(self, node: Node) -> bool:
@@ -306,26 +302,3 @@ class ClusterNodes:
                 ready.set_result(None)
             else:
                 ready.set_exception(error)
-
-    def _show_demand(self, wanted: tuple[Wanted, ...]) -> None:
-        """Tasks that any node may run, by which an autoscaler sees that more slots would be used.
-
-        It leaves out those that are sent to one node.
-        """
-        if self._demand:
-            _, self._demand = self._ray.wait(
-                self._demand, num_returns=len(self._demand), timeout=0.0
-            )
-        now = time.monotonic()
-        if not wanted or any(node.room > 0.0 for node in self._nodes.values()):
-            # What has a slot now ends by itself, and must not be cancelled in that instant: Ray
-            # would end this process. What has none after a while is cancelled.
-            if now >= self._next_demand + LOOK_SECONDS:
-                for reference in self._demand:
-                    with suppress(self._ray.exceptions.RayError):
-                        self._ray.cancel(reference)
-                self._demand = []
-        elif now >= self._next_demand:
-            self._next_demand = now + LOOK_SECONDS
-            lacking = min(max(self.slots, 1), _LARGEST_DEMAND) - len(self._demand)
-            self._demand += [self._any_cpu.remote() for _ in range(lacking)]

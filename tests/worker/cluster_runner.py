@@ -7,6 +7,7 @@ import os
 import signal
 import threading
 import time
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from io import StringIO
@@ -138,6 +139,13 @@ def begin_and_stop(request: EvaluationRequest, seconds: float) -> str:
     except EvaluationStopped:
         return "stopped"
     return "not stopped"
+
+
+def ready_nodes(request: EvaluationRequest) -> int:
+    """Nodes that are prepared for a request."""
+    link: Any = vars(_evaluator)["_link"]
+    known: Iterable[nodes.Node] = vars(link.nodes.result())["_nodes"].values()
+    return sum(nodes.Wanted.by(request) in node.prepared for node in known)
 
 
 def slots() -> int:

@@ -130,6 +130,13 @@ def test_walks_that_kill_their_worker_are_tried_on_another_node_before_they_are_
     assert isinstance(case, Walk)
     deadly = Deadly(case, tmp_path / "deaths")
     wanted = replace(SMALL, job_id="deadly", cases=(deadly,), designs=SMALL.designs[:1])
+
+    def are_ready() -> bool:
+        runner.run(cluster_runner.evaluate, SMALL)
+        return runner.run(cluster_runner.ready_nodes, wanted) == 2
+
+    # This runner waits for a second only while a node is prepared.
+    eventually(are_ready)
     with pytest.raises(KilledWorker, match="3 worker processes died"):
         runner.run(cluster_runner.evaluate, wanted)
     first, second, third = deadly.deaths.read_text().split()

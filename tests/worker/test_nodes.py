@@ -7,14 +7,24 @@ import pytest
 from services.worker.cluster.nodes import Node, OwnNode, Wanted, chosen
 
 WANTED = Wanted(frozenset(), "")
+OTHER = Wanted(frozenset(), "other")
 
 
-def node(name: str, *, cpus: int = 1, flying: int = 0) -> Node:
-    return Node(name, name, cpus, ("", 0), flying=flying)
+def node(name: str, *, cpus: int = 1, flying: int = 0, ready: bool = True) -> Node:
+    found = Node(name, name, cpus, ("", 0), flying=flying)
+    if ready:
+        found.prepared.add(WANTED)
+    return found
+
+
+def preparing(name: str, wanted: Wanted | None) -> Node:
+    found = node(name, ready=False)
+    found.asked[object()] = wanted
+    return found
 
 
 @pytest.mark.parametrize(
-    ("ready", "avoid", "expected"),
+    ("nodes", "avoid", "expected"),
     [
         ([node("a", flying=1), node("b")], "", "b"),
         ([node("a", flying=1), node("b", cpus=4, flying=3)], "", "b"),
@@ -24,6 +34,11 @@ def node(name: str, *, cpus: int = 1, flying: int = 0) -> Node:
         ([node("a"), node("b", flying=1), node("c")], "ac", "b"),
         ([node("a", flying=1), node("b")], "ab", "b"),
         ([node("a")], "a", "a"),
+        ([node("a"), preparing("b", WANTED)], "a", None),
+        ([node("a"), preparing("b", None)], "a", None),
+        ([node("a"), preparing("b", OTHER)], "a", "a"),
+        ([node("a"), node("b", ready=False)], "a", "a"),
+        ([preparing("a", WANTED), node("b", flying=1)], "", "b"),
         ([], "a", None),
     ],
     ids=[
@@ -35,11 +50,16 @@ def node(name: str, *, cpus: int = 1, flying: int = 0) -> Node:
         "the last that is not avoided",
         "all are avoided",
         "the only one",
-        "none is ready",
+        "one is being prepared, and waited for",
+        "one is about to be",
+        "another one is being prepared for something else",
+        "another one is refused",
+        "not the one that is being prepared",
+        "there is none",
     ],
 )
-def test_a_task_is_sent_to_the_node(ready: list[Node], avoid: str, expected: str | None) -> None:
-    found = chosen(ready, frozenset(avoid))
+def test_a_task_is_sent_to_the_node(nodes: list[Node], avoid: str, expected: str | None) -> None:
+    found = chosen(nodes, WANTED, frozenset(avoid))
     assert (found and found.id) == expected
 
 

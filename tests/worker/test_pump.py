@@ -78,8 +78,10 @@ class TwoNodes(OwnNode):
         super().__init__(SLOTS)
         self.nodes = [Node("free", "", 1, ("", 0)), Node("busy", "", 1, ("", 0), flying=LOOK_AHEAD)]
 
-    def place(self, _wanted: Wanted, avoid: frozenset[str]) -> Node | None:
-        return chosen(self.nodes, avoid)
+    def place(self, wanted: Wanted, avoid: frozenset[str]) -> Node | None:
+        for node in self.nodes:
+            node.prepared.add(wanted)
+        return chosen(self.nodes, wanted, avoid)
 
 
 @pytest.fixture

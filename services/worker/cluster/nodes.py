@@ -80,21 +80,33 @@ class Node:
         """Further tasks per slot that it may be sent."""
         return LOOK_AHEAD - self.flying / self.cpus
 
+    def can_serve(self, wanted: Wanted) -> bool:
+        """Whether it is ready for some tasks, busy or not, or may be soon.
 
-def chosen(ready: Iterable[Node], avoid: frozenset[str]) -> Node | None:
+        Args:
+            wanted: What they need.
+
+        Returns:
+            True if it was prepared, or was asked to be, or to introduce itself.
+        """
+        return wanted in self.prepared or not {wanted, None}.isdisjoint(self.asked.values())
+
+
+def chosen(nodes: Iterable[Node], wanted: Wanted, avoid: frozenset[str]) -> Node | None:
     """The node that a task is sent to.
 
     Args:
-        ready: Nodes that are prepared for it, busy or not.
-        avoid: Ids of nodes that get it only if no other is ready. One that is ready and busy is
-            waited for.
+        nodes: That there are.
+        wanted: What it needs.
+        avoid: Ids of nodes that get it only if no other can serve it. One that can, and is busy or
+            being prepared, is waited for.
 
     Returns:
-        The one with most room for its size; None if none has any.
+        Of those that are ready, the one with most room for its size; None if none has any.
     """
-    known = tuple(ready)
-    others = [node for node in known if node.id not in avoid] or known
-    free = [node for node in others if node.room > 0.0]
+    serving = [node for node in nodes if node.can_serve(wanted)]
+    others = [node for node in serving if node.id not in avoid] or serving
+    free = [node for node in others if wanted in node.prepared and node.room > 0.0]
     return max(free, key=lambda node: node.room, default=None)
 
 
@@ -224,9 +236,9 @@ class OwnNode:
         """It is not lost before its cluster is."""
         return ()
 
-    def place(self, _wanted: Wanted, avoid: frozenset[str]) -> Node | None:
+    def place(self, _wanted: Wanted, _avoid: frozenset[str]) -> Node | None:
         """This machine, if it has room."""
-        return chosen([self._node], avoid)
+        return self._node if self._node.room > 0.0 else None
 
     def can_serve(self, _wanted: Wanted) -> bool:
         """It is ready for all."""

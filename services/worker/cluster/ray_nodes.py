@@ -162,14 +162,11 @@ class ClusterNodes:
 
     def place(self, wanted: Wanted, avoid: frozenset[str]) -> Node | None:
         """Of those that are prepared."""
-        return chosen((n for n in self._nodes.values() if wanted in n.prepared), avoid)
+        return chosen(self._nodes.values(), wanted, avoid)
 
     def can_serve(self, wanted: Wanted) -> bool:
-        """Whether one was prepared, or was asked to be, or to introduce itself."""
-        return any(
-            wanted in node.prepared or not {wanted, None}.isdisjoint(node.asked.values())
-            for node in self._nodes.values()
-        )
+        """Whether one of them can."""
+        return any(node.can_serve(wanted) for node in self._nodes.values())
 
     def refuse(self, node: Node, wanted: Wanted, reason: str) -> bool:
         """It is asked again after a minute, by when its disk may be cleared."""

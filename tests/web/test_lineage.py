@@ -19,7 +19,7 @@ def test_a_fork_and_its_parent_lead_to_each_other(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url).go(f"/jobs/{finished_job}")
-    expect(page.get_by_text("Submitted", exact=True)).to_be_visible()
+    expect(page.get_by_text("Computing time", exact=True)).to_be_visible()
     assert page.locator("[data-forks], [data-parent]").count() == 0
 
     page.goto(f"{server.url}/jobs/{finished_job}/iterations/1")

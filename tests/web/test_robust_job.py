@@ -75,5 +75,5 @@ def test_other_jobs_do_not_call_themselves_robust(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url).go(f"/jobs/{finished_job}")
-    expect(page.get_by_text("Submitted", exact=True)).to_be_visible()
+    expect(page.get_by_text("Computing time", exact=True)).to_be_visible()
     assert page.locator("[data-worlds]").count() == 0

@@ -42,7 +42,7 @@ export function JobHeader({ live, job, gain }: { live: LiveJob; job: StoredJob; 
               <StreamNote live={live} />
               <EndNotice job={job} />
             </div>
-            <p class="muted small">{subtitle(job)}</p>
+            <Subtitle job={job} />
             {(marks.length > 0 || job.note) && (
               <p class="small" data-labels>
                 {marks.join(' · ')}
@@ -95,7 +95,6 @@ export function JobHeader({ live, job, gain }: { live: LiveJob; job: StoredJob; 
 }
 
 function Figures({ job, gain, committed }: { job: StoredJob; gain: Gain; committed: number }) {
-  const now = useNow(1000)
   const unit = fitnessUnit(job)
   const merit = job.best?.figure_of_merit ?? null
   const search = job.best?.search ?? null
@@ -154,7 +153,6 @@ function Figures({ job, gain, committed }: { job: StoredJob; gain: Gain; committ
       <Figure label="Walk rate" value={quantity(job.simulations_per_second, '1/s', 3)} />
       <Figure label="Time left" value={timeLeft(job)} />
       <Figure label="Computing time" value={formatDuration(job.compute_seconds)} />
-      <Figure label="Submitted" value={`${formatAge(job.created_at, now)} ago`} />
     </dl>
   )
 }
@@ -188,7 +186,9 @@ function StreamNote({ live }: { live: LiveJob }) {
   return null
 }
 
-function subtitle(job: StoredJob): string {
+/** What it is, and since when. */
+function Subtitle({ job }: { job: StoredJob }) {
+  const now = useNow(1000)
   const words = caseWords(job.kind ?? 'tuning')
   const asked = isReadable(job)
     ? [
@@ -203,5 +203,6 @@ function subtitle(job: StoredJob): string {
       ]
     : []
   const priority = job.priority === 0 ? [] : [`priority ${job.priority}`]
-  return [job.id, ...asked, ...priority, `submitted ${formatMoment(job.created_at)}`].join(' · ')
+  const submitted = `submitted ${formatMoment(job.created_at)}, ${formatAge(job.created_at, now)} ago`
+  return <p class="muted small">{[job.id, ...asked, ...priority, submitted].join(' · ')}</p>
 }

@@ -7,6 +7,7 @@ ends with 0 if a node runs here of a cluster whose head listens at that port, el
 
 from __future__ import annotations
 
+import socket
 import subprocess
 import sys
 import tempfile
@@ -22,6 +23,9 @@ _STORE_BYTES: Final = 80 * 1024 * 1024
 _START_SECONDS: Final = 60.0
 
 _END_SECONDS: Final = 10.0
+
+_LATE_SECONDS: Final = 20.0
+"""After a head has begun to listen, within which its own node comes on a busy machine."""
 
 _STARTED: Final = "Ray runtime started"
 
@@ -55,6 +59,38 @@ def runs_here(port: int) -> bool:
         if words[0].endswith("/raylet") and any(head.endswith(f":{port}") for head in heads):
             return True
     return False
+
+
+def comes_here(host: str, port: int) -> bool:
+    """Whether a node runs on this machine, or its cluster's head does, whose own node may be late.
+
+    A head listens a second or more before it is a node. Whoever joined in between would keep the
+    head from being started again once it is lost: Ray finds the cluster running here.
+
+    Args:
+        host: Of the head.
+        port: Of the head's control service.
+
+    Returns:
+        Whether a node runs here; of a head here, once it does or has not come for long.
+    """
+    until = time.monotonic() + (_LATE_SECONDS if _is_here(host) else 0.0)
+    while not runs_here(port):
+        if time.monotonic() >= until:
+            return False
+        time.sleep(0.1)
+    return True
+
+
+def _is_here(host: str) -> bool:
+    """Whether an address is one of this machine: others cannot be bound."""
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(host, 0, type=socket.SOCK_STREAM)[0]
+        with socket.socket(family, kind, protocol) as probe:
+            probe.bind(address)
+    except OSError:
+        return False
+    return True
 
 
 class JoinedNode:

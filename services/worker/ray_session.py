@@ -19,7 +19,7 @@ from typing import Any, Final
 
 from services.optimizer.errors import EvaluatorUnavailable
 from services.worker.in_process import available_cpus
-from services.worker.joining import JoinedNode, runs_here
+from services.worker.joining import JoinedNode, comes_here
 
 _OBJECT_STORE_BYTES: Final = 80 * 1024 * 1024
 """Ray's minimum is 75 MiB; designs and results take kilobytes."""
@@ -167,11 +167,12 @@ def open_ray(address: str | None = None, *, cpus: int | None = None) -> RaySessi
 
 def _connect(ray: ModuleType, address: str) -> RaySession:
     host, _, port = address.rpartition(":")
-    if port.isdecimal() and not listens(host.strip("[]"), int(port)):
+    host = host.strip("[]")
+    if port.isdecimal() and not listens(host, int(port)):
         # Ray would try for minutes, and so long nobody could see what is wrong.
         raise EvaluatorUnavailable(f"no Ray cluster listens at {address!r}; is it up?")
     node = None
-    if port.isdecimal() and not runs_here(int(port)):
+    if port.isdecimal() and not comes_here(host, int(port)):
         node = JoinedNode(address)
     try:
         ray.init(address=address, log_to_driver=False, logging_level="ERROR")

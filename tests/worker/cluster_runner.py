@@ -106,7 +106,7 @@ def connect(address: str, patience: float = nodes.PATIENCE_SECONDS) -> None:
 
 def connect_from_elsewhere(address: str) -> None:
     """As from a machine that is no node of the cluster."""
-    with patch("services.worker.ray_session.runs_here", lambda _port: False):
+    with patch("services.worker.ray_session.comes_here", lambda _host, _port: False):
         connect(address)
 
 

@@ -14,10 +14,10 @@ import pytest
 from services.optimizer.errors import InvalidRequest, KilledWorker
 from services.optimizer.jobs.priority import weight
 from services.runtime import open_evaluator
+from services.worker import joining
 from services.worker.cluster.handshake import Introduction, fingerprint, introducer
 from services.worker.cluster.nodes import Wanted
 from services.worker.cluster.shares import ledger, share
-from services.worker.joining import runs_here
 from sim.case import Walk
 from tests.examples.paths import ROOT
 from tests.examples.processes import eventually, within
@@ -257,7 +257,20 @@ def test_an_address_of_ray_client_is_refused_with_the_way_out() -> None:
 
 
 def test_no_node_runs_here_of_a_cluster_that_does_not_exist() -> None:
-    assert not runs_here(1)
+    assert not joining.runs_here(1)
+
+
+def test_the_node_of_a_head_that_has_just_begun_to_listen_here_is_waited_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    looks = iter([False, False, True, False])
+    monkeypatch.setattr(joining, "runs_here", lambda _port: next(looks))
+    assert joining.comes_here("127.0.0.1", 6379)
+    # Elsewhere it is not waited for: the address is for documentation, and nobody's.
+    assert not joining.comes_here("203.0.113.77", 6379)
+    monkeypatch.setattr(joining, "runs_here", lambda _port: False)
+    monkeypatch.setattr(joining, "_LATE_SECONDS", 0.3)
+    assert not joining.comes_here("127.0.0.1", 6379), "it does not come"
 
 
 def test_requests_that_need_other_robots_or_another_provenance_have_nodes_prepared_anew() -> None:

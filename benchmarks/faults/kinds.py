@@ -315,17 +315,9 @@ def _kill(pid: int, number: signal.Signals = signal.SIGKILL) -> None:
 KINDS: Final[dict[str, type[Fault]]] = {
     kind.name: kind
     for kind in (
-        *(
-            KillApi,
-            KillRunner,
-            KillPostgres,
-            KillWorker,
-            KillRaylet,
-            KillGcs,
-            KillAgent,
-            StopRunner,
-        ),
-        *(DatabaseLocked, DiskFull, ClockStep, ForkRefused, OutOfMemory, Partition, ClusterAway),
+        *(KillApi, KillRunner, KillPostgres, KillWorker, KillRaylet, KillGcs, KillAgent),
+        *(StopRunner, DatabaseLocked, DiskFull, ClockStep, ForkRefused, OutOfMemory),
+        *(Partition, ClusterAway),
     )
 }
 """Every kind by its name."""

@@ -2,11 +2,11 @@
 
 import { useEffect, useLayoutEffect, useRef } from 'preact/hooks'
 import { Empty } from './components/feedback'
-import { lazyPage } from './components/lazy-page'
 import icon from './icon.svg'
 import { JobsPage } from './jobs/page'
 import { Keys } from './palette/keys'
 import { forgetIgnored, IgnoredNotice } from './router/ignored'
+import { lazyPage } from './router/lazy-page'
 import { usePlace } from './router/navigation'
 import { type Route, routeOf } from './router/routes'
 import { useManual, useUnauthorized } from './session/session'

@@ -1,6 +1,6 @@
 /** Jobs to choose from, as the server finds them: by name, id, note or tag, the newest first. */
 
-import type { Choice, Search } from '../components/found-choices'
+import type { Choice, Search } from '../components/fields/found-choices'
 import { get } from './client'
 import type { Job, JobSummary } from './types'
 

@@ -1,6 +1,6 @@
 /** Draws many lines without holding up the page: a part of them in every frame. */
 
-import { BUCKETS, FAILED, type ParallelModel } from './parallel-model'
+import { BUCKETS, FAILED, type ParallelModel } from './parallel/parallel-model'
 
 export interface Palette {
   /** Colours from the best rows to the worst. */

@@ -1,9 +1,9 @@
 /** The distribution function of every job's fitness: how many of its designs are how good. */
 
 import { useMemo } from 'preact/hooks'
-import { LinkedChart } from '../charts/linked-chart'
-import { ChartFrame, LegendEntry } from '../components/chart-frame'
-import { Table } from '../components/table'
+import { ChartFrame, LegendEntry } from '../charts/chart-frame'
+import { LinkedChart } from '../charts/lines/linked-chart'
+import { Table } from '../components/table/table'
 import { formatNumber, percent } from '../format/number'
 import { type ComparedJob, colourOf, dashOf, distributions } from './series'
 

@@ -1,7 +1,7 @@
 /** Lines of several jobs over one axis, which a chart of lines takes with the same x for all. Pure. */
 
 import type { JobComparison } from '../api/types'
-import type { ReferenceLine } from '../charts/reference-line'
+import type { ReferenceLine } from '../charts/lines/reference-line'
 import { referenceLabel } from '../job/gain'
 
 export type ComparedJob = JobComparison['jobs'][number]

@@ -1,7 +1,7 @@
 /** The values of a design, with what each is and the bounds of its search. */
 
 import type { Variable } from '../api/types'
-import { type Column, Table } from '../components/table'
+import { type Column, Table } from '../components/table/table'
 import { formatExact, writtenUnit } from '../format/number'
 import { formatExactValue, type Value } from '../format/value'
 import { inWords } from '../format/words'

@@ -1,8 +1,8 @@
 /** A surface from above: colours for numbers, which pointer and keys read out. */
 
 import { useEffect, useRef, useState } from 'preact/hooks'
-import { ChartFrame } from '../components/chart-frame'
-import { type Column, Table } from '../components/table'
+import { ChartFrame } from '../charts/chart-frame'
+import { type Column, Table } from '../components/table/table'
 import { formatNumber, quantity } from '../format/number'
 import { useTheme } from '../theme'
 import { gradient } from './colour-map'

@@ -1,10 +1,10 @@
 /** The fuzzy sets of an input or output: how much every value belongs to each. */
 
 import { useMemo } from 'preact/hooks'
-import type { Series } from '../charts/line-chart'
-import { LinkedChart } from '../charts/linked-chart'
-import { ChartFrame, LegendEntry } from '../components/chart-frame'
-import { type Column, Table } from '../components/table'
+import { ChartFrame, LegendEntry } from '../charts/chart-frame'
+import type { Series } from '../charts/lines/line-chart'
+import { LinkedChart } from '../charts/lines/linked-chart'
+import { type Column, Table } from '../components/table/table'
 import { formatNumber } from '../format/number'
 import type { Universe } from './surface'
 

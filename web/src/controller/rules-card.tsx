@@ -1,6 +1,6 @@
 /** The rules in words, with their weights and how far they fire at the chosen point. */
 
-import { type Column, Table } from '../components/table'
+import { type Column, Table } from '../components/table/table'
 import { formatExact } from '../format/number'
 import { type Cell, type Output, type Rule, ruleText, type SurfaceView, strength } from './surface'
 

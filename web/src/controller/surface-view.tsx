@@ -2,8 +2,8 @@
 
 import { useEffect, useRef, useState } from 'preact/hooks'
 import { messageOf } from '../api/problem'
-import { ChartFrame } from '../components/chart-frame'
-import { Segmented } from '../components/segmented'
+import { ChartFrame } from '../charts/chart-frame'
+import { Segmented } from '../components/fields/segmented'
 import { describeCanvas } from '../export/canvas-source'
 import { quantity, withUnit } from '../format/number'
 import { oneOf, useQueryValue } from '../router/query-value'

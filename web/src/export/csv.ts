@@ -1,6 +1,6 @@
 /** Tables as comma-separated values (RFC 4180), numbers in full. Pure. */
 
-import type { Cell } from '../components/rows'
+import type { Cell } from '../components/table/rows'
 
 export interface DataTable {
   /** What the table holds. */

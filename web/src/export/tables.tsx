@@ -1,9 +1,9 @@
 /** The tables behind a chart as data: the same that readers of screens get, all rows, in full. */
 
 import { type ComponentChildren, render } from 'preact'
-import type { Cell } from '../components/rows'
-import type { Column } from '../components/table'
-import { type CollectedTable, TableSink } from '../components/table-sink'
+import type { Cell } from '../components/table/rows'
+import type { Column } from '../components/table/table'
+import { type CollectedTable, TableSink } from '../components/table/table-sink'
 import { withUnit } from '../format/number'
 import type { DataTable } from './csv'
 

@@ -1,6 +1,6 @@
 /** Numbers of a chart over the iterations, as a table. */
 
-import { type Column, Table } from '../components/table'
+import { type Column, Table } from '../components/table/table'
 
 export function ByIteration<R extends { readonly index: number }>({
   caption,

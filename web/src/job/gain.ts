@@ -3,7 +3,7 @@
 import { get } from '../api/client'
 import { useResource } from '../api/resource'
 import type { ReferenceView, StoredJob } from '../api/types'
-import type { ReferenceLine } from '../charts/reference-line'
+import type { ReferenceLine } from '../charts/lines/reference-line'
 
 export interface Gain {
   /** Null while it is not known, and where there is none. */

@@ -2,10 +2,10 @@
 
 import { isReadable } from '../api/readable'
 import type { Job, StoredJob } from '../api/types'
-import { ALL_JOBS, Breadcrumbs, type Crumb } from '../components/breadcrumbs'
 import { ErrorNotice, Loading } from '../components/feedback'
-import { lazyPart } from '../components/lazy-page'
 import { capitalized } from '../format/words'
+import { ALL_JOBS, Breadcrumbs, type Crumb } from '../router/breadcrumbs'
+import { lazyPart } from '../router/lazy-page'
 import { usePlace } from '../router/navigation'
 import { jobPath, withQuery } from '../router/routes'
 import { caseWords } from './fitness'

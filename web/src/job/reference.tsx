@@ -6,7 +6,7 @@ import { readableJob } from '../api/readable'
 import { useResource } from '../api/resource'
 import { isPublished, NOT_PUBLISHED } from '../api/robots'
 import type { Controller, Job, JobSpec, ScenarioResult, Simulation } from '../api/types'
-import { Combobox } from '../components/combobox'
+import { Combobox } from '../components/fields/combobox'
 import type { Design } from '../format/value'
 
 export interface Reference {

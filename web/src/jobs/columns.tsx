@@ -3,7 +3,7 @@
 import type { JobSummary } from '../api/types'
 import { Progress } from '../components/progress'
 import { STATE_TONES, StateBadge } from '../components/state-badge'
-import type { Column } from '../components/table'
+import type { Column } from '../components/table/table'
 import { formatNumber, percent, quantity } from '../format/number'
 import { formatAge, formatDuration, formatMoment } from '../format/time'
 import { budgetSpent, spentInWords } from '../job/budget'

@@ -1,6 +1,6 @@
 /** What the palette offers: pages, what can be done with the job that is open, and jobs. Pure but for the page. */
 
-import { matching } from '../components/rows'
+import { matching } from '../components/table/rows'
 
 export interface Entry {
   readonly key: string

@@ -1,10 +1,10 @@
 /** Data profiles: which share of its runs a method has solved within a budget. */
 
 import type { TournamentProfile } from '../api/types'
-import type { Series } from '../charts/line-chart'
-import { LinkedChart } from '../charts/linked-chart'
-import { ChartFrame, LegendEntry } from '../components/chart-frame'
-import { Table } from '../components/table'
+import { ChartFrame, LegendEntry } from '../charts/chart-frame'
+import type { Series } from '../charts/lines/line-chart'
+import { LinkedChart } from '../charts/lines/linked-chart'
+import { Table } from '../components/table/table'
 import { formatExact, percent } from '../format/number'
 import { OTHERS, type RankedMethod } from './methods'
 

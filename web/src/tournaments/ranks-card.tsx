@@ -1,9 +1,9 @@
 /** Methods by mean rank, with bootstrap intervals; which of them have a colour is chosen here. */
 
 import type { TournamentStandings } from '../api/types'
-import { ChartFrame } from '../components/chart-frame'
+import { ChartFrame } from '../charts/chart-frame'
 import { StateBadge } from '../components/state-badge'
-import { Table } from '../components/table'
+import { Table } from '../components/table/table'
 import { formatCount, formatNumber } from '../format/number'
 import { setQuery } from '../router/navigation'
 import { jobPath } from '../router/routes'

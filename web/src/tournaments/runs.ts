@@ -1,7 +1,7 @@
 /** Runs on a problem as columns of charts. Pure. */
 
 import type { ProblemRuns } from '../api/types'
-import type { Band, Series } from '../charts/line-chart'
+import type { Band, Series } from '../charts/lines/line-chart'
 import { OTHERS, type RankedMethod } from './methods'
 
 /** Least value that a logarithmic axis shows; smaller ones, such as 0, are drawn there. */

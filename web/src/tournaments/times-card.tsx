@@ -1,8 +1,8 @@
 /** Expected running times on a problem, with the other numbers of its standings as a table. */
 
 import type { Standing, TournamentStandings } from '../api/types'
-import { ChartFrame } from '../components/chart-frame'
-import { type Column, Table } from '../components/table'
+import { ChartFrame } from '../charts/chart-frame'
+import { type Column, Table } from '../components/table/table'
 import { formatCount, formatExact, formatNumber } from '../format/number'
 import { OTHERS, type RankedMethod } from './methods'
 import { RangeBars } from './range-bars'

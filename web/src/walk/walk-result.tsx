@@ -1,6 +1,6 @@
 /** How the walks ended and what they are worth. */
 
-import { Table } from '../components/table'
+import { Table } from '../components/table/table'
 import { Unit } from '../components/unit'
 import { change, formatNumber, NONE } from '../format/number'
 import { inWords, sentence } from '../format/words'

@@ -9,7 +9,7 @@ import {
   selectRows,
   stretchOf,
   valueAt,
-} from '../../src/charts/parallel-model'
+} from '../../src/charts/parallel/parallel-model'
 import { decodeParticles } from '../../src/job/designs/particles'
 import { grouped } from '../../src/job/overview/grouped'
 

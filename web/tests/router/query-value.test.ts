@@ -1,5 +1,5 @@
 import { describe, expect, test } from 'vitest'
-import { buildModel } from '../../src/charts/parallel-model'
+import { buildModel } from '../../src/charts/parallel/parallel-model'
 import { brushesOf, brushWords } from '../../src/job/designs/brush-words'
 import { flag, ORDER, oneOf, RANGE } from '../../src/router/query-value'
 

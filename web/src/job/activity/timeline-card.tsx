@@ -2,9 +2,9 @@
 
 import { useMemo } from 'preact/hooks'
 import type { Activity } from '../../api/types'
-import { ChartFrame } from '../../components/chart-frame'
+import { ChartFrame } from '../../charts/chart-frame'
 import { Empty } from '../../components/feedback'
-import { type Column, Table } from '../../components/table'
+import { type Column, Table } from '../../components/table/table'
 import { formatCount, formatNumber } from '../../format/number'
 import { formatMoment } from '../../format/time'
 import { type Bar, type Lane, type Timeline, timelineOf } from './timeline'

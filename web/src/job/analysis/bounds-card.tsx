@@ -3,7 +3,7 @@
 import type { Importance, Job, VariableImportance } from '../../api/types'
 import { BrokenName } from '../../components/broken-name'
 import { Empty } from '../../components/feedback'
-import { Table } from '../../components/table'
+import { Table } from '../../components/table/table'
 import { exactQuantity, formatExact } from '../../format/number'
 import { withQuery } from '../../router/routes'
 import { widenQuery } from './outputs'

@@ -1,10 +1,10 @@
 /** How much of an output goes with each variable alone, with intervals. */
 
 import type { Importance, VariableImportance } from '../../api/types'
+import { ChartFrame } from '../../charts/chart-frame'
 import { BrokenName } from '../../components/broken-name'
-import { ChartFrame } from '../../components/chart-frame'
 import { Empty } from '../../components/feedback'
-import { type Column, Table } from '../../components/table'
+import { type Column, Table } from '../../components/table/table'
 import { formatCount, formatNumber, NONE, percent } from '../../format/number'
 import { setQuery, usePlace } from '../../router/navigation'
 import { byImportance, indexOf, type Output, outputsOf, outputWords } from './outputs'

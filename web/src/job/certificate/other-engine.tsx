@@ -1,7 +1,7 @@
 /** What another engine makes of a certificate's nominal world, beside what ours makes of it. */
 
 import type { Compared, ComparedEngine, Job } from '../../api/types'
-import { type Column, Table } from '../../components/table'
+import { type Column, Table } from '../../components/table/table'
 import { change, formatNumber, withUnit } from '../../format/number'
 import { inWords } from '../../format/words'
 

@@ -12,7 +12,7 @@ import type {
   World,
 } from '../../api/types'
 import { Empty, ErrorNotice, Loading } from '../../components/feedback'
-import { type Column, Table } from '../../components/table'
+import { type Column, Table } from '../../components/table/table'
 import { change, formatCount, formatNumber, percent } from '../../format/number'
 import { inWords } from '../../format/words'
 import { withQuery } from '../../router/routes'

@@ -1,7 +1,7 @@
 /** A selection over axes as a part of an address: `FI1R:1500:3000,fitness:10:12`. Pure. */
 
-import type { Brushes } from '../../charts/parallel-coordinates'
-import { type Axis, type Brush, placeOf, valueAt } from '../../charts/parallel-model'
+import type { Brushes } from '../../charts/parallel/parallel-coordinates'
+import { type Axis, type Brush, placeOf, valueAt } from '../../charts/parallel/parallel-model'
 
 /** Axes by value rather than by place, so that a link means the same when bounds have moved. */
 export function brushWords(axes: readonly Axis[], brushes: Brushes): string | null {

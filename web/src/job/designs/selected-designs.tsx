@@ -1,7 +1,7 @@
 /** Some designs of a job as a table, each with the way to its walk. */
 
 import type { Job } from '../../api/types'
-import { type Column, Table } from '../../components/table'
+import { type Column, Table } from '../../components/table/table'
 import { placeWord } from '../../format/place'
 import { formatValue, named } from '../../format/value'
 import { inWords } from '../../format/words'

@@ -1,6 +1,6 @@
 /** Designs that were selected by stretches of axes, on whatever part of the job's page. Pure. */
 
-import { type AxisSource, buildModel, selectRows } from '../../charts/parallel-model'
+import { type AxisSource, buildModel, selectRows } from '../../charts/parallel/parallel-model'
 import { brushesOf } from './brush-words'
 import { columnNamed, type Particles } from './particles'
 

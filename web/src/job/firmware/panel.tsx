@@ -6,7 +6,7 @@ import { useResource } from '../../api/resource'
 import type { Firmware, Job } from '../../api/types'
 import { CopyBlock } from '../../components/copy-button'
 import { Empty, ErrorNotice, Loading } from '../../components/feedback'
-import { Table } from '../../components/table'
+import { Table } from '../../components/table/table'
 import { formatCount, formatNumber, NONE, percent, quantity } from '../../format/number'
 import { inWords } from '../../format/words'
 

@@ -3,8 +3,8 @@
 import { useEffect, useRef, useState } from 'preact/hooks'
 import { useSlowly } from '../../api/resource'
 import type { Job } from '../../api/types'
-import { lazyPage } from '../../components/lazy-page'
 import { useVisible } from '../../components/use-visible'
+import { lazyPage } from '../../router/lazy-page'
 import { withQuery } from '../../router/routes'
 import '../../walk/player/walk-stage.css'
 

@@ -1,9 +1,9 @@
 /** Every committed iteration, to look through and to take away. */
 
 import type { Iteration, Job } from '../../api/types'
-import { Check } from '../../components/check'
 import { Empty } from '../../components/feedback'
-import { type Column, Table } from '../../components/table'
+import { Check } from '../../components/fields/check'
+import { type Column, Table } from '../../components/table/table'
 import { formatNumber } from '../../format/number'
 import { formatMoment } from '../../format/time'
 import { type Codec, flag, ORDER, PAGE_NUMBER, useQueryValue } from '../../router/query-value'

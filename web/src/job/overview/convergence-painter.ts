@@ -1,8 +1,8 @@
 /** Draws on the convergence chart what is no line: designs, the reference, marks and a label. */
 
 import type uPlot from 'uplot'
-import { withAlpha } from '../../charts/line-chart'
-import { chartFont, paintReference, type ReferenceLine } from '../../charts/reference-line'
+import { withAlpha } from '../../charts/lines/line-chart'
+import { chartFont, paintReference, type ReferenceLine } from '../../charts/lines/reference-line'
 import { themeColour } from '../../theme'
 import type { Dots } from './convergence-model'
 

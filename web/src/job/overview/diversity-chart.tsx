@@ -1,8 +1,8 @@
 /** How far designs are spread over the design space. */
 
 import { useMemo } from 'preact/hooks'
-import { LinkedChart } from '../../charts/linked-chart'
-import { ChartFrame } from '../../components/chart-frame'
+import { ChartFrame } from '../../charts/chart-frame'
+import { LinkedChart } from '../../charts/lines/linked-chart'
 import { percent } from '../../format/number'
 import { ByIteration } from '../by-iteration'
 import type { Distribution } from './use-distribution'

@@ -1,8 +1,8 @@
 /** What limits the winner now, in words and numbers. */
 
 import type { Job, JobSpec, Preference } from '../../api/types'
-import { ChartFrame } from '../../components/chart-frame'
-import { Table } from '../../components/table'
+import { ChartFrame } from '../../charts/chart-frame'
+import { Table } from '../../components/table/table'
 import { formatNumber, percent, quantity } from '../../format/number'
 import { inWords } from '../../format/words'
 import { type Analysis, analyse, type Factor } from '../preference'

@@ -1,9 +1,9 @@
 /** The winner: each variable's value, and where in its bounds it lies. */
 
 import type { Job } from '../../api/types'
+import { ChartFrame } from '../../charts/chart-frame'
 import { BrokenName } from '../../components/broken-name'
-import { ChartFrame } from '../../components/chart-frame'
-import { Table } from '../../components/table'
+import { Table } from '../../components/table/table'
 import { formatExact, percent } from '../../format/number'
 import { placeWord } from '../../format/place'
 import { exactValueQuantity } from '../../format/value'

@@ -2,7 +2,7 @@
 
 import type { FittedParameter } from '../../api/types'
 import { BrokenName } from '../../components/broken-name'
-import { type Column, Table } from '../../components/table'
+import { type Column, Table } from '../../components/table/table'
 import { formatNumber } from '../../format/number'
 import { inWords } from '../../format/words'
 

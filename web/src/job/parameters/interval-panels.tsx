@@ -1,9 +1,9 @@
 /** Small charts of the intervals, one for each parameter (fig. 2.14). */
 
 import type { FittedParameter, Identifiability } from '../../api/types'
+import { ChartFrame } from '../../charts/chart-frame'
 import { BrokenName } from '../../components/broken-name'
-import { ChartFrame } from '../../components/chart-frame'
-import { type Column, Table } from '../../components/table'
+import { type Column, Table } from '../../components/table/table'
 import { Unit } from '../../components/unit'
 import { formatExact, formatNumber, percent } from '../../format/number'
 import { exactValueQuantity, type Value, valueQuantity } from '../../format/value'

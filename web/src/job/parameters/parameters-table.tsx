@@ -2,7 +2,7 @@
 
 import type { FittedParameter, Identifiability } from '../../api/types'
 import { BrokenName } from '../../components/broken-name'
-import { type Column, Table } from '../../components/table'
+import { type Column, Table } from '../../components/table/table'
 import { formatExact, percent, writtenUnit } from '../../format/number'
 import { formatValue } from '../../format/value'
 import { inWords } from '../../format/words'

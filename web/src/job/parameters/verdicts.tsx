@@ -1,7 +1,7 @@
 /** What the runs say of the parameters as a whole, and which of them are to be shown. */
 
 import type { Identifiability } from '../../api/types'
-import { Segmented } from '../../components/segmented'
+import { Segmented } from '../../components/fields/segmented'
 import { formatCount } from '../../format/number'
 import { type Trust, verdicts } from './intervals'
 

@@ -2,10 +2,10 @@
 
 import { useMemo } from 'preact/hooks'
 import type { Job, Preference, RankedDesign, Ranking } from '../../api/types'
-import { LinkedChart } from '../../charts/linked-chart'
-import { ChartFrame } from '../../components/chart-frame'
+import { ChartFrame } from '../../charts/chart-frame'
+import { LinkedChart } from '../../charts/lines/linked-chart'
 import { Empty } from '../../components/feedback'
-import { type Column, Table } from '../../components/table'
+import { type Column, Table } from '../../components/table/table'
 import { change, formatCount, formatNumber } from '../../format/number'
 import { placeWord } from '../../format/place'
 import { formatValue } from '../../format/value'

@@ -1,8 +1,8 @@
 /** Biases and exponents of the objectives to move, and the published preferences. */
 
 import type { Preference, PreferencePreset } from '../../api/types'
-import { NumberField } from '../../components/number-field'
-import { Segmented } from '../../components/segmented'
+import { NumberField } from '../../components/fields/number-field'
+import { Segmented } from '../../components/fields/segmented'
 import { writtenUnit } from '../../format/number'
 import { inWords } from '../../format/words'
 import { weighed } from '../preference'

@@ -1,7 +1,7 @@
 /** The designs that a job began with. */
 
 import type { Job } from '../../api/types'
-import { type Column, Table } from '../../components/table'
+import { type Column, Table } from '../../components/table/table'
 import { formatCount } from '../../format/number'
 import { type Design, formatExactValue } from '../../format/value'
 import { startDesigns } from '../start'

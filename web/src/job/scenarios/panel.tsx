@@ -3,7 +3,7 @@
 import { isPublished } from '../../api/robots'
 import type { Job, JobSpec, Preference, ScenarioResult } from '../../api/types'
 import { Empty, ErrorNotice, Loading } from '../../components/feedback'
-import { type Column, Table } from '../../components/table'
+import { type Column, Table } from '../../components/table/table'
 import { change, formatNumber } from '../../format/number'
 import { capitalized, inWords } from '../../format/words'
 import { setQuery, usePlace } from '../../router/navigation'

@@ -4,7 +4,7 @@ import { get } from '../../api/client'
 import { type Resource, useResource } from '../../api/resource'
 import type { Job, RecordingView } from '../../api/types'
 import { ErrorNotice, Loading } from '../../components/feedback'
-import { Table } from '../../components/table'
+import { Table } from '../../components/table/table'
 import { formatNumber } from '../../format/number'
 
 /** A recording without its numbers, which are many. */

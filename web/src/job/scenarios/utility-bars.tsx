@@ -1,7 +1,7 @@
 /** Utilities of the winner by scenario as bars, beside those of a reference. */
 
 import type { ComponentChildren } from 'preact'
-import { ChartFrame, LegendEntry } from '../../components/chart-frame'
+import { ChartFrame, LegendEntry } from '../../charts/chart-frame'
 import { quantity } from '../../format/number'
 import { capitalized } from '../../format/words'
 import type { CaseWords } from '../fitness'

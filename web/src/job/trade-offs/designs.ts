@@ -1,7 +1,7 @@
 /** Designs of a front: how they are named, pointed at and drawn. Pure. */
 
 import type { Front, ScenarioResult } from '../../api/types'
-import type { Cloud, Mark } from '../../charts/scatter'
+import type { Cloud, Mark } from '../../charts/scatter/scatter'
 import { placeWord } from '../../format/place'
 import { columnNamed, type Particles } from '../designs/particles'
 import type { Reference } from '../reference'

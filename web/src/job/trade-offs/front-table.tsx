@@ -1,7 +1,7 @@
 /** The designs of a front as a table: what is remarkable of them, and all their objectives. */
 
 import type { Front, FrontDesign, Job, Objective } from '../../api/types'
-import { type Column, Table } from '../../components/table'
+import { type Column, Table } from '../../components/table/table'
 import { formatNumber, NONE } from '../../format/number'
 import { type Place, placeWord } from '../../format/place'
 import { inWords } from '../../format/words'

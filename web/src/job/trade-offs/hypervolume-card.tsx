@@ -2,8 +2,8 @@
 
 import { useMemo } from 'preact/hooks'
 import type { Front } from '../../api/types'
-import { LinkedChart } from '../../charts/linked-chart'
-import { ChartFrame } from '../../components/chart-frame'
+import { ChartFrame } from '../../charts/chart-frame'
+import { LinkedChart } from '../../charts/lines/linked-chart'
 import { formatNumber } from '../../format/number'
 import { ByIteration } from '../by-iteration'
 

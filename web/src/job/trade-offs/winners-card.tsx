@@ -1,7 +1,7 @@
 /** Where the best designs under A, B, C and the job's own preference lie with respect to the front. */
 
 import type { Front, FrontWinner, Job } from '../../api/types'
-import { Table } from '../../components/table'
+import { Table } from '../../components/table/table'
 import { formatCount, percent } from '../../format/number'
 import { type Place, placeWord } from '../../format/place'
 import { capitalized } from '../../format/words'

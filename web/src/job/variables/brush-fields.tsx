@@ -1,9 +1,14 @@
 /** The same selection by numbers, for keyboards and for exact bounds. */
 
-import { type Brushes, withBrush } from '../../charts/parallel-coordinates'
-import { type Axis, type ParallelModel, placeOf, valueAt } from '../../charts/parallel-model'
+import { type Brushes, withBrush } from '../../charts/parallel/parallel-coordinates'
+import {
+  type Axis,
+  type ParallelModel,
+  placeOf,
+  valueAt,
+} from '../../charts/parallel/parallel-model'
 import { BrokenName } from '../../components/broken-name'
-import { NumberField } from '../../components/number-field'
+import { NumberField } from '../../components/fields/number-field'
 import { Unit } from '../../components/unit'
 import { inWords } from '../../format/words'
 import './brush-fields.css'

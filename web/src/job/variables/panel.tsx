@@ -4,9 +4,14 @@ import { useMemo, useRef, useState } from 'preact/hooks'
 import { getBytes } from '../../api/client'
 import { useResource, useSlowly } from '../../api/resource'
 import type { Job } from '../../api/types'
-import { type Brushes, ParallelCoordinates } from '../../charts/parallel-coordinates'
-import { bestRows, buildModel, type ParallelModel, selectRows } from '../../charts/parallel-model'
-import { ChartFrame, LegendEntry } from '../../components/chart-frame'
+import { ChartFrame, LegendEntry } from '../../charts/chart-frame'
+import { type Brushes, ParallelCoordinates } from '../../charts/parallel/parallel-coordinates'
+import {
+  bestRows,
+  buildModel,
+  type ParallelModel,
+  selectRows,
+} from '../../charts/parallel/parallel-model'
 import { Empty, ErrorNotice, Loading } from '../../components/feedback'
 import { formatCount } from '../../format/number'
 import { type Place, placeOf, placeWord } from '../../format/place'

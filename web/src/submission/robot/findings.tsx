@@ -1,7 +1,7 @@
 /** What was seen of a robot: mass, legs, how it stands, what is wrong, what was guessed. */
 
 import type { CheckedLeg, RobotCheck } from '../../api/types'
-import { type Column, Table } from '../../components/table'
+import { type Column, Table } from '../../components/table/table'
 import { exactQuantity, formatExact, formatNumber, quantity } from '../../format/number'
 
 const COLUMNS: readonly Column<CheckedLeg>[] = [

@@ -1,6 +1,6 @@
 /** The robot: as it is, a variant of it, or one's own from its files. */
 
-import { Segmented } from '../../components/segmented'
+import { Segmented } from '../../components/fields/segmented'
 import { errorsUnder } from '../draft/build-spec'
 import { emptyDraft, type RobotDraft } from '../draft/draft'
 import { ChoiceField, NumberField, Problems } from '../fields/number-field'

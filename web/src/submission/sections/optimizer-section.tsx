@@ -1,7 +1,7 @@
 /** The search method and its settings, as the API describes them. */
 
 import type { OptimizerPreset } from '../../api/types'
-import { Segmented } from '../../components/segmented'
+import { Segmented } from '../../components/fields/segmented'
 import { capitalized, inWords, sentence } from '../../format/words'
 import {
   methodNamed,

@@ -1,6 +1,6 @@
 /** How objectives are weighed: a published preference or one's own. */
 
-import { Segmented } from '../../components/segmented'
+import { Segmented } from '../../components/fields/segmented'
 import { formatExact } from '../../format/number'
 import { inWords } from '../../format/words'
 import { weighed } from '../../job/preference'

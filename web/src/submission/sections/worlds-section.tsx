@@ -1,6 +1,6 @@
 /** Robust jobs: worlds that differ from the model, and what the walks in them come to. */
 
-import { Segmented } from '../../components/segmented'
+import { Segmented } from '../../components/fields/segmented'
 import { formatCount } from '../../format/number'
 import { capitalized, inWords, sentence } from '../../format/words'
 import { errorsUnder } from '../draft/build-spec'

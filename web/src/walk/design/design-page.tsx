@@ -1,9 +1,9 @@
 /** What the pages of walks and of controllers share: a design that the address names. */
 
 import type { ComponentChildren } from 'preact'
-import { ALL_JOBS, Breadcrumbs, type Crumb } from '../../components/breadcrumbs'
 import { ErrorNotice } from '../../components/feedback'
 import { useProgress } from '../../job/live/use-progress'
+import { ALL_JOBS, Breadcrumbs, type Crumb } from '../../router/breadcrumbs'
 import { usePlace } from '../../router/navigation'
 import { jobPath, withQuery } from '../../router/routes'
 import { type DesignSource, queryOf } from './design-source'

@@ -3,7 +3,7 @@
 import { get } from '../../api/client'
 import { foundJobs } from '../../api/found-jobs'
 import { useResource } from '../../api/resource'
-import { type ChoiceGroup, Combobox } from '../../components/combobox'
+import { type ChoiceGroup, Combobox } from '../../components/fields/combobox'
 import { type DesignSource, sourceOfWord, wordOf } from './design-source'
 
 export function DesignPicker({

@@ -1,7 +1,7 @@
 /** Play, scrub, speed and view of a replay. */
 
 import { useId } from 'preact/hooks'
-import { Segmented } from '../../components/segmented'
+import { Segmented } from '../../components/fields/segmented'
 import { formatExact } from '../../format/number'
 import type { ViewName } from '../scene/camera-rig'
 import type { SceneOptions } from '../scene/walk-scene'

@@ -1,9 +1,9 @@
 /** Which foot stands when: a bar for every stance, a row for every leg. */
 
 import { useMemo, useRef } from 'preact/hooks'
+import { ChartFrame } from '../../charts/chart-frame'
 import { linearTicks } from '../../charts/log-axis'
-import { ChartFrame } from '../../components/chart-frame'
-import { Table } from '../../components/table'
+import { Table } from '../../components/table/table'
 import { useVisible } from '../../components/use-visible'
 import { formatExact, formatNumber, percent, quantity } from '../../format/number'
 import type { Playback } from '../player/playback'

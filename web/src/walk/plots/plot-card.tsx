@@ -1,10 +1,10 @@
 /** One chart over time, whose line moves with the replay and whose clicks move the replay. */
 
 import { useMemo, useRef } from 'preact/hooks'
-import type { Series } from '../../charts/line-chart'
-import { LinkedChart } from '../../charts/linked-chart'
-import { ChartFrame } from '../../components/chart-frame'
-import { type Column, Table } from '../../components/table'
+import { ChartFrame } from '../../charts/chart-frame'
+import type { Series } from '../../charts/lines/line-chart'
+import { LinkedChart } from '../../charts/lines/linked-chart'
+import { type Column, Table } from '../../components/table/table'
 import { useVisible } from '../../components/use-visible'
 import { formatNumber, quantity } from '../../format/number'
 import type { Playback } from '../player/playback'

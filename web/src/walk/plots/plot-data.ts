@@ -1,6 +1,6 @@
 /** Curves of one walk or two on common moments. Pure. */
 
-import type { Series } from '../../charts/line-chart'
+import type { Series } from '../../charts/lines/line-chart'
 import type { Recorded } from '../replay/recorded'
 import type { Replay } from '../replay/replay'
 import type { Curve } from './plot-specs'

@@ -2,9 +2,9 @@
 
 import type { Resource } from '../../../api/resource'
 import type { RecordingView } from '../../../api/types'
-import { ChosenList } from '../../../components/chosen-list'
-import { Combobox } from '../../../components/combobox'
 import { ErrorNotice, Loading } from '../../../components/feedback'
+import { ChosenList } from '../../../components/fields/chosen-list'
+import { Combobox } from '../../../components/fields/combobox'
 import { formatNumber } from '../../../format/number'
 import { foundRecordings, idsIn, shortId } from './found-recordings'
 

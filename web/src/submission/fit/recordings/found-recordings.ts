@@ -2,7 +2,7 @@
 
 import { get } from '../../../api/client'
 import type { RecordingEntry } from '../../../api/types'
-import type { Choice, Search } from '../../../components/found-choices'
+import type { Choice, Search } from '../../../components/fields/found-choices'
 import { formatNumber } from '../../../format/number'
 import { formatMoment } from '../../../format/time'
 

@@ -1,7 +1,7 @@
 /** What was read of a measured log: how long it is, what it holds, and where the walk begins. */
 
 import type { MeasuredWalk } from '../../../api/types'
-import { Table } from '../../../components/table'
+import { Table } from '../../../components/table/table'
 import { formatCount, formatNumber } from '../../../format/number'
 
 /** Correlation of desired angles under which it is told that another walk may have been named. */

@@ -1,5 +1,11 @@
 import { describe, expect, test } from 'vitest'
-import { axisOf, nearest, placeIn, placeNames, shareOf } from '../../src/charts/scatter-model'
+import {
+  axisOf,
+  nearest,
+  placeIn,
+  placeNames,
+  shareOf,
+} from '../../../src/charts/scatter/scatter-model'
 
 const BOX = { left: 10, top: 20, width: 100, height: 200 }
 

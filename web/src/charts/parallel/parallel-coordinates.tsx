@@ -1,9 +1,10 @@
 /** Rows as lines across one axis per column; dragging along an axis selects a stretch of it. */
 
 import { useEffect, useLayoutEffect, useMemo, useRef, useState } from 'preact/hooks'
-import { BrokenName } from '../components/broken-name'
-import { formatExact, writtenUnit } from '../format/number'
-import { themeColour, useTheme } from '../theme'
+import { BrokenName } from '../../components/broken-name'
+import { formatExact, writtenUnit } from '../../format/number'
+import { themeColour, useTheme } from '../../theme'
+import { type Palette, ProgressivePainter } from '../progressive-painter'
 import {
   type Brush,
   BUCKETS,
@@ -13,7 +14,6 @@ import {
   selectRows,
   stretchOf,
 } from './parallel-model'
-import { type Palette, ProgressivePainter } from './progressive-painter'
 import './parallel.css'
 
 export type Brushes = ReadonlyMap<number, Brush>

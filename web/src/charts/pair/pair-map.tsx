@@ -1,15 +1,15 @@
 /** Rows over any two axes of parallel coordinates, as points or as cells by rank; a drag selects. */
 
 import { useEffect, useLayoutEffect, useMemo, useRef, useState } from 'preact/hooks'
-import { describeCanvas } from '../export/canvas-source'
-import { themeColour, useTheme } from '../theme'
+import { describeCanvas } from '../../export/canvas-source'
+import { themeColour, useTheme } from '../../theme'
+import { themePalette } from '../parallel/parallel-coordinates'
+import { type Brush, FAILED, type ParallelModel } from '../parallel/parallel-model'
+import type { Palette } from '../progressive-painter'
 import { IsolineLayer } from './isoline-layer'
 import { isolinesOf } from './isolines'
 import { PairAxes } from './pair-axes'
 import { CELLS, cellsOf, dragged, nearestRow, placeInWords, sampleOf, ticksOf } from './pair-model'
-import { themePalette } from './parallel-coordinates'
-import { type Brush, FAILED, type ParallelModel } from './parallel-model'
-import type { Palette } from './progressive-painter'
 import './pair-map.css'
 
 const HEIGHT_PX = 340

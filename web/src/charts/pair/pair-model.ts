@@ -1,8 +1,8 @@
 /** Two axes of parallel coordinates set against each other: points, cells, what a drag selects. Pure. */
 
-import { exactQuantity, formatCount, formatExact, formatNumber } from '../format/number'
-import { inWords } from '../format/words'
-import { linearTicks, logTicks } from './log-axis'
+import { exactQuantity, formatCount, formatExact, formatNumber } from '../../format/number'
+import { inWords } from '../../format/words'
+import { linearTicks, logTicks } from '../log-axis'
 import {
   type Axis,
   type Brush,
@@ -13,7 +13,7 @@ import {
   placeOf,
   stretchOf,
   valueAt,
-} from './parallel-model'
+} from '../parallel/parallel-model'
 
 /** Rows that are looked at; of more, a fair sample. */
 export const SAMPLE = 4000

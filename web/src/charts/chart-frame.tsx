@@ -2,10 +2,10 @@
 
 import type { ComponentChildren } from 'preact'
 import { useId, useRef, useState } from 'preact/hooks'
+import { ErrorNotice } from '../components/feedback'
+import { Menu } from '../components/menu'
 import type { DataTable } from '../export/csv'
 import type { Kind } from '../export/save'
-import { ErrorNotice } from './feedback'
-import { Menu } from './menu'
 
 export function ChartFrame({
   title,

@@ -2,7 +2,7 @@
 
 import type { ComponentType } from 'preact'
 import { useEffect, useState } from 'preact/hooks'
-import { ErrorNotice, Loading } from './feedback'
+import { ErrorNotice, Loading } from '../components/feedback'
 
 /** A component that stands for a module's default export. what: as in "Loading the walk". */
 export function lazyPage<P extends object>(

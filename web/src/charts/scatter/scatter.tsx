@@ -1,10 +1,10 @@
 /** Points over two axes, some with a name; a click chooses the nearest that can be chosen. */
 
 import { useEffect, useLayoutEffect, useMemo, useRef, useState } from 'preact/hooks'
-import { describeCanvas } from '../export/canvas-source'
-import { formatExact, formatNumber, withUnit } from '../format/number'
-import { themeColour, useTheme } from '../theme'
-import { withAlpha } from './line-chart'
+import { describeCanvas } from '../../export/canvas-source'
+import { formatExact, formatNumber, withUnit } from '../../format/number'
+import { themeColour, useTheme } from '../../theme'
+import { withAlpha } from '../lines/line-chart'
 import {
   type Axis,
   axisOf,

@@ -1,7 +1,7 @@
 /** Parallel coordinates as numbers: where each row crosses each axis, its colour, its selection. */
 
-import { formatExact } from '../format/number'
-import { inWords } from '../format/words'
+import { formatExact } from '../../format/number'
+import { inWords } from '../../format/words'
 
 export interface AxisSource {
   readonly name: string

@@ -1,6 +1,6 @@
 /** A chart of lines whose zoom is in the address. */
 
-import { RANGE, useQueryValue } from '../router/query-value'
+import { RANGE, useQueryValue } from '../../router/query-value'
 import { LineChart, type LineChartProps } from './line-chart'
 
 export function LinkedChart({

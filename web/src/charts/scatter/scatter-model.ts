@@ -1,6 +1,6 @@
 /** Where points, ticks and names of a scatter chart lie on its canvas. Pure. */
 
-import { linearTicks, logRange, logTicks } from './log-axis'
+import { linearTicks, logRange, logTicks } from '../log-axis'
 
 /** Values by point. */
 export type Values = ArrayLike<number>

@@ -3,11 +3,11 @@
 import { useEffect, useRef } from 'preact/hooks'
 import uPlot from 'uplot'
 import 'uplot/dist/uPlot.min.css'
-import { describeCanvas } from '../export/canvas-source'
-import { formatExact, formatNumber, withUnit } from '../format/number'
-import { themeColour, useTheme } from '../theme'
+import { describeCanvas } from '../../export/canvas-source'
+import { formatExact, formatNumber, withUnit } from '../../format/number'
+import { themeColour, useTheme } from '../../theme'
+import { logRange, logTicks } from '../log-axis'
 import { drawLines, drawMarker } from './line-drawing'
-import { logRange, logTicks } from './log-axis'
 
 export interface Series {
   readonly label: string

@@ -1,7 +1,7 @@
 /** What a server finds for a picker, page by page: the next page only when it is asked for. */
 
 import { useEffect, useState } from 'preact/hooks'
-import { LatestAnswer } from '../api/latest-answer'
+import { LatestAnswer } from '../../api/latest-answer'
 
 export interface Choice {
   readonly value: string

@@ -1,10 +1,10 @@
 /** A field that offers choices and finds more of them on the server (combobox of the ARIA patterns). */
 
 import { useEffect, useId, useRef, useState } from 'preact/hooks'
-import { messageOf } from '../api/problem'
+import { messageOf } from '../../api/problem'
 import './combobox.css'
+import { matching } from '../table/rows'
 import { type Choice, type Search, useFoundChoices } from './found-choices'
-import { matching } from './rows'
 
 export interface ChoiceGroup {
   readonly label: string

@@ -2,10 +2,10 @@
 
 import type { ComponentChildren } from 'preact'
 import { useContext, useState } from 'preact/hooks'
-import { formatCount } from '../format/number'
+import { formatCount } from '../../format/number'
+import { Unit } from '../unit'
 import { type Cell, paged, type SortOrder, sorted } from './rows'
 import { type CollectedTable, TableSink } from './table-sink'
-import { Unit } from './unit'
 
 export interface Column<R> {
   readonly key: string

@@ -1,8 +1,8 @@
 /** A dashed line across a chart of lines for what others reached, with its name. */
 
 import type uPlot from 'uplot'
-import { formatNumber } from '../format/number'
-import { themeColour } from '../theme'
+import { formatNumber } from '../../format/number'
+import { themeColour } from '../../theme'
 
 /** What jobs are measured against. */
 export interface ReferenceLine {

@@ -1,11 +1,11 @@
 /** A line chart drawn anew from its data as lines and words, under the zoom that is shown. */
 
 import type uPlot from 'uplot'
-import { formatExact, withUnit } from '../format/number'
-import { themeColour } from '../theme'
+import { formatExact, withUnit } from '../../format/number'
+import { themeColour } from '../../theme'
+import { linearTicks, logTicks } from '../log-axis'
 import type { Band, LineChartProps, Series } from './line-chart'
 import { withAlpha } from './line-chart'
-import { linearTicks, logTicks } from './log-axis'
 
 type Context = CanvasRenderingContext2D
 

@@ -1,5 +1,5 @@
 import { expect, test } from 'vitest'
-import { matching, paged, sorted } from '../../src/components/rows'
+import { matching, paged, sorted } from '../../../src/components/table/rows'
 
 const rows = [
   { name: 'b', size: 2 },

@@ -1,11 +1,11 @@
 /** Ticks and titles around a chart of two axes. */
 
 import type { ComponentChildren } from 'preact'
-import { withUnit } from '../format/number'
-import { inWords } from '../format/words'
+import { withUnit } from '../../format/number'
+import { inWords } from '../../format/words'
 import './pair-axes.css'
+import type { Axis } from '../parallel/parallel-model'
 import { ticksOf } from './pair-model'
-import type { Axis } from './parallel-model'
 
 export function PairAxes({
   across,

@@ -1,6 +1,6 @@
 import { expect, test } from 'vitest'
-import { isolinesOf } from '../../src/charts/isolines'
-import { CELLS } from '../../src/charts/pair-model'
+import { isolinesOf } from '../../../src/charts/pair/isolines'
+import { CELLS } from '../../../src/charts/pair/pair-model'
 
 /** A cell for each value; null: of designs that all failed. */
 function cellsFrom(rows: readonly (readonly (number | null)[])[]) {

@@ -6,8 +6,8 @@ import {
   nearestRow,
   placeInWords,
   ticksOf,
-} from '../../src/charts/pair-model'
-import { buildModel, selectRows } from '../../src/charts/parallel-model'
+} from '../../../src/charts/pair/pair-model'
+import { buildModel, selectRows } from '../../../src/charts/parallel/parallel-model'
 
 const source = (name: string, values: number[]) => ({
   name,

@@ -57,6 +57,7 @@ OTHERS: Final = ("pso-ps", "ps", "tlbo", "de", "ga", "gsa", "mads")
 PLANS: Final = {
     "chapter-4-anchors": Plan(ANCHORS, ROBOT, 5, 625),
     "chapter-4-local": Plan(LOCAL, ROBOT, 5, 625),
+    "chapter-4-default": Plan(("cma-es",), ROBOT, 20, 625),
     "chapter-4-others": Plan(OTHERS, ROBOT, 5, 625),
     "chapter-4-rivals": Plan(("pymoo-pso", "cma", "scipy-de", "optuna-cma-es"), ROBOT, 5, 625),
     "chapter-4-tpe": Plan(("optuna-tpe",), ROBOT, 20, 625),
@@ -68,7 +69,7 @@ PLANS: Final = {
     "chapter-3": Plan(("cma-es", "de", "pso-ps", "pso-thesis", "tlbo"), CHAPTER_3, 20, 625),
     "between": Plan(("cma-es", "de"), BETWEEN, 20, 625),
     "function": Plan(
-        (*ANCHORS, *LOCAL, *OTHERS, "pymoo-pso", "scipy-de", "cma"), FUNCTION, 30, 5000
+        (*ANCHORS, *LOCAL, *OTHERS, "pymoo-pso", "scipy-de", "cma"), FUNCTION, 100, 5000
     ),
     "function-slow": Plan(("optuna-cma-es",), FUNCTION, 5, 5000),
 }

@@ -78,22 +78,22 @@ def medians_table(
     """Medians after some evaluations on every problem; the least of a column is bold."""
     methods = in_order(medians)
     head = ["method", "runs"]
-    columns = [[_shown(m) for m in methods], [str(medians[m].runs) for m in methods]]
+    columns = [[shown(m) for m in methods], [str(medians[m].runs) for m in methods]]
     for problem in problems:
         for k, count in enumerate(checkpoints):
             head.append(str(count) if k else f"{_short(problem)}: {count}")
             of = [medians[m].by_problem.get(problem) for m in methods]
             columns.append(_bold_least([values[k] if values else math.inf for values in of]))
-    return _markdown(head, columns)
+    return markdown(head, columns)
 
 
 def few_runs_table(results: Results, methods: Sequence[str]) -> str:
     """What every run came to, of methods that have too few for a median."""
-    columns = [[_shown(method) for method in methods]]
+    columns = [[shown(method) for method in methods]]
     for of in results.values():
         runs = [of[m].final.tolist() if m in of else [] for m in methods]
         columns.append([", ".join(map(_value, sorted(values))) or "-" for values in runs])
-    return _markdown(["method", *map(_short, results)], columns)
+    return markdown(["method", *map(_short, results)], columns)
 
 
 def spread_table(results: Results) -> list[str]:
@@ -111,14 +111,14 @@ def spread_table(results: Results) -> list[str]:
         return []
     budget = kept[problems[0]][MEASURE].budget
     methods = in_order(medians_of({p: kept[p] for p in problems}, (budget,)))
-    head, columns = ["method"], [[_shown(m) for m in methods]]
+    head, columns = ["method"], [[shown(m) for m in methods]]
     for problem in problems:
         of = kept[problem]
         head += [f"{_short(problem)}: quartiles", "p"]
         columns.append([_quartiles(of[m]) if m in of else "-" for m in methods])
         tested = {m: _p(probability(of[m], of[MEASURE])) for m in of if m != MEASURE}
         columns.append([tested.get(m, "-") for m in methods])
-    return [_markdown(head, columns)]
+    return [markdown(head, columns)]
 
 
 def calls_table(by_method: Mapping[str, Runs]) -> str:
@@ -127,7 +127,7 @@ def calls_table(by_method: Mapping[str, Runs]) -> str:
     order = sorted(calls, key=lambda m: (calls[m][1], -by_method[m].solved.sum(), m))
     rows = [
         [
-            _shown(m),
+            shown(m),
             str(len(by_method[m])),
             str(int(by_method[m].solved.sum())),
             _count(calls[m][1]),
@@ -137,7 +137,7 @@ def calls_table(by_method: Mapping[str, Runs]) -> str:
         for m in order
     ]
     head = ["method", "runs", "solved", "median calls", "first to third quartile", "median at end"]
-    return _markdown(head, list(map(list, zip(*rows, strict=True))))
+    return markdown(head, list(map(list, zip(*rows, strict=True))))
 
 
 def correlation_table(
@@ -164,7 +164,18 @@ def correlation_table(
         shown = [f"{v.value:.2f} ({v.low:.2f} to {v.high:.2f})" for v in values]
         rows.append([name, str(found[0].methods), *shown])
     head = ["robot", "methods", *(f"after {count}" for count in _LOOKED_AT)]
-    return _markdown(head, list(map(list, zip(*rows, strict=True))))
+    return markdown(head, list(map(list, zip(*rows, strict=True))))
+
+
+def shown(method: str) -> str:
+    """A method's name: in code style one of jobs, in italics another library's."""
+    return f"`{method}`" if method in OPTIMIZERS else f"*{method}*"
+
+
+def markdown(head: Sequence[str], columns: Sequence[Sequence[str]]) -> str:
+    """A table of columns of texts, with a head each."""
+    rows = [head, ["---"] * len(head), *zip(*columns, strict=True)]
+    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
 
 
 def _call_quartiles(runs: Runs) -> list[float]:
@@ -176,11 +187,6 @@ def _call_quartiles(runs: Runs) -> list[float]:
 def _short(problem: str) -> str:
     """Of a preference its letter alone."""
     return problem.removeprefix("chapter-4.")
-
-
-def _shown(method: str) -> str:
-    """In code style a method of jobs, in italics another library's."""
-    return f"`{method}`" if method in OPTIMIZERS else f"*{method}*"
 
 
 def _bold_least(values: Sequence[float]) -> list[str]:
@@ -206,8 +212,3 @@ def _count(value: float) -> str:
 
 def _p(value: float) -> str:
     return f"{value:.2f}" if value >= _SMALL_P else f"{value:.1g}"
-
-
-def _markdown(head: Sequence[str], columns: Sequence[Sequence[str]]) -> str:
-    rows = [head, ["---"] * len(head), *zip(*columns, strict=True)]
-    return "\n".join(f"| {' | '.join(row)} |" for row in rows)

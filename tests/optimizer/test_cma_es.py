@@ -126,6 +126,18 @@ def test_a_restart_begins_elsewhere_as_wide_as_the_first() -> None:
     assert np.ptp(asked[restart]) > 0.05
 
 
+def test_a_distribution_that_gains_nothing_but_by_chance_is_given_up() -> None:
+    """The best of a generation may vary for ever, as on a surface of small steps."""
+
+    def rattling(designs: Floats) -> Floats:
+        height: Floats = 10.0 + 0.01 * np.sin(1e7 * designs.sum(axis=1))
+        return height
+
+    asked = designs_asked("cma-es", BOX, rattling, 1_000, particles=100)
+    sizes = [len(designs) for designs in asked]
+    assert sizes.index(2 * sizes[0]) <= 40
+
+
 def test_only_the_order_of_fitness_values_counts() -> None:
     plain = designs_asked("cma-es", MIXED, mixed_bowl, 200)
     stretched = designs_asked("cma-es", MIXED, lambda x: np.exp(9.0 * mixed_bowl(x)), 200)

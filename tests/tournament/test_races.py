@@ -6,8 +6,11 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+import pyarrow as pa
 import pytest
+from pyarrow import parquet
 
+from benchmarks.races import functions
 from benchmarks.races.plans import CHECKPOINTS, FUNCTION, Plan
 from benchmarks.races.records import HEADER, BadRecord, Record, append, read, read_all
 from benchmarks.races.running import run_missing, seeds_of
@@ -153,9 +156,44 @@ def test_medians_of_more_runs_count(tmp_path: Path) -> None:
     assert known["cma-es"] == recorded["cma-es"]
 
 
+def test_a_tournament_on_functions_is_kept_by_its_last_best_and_ranked_by_group(
+    tmp_path: Path,
+) -> None:
+    def row(problem: str, method: str, repetition: int, *best: float) -> dict[str, object]:
+        names = ("best_10", "best_100", "best_20")
+        solved = min(best) <= 1e-3
+        return {
+            "problem": problem,
+            "method": method,
+            "repetition": repetition,
+            "evaluations_to_target": 50.0 + repetition if solved else math.nan,
+            **dict(zip(names, best, strict=True)),
+        }
+
+    rows = [
+        *(row("D7C0R0I1", "de", k, 3.0, 1e-4, 2.0) for k in range(2)),
+        row("D7C0R0I1", "ps", 0, 3.0, 1e-4, 2.0),
+        row("D7C0R0I1", "ps", 1, 3.0, 0.5, 2.0),
+        *(row("D4C1R1I0", "de", k, 9.0, 7.0, 8.0) for k in range(2)),
+        *(row("D4C1R1I0", "ps", k, 9.0, 6.0, 8.0) for k in range(2)),
+        *(row("D4C1R0I0", name, 0, 9.0, 1e-4, 8.0) for name in ("de", "ps")),
+    ]
+    parquet.write_table(pa.Table.from_pylist(rows), tmp_path / "runs.parquet")
+    kept = tmp_path / "kept.csv"
+    functions.keep(tmp_path, kept)
+    assert kept.read_text().splitlines()[1] == "D7C0R0I1,de,0,50,0.0001"
+    assert functions.table(functions.read(kept)).splitlines()[2:] == [
+        "| `de` | 1.5 | 60 % | 1.0 | 100 % | 1.0 | 100 % | 1.5 | 100 % | 2.0 | 0 % |",
+        "| `ps` | 1.5 | 40 % | 2.0 | 50 % | 2.0 | 50 % | 1.5 | 100 % | 1.0 | 0 % |",
+    ]
+    kept.write_text("problem,method\nD7C0R0I1,de\n")
+    with pytest.raises(BadRecord, match="the header must be problem,method,repetition"):
+        functions.read(kept)
+
+
 def test_the_document_has_the_tables_of_the_recorded_runs() -> None:
     text = DOCUMENT.read_text(encoding="utf-8")
     tables = all_tables(read_all())
     assert tables
-    for table in tables:
+    for table in (*tables, functions.table(functions.read())):
         assert table in text, f"put this into {DOCUMENT.name}:\n{table}"

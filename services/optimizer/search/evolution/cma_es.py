@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import statistics
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -28,7 +29,7 @@ _RESTART: Final = 6
 _LARGEST_POPULATION: Final = 10_000
 
 _FLAT: Final = 1e-4
-"""Share of the fitness by which generations differ in their best that no longer improve."""
+"""Share of the fitness that generations gain, at most, if they gain nothing that counts."""
 
 
 class CmaEsSettings(SearchSettings):
@@ -76,8 +77,8 @@ class CmaEs(Generational[CmaEsSettings, _CmaEsState]):
     than, how they go together. Only the order of fitness values counts; failures are the last.
 
     The first distribution is about the box's middle, or about the best of the start positions,
-    which are judged before. One that has converged is given up for another at a random place, of a
-    larger population (IPOP, Auger and Hansen 2005), which keeps nothing.
+    which are judged before. One that has converged, or stagnates, is given up for another at a
+    random place, of a larger population (IPOP, Auger and Hansen 2005), which keeps nothing.
     """
 
     state_model = _CmaEsState
@@ -131,7 +132,9 @@ class CmaEs(Generational[CmaEsSettings, _CmaEsState]):
         self._distribution.learn(self._random(), np.argsort(fitness, kind="stable"))
         patience = 10 + math.ceil(30 * self.space.dimension / self.population)
         self._bests = [*self._bests, float(fitness.min())][-patience:]
-        if self._distribution.has_converged() or (len(self._bests) == patience and self._is_flat()):
+        if self._distribution.has_converged() or (
+            len(self._bests) == patience and self._stagnates()
+        ):
             self._restarts += 1
             random = RandomNumbers(self.seed, _RESTART, iteration=self._restarts)
             self._distribution = self._about(random.uniform(self.space.dimension))
@@ -171,8 +174,19 @@ class CmaEs(Generational[CmaEsSettings, _CmaEsState]):
         """Numbers of this generation, from the first on."""
         return RandomNumbers(self.seed, _SAMPLE, iteration=self.generations)
 
-    def _is_flat(self) -> bool:
-        """Whether the latest generations differ in nothing that counts."""
-        if not math.isfinite(max(self._bests)):
-            return not math.isfinite(min(self._bests))
-        return max(self._bests) - min(self._bests) <= _FLAT * abs(min(self._bests))
+    def _stagnates(self) -> bool:
+        """Whether the latest third of the generations looked at is no better than the first.
+
+        Neither in its best nor in its median, as in Hansen's tutorial (2016, B.3), which looks at
+        more generations. They need not be alike: steps of a surface make them differ for ever.
+        """
+        third = len(self._bests) // 3
+        before, after = self._bests[:third], self._bests[-third:]
+        return not any(_gains(of(before), of(after)) for of in (min, statistics.median_high))
+
+
+def _gains(before: float, after: float) -> bool:
+    """Whether one fitness is less than another by what counts."""
+    if not math.isfinite(after):
+        return False
+    return not math.isfinite(before) or before - after > _FLAT * abs(after)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from contextlib import closing
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 
 import httpx2
 import pytest
@@ -15,6 +17,7 @@ from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.store.sql_store import SqlStore
 from tests.api.conftest import Commit
 from tests.examples.processes import eventually
+from tests.examples.servers import ServerProcess
 
 
 def test_a_job_is_deleted_once(client: httpx2.Client, job: Job, commit: Commit) -> None:
@@ -98,3 +101,14 @@ def test_housekeeping_that_is_started_does_its_rounds(store: SqlStore, spec: Job
     keeper.stop()
     with pytest.raises(NotFound):
         store.job(job.id)
+
+
+@pytest.mark.slow
+def test_a_server_keeps_jobs_and_its_audit_log_as_long_as_it_is_set_to(
+    store: SqlStore, spec: JobSpec, database: Path
+) -> None:
+    job, _ = store.create_job(spec)
+    store.command(job.id, Command.CANCEL)
+    kept = {"GAITSWARM_RETENTION_DAYS": "1e-9", "GAITSWARM_AUDIT_DAYS": "1e-9"}
+    with closing(ServerProcess(database, "--no-runner", environment=kept)):
+        eventually(lambda: not store.jobs().items and not store.audit().items)

@@ -36,12 +36,10 @@ _log = StringIO()
 
 
 @dataclass(frozen=True, slots=True)
-class Sleep:
-    """A case that takes a minute and comes to nothing, in place of a walk."""
+class InPlaceOfWalk:
+    """A case that needs what a walk needs."""
 
     walk: Walk
-    name = "sleep"
-    duration = 1000.0
 
     @property
     def robots(self) -> tuple[RobotSource, ...]:
@@ -54,6 +52,14 @@ class Sleep:
     @property
     def objectives(self) -> tuple[Objective, ...]:
         return self.walk.objectives
+
+
+@dataclass(frozen=True, slots=True)
+class Sleep(InPlaceOfWalk):
+    """It takes a minute and comes to nothing."""
+
+    name = "sleep"
+    duration = 1000.0
 
     def run(self, designs: NDArray[np.float64]) -> Outcome:
         until = time.monotonic() + 60.0
@@ -63,25 +69,12 @@ class Sleep:
 
 
 @dataclass(frozen=True, slots=True)
-class Deadly:
-    """A case that ends its process, and leaves the id of its node in a file."""
+class Deadly(InPlaceOfWalk):
+    """It ends its process, and leaves the id of its node in a file."""
 
-    walk: Walk
     deaths: Path
     name = "deadly"
     duration = 1.0
-
-    @property
-    def robots(self) -> tuple[RobotSource, ...]:
-        return self.walk.robots
-
-    @property
-    def precision(self) -> Precision:
-        return self.walk.precision
-
-    @property
-    def objectives(self) -> tuple[Objective, ...]:
-        return self.walk.objectives
 
     def run(self, designs: NDArray[np.float64]) -> Outcome:
         import ray

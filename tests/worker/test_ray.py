@@ -120,12 +120,11 @@ class Importing:
 
 
 @pytest.mark.slow
-def test_a_worker_whose_task_is_cancelled_in_an_import_ends_that_first_and_walks_on(
+def test_a_task_that_is_cancelled_in_an_import_ends_the_import_first_and_its_slot_walks_on(
     ray_evaluator: RayEvaluator, tmp_path: Path
 ) -> None:
     sound = request(2)
     ray_evaluator.evaluate(sound, never)
-    before = {worker.pid for worker in walkers(os.getpid())}
     importing = Importing(sound.cases[0], tmp_path)
     # A second after it is let go it is cancelled.
     with pytest.raises(EvaluationStopped):
@@ -136,7 +135,6 @@ def test_a_worker_whose_task_is_cancelled_in_an_import_ends_that_first_and_walks
     assert within(30.0, lambda: importing.imported == ["begun", "ended"]), importing.imported
     assert within(30.0, lambda: ray_evaluator.loads["ray"].used == 0)
     assert bits(ray_evaluator.evaluate(sound, never)) == bits(walked_at_once(sound))
-    assert {worker.pid for worker in walkers(os.getpid())} >= before
 
 
 @pytest.mark.slow

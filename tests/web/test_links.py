@@ -130,6 +130,9 @@ def test_the_manual_is_linked_where_the_server_has_it(
     (tmp_path / "docs").mkdir()
     (tmp_path / "docs" / "index.html").write_text("<h1>The manual</h1>", encoding="utf-8")
     page.reload()
+    # The palette has its key as soon as the page is shown.
+    expect(page.get_by_role("link", name="API", exact=True)).to_be_visible()
+    page.wait_for_load_state("networkidle")
     page.keyboard.press("Control+k")
     page.get_by_role("combobox", name="Find pages").fill("manual")
     expect(page.get_by_role("option", name="Manual")).to_be_visible()

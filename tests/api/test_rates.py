@@ -82,17 +82,20 @@ def test_too_many_requests_with_a_token_are_told_when_to_come_back(
     assert client.get("/v1/jobs", headers=headers[1]).status_code == 200
 
 
+def guesses_of_tokens(client: httpx2.Client, path: str) -> list[int]:
+    """Statuses of four requests, each with another token that there is not."""
+    return [
+        client.get(path, headers={"Authorization": f"Bearer {n}"}).status_code for n in range(4)
+    ]
+
+
 def test_who_guesses_tokens_is_stopped_before_any_is_looked_up(
     serve: Serve, store: SqlStore
 ) -> None:
     client = serve(api_access="token", **SELDOM).client
     known = {"Authorization": f"Bearer {store.tokens.create('known', Scope.READ)[1]}"}
     assert client.get("/v1/jobs", headers=known).status_code == 200
-    guesses = [
-        client.get("/v1/jobs", headers={"Authorization": f"Bearer {n}"}).status_code
-        for n in range(4)
-    ]
-    assert guesses == [401, 401, 429, 429]
+    assert guesses_of_tokens(client, "/v1/jobs") == [401, 401, 429, 429]
     assert client.post("/v1/session", json={"token": "guess"}).status_code == 429
     # Whoever is known already does not suffer from others at the same address.
     assert client.get("/v1/jobs", headers=known).status_code == 200
@@ -102,11 +105,7 @@ def test_metrics_are_counted_as_other_requests_are(serve: Serve, store: SqlStore
     client = serve(api_access="token", **SELDOM).client
     known = {"Authorization": f"Bearer {store.tokens.create('known', Scope.READ)[1]}"}
     assert client.get("/metrics", headers=known).status_code == 200
-    guesses = [
-        client.get("/metrics", headers={"Authorization": f"Bearer {n}"}).status_code
-        for n in range(4)
-    ]
-    assert guesses == [401, 401, 429, 429]
+    assert guesses_of_tokens(client, "/metrics") == [401, 401, 429, 429]
     refused = client.get("/metrics")
     assert refused.status_code == 429 and refused.headers["Retry-After"]
     # Nor does a Prometheus suffer from others at its address.

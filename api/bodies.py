@@ -16,8 +16,8 @@ from fastapi.exceptions import RequestValidationError
 from pydantic import TypeAdapter, ValidationError, WrapValidator
 
 from sim.errors import RobotFileError
+from sim.input.wording import with_known_keys
 from sim.robot.check import MOST_ROBOTS, Location, check_files, files_of, objects_in
-from sim.wording import with_known_keys
 
 MOST_NAMES: Final = 10_000
 """Names of fields in a body, designs to start from aside: each may be an error to be told."""

@@ -96,7 +96,7 @@ def invalid_request(
         An error that names every bad field; its `field` is the first.
     """
     from gaitswarm.views import field_errors
-    from sim.wording import with_known_keys
+    from sim.input.wording import with_known_keys
 
     found = with_known_keys(error.errors(include_url=False), model)
     first, *others = field_errors(found, document)

@@ -14,7 +14,7 @@ from services.optimizer.errors import InvalidRequest, StoreUnavailable
 from services.optimizer.jobs.job import QUARANTINE_AFTER
 from services.worker import EvaluatorKind
 from sim.compiler.cache import DEFAULT_SIZE
-from sim.wording import message_of
+from sim.input.wording import message_of
 
 LogLevel = Annotated[Literal["DEBUG", "INFO", "WARNING", "ERROR"], BeforeValidator(str.upper)]
 

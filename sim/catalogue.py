@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from sim.controllers import CONTROLLERS
 from sim.errors import SimulationInputError
 from sim.gait_variables import GAIT_VARIABLES
-from sim.near_names import instead_of
+from sim.input.near_names import instead_of
 from sim.variables import VariableCatalogue
 
 

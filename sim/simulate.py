@@ -27,11 +27,11 @@ from sim.errors import SimulationInputError
 from sim.gait.leg_gaits import LegGait, leg_gaits
 from sim.gait.trajectory import desired_angles, require_reachable
 from sim.gait_variables import GAIT_CATALOGUE, with_gait
+from sim.input.near_names import instead_of
 from sim.kernel.batch import Walking, WantedWalk, walk_together
 from sim.kernel.gains import NO_JOINT_PD
 from sim.kernel.observation import WalkLog, walk_log
 from sim.kernel.walk import Kernel, Precision, WalkSetup
-from sim.near_names import instead_of
 from sim.noise import LinkNoise
 from sim.outcome import N_MEASUREMENTS, N_OBJECTIVES, Measurements, Outcome, Status
 from sim.robot import DEFAULT_ROBOT, Robot, RobotChoice, load_robot

@@ -13,7 +13,7 @@ from cli.inputs.spec_file import json_object, read_json_object
 from services.optimizer.errors import InvalidRequest, NotFound
 from sim.controllers import CONTROLLERS, Controller, ControllerName
 from sim.gait_variables import GAIT_VARIABLES
-from sim.near_names import instead_of
+from sim.input.near_names import instead_of
 from sim.variables import Variable, VariableCatalogue
 
 if TYPE_CHECKING:

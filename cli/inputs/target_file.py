@@ -173,8 +173,8 @@ def _checked(
     """columns: of the fields that are called otherwise in the table."""
     from pydantic import ValidationError
 
-    from sim.choice import without_tags
-    from sim.wording import message_of
+    from sim.input.choice import without_tags
+    from sim.input.wording import message_of
 
     try:
         return model.model_validate(document)

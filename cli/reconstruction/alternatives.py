@@ -16,7 +16,7 @@ from sim.calibration.catalogue import ROBOT
 from sim.calibration.targets import TargetWalk
 from sim.calibration.walk import RESULTS, CalibrationWalk
 from sim.controllers import CONTROLLERS, ControllerName
-from sim.near_names import instead_of
+from sim.input.near_names import instead_of
 from sim.outcome import Outcome
 from sim.robot import load_robot
 from sim.scenario import SCENARIOS, Scenario, find_scenario

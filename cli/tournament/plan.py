@@ -26,7 +26,7 @@ from services.optimizer.tournament.methods import (
 )
 from services.optimizer.tournament.race import default_checkpoints
 from services.optimizer.tournament.rivals import RIVALS
-from sim.near_names import instead_of
+from sim.input.near_names import instead_of
 
 PresetName = Literal["thesis", "robot"]
 

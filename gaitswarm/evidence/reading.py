@@ -28,9 +28,9 @@ from services.optimizer.jobs.fork import Lineage
 from services.optimizer.jobs.provenance import JobProvenance, ProvenanceRecord
 from sim.errors import RobotFileError
 from sim.identification.recorded_walk import RecordedWalk, Recordings
+from sim.input.wording import message_of
 from sim.outcome import Status
 from sim.robot.check import MOST_ROBOTS, check_files, files_of, objects_in
-from sim.wording import message_of
 
 if TYPE_CHECKING:
     import pyarrow as pa

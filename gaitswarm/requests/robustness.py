@@ -18,8 +18,8 @@ from services.optimizer.run.evaluator import EvaluationRequest
 from sim.case import Walk
 from sim.catalogue import design_catalogue
 from sim.controllers import CONTROLLERS, ControllerName
+from sim.input.near_names import instead_of
 from sim.kernel.walk import Precision
-from sim.near_names import instead_of
 from sim.outcome import Outcome, Status
 from sim.provenance import provenance_of
 from sim.variables import Variable, VariableChoice

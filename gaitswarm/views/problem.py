@@ -9,9 +9,9 @@ from typing import Any, Final
 from pydantic import Field
 
 from gaitswarm.views.base import View
-from sim.choice import without_tags
-from sim.former_names import as_written
-from sim.wording import message_of
+from sim.input.choice import without_tags
+from sim.input.former_names import as_written
+from sim.input.wording import message_of
 
 _LEADING_FIELD: Final = re.compile(r"^([a-z_]+(?:\.\w+)*): (.*)$", re.DOTALL)
 

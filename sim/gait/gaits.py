@@ -14,7 +14,7 @@ from types import MappingProxyType
 from typing import Final
 
 from sim.errors import SimulationInputError
-from sim.near_names import instead_of
+from sim.input.near_names import instead_of
 from sim.robot import Robot
 from sim.robot.leg_groups import rows_of
 from sim.robot.legs import LegKinematics

@@ -21,11 +21,11 @@ from sim.controllers import CONTROLLERS, ControllerName, names_of
 from sim.controllers.fixed_point import CONTROL_PERIOD
 from sim.errors import MeasuredLogError, SimulationInputError
 from sim.gait_variables import GAIT_CATALOGUE
+from sim.input.wording import message_of
 from sim.robot import RobotSource, load_robot
 from sim.scenario import Scenario
 from sim.simulate import check_reach
 from sim.variables import VariableName
-from sim.wording import message_of
 
 if TYPE_CHECKING:
     from sim.measurement.synchronise import Synchronised

@@ -10,8 +10,8 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 
-from sim import former_names
-from sim.former_names import current_names
+from sim.input import former_names
+from sim.input.former_names import current_names
 from sim.robot.bounds import Number, PartName
 
 ActuatorKind = Literal["dc", "torque"]

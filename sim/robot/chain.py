@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.errors import RobotFileError
-from sim.near_names import nearest
+from sim.input.near_names import nearest
 from sim.robot.description import Leg
 from sim.robot.elements import MOST_TURNED
 from sim.robot.inertia import BodyInertia, product

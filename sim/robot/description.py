@@ -11,8 +11,8 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import ConfigDict, Field, model_validator
 
-from sim import former_names
-from sim.former_names import current_names
+from sim.input import former_names
+from sim.input.former_names import current_names
 from sim.robot.actuators import (
     CONTROL_RATE,
     LARGEST_OUTPUT,

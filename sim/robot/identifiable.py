@@ -14,6 +14,7 @@ from typing import Final, TypeVar, get_args
 from pydantic import BaseModel, ValidationError
 
 from sim.errors import SimulationInputError
+from sim.input.wording import message_of
 from sim.robot.actuators import Actuator, TorqueActuator
 from sim.robot.description import (
     ContactLaw,
@@ -24,7 +25,6 @@ from sim.robot.description import (
 )
 from sim.robot.robot import Robot
 from sim.variables import Variable
-from sim.wording import message_of
 
 _WHOLE: Final = (
     Variable(

@@ -10,7 +10,8 @@ from typing import Any, Final
 from pydantic import BaseModel, ValidationError
 
 from sim.errors import RobotFileError
-from sim.former_names import as_written
+from sim.input.former_names import as_written
+from sim.input.wording import message_of, with_known_keys
 from sim.robot.actuators import Actuator, Gearhead, Motor, TorqueActuator, TorqueCommand
 from sim.robot.bounds import shortened
 from sim.robot.description import (
@@ -21,7 +22,6 @@ from sim.robot.description import (
     Sensors,
     Supply,
 )
-from sim.wording import message_of, with_known_keys
 
 _TABLE: Final = re.compile(r"(\[\[?)([^\[\]]++)\]\]?(?:\s*+#.*)?")
 _KEY: Final = re.compile(r"([^=#\[\]\s][^=]*+)=")

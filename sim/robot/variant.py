@@ -9,9 +9,9 @@ from typing import Annotated, Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field, Tag, model_validator
 
-from sim import former_names
-from sim.choice import NAME, alternatives
-from sim.former_names import current_names
+from sim.input import former_names
+from sim.input.choice import NAME, alternatives
+from sim.input.former_names import current_names
 from sim.robot.actuators import AnyActuator
 from sim.robot.bounds import (
     DEEPEST,

@@ -16,6 +16,7 @@ from sim.controllers.base import ControlLaw
 from sim.controllers.fuzzy_pi import FuzzyPi
 from sim.controllers.quantisation import Axis
 from sim.errors import SimulationInputError
+from sim.input.wording import message_of
 from sim.kernel.readable.reference import reference_kernel
 from sim.noise import LinkNoise
 from sim.outcome import Status
@@ -23,7 +24,6 @@ from sim.robot import DEFAULT_ROBOT, RobotChoice, load_robot
 from sim.robot.robot import with_shafts
 from sim.scenario import SCENARIOS, Scenario
 from sim.simulate import simulate
-from sim.wording import message_of
 
 RESOLUTIONS: Final = ((6, 6), (8, 8), (10, 6))
 """Bits of error and current in the tables that are compared."""

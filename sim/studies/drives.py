@@ -13,7 +13,7 @@ from sim.controllers import CONTROLLERS, ControllerName
 from sim.errors import SimulationInputError
 from sim.gait.driving_2011 import driven_as_in_2011
 from sim.gait_variables import GAIT_CATALOGUE, with_gait
-from sim.near_names import instead_of
+from sim.input.near_names import instead_of
 from sim.outcome import Status
 from sim.robot import DEFAULT_ROBOT, RobotChoice
 from sim.scenario import Scenario

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.errors import SimulationInputError
+from sim.input.near_names import instead_of
 from sim.kernel.sensors import LARGEST_DELAY
-from sim.near_names import instead_of
 from sim.variables import Variable
 
 Floats = NDArray[np.float64]

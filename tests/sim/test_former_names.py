@@ -8,7 +8,7 @@ import pytest
 from pydantic import TypeAdapter, ValidationError
 
 from sim.errors import RobotFileError
-from sim.former_names import as_written
+from sim.input.former_names import as_written
 from sim.robot import RobotFiles, RobotSource, RobotVariant, load_robot, parse_robot
 from sim.scenario import Scenario
 from tests.examples.walks import quadruped_files

@@ -17,7 +17,7 @@ from cli.inputs.options import (
     WorkerOptions,
     with_groups,
 )
-from sim.near_names import instead_of
+from sim.input.near_names import instead_of
 
 if TYPE_CHECKING:
     from gaitswarm.jobs.port import Jobs

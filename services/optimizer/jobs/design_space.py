@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from services.optimizer.errors import InvalidRequest
 from services.optimizer.search.space import Axis, Space
 from sim.errors import SimulationInputError
-from sim.near_names import instead_of
+from sim.input.near_names import instead_of
 from sim.variables import Variable, VariableCatalogue
 
 

@@ -13,7 +13,7 @@ from services.optimizer.jobs.kinds.certificate import CertificateSpec
 from services.optimizer.jobs.kinds.identification import IdentificationSpec
 from services.optimizer.jobs.kinds.tournament import TournamentSpec
 from services.optimizer.jobs.kinds.tuning import JobSpec
-from sim.wording import message_of
+from sim.input.wording import message_of
 
 _TUNING: Final = "<tuning>"
 _IDENTIFICATION: Final = "<identification>"

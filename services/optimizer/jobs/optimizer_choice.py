@@ -18,7 +18,7 @@ from services.optimizer.search.automatic import (
 from services.optimizer.search.method import settings_of
 from services.optimizer.search.optimizer import SearchSettings
 from services.optimizer.search.registry import DEFAULT_METHOD, METHODS
-from sim.near_names import instead_of, nearest
+from sim.input.near_names import instead_of, nearest
 from sim.plugins import PluginSettings
 
 _BUILT_IN: Final[dict[str, type[SearchSettings]]] = {

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from services.optimizer.search.space import Space
-from sim.wording import message_of
+from sim.input.wording import message_of
 
 
 class SearchSettings(BaseModel):

@@ -15,9 +15,9 @@ from services.optimizer.search.registry import METHODS, create_search
 from services.optimizer.search.space import Space
 from services.optimizer.tournament.race import Evaluate, Search
 from services.optimizer.tournament.rivals import RIVALS
-from sim.near_names import instead_of
+from sim.input.near_names import instead_of
+from sim.input.wording import message_of
 from sim.variables import Variable
-from sim.wording import message_of
 
 _UNBOUNDED: Final = 1e9
 """In place of a bound that a setting does not have."""

@@ -13,9 +13,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from services.optimizer.jobs.judgement import Judgement
 from services.optimizer.jobs.preference import Preference, geometric_mean, log_utilities
-from sim.near_names import instead_of
+from sim.input.near_names import instead_of
+from sim.input.wording import message_of
 from sim.variables import Variable, VariableChoice
-from sim.wording import message_of
 from sim.worlds import PERTURBATIONS, sample_worlds
 
 Floats = NDArray[np.float64]

@@ -20,7 +20,7 @@ from services.optimizer.jobs.reference import Reference
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.store.rows.evaluation_rows import Row
 from services.optimizer.store.rows.tables import UnparsedText
-from sim.wording import message_of
+from sim.input.wording import message_of
 
 _KEPT: Final = (
     "what is stored stays as it is: run the gaitswarm that wrote it, or a newer one, and resume the"

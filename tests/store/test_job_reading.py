@@ -155,6 +155,38 @@ def test_while_nothing_is_committed_the_jobs_that_are_sorted_are_read_once(
     other.close()
 
 
+def test_the_further_pages_of_a_sorted_list_read_no_more_than_their_own_jobs(
+    store: SqlStore,
+) -> None:
+    made = [store.create_job(spec(name=name))[0].id for name in "abcde"]
+    page = store.jobs(order=JobOrder.NAME, limit=2)
+    found = [job.id for job in page.items]
+    with statements() as sent:
+        while page.next is not None:
+            page = store.jobs(order=JobOrder.NAME, after=page.next, limit=2)
+            found += [job.id for job in page.items]
+    assert found == made
+    of_pages = [s for s, _ in sent if s.startswith("SELECT") and "pg_" not in s]
+    assert len(of_pages) == 2 and all(" IN " in statement for statement in of_pages), sent
+
+
+def test_the_name_in_a_spec_is_read_once_however_often_its_job_changes(store: SqlStore) -> None:
+    first = store.create_job(spec(name="b"))[0]
+
+    def read_and_found() -> tuple[int, list[str]]:
+        with statements() as sent:
+            found = [job.id for job in store.jobs(order=JobOrder.NAME).items]
+        # Names alone: who reads all of a job reads its labels as well.
+        return len([s for s, _ in sent if " IN " in s and "labels" not in s]), found
+
+    assert read_and_found() == (1, [first.id])
+    with_fitness(store, first, 2.0)
+    store.command(first.id, Command.CANCEL)
+    assert read_and_found() == (0, [first.id])
+    second = store.create_job(spec(name="a"))[0]
+    assert read_and_found() == (1, [second.id, first.id])
+
+
 def test_of_a_server_only_jobs_that_have_changed_are_read_anew(
     store: SqlStore, database_url: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

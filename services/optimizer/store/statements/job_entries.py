@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from datetime import datetime
-from functools import cached_property
-from typing import Any, Final
+from functools import cached_property, lru_cache
+from typing import Any, Final, TypeVar
 from weakref import WeakKeyDictionary
 
-from sqlalchemy import Connection, Dialect, Engine, and_, func, select, text
+from sqlalchemy import Connection, Dialect, Engine, Select, and_, bindparam, func, select, text
 
 from services.optimizer.store.rows.job_rows import reference_of
 from services.optimizer.store.rows.job_views import LARGEST, RowMemory, as_stored, from_stored
 from services.optimizer.store.rows.tables import jobs
 from services.optimizer.store.statements.job_list import Among
 from services.optimizer.store.statements.labels import spec_field
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -88,13 +90,18 @@ _COLUMNS: Final = tuple(
 
 _ENTRIES: Final = select(*map(as_stored, _COLUMNS))
 
+_ENTRY_OF: Final = _ENTRIES.where(jobs.c.id == bindparam("job"))
+
 _UNENDED: Final = "age(CAST(CAST(CAST(:unended AS text) AS xid8) AS xid))"
 
 _SINCE: Final = text(f"(age(jobs.xmin) <= {_UNENDED} OR {_UNENDED} < 0)")
 """Whether a row is of no transaction before this one; of a server that was set back, any row."""
 
 _known: Final = WeakKeyDictionary[Engine, RowMemory["JobEntry"]]()
-"""By their rows, without the names in their specs, which never change in a database."""
+"""By their rows, without the names in their specs."""
+
+_names: Final = WeakKeyDictionary[Engine, RowMemory[str]]()
+"""Of jobs in their specs, which never change in a database; by the id alone."""
 
 _AT_ONCE: Final = 500
 """Jobs whose names are read by one statement."""
@@ -105,13 +112,41 @@ _QUESTIONS: Final = 8
 _PATIENCE: Final = 1.0
 """Seconds that are waited for entries that another thread reads."""
 
+_KEPT: Final = 64
+"""Statements: to put one together takes as long as to find some changed jobs."""
+
+
+@dataclass(frozen=True)
+class JobEntries:
+    """Of all jobs that were asked for.
+
+    Attributes:
+        by_id: The entries, in no order.
+    """
+
+    by_id: Mapping[str, JobEntry]
+    _made: dict[Hashable, Any] = field(default_factory=dict, compare=False, repr=False)
+
+    def once(self, key: Hashable, make: Callable[[], T]) -> T:
+        """What follows from these entries alone, made once for all who ask. Thread-safe.
+
+        Args:
+            key: Tells what it is.
+            make: Makes it; two that ask at the same time may both do so.
+
+        Returns:
+            What was made first.
+        """
+        found: T | None = self._made.get(key)
+        return self._made.setdefault(key, make()) if found is None else found
+
 
 @dataclass(frozen=True)
 class _Answer:
-    """Entries by id; of this version of the database, or of a later one."""
+    """Entries of this version of the database, or of a later one."""
 
     version: Hashable
-    entries: Mapping[str, JobEntry]
+    entries: JobEntries
 
 
 class _Memory:
@@ -127,7 +162,7 @@ _memories: Final = WeakKeyDictionary[Engine, _Memory]()
 
 def job_entries(
     connection: Connection, among: Among, kind: str | None, version: Hashable | None
-) -> Sequence[JobEntry]:
+) -> JobEntries:
     """Read what jobs are found and sorted by.
 
     It is remembered while nothing is committed: to the file on SQLite, to the server on PostgreSQL.
@@ -141,7 +176,7 @@ def job_entries(
             a PostgreSQL server is asked.
 
     Returns:
-        The entries, in no order.
+        The entries: the same object as before, if nothing was committed since.
     """
     where = among
     if kind is not None:
@@ -162,7 +197,7 @@ def job_entries(
             if key not in memory.answers and len(memory.answers) >= _QUESTIONS:
                 memory.answers.clear()
             memory.answers[key] = known
-        return tuple(known.entries.values())
+        return known.entries
     finally:
         memory.lock.release()
 
@@ -179,10 +214,8 @@ def _seen(connection: Connection) -> Hashable | None:
     return str(connection.exec_driver_sql("SELECT pg_current_snapshot()::text").scalar_one())
 
 
-def _read_anew(
-    connection: Connection, where: Among, known: _Answer | None
-) -> Mapping[str, JobEntry]:
-    """Entries by id; of a server that has told of the others, only those of changed jobs are read.
+def _read_anew(connection: Connection, where: Among, known: _Answer | None) -> JobEntries:
+    """Entries; of a server that has told of the others, only those of changed jobs are read.
 
     A row that was not seen then is of a transaction that had not ended, or of a later one. If there
     are as many jobs now as are known with these, none of the others is gone.
@@ -196,10 +229,12 @@ def _read_anew(
         query = query.select_from(count.outerjoin(jobs, changed))
         rows = connection.execute(query).all()
         read = entries_of(connection, [tuple(row[1:]) for row in rows if row[1] is not None])
-        entries = {**known.entries, **{entry.id: entry for entry in read}}
+        if not read and len(known.entries.by_id) == rows[0][0]:
+            return known.entries
+        entries = {**known.entries.by_id, **{entry.id: entry for entry in read}}
         if len(entries) == rows[0][0]:
-            return entries
-    return {entry.id: entry for entry in _read_all(connection, where)}
+            return JobEntries(entries)
+    return _read_all(connection, where)
 
 
 def job_entry(connection: Connection, job_id: str) -> JobEntry | None:
@@ -212,13 +247,21 @@ def job_entry(connection: Connection, job_id: str) -> JobEntry | None:
     Returns:
         The entry; None if there is no such job.
     """
-    found = _read_all(connection, (jobs.c.id == job_id,))
+    rows = connection.execute(_ENTRY_OF, {"job": job_id}).all()
+    found = entries_of(connection, list(map(tuple, rows)))
     return found[0] if found else None
 
 
-def _read_all(connection: Connection, where: Among) -> list[JobEntry]:
+def _read_all(connection: Connection, where: Among) -> JobEntries:
     """Entries of all jobs for which these conditions hold."""
-    return entries_of(connection, list(map(tuple, connection.execute(_ENTRIES.where(*where)))))
+    # All at once: the next row of many is asked for in a way that takes as long as to find it.
+    rows = connection.execute(_entries_among(where)).all()
+    return JobEntries({entry.id: entry for entry in entries_of(connection, list(map(tuple, rows)))})
+
+
+@lru_cache(maxsize=_KEPT)
+def _entries_among(where: Among) -> Select[Any]:
+    return _ENTRIES.where(*where)
 
 
 def entries_of(connection: Connection, rows: Sequence[tuple[Any, ...]]) -> list[JobEntry]:
@@ -252,12 +295,22 @@ def _read(row: tuple[Any, ...], name: str, dialect: Dialect) -> JobEntry:
 
 
 def _spec_names(connection: Connection, ids: Sequence[str]) -> dict[str, str]:
-    """Names of jobs in their specs, by id."""
-    names = select(jobs.c.id, spec_field(connection, "name"))
+    """Names of jobs in their specs, by id; those that are known are not read anew."""
+    memory = _names.setdefault(connection.engine, RowMemory(LARGEST))
     found: dict[str, str] = {}
-    for begin in range(0, len(ids), _AT_ONCE):
-        some = names.where(jobs.c.id.in_(ids[begin : begin + _AT_ONCE]))
-        found.update((row[0], row[1]) for row in connection.execute(some))
+    unknown: list[str] = []
+    for job_id, name in zip(ids, memory.find_all([(job_id,) for job_id in ids]), strict=True):
+        if name is None:
+            unknown.append(job_id)
+        else:
+            found[job_id] = name
+    if not unknown:
+        return found
+    names = select(jobs.c.id, spec_field(connection, "name"))
+    for begin in range(0, len(unknown), _AT_ONCE):
+        some = names.where(jobs.c.id.in_(unknown[begin : begin + _AT_ONCE]))
+        for job_id, name in connection.execute(some):
+            found[job_id] = memory.add((job_id,), name)
     return found
 
 

@@ -6,9 +6,10 @@ than ASCII. Of every job only what is compared is read, and remembered.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import cached_property
 from typing import Any, Final
 
 from sqlalchemy import Connection, select
@@ -27,7 +28,12 @@ from services.optimizer.store.statements.job_cursors import (
     from_place_cursor,
     no_cursor,
 )
-from services.optimizer.store.statements.job_entries import JobEntry, job_entries, job_entry
+from services.optimizer.store.statements.job_entries import (
+    JobEntries,
+    JobEntry,
+    job_entries,
+    job_entry,
+)
 from services.optimizer.store.statements.job_list import Among
 from services.optimizer.store.statements.labels import facet_columns, to_facets
 
@@ -65,7 +71,11 @@ def sort_jobs(
     Raises:
         InvalidRequest: The cursor is none of this order; names the field `after`.
     """
-    found = job_entries(connection, among, kind, version)
+    entries = job_entries(connection, among, kind, version)
+    listed = _in_order(connection, entries, order, reverse=reverse)
+    found: Sequence[JobEntry] = listed.entries
+    if after is not None:
+        found = listed.after(_entry_before(connection, entries, after, order, reverse=reverse))
     if where.needs_specs:
         columns = connection.execute(select(jobs.c.id, *facet_columns(connection)).where(*among))
         admitted = {row[0] for row in columns if where.admits(to_facets(row[1:]))}
@@ -73,12 +83,7 @@ def sort_jobs(
     wanted = search.casefold()
     if wanted:
         found = [entry for entry in found if wanted in entry.words]
-    place = _Places(order, reverse, _ends(connection) if order is JobOrder.TIME_LEFT else {})
-    if after is None:
-        return [entry.id for entry in place.sorted(found)]
-    last = _entry_before(connection, after, order, reverse=reverse)
-    # The job itself may have another place by now, or fit no longer.
-    return [entry.id for entry in place.after(last, [e for e in found if e.id != last.id])]
+    return [entry.id for entry in found]
 
 
 def _ends(connection: Connection) -> Mapping[str, float | None]:
@@ -89,39 +94,70 @@ def _ends(connection: Connection) -> Mapping[str, float | None]:
     return {job.id: time_left(job, now).eta_seconds for job in found}
 
 
-@dataclass(frozen=True, slots=True)
-class _Places:
-    """order, reverse: of the list; ends: time to the end by id of the jobs that run [s]."""
+@dataclass(frozen=True)
+class _InOrder:
+    """Entries in an order, of which whoever asks has a part.
 
-    order: JobOrder
-    reverse: bool
-    ends: Mapping[str, float | None]
+    Attributes:
+        entries: Those without what they are sorted by last; equals are told apart by their ids.
+    """
 
-    def sorted(self, entries: Sequence[JobEntry]) -> list[JobEntry]:
-        """Those without what they are sorted by last; equals are told apart by their ids."""
+    entries: Sequence[JobEntry]
+    _key: Callable[[JobEntry], Any]
+    _descends: bool
+
+    @classmethod
+    def sort(
+        cls, entries: Iterable[JobEntry], key: Callable[[JobEntry], Any], *, descends: bool
+    ) -> _InOrder:
+        """Sort entries.
+
+        Args:
+            entries: In any order.
+            key: Less comes first, unless the order descends; None if it is not known.
+            descends: Whether the greatest comes first.
+        """
         known: list[tuple[Any, str, JobEntry]] = []
         unknown: list[tuple[Any, str, JobEntry]] = []
         for entry in entries:
-            key = self._key(entry)
-            (unknown if key is None else known).append((key, entry.id, entry))
-        known.sort(key=lambda place: place[:2], reverse=self._descends)
+            value = key(entry)
+            (unknown if value is None else known).append((value, entry.id, entry))
+        known.sort(key=lambda place: place[:2], reverse=descends)
         unknown.sort(key=lambda place: place[1])
-        return [entry for _, _, entry in (*known, *unknown)]
+        return cls([entry for _, _, entry in (*known, *unknown)], key, descends)
 
-    def after(self, last: JobEntry, entries: list[JobEntry]) -> list[JobEntry]:
-        """Those that come after one that is not among them, in order."""
-        in_order = self.sorted([*entries, last])
-        return in_order[in_order.index(last) + 1 :]
+    def after(self, last: JobEntry) -> Sequence[JobEntry]:
+        """Those that come after one.
 
-    @property
-    def _descends(self) -> bool:
-        return self.reverse is not (self.order is JobOrder.CREATED)
+        Args:
+            last: One of them; or what it was, or one that is none of them.
+        """
+        place = self._places.get(last.id)
+        if place is not None and self._key(self.entries[place]) == self._key(last):
+            return self.entries[place + 1 :]
+        # The job may have another place by now: what it was is put among the others.
+        others = [entry for entry in self.entries if entry.id != last.id]
+        return _InOrder.sort([*others, last], self._key, descends=self._descends).after(last)
 
-    def _key(self, entry: JobEntry) -> Any:
-        """Less comes first, but for the newest; None if it is not known."""
-        if self.order is JobOrder.TIME_LEFT:
-            return self.ends.get(entry.id)
-        return _KEYS[self.order](entry)
+    @cached_property
+    def _places(self) -> Mapping[str, int]:
+        return {entry.id: place for place, entry in enumerate(self.entries)}
+
+
+def _in_order(
+    connection: Connection, entries: JobEntries, order: JobOrder, *, reverse: bool
+) -> _InOrder:
+    descends = reverse is not (order is JobOrder.CREATED)
+    if order is JobOrder.TIME_LEFT:
+        ends = _ends(connection)
+        return _InOrder.sort(
+            entries.by_id.values(), lambda entry: ends.get(entry.id), descends=descends
+        )
+
+    def make() -> _InOrder:
+        return _InOrder.sort(entries.by_id.values(), _KEYS[order], descends=descends)
+
+    return entries.once((order, reverse), make)
 
 
 def _negative(value: float | None) -> float | None:
@@ -142,7 +178,7 @@ _KEYS: Final[Mapping[JobOrder, Callable[[JobEntry], Any]]] = {
 
 
 def _entry_before(
-    connection: Connection, cursor: str, order: JobOrder, *, reverse: bool
+    connection: Connection, entries: JobEntries, cursor: str, order: JobOrder, *, reverse: bool
 ) -> JobEntry:
     """The job that a page ended with, as it was then or as it is; only its place counts."""
     if not reverse and order is JobOrder.CREATED:
@@ -152,7 +188,7 @@ def _entry_before(
         fitness, job_id = from_fitness_cursor(cursor)
         return JobEntry(job_id, datetime.max.replace(tzinfo=UTC), best_fitness=fitness)
     job_id = from_place_cursor(order, cursor, reverse=reverse)
-    found = job_entry(connection, job_id)
+    found = entries.by_id.get(job_id) or job_entry(connection, job_id)
     if found is None:
         raise no_cursor()
     return found

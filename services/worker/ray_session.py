@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import platform
 import secrets
@@ -20,6 +21,8 @@ from typing import Any, Final
 from services.optimizer.errors import EvaluatorUnavailable
 from services.worker.in_process import available_cpus
 from services.worker.joining import JoinedNode, comes_here
+
+_log = logging.getLogger(__name__)
 
 _OBJECT_STORE_BYTES: Final = 80 * 1024 * 1024
 """Ray's minimum is 75 MiB; designs and results take kilobytes."""
@@ -160,9 +163,18 @@ def open_ray(address: str | None = None, *, cpus: int | None = None) -> RaySessi
                 " in-process evaluator instead"
             ) from error
 
+        # Its own goes in colours to standard output, which is for a command's answers.
+        printer: Any = ray._private.worker  # noqa: SLF001 - there is no other way
+        printer.print_to_stdstream = _pass_on
         if ray.is_initialized():
             raise EvaluatorUnavailable("this process has a connection to Ray already")
         return _connect(ray, address) if address else _embed(ray, cpus or available_cpus())
+
+
+def _pass_on(told: Mapping[str, Any], **_: object) -> None:
+    """Log what a raylet tells, of workers that died, say."""
+    for line in told["lines"]:
+        _log.info("%s: %s", told["pid"], line)
 
 
 def _connect(ray: ModuleType, address: str) -> RaySession:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import logging
 import os
 import pickle
 import shutil
@@ -85,6 +86,22 @@ def test_walks_that_kill_their_workers_are_tried_on_three_and_then_given_up(
     assert len(died) == len(set(died)) == 3
     assert not ray_evaluator.lost
     assert bits(ray_evaluator.evaluate(sound, never)) == bits(walked_at_once(sound))
+
+
+@pytest.mark.slow
+def test_what_ray_tells_of_its_workers_is_logged_and_not_written_among_a_commands_answers(
+    ray_evaluator: RayEvaluator,
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    caplog.set_level(logging.INFO, logger="services.worker.ray_session")
+    sound = request(2)
+    deadly = Deadly(sound.cases[0], tmp_path / "deaths")
+    with pytest.raises(KilledWorker):
+        ray_evaluator.evaluate(replace(sound, cases=(deadly,)), never)
+    assert within(20.0, lambda: "raylet: A worker died" in caplog.text)
+    assert capfd.readouterr().out == ""
 
 
 class Importing:

@@ -64,9 +64,9 @@ export interface LineChartProps {
   /** Called with the x under the pointer when it is clicked. */
   readonly onPick?: (x: number) => void
   /** Stretch of x that is shown at first; null for all. */
-  readonly zoom?: readonly [number, number] | null
+  readonly zoom?: Zoom
   /** Told when another stretch is shown by hand; null for all. */
-  readonly onZoom?: (range: readonly [number, number] | null) => void
+  readonly onZoom?: (range: Zoom) => void
   /** Charts of the same key move their pointers together. */
   readonly sync?: string
 }
@@ -82,6 +82,7 @@ export function LineChart(props: LineChartProps) {
   const plot = useRef<uPlot | null>(null)
   const latest = useRef(props)
   latest.current = props
+  const zoom = useZoom(props)
   const theme = useTheme()
   const height = remPixels((props.height ?? 260) / 14)
 
@@ -89,13 +90,13 @@ export function LineChart(props: LineChartProps) {
     const parent = box.current!
     const width = Math.max(120, parent.clientWidth)
     const drawn = new uPlot(
-      { ...options(latest, readout.current!), width, height },
+      { ...options(latest, zoom, readout.current!), width, height },
       dataOf(latest.current),
       parent,
     )
     plot.current = drawn
-    const { zoom } = latest.current
-    if (zoom) drawn.setScale('x', { min: zoom[0], max: zoom[1] })
+    const wanted = zoom.current
+    if (wanted) drawn.setScale('x', { min: wanted[0], max: wanted[1] })
     // What it shows first was chosen by nobody.
     const settled = setTimeout(() => {
       drawn.root.dataset.settled = 'true'
@@ -117,7 +118,7 @@ export function LineChart(props: LineChartProps) {
   }, [theme, height, shapeOf(props)])
 
   useEffect(() => {
-    if (plot.current) renew(plot.current, dataOf(latest.current), latest.current.zoom ?? null)
+    if (plot.current) renew(plot.current, dataOf(latest.current), zoom.current)
   }, [props.x, props.series, props.yRange?.join()])
   useEffect(() => plot.current?.redraw(false), [props.marker, props.paint, props.paintOver])
 
@@ -127,6 +128,19 @@ export function LineChart(props: LineChartProps) {
       <p class="readout" ref={readout} aria-hidden="true" />
     </div>
   )
+}
+
+type Zoom = readonly [number, number] | null
+
+/**
+ * The stretch of x that is wanted: the one that was last asked for, by hand or by whoever shows the
+ * chart. Data may come before a change by hand has come back as a property, and must not undo it.
+ */
+function useZoom({ zoom = null }: LineChartProps): { current: Zoom } {
+  const wanted = useRef<Zoom>(zoom)
+  const given = useRef<Zoom>(zoom)
+  if (zoom?.join() !== given.current?.join()) wanted.current = given.current = zoom
+  return wanted
 }
 
 /** What a new plot is needed for; other changes are only new data. */
@@ -148,7 +162,7 @@ function shapeOf({
 }
 
 /** New data under the same zoom, also one that the first data are to have; all where there is none. */
-function renew(plot: uPlot, data: uPlot.AlignedData, wanted: LineChartProps['zoom']) {
+function renew(plot: uPlot, data: uPlot.AlignedData, wanted: Zoom) {
   const zoom = wanted ?? zoomOf(plot)
   if (!zoom) {
     plot.setData(data)
@@ -161,7 +175,7 @@ function renew(plot: uPlot, data: uPlot.AlignedData, wanted: LineChartProps['zoo
 }
 
 /** The stretch of x that is shown; null where it is all, and before anything is. */
-function zoomOf({ scales, data: [x] }: uPlot): readonly [number, number] | null {
+function zoomOf({ scales, data: [x] }: uPlot): Zoom {
   const { min, max } = scales.x
   if (x.length === 0 || typeof min !== 'number' || typeof max !== 'number') return null
   return min > x[0] || max < x[x.length - 1] ? [min, max] : null
@@ -175,7 +189,11 @@ function dataOf({ x, series, logarithmic }: LineChartProps): uPlot.AlignedData {
 }
 
 /** props: kept by reference, as callbacks outlive a rendering. */
-function options(props: { current: LineChartProps }, readout: HTMLElement) {
+function options(
+  props: { current: LineChartProps },
+  wanted: { current: Zoom },
+  readout: HTMLElement,
+) {
   const { series, bands = [], logarithmic, sync, counted, xMargin = 0 } = props.current
   const { xLabel, xUnit = '1', xLogarithmic, yLabel, yUnit = '1' } = props.current
   const axis: uPlot.Axis = {
@@ -258,11 +276,12 @@ function options(props: { current: LineChartProps }, readout: HTMLElement) {
           if (key !== 'x') return
           u.root.dataset.range = `${min} ${max}`
           const range = zoomOf(u)
-          const before = props.current.zoom ?? null
+          const before = wanted.current
           // Data that are still to come may reach beyond those that are there.
           if (before?.[0] === min && before?.[1] === max) return
-          if (u.root.dataset.settled && range?.join() !== before?.join())
-            props.current.onZoom?.(range)
+          if (!u.root.dataset.settled || range?.join() === before?.join()) return
+          wanted.current = range
+          props.current.onZoom?.(range)
         },
       ],
       ready: [

@@ -76,6 +76,31 @@ def test_sqlite_reads_a_page_of_the_list_from_an_index_and_sorts_nothing(
     database.close()
 
 
+@pytest.mark.parametrize(
+    "question",
+    [
+        {"order": JobOrder.NAME},
+        {"order": JobOrder.GAIN, "reverse": True},
+        {"search": "a", "where": JobFilter(archived=False)},
+    ],
+    ids=["by name", "by gain", "found"],
+)
+def test_sqlite_finds_and_sorts_jobs_without_reading_their_specs(
+    migrated_sqlite: Any, question: dict[str, Any]
+) -> None:
+    url = f"sqlite:///{migrated_sqlite}"
+    store = open_store(url)
+    with statements() as sent:
+        store.jobs(**question)
+    store.close()
+    ((statement, parameters),) = [(s, p) for s, p in sent if s in _whole_lists(sent)]
+    database = connect(parse_url(url))
+    with database.transaction(write=False) as connection:
+        plan = connection.exec_driver_sql(f"EXPLAIN QUERY PLAN {statement}", parameters).all()
+    database.close()
+    assert [row[-1] for row in plan] == ["SCAN jobs USING COVERING INDEX ix_jobs_entries"]
+
+
 def test_a_spec_is_read_once_and_anew_when_its_text_is_another(
     store: SqlStore, database_url: str
 ) -> None:

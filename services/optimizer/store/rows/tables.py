@@ -208,6 +208,26 @@ jobs: Final = Table(
     # Of deleted jobs alone: SQLite would take it to find all others, and then sort these.
     Index(None, "deleted_at", sqlite_where=_DELETED, postgresql_where=_DELETED),
     Index(None, "best_fitness", "id"),
+    # All that jobs are found and sorted by. SQLite reads a row from its beginning on, and before
+    # most of this comes the spec, with robots in it. A server has large documents elsewhere.
+    Index(
+        "ix_jobs_entries",
+        "id",
+        "created_at",
+        "best_fitness",
+        "evaluations",
+        "state",
+        "labels",
+        "iterations",
+        "priority",
+        "compute_seconds",
+        "reference",
+        "lineage",
+        "archived",
+        "parent_id",
+        "deleted_at",
+        sqlite_where=text("deleted_at IS NULL"),
+    ).ddl_if(dialect="sqlite"),
 )
 
 EXISTING: Final = jobs.c.deleted_at.is_(None)

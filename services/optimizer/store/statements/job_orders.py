@@ -137,7 +137,8 @@ class _InOrder:
             return self.entries[place + 1 :]
         # The job may have another place by now: what it was is put among the others.
         others = [entry for entry in self.entries if entry.id != last.id]
-        return _InOrder.sort([*others, last], self._key, descends=self._descends).after(last)
+        found = _InOrder.sort([*others, last], self._key, descends=self._descends).entries
+        return found[found.index(last) + 1 :]
 
     @cached_property
     def _places(self) -> Mapping[str, int]:

@@ -163,11 +163,11 @@ def open_ray(address: str | None = None, *, cpus: int | None = None) -> RaySessi
                 " in-process evaluator instead"
             ) from error
 
+        if ray.is_initialized():
+            raise EvaluatorUnavailable("this process has a connection to Ray already")
         # Its own goes in colours to standard output, which is for a command's answers.
         printer: Any = ray._private.worker  # noqa: SLF001 - there is no other way
         printer.print_to_stdstream = _pass_on
-        if ray.is_initialized():
-            raise EvaluatorUnavailable("this process has a connection to Ray already")
         return _connect(ray, address) if address else _embed(ray, cpus or available_cpus())
 
 

@@ -67,7 +67,7 @@ PLANS: Final = {
     ),
     "chapter-4-long-rivals": Plan(("cma", "scipy-de"), ROBOT, 20, 2500),
     "chapter-4-long-optuna": Plan(("optuna-cma-es",), ROBOT, 20, 2500),
-    "chapter-4-long-tpe": Plan(("optuna-tpe",), ROBOT, 4, 2500),
+    "chapter-4-long-tpe": Plan(("optuna-tpe",), ROBOT, 20, 2500),
     "chapter-3": Plan(("cma-es", "de", "pso-ps", "pso-thesis", "tlbo"), CHAPTER_3, 20, 625),
     "between": Plan(("cma-es", "de"), BETWEEN, 20, 625),
     "function": Plan(

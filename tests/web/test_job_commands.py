@@ -168,3 +168,31 @@ def test_a_job_has_a_priority_from_the_form_and_another_one_from_its_page(
 
     page.goto(server.url)
     expect(page.get_by_role("row").filter(has_text=job_id)).to_contain_text("-4")
+
+
+def test_an_answer_from_before_a_command_is_not_shown_after_it(
+    start_server: Callable[..., Server], visit: Callable[..., Visit]
+) -> None:
+    server = start_server()
+    job_id = server.submit(SMALL_SPEC)
+    server.client.post(f"/v1/jobs/{job_id}/cancel").raise_for_status()
+    visited = visit(server.url)
+    asked: list[str] = []
+
+    def answer_after_the_command(route: Route) -> None:
+        asked.append(route.request.url)
+        if len(asked) != 2:
+            route.continue_()
+            return
+        answer = route.fetch()
+        page = route.request.frame.page
+        named(page, "Keep")
+        expect(page.locator("[data-labels]")).to_have_text("kept")
+        route.fulfill(response=answer)
+
+    visited.page.route(f"**/v1/jobs/{job_id}", answer_after_the_command)
+    page = visited.go(f"/jobs/{job_id}")
+    expect(page.locator("[data-labels]")).to_have_text("kept")
+    page.wait_for_timeout(300)
+    assert len(asked) >= 2
+    expect(page.locator("[data-labels]")).to_have_text("kept")

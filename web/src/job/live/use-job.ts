@@ -41,6 +41,9 @@ export function useJob(id: string): LiveJob {
   const stream = useRef<EventStream | null>(null)
   const asked = useRef(0)
   const missing = useRef(false)
+  // Questions and commands are numbered: what was asked before the job that is shown is no news.
+  const sent = useRef(0)
+  const shown = useRef(0)
   // Ends what is asked when nobody wants the answer any more; null while the job is held.
   const questions = useRef<AbortController | null>(null)
   const [held, setHeld] = useState(false)
@@ -49,14 +52,20 @@ export function useJob(id: string): LiveJob {
     const signal = questions.current?.signal
     if (!signal) return
     asked.current = Date.now()
+    const question = ++sent.current
+    const isNews = () => {
+      if (signal.aborted || question < shown.current) return false
+      shown.current = question
+      return true
+    }
     get('/v1/jobs/{job_id}', { path: { job_id: id }, signal }).then(
       (answer) => {
-        if (signal.aborted) return
+        if (!isNews()) return
         setJob(answer)
         setError(null)
       },
       (problem: unknown) => {
-        if (signal.aborted) return
+        if (!isNews()) return
         setError(problem)
         // There is nothing to follow, and asking again does not help.
         missing.current = problem instanceof ApiProblem && problem.status === 404
@@ -108,6 +117,7 @@ export function useJob(id: string): LiveJob {
   }, [followed.iterations.length])
 
   const replace = useCallback((answer: StoredJob) => {
+    shown.current = ++sent.current
     setJob(answer)
     stream.current?.restart()
   }, [])

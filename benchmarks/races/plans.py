@@ -75,4 +75,4 @@ PLANS: Final = {
     ),
     "function-slow": Plan(("optuna-cma-es",), FUNCTION, 5, 5000),
 }
-"""Methods that compute for long themselves have plans of their own, of fewer runs."""
+"""Methods that compute for long themselves have plans of their own."""

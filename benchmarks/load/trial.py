@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import os
 import time
 from bisect import bisect_right
@@ -115,6 +116,9 @@ def run(database: str, load: Load, say: Callable[[str], None] = lambda _: None) 
         if load.slots:
             _wait_for_iterations(server, job, _BEGUN[load.evaluator])
         trial = _Trial(server, target, wanted, [job, *idle] if load.slots else idle, load)
+        # Python's search for garbage among all that is loaded here would look like slow answers.
+        gc.disable()
+        opened.callback(gc.enable)
         # Code that is loaded with the first request of a kind is no part of it.
         asyncio.run(ask_at_rate(target, wanted, per_second=load.per_second, seconds=_SETTLE))
         windows = []

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from services.optimizer.errors import EvaluatorUnavailable
 from services.worker.cluster.nodes import LOOK_AHEAD, PATIENCE_SECONDS, Node, Nodes, Wanted
-from services.worker.cluster.shared_cases import CaseShelf, run_sent, sent
+from services.worker.cluster.shared_cases import CaseShelf, run_behind_others, sent
 from services.worker.cluster.shares import Shares
 from services.worker.dispatch import Dispatcher, Work
 from services.worker.ray_session import RaySession
@@ -57,7 +57,7 @@ class Pump:
         self._warm = warm
         # Ray's own retries would run a task again behind our accounts.
         options = {"num_cpus": 1, "max_retries": 0}
-        self._walk = session.ray.remote(**options, name="run_in_worker")(run_sent)
+        self._walk = session.ray.remote(**options, name="run_in_worker")(run_behind_others)
         self._warm_up = session.ray.remote(**options)(warm_up)
         self._shelf = CaseShelf(session.ray)
         self._shares = None if session.directory is not None else Shares(session)

@@ -14,6 +14,7 @@ from types import ModuleType
 from typing import Any, Final
 
 from services.worker.cluster.interrupts import interrupted_outside_imports
+from services.worker.cluster.priority import Priority
 from services.worker.tasks import Answer, Failure, Task, run_in_worker
 from sim.case import Case
 
@@ -21,6 +22,8 @@ _KEPT: Final = 32
 """Lists of cases, of as many jobs: those that were used last."""
 
 _MISSING_IN_MODULE: Final = re.compile(r"module '[\w.]+' has no attribute")
+
+_PRIORITY: Final = Priority()
 
 _received: Final[OrderedDict[str, tuple[Case, ...]]] = OrderedDict()
 """In a worker, by key."""
@@ -129,8 +132,21 @@ def sent(task: Task, chosen: Sequence[int], shared: SharedCases) -> SentTask:
     return SentTask(replace(task, cases=()), shared, tuple(chosen))
 
 
+def run_behind_others(sent_task: SentTask) -> Answer | Failure:
+    """The body of a remote task: first the process is put behind all others of the machine.
+
+    Args:
+        sent_task: What is to be run.
+
+    Returns:
+        As of `run_sent`.
+    """
+    _PRIORITY.stand_back()
+    return run_sent(sent_task)
+
+
 def run_sent(sent_task: SentTask) -> Answer | Failure:
-    """The body of a remote task. What Ray raises of the store is not caught: it is no result.
+    """Run a task as it was sent. What Ray raises of the store is not caught: it is no result.
 
     Args:
         sent_task: What is to be run.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import threading
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Final, Generic, TypeVar
 
 from sqlalchemy import Column, Dialect, Row, Text, cast, type_coerce
@@ -52,12 +52,24 @@ def as_stored(column: Column[Any]) -> Label[Any]:
     return type_coerce(found, NullType()).label(column.name)
 
 
-_COLUMNS: Final = tuple(column for column in jobs.c if column.name not in _UNSHOWN)
+_COLUMNS: Final = tuple(
+    sorted(
+        (column for column in jobs.c if column.name not in _UNSHOWN),
+        key=lambda column: column.name in _DOCUMENTS,
+    )
+)
+"""The documents last."""
 
 _NAMES: Final = tuple(column.name for column in _COLUMNS)
 
 SHOWN: Final = tuple(map(as_stored, _COLUMNS))
 """Columns of a job that is shown and not changed, as they are stored."""
+
+BRIEF: Final = SHOWN[: -len(_DOCUMENTS)]
+"""Those of them that are no long documents."""
+
+LONG: Final = SHOWN[-len(_DOCUMENTS) :]
+"""Those that are; after `BRIEF` they are all of `SHOWN`."""
 
 LARGEST: Final = 8 << 20
 """Characters of all texts that a memory has; what they are read to takes some times that."""
@@ -77,10 +89,12 @@ class RowMemory(Generic[V]):
 
     Args:
         largest: Characters of all rows together; each counts for at least a hundred.
+        length: Characters of what a row was read to, where it has some that the row has not.
     """
 
-    def __init__(self, largest: int) -> None:
+    def __init__(self, largest: int, length: Callable[[V], int] = lambda _: 0) -> None:
         self._largest = largest
+        self._length = length
         self._size = 0
         self._known: OrderedDict[Values, V] = OrderedDict()
         self._lock = threading.Lock()
@@ -125,15 +139,25 @@ class RowMemory(Generic[V]):
         with self._lock:
             first = self._known.setdefault(values, read)
             if first is read:
-                self._size += _length(values)
+                self._size += self._of_entry(values, read)
             while self._size > self._largest:
-                oldest, _ = self._known.popitem(last=False)
-                self._size -= _length(oldest)
+                self._size -= self._of_entry(*self._known.popitem(last=False))
             return first
 
+    def _of_entry(self, values: Values, read: V) -> int:
+        return _ENTRY + length_of(values) + self._length(read)
 
-def _length(values: Values) -> int:
-    return _ENTRY + sum(len(value) for value in values if isinstance(value, str))
+
+def length_of(values: Values) -> int:
+    """Characters of all texts among the values of a row.
+
+    Args:
+        values: Of some columns.
+
+    Returns:
+        Their sum.
+    """
+    return sum(len(value) for value in values if isinstance(value, str))
 
 
 _documents: Final = RowMemory[JobDocuments](LARGEST)

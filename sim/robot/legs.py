@@ -149,7 +149,7 @@ class ChainLeg:
             axis, sine, cosine = self.axes[k], np.sin(angles[:, k]), np.cos(angles[:, k])
             behind = [turned(vector, axis, sine, cosine) for vector in behind]
             point = turned(point, axis, sine, cosine)
-            behind.append(np.cross(axis, point))
+            behind.append(_across(axis, point))
             behind = [vector @ self.rotations[k].T for vector in behind]
             point = point @ self.rotations[k].T + self.offsets[k]
         return np.asarray(point), np.stack(behind[::-1], axis=-1)
@@ -168,5 +168,15 @@ def turned(vector: Floats, axis: Floats, sine: Floats, cosine: Floats) -> Floats
         (T, 3).
     """
     along = (vector @ axis)[:, None] * axis
-    across = np.cross(axis, vector)
+    across = _across(axis, vector)
     return np.asarray(along + cosine[:, None] * (vector - along) + sine[:, None] * across)
+
+
+def _across(axis: Floats, vector: Floats) -> Floats:
+    """Cross product of one vector and many: `numpy.cross` to the bit, but much faster."""
+    (x, y, z), (a, b, c) = axis.tolist(), vector.T
+    found = np.empty(vector.shape)
+    found[..., 0] = y * c - z * b
+    found[..., 1] = z * a - x * c
+    found[..., 2] = x * b - y * a
+    return found

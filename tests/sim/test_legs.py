@@ -14,6 +14,7 @@ from sim.gait.inverse_kinematics import chain_angles, leg_angles
 from sim.gait.trajectory import desired_angles, require_reachable
 from sim.robot import Robot, RobotFiles, load_robot, parse_robot
 from sim.robot.legs import ChainLeg
+from sim.robot.legs import turned as turned_about
 from sim.robot.robot import assembled
 from sim.scenario import SCENARIOS, Scenario
 from tests.examples.walks import quadruped_files, short_walk, walk
@@ -94,6 +95,18 @@ def test_a_foot_is_where_pinocchio_has_it(frames: Callable[[str], str]) -> None:
             np.testing.assert_allclose(found[0], expected, atol=1e-14)
             nudged = [chain(robot, number).feet(own[None] + e)[0][0] for e in 1e-6 * np.eye(3)]
             np.testing.assert_allclose(slopes[0], (np.array(nudged) - found[0]).T / 1e-6, atol=1e-6)
+
+
+def test_vectors_are_turned_to_the_bits_of_numpys_cross_product() -> None:
+    draw = np.random.default_rng(1)
+    axis = draw.normal(size=3)
+    axis /= np.linalg.norm(axis)
+    angles, vectors = draw.uniform(-np.pi, np.pi, 200), draw.normal(size=(200, 3))
+    along = (vectors @ axis)[:, None] * axis
+    expected = along + np.cos(angles)[:, None] * (vectors - along)
+    expected += np.sin(angles)[:, None] * np.cross(axis, vectors)
+    found = turned_about(vectors, axis, np.sin(angles), np.cos(angles))
+    assert found.tobytes() == expected.tobytes()
 
 
 def test_steps_from_a_stance_find_the_angles_of_the_closed_form() -> None:

@@ -33,7 +33,7 @@ pytestmark = pytest.mark.skipif(
 
 
 def told(code: str, niceness: int = 0) -> list[str]:
-    """What a process says that leads a group of its own in this session, as Ray's workers do."""
+    """What a process says that leads a group but no session, as Ray's workers do."""
     command = ["nice", f"-n{niceness}", sys.executable, "-c", _TELLS + code]
     done = subprocess.run(
         command, cwd=ROOT, capture_output=True, text=True, process_group=0, check=True

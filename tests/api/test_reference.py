@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from unittest.mock import patch
 
 import httpx2
 import pytest
@@ -11,6 +12,7 @@ from cli.tables.views import jobs_table
 from gaitswarm.views import JobSummaryView
 from services.optimizer.analysis import reference as references
 from services.optimizer.analysis.reference import note_reference, walked_reference, with_reference
+from services.optimizer.errors import StoreUnavailable
 from services.optimizer.jobs.job import Job, JobOrder
 from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.provenance import job_provenance
@@ -92,6 +94,21 @@ def test_a_reference_that_is_stored_stays(store: SqlStore, commit: Commit) -> No
     store.note_reference(job.id, Reference(None, None))
     assert note_reference(store, store.job(job.id)).reference == Reference(None, None)
     assert store.job(job.id).gain is None
+
+
+def test_a_reference_that_an_outage_hinders_is_a_line_of_the_log_and_found_later(
+    store: SqlStore, commit: Commit, caplog: pytest.LogCaptureFixture
+) -> None:
+    spec = tuning()
+    job, _ = store.create_job(spec, provenance=job_provenance(spec))
+    commit(job, 1)
+    ended = store.job(job.id)
+    with patch.object(store, "note_reference", side_effect=StoreUnavailable("it is away")):
+        assert note_reference(store, ended) == ended
+    (record,) = caplog.records
+    assert (record.levelname, record.exc_info) == ("WARNING", None)
+    assert record.getMessage() == f"job {job.id}: its best is compared with nothing yet: it is away"
+    assert note_reference(store, ended).reference is not None
 
 
 def test_a_start_that_does_not_walk_says_so(store: SqlStore, commit: Commit) -> None:

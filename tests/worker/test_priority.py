@@ -22,7 +22,8 @@ from services.worker.cluster.priority import Priority
 
 def tell():
     print(os.getsid(0) == os.getpid(), os.getpgid(0) == os.getpid(), end=" ")
-    print(Path("/proc/self/autogroup").read_text().split()[-1])
+    # Nothing is read where no session was begun since the system was.
+    print((Path("/proc/self/autogroup").read_text().split() or ["none"])[-1])
 """
 
 NICER = min(os.nice(0) + 4, 19)

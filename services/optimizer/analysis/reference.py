@@ -10,6 +10,7 @@ from typing import Final
 
 import numpy as np
 
+from services.optimizer.errors import StoreUnavailable
 from services.optimizer.jobs.job import Job
 from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.jobs.provenance import changes_since, job_provenance
@@ -126,6 +127,9 @@ def note_reference(store: Store, job: Job) -> Job:
         return job
     try:
         job, reason = with_reference(store, job)
+    except StoreUnavailable as error:
+        # It is found out when somebody asks for the gain.
+        _log.warning("job %s: its best is compared with nothing yet: %s", job.id, error)
     except Exception:  # noqa: BLE001
         # Whatever it is: the job's results are stored, and need it for nothing.
         _log.exception("job %s: its best is compared with nothing", job.id)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from functools import cache
 
 import numpy as np
 import pytest
@@ -34,6 +35,7 @@ LAYOUTS = {
 }
 
 
+@cache
 def made(layout: str, limit: float = 0.8) -> tuple[Proposal, Robot]:
     proposal = walking_proposal(radial_robot(*LAYOUTS[layout], limit), "round")
     return proposal, parse_robot(proposal.toml, proposal.urdf)

@@ -7,9 +7,7 @@ DB ?=
 ARGS ?=
 COMPILE := $(UV) pip compile --universal --generate-hashes --no-header --no-annotate --quiet
 
-# Many tests wait: five workers for every two processors keep both of them computing. Each takes a
-# gigabyte of memory.
-WORKERS := --numprocesses $(shell echo $$(( ($$(getconf _NPROCESSORS_ONLN) * 5 + 1) / 2 ))) --maxprocesses 8 --dist worksteal
+WORKERS = --numprocesses $(shell scripts/test_processes.sh) --dist worksteal
 
 # An empty DB means the default database of the user.
 ifneq ($(DB),)

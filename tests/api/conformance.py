@@ -129,14 +129,16 @@ def served() -> Iterator[tuple[Server, dict[str, list[str]]]]:
             store.close()
 
 
+_GOOD_JOB: Final = JobSpec(
+    controller="pi",
+    scenarios=(Scenario(**SHORT_WALK),),
+    optimizer=PsoSettings(particles=4),
+    iterations=3,
+)
+
+
 def _jobs(store: SqlStore, service: JobService) -> list[str]:
-    tuning = JobSpec(
-        controller="pi",
-        scenarios=(Scenario(**SHORT_WALK),),
-        optimizer=PsoSettings(particles=4),
-        iterations=3,
-    )
-    found = [service.submit(spec)[0].id for spec in (tuning, small())]
+    found = [service.submit(spec)[0].id for spec in (_GOOD_JOB, small())]
     evaluator = open_evaluator("in-process", cpus=2)
     try:
         for job_id in found:
@@ -147,11 +149,16 @@ def _jobs(store: SqlStore, service: JobService) -> list[str]:
 
 
 def schema_of(server: Server, ids: dict[str, list[str]]) -> BaseSchema:
-    """The document of a server; half of all paths name something that there is."""
+    """The document of a server; half of all paths name something that there is.
+
+    Half of all jobs submitted are a good one, which values by chance almost never are, so that
+    sequences have a job of their own to go on with.
+    """
     # Made at the first request, which takes long on a busy machine.
     document = server.client.get("/openapi.json", timeout=300.0).json()
     # Streams end with their jobs only, and are tested apart.
     schema = schemathesis.openapi.from_dict(document).exclude(operation_id="stream_events")
+    good = _GOOD_JOB.model_dump(mode="json")
 
     @schema.hook
     def map_path_parameters(
@@ -162,6 +169,11 @@ def schema_of(server: Server, ids: dict[str, list[str]]) -> BaseSchema:
             if path_parameters and name in path_parameters and drawn < len(known):
                 path_parameters[name] = known[drawn]
         return path_parameters
+
+    @schema.hook
+    def map_body(context: schemathesis.HookContext, body: Any) -> Any:
+        submits = context.operation is not None and context.operation.label == "POST /v1/jobs"
+        return good if submits and crc32(repr(body).encode()) % 2 else body
 
     return schema
 

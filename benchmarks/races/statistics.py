@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from scipy.stats import mannwhitneyu
 
 from benchmarks.races.plans import CHECKPOINTS, Plan
 from benchmarks.races.records import Record
@@ -59,6 +58,8 @@ def probability(runs: Runs, measure: Runs) -> float:
 
     Two-sided, by the test of Mann and Whitney; exact for few runs without ties.
     """
+    from scipy.stats import mannwhitneyu  # noqa: PLC0415 - slow to import
+
     return float(mannwhitneyu(runs.final, measure.final, alternative="two-sided").pvalue)
 
 

@@ -38,7 +38,7 @@ SPACES: Final[Mapping[str, Space]] = MappingProxyType(
 
 PARTICLES: Final = 6
 BUDGET: Final = 90
-BUDGETS: Final = MappingProxyType({"mixed": BUDGET, "one variable": 60, "integers only": 30})
+BUDGETS: Final = MappingProxyType({"mixed": BUDGET, "one variable": 60, "integers only": 20})
 """By space, evaluations: enough for local searches to begin anew, and for all of the 8 designs."""
 SEED: Final = 3
 

@@ -20,7 +20,7 @@ from services.optimizer.search.registry import METHODS
 INSTALLED = [name for name, method in METHODS.built_in.items() if not method.missing]
 """Methods whose libraries are here; with the development lock, all that this machine can have."""
 
-REPLAYED_UNTIL = {"bayesian": 36, "ga": 45, "mads": 45}
+REPLAYED_UNTIL = {"bayesian": 24, "ga": 30, "mads": 30}
 """Evaluations of methods whose loads repeat all that was told, which takes the square of them."""
 
 WITHOUT_WHEEL = set() if platform.machine() == "x86_64" else {"mads"}

@@ -20,7 +20,7 @@ from services.optimizer.jobs.judgement import Judgement
 from services.optimizer.jobs.preference import PREFERENCES, geometric_mean, judge
 from tests.certificate.examples import columns, small
 
-WORLDS = 20_000
+DESIGNS = 20_000
 
 
 @contextmanager
@@ -67,7 +67,8 @@ def longest_call(compute: Callable[[], object]) -> float:
     return longest / total
 
 
-LOGARITHMS = np.random.default_rng(1).random((WORLDS, 8))
+LOGARITHMS = np.random.default_rng(1).random((DESIGNS, 8))
+IN_SCENARIOS = LOGARITHMS[: DESIGNS // 5, :, None].repeat(6, axis=2)
 
 
 @pytest.mark.parametrize(
@@ -75,7 +76,7 @@ LOGARITHMS = np.random.default_rng(1).random((WORLDS, 8))
     [
         lambda: geometric_mean(LOGARITHMS),
         lambda: Judgement(LOGARITHMS[:, 0], LOGARITHMS).utilities,
-        lambda: judge(LOGARITHMS[:, :, None].repeat(6, axis=2), LOGARITHMS < 0, PREFERENCES["A"]),
+        lambda: judge(IN_SCENARIOS, np.zeros(IN_SCENARIOS.shape[:2]) > 0, PREFERENCES["A"]),
     ],
     ids=["fitness", "utilities", "judgement"],
 )
@@ -84,6 +85,7 @@ def test_designs_are_judged_in_parts(compute: Callable[[], object]) -> None:
 
 
 def test_a_certificate_is_summed_up_in_parts() -> None:
-    spec = small(worlds=WORLDS)
-    walked = columns(spec, np.random.default_rng(1).uniform(5.0, 9.0, (WORLDS + 1, 2)))
+    worlds = DESIGNS // 3
+    spec = small(worlds=worlds)
+    walked = columns(spec, np.random.default_rng(1).uniform(5.0, 9.0, (worlds + 1, 2)))
     assert computes_in_parts(lambda: certificate(spec, walked))

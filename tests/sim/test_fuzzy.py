@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import skfuzzy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -38,6 +37,8 @@ SETS = MembershipSets(
 
 def scikit_fuzzy_union(e: float, c: float, w: tuple[float, ...], shape: Shape) -> np.ndarray:
     """Table 4.3 written once more, with scikit-fuzzy's own functions."""
+    import skfuzzy  # slow to import
+
     y = np.arange(-50, 51) / 50 * 1.5
     sigma = 0.3 / np.sqrt(2 * np.log(2))
 
@@ -75,6 +76,8 @@ def scikit_fuzzy_union(e: float, c: float, w: tuple[float, ...], shape: Shape) -
 def test_inference_agrees_with_scikit_fuzzy(
     e: float, c: float, weights: tuple[float, float, float, float], shape: Shape
 ) -> None:
+    import skfuzzy
+
     system = inference_system(*weights, shape, SETS)
     ours = system.infer({"error": np.array([e]), "current": np.array([c])})[0, 0]
     y = system.output_points()

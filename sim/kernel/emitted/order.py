@@ -77,7 +77,12 @@ class _Schedule:
         """Readers to come, by statement."""
         self._there = [0] * len(statements)
         """When all that a statement reads is there, as far as is known."""
-        self._written = [0] * len(statements)
+        self._newest = [0] * len(statements)
+        """When the last one was written of those that a statement reads."""
+        self._last_reads = [sum(self._unread[j] == 1 for j in of) for of in self._sources]
+        """How many values nothing reads after a statement."""
+        self._born = [len(s.defines) * bool(self._readers[k]) for k, s in enumerate(statements)]
+        """How many values of a statement are read."""
         self._kept = 0
         """Values in registers."""
 
@@ -86,6 +91,7 @@ class _Schedule:
         missing = [len(of) for of in self._sources]
         ready = [k for k, s in enumerate(self._statements) if s.operations and not missing[k]]
         given: set[int] = set()
+        written: set[int] = set()
         now = 0
         while ready:
             k = min(ready, key=lambda k: self._preference(k, now))
@@ -95,14 +101,18 @@ class _Schedule:
                     given.add(j)
                     yield self._statements[j]
             yield self._statements[k]
+            written.add(k)
             self._kept += self._more_kept(k)
             for j in self._sources[k]:
                 self._unread[j] -= 1
+                if self._unread[j] == 1:
+                    (last,) = (reader for reader in self._readers[j] if reader not in written)
+                    self._last_reads[last] += 1
             now = max(now + self._statements[k].operations, self._there[k])
-            self._written[k] = now
             for reader in self._readers[k]:
                 missing[reader] -= 1
                 self._there[reader] = max(self._there[reader], now + self._statements[k].latency)
+                self._newest[reader] = now
                 if not missing[reader]:
                     ready.append(reader)
         for k, statement in enumerate(self._statements):
@@ -112,12 +122,10 @@ class _Schedule:
     def _preference(self, k: int, now: int) -> tuple[int, ...]:
         """The least is written next."""
         late = max(0, self._there[k] - now)
-        newest = max((self._written[j] for j in self._sources[k]), default=0)
         if self._kept >= REGISTERS:
-            return self._more_kept(k), late, -self._to_end[k], -newest, k
-        return max(0, late - PATIENCE), -self._to_end[k], -newest, k
+            return self._more_kept(k), late, -self._to_end[k], -self._newest[k], k
+        return max(0, late - PATIENCE), -self._to_end[k], -self._newest[k], k
 
     def _more_kept(self, k: int) -> int:
         """Values that it defines, less those that nothing reads after it."""
-        born = len(self._statements[k].defines) if self._readers[k] else 0
-        return born - sum(self._unread[j] == 1 for j in self._sources[k])
+        return self._born[k] - self._last_reads[k]

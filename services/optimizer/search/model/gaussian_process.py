@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
+from functools import cache
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -12,6 +14,7 @@ from sim.memory import require_room_for_scipy
 
 if TYPE_CHECKING:
     from sklearn.gaussian_process import GaussianProcessRegressor
+    from threadpoolctl import ThreadpoolController
 
 Floats = NDArray[np.float64]
 
@@ -66,7 +69,6 @@ class GaussianProcess:
         require_room_for_scipy()
         from scipy.optimize import minimize  # noqa: PLC0415 - slow to import
         from sklearn.gaussian_process import GaussianProcessRegressor  # noqa: PLC0415
-        from threadpoolctl import threadpool_limits  # noqa: PLC0415
 
         features = self._features(designs)
 
@@ -76,8 +78,7 @@ class GaussianProcess:
             )
             return -likelihood, -slope
 
-        # Another number of threads would add in another order.
-        with threadpool_limits(limits=1):
+        with _one_thread():
             model = GaussianProcessRegressor(self._kernel, optimizer=None).fit(features, values)
             bounds = self._kernel.bounds
             found = minimize(
@@ -117,15 +118,14 @@ class GaussianProcess:
         """
         require_room_for_scipy()
         from scipy.special import ndtr  # noqa: PLC0415 - slow to import
-        from threadpoolctl import threadpool_limits  # noqa: PLC0415
 
         assert self._model is not None, "a model is fitted before it is asked"  # noqa: S101
         candidates = np.unique(candidates, axis=0)
-        with threadpool_limits(limits=1):
+        with _one_thread():
             features = self._features(candidates)
             mean, covariance = self._model.predict(features, return_cov=True)
         least, chosen = self._least, list[int]()
-        variance = np.diag(covariance).copy()
+        variance, known = np.diag(covariance).copy(), list[Floats]()
         for _ in range(min(count, len(candidates))):
             deviation = np.sqrt(np.maximum(variance, 1e-12))
             z = (least - mean) / deviation
@@ -135,9 +135,12 @@ class GaussianProcess:
             pick = int(np.argmax(improvement))
             chosen.append(pick)
             # What is known of a design is known of those like it, too.
-            row = covariance[pick] / np.sqrt(max(covariance[pick, pick], 1e-12))
-            covariance = covariance - np.outer(row, row)
-            variance = np.diag(covariance).copy()
+            row = covariance[pick]
+            for earlier in known:
+                row = row - earlier[pick] * earlier
+            row = row / np.sqrt(max(row[pick], 1e-12))
+            variance -= row * row
+            known.append(row)
             least = min(least, float(mean[pick]))
         return candidates[chosen + [chosen[-1]] * (count - len(chosen))]
 
@@ -156,3 +159,18 @@ class GaussianProcess:
             else:
                 columns.append(unit[:, j, np.newaxis])
         return np.hstack(columns)
+
+
+def _one_thread() -> AbstractContextManager[object]:
+    """Hold linear algebra to one thread: another number of them would add in another order."""
+    limiter: AbstractContextManager[object] = _linear_algebra().limit(limits=1)
+    return limiter
+
+
+@cache
+def _linear_algebra() -> ThreadpoolController:
+    """The libraries that scikit-learn computes with, looked for once a process."""
+    import sklearn.gaussian_process  # noqa: F401, PLC0415 - so that they are loaded
+    from threadpoolctl import ThreadpoolController  # noqa: PLC0415
+
+    return ThreadpoolController()

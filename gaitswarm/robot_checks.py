@@ -126,7 +126,7 @@ def standing_scenario(robot: Robot) -> Scenario:
     radius, height = 0.16, 0.15
     stances = [leg for leg in robot.legs if isinstance(leg, ChainLeg)]
     if stances:
-        feet = np.array([leg.foot(leg.stance.tolist()) for leg in stances])
+        feet = np.array([leg.stand for leg in stances])
         radius = max(1e-6, float(np.abs(feet[:, 1]).mean()))
         hips = max(leg.hip[2] for leg in robot.legs)
         height = hips - float(feet[:, 2].mean()) + float(np.mean(robot.planned_soles()))

@@ -6,7 +6,7 @@ any other leg of three joints.
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,16 +73,31 @@ def chain_angles(leg: ChainLeg, targets: Floats) -> tuple[Floats, Floats]:
         Angles (T, 3) [rad]; and the miss (T,) [m] by which the target lies outside the leg's reach,
         0 inside; the angles of a missed target are the nearest that were found.
     """
+    # A walk comes back to where it was: equal targets are met once. But numpy does not round a row
+    # that is alone as it does others, so that it stays with its equals.
+    rows = np.ascontiguousarray(targets).view(f"V{targets.itemsize * 3}")[:, 0]
+    _, first, where = np.unique(rows, return_index=True, return_inverse=True)
+    if len(first) == 1:
+        first, where = np.arange(len(targets)), np.arange(len(targets))
+    targets = targets[first]
     angles = np.tile(leg.stance, (len(targets), 1))
-    begin, _ = leg.feet(angles)
-    angles = _stepped(leg, angles, 0.5 * (begin + targets))
-    angles = _stepped(leg, angles, targets)
-    missed = np.linalg.norm(targets - leg.feet(angles)[0], axis=1)
-    return angles, np.where(missed > _REACHED, missed, 0.0)
+    pose = _Pose(angles, *leg.feet(angles))
+    pose = _stepped(leg, pose, 0.5 * (pose.at + targets))
+    pose = _stepped(leg, pose, targets)
+    missed = np.linalg.norm(targets - pose.at, axis=1)
+    return pose.angles[where], np.where(missed > _REACHED, missed, 0.0)[where]
 
 
-def _stepped(leg: ChainLeg, angles: Floats, targets: Floats) -> Floats:
-    at, jacobian = leg.feet(angles)
+class _Pose(NamedTuple):
+    """Of a leg at several times: angles (T, 3) [rad], foot (T, 3) [m] and its derivatives."""
+
+    angles: Floats
+    at: Floats
+    jacobian: Floats
+
+
+def _stepped(leg: ChainLeg, pose: _Pose, targets: Floats) -> _Pose:
+    angles, at, jacobian = pose
     missed = targets - at
     squares = np.einsum("ti,ti->t", missed, missed)
     damping = np.full(len(targets), _FIRST_DAMPING)
@@ -94,11 +109,12 @@ def _stepped(leg: ChainLeg, angles: Floats, targets: Floats) -> Floats:
         gradient = np.einsum("tij,ti->tj", jacobian, missed)
         steps = np.linalg.solve(normal, gradient[:, :, None])[:, :, 0]
         tried = angles + steps
-        at, slopes = leg.feet(tried)
-        left = targets - at
+        reached, slopes = leg.feet(tried)
+        left = targets - reached
         better = np.einsum("ti,ti->t", left, left)
         good = better < squares
         angles = np.where(good[:, None], tried, angles)
+        at = np.where(good[:, None], reached, at)
         jacobian = np.where(good[:, None, None], slopes, jacobian)
         missed = np.where(good[:, None], left, missed)
         squares = np.where(good, better, squares)
@@ -106,4 +122,4 @@ def _stepped(leg: ChainLeg, angles: Floats, targets: Floats) -> Floats:
         damping = np.where(squares < _REACHED**2, 0.0, damping)
         if squares.max() < _EXACT**2 or np.abs(steps).max() < _EXACT:
             break
-    return angles
+    return _Pose(angles, at, jacobian)

@@ -213,8 +213,7 @@ def _foot(
     ground = scenario.hip_height - sole
     limits = tuple((lower, upper) for lower, upper in leg.limits.tolist())
     if isinstance(leg, ChainLeg):
-        x, _, _ = leg.foot(leg.stance.tolist())
-        rest = (x, leg.side * gait.radius, hips - ground)
+        rest = (leg.stand[0], leg.side * gait.radius, hips - ground)
         return _ChainFoot(gait=gait, limits=limits, leg=leg, rest=rest)
     return _KneeUpFoot(
         gait=gait,
@@ -228,8 +227,7 @@ def _foot(
 
 def _trajectory(feet: tuple[_KneeUpFoot | _ChainFoot, ...], gait: _Gait) -> Trajectory:
     alike = {foot: number for number, foot in enumerate(dict.fromkeys(feet))}
-    time = gait.time()
-    planned = [_unfiltered(foot, gait, time) for foot in alike]
+    planned = [_planned(foot, gait) for foot in alike]
     angles, misses, excesses = zip(*planned, strict=True)
     smoothed = low_pass(np.concatenate(angles, axis=1), gait.fir_ms, gait.fir_window)
     # numpy's arc functions differ in the last bit between processors.
@@ -245,11 +243,16 @@ def _trajectory(feet: tuple[_KneeUpFoot | _ChainFoot, ...], gait: _Gait) -> Traj
 _kept: Final = lru_cache(maxsize=_KEPT)(_trajectory)
 
 
-def _unfiltered(
-    foot: _KneeUpFoot | _ChainFoot, gait: _Gait, time: Floats
-) -> tuple[Floats, float, Floats]:
+def _planned(foot: _KneeUpFoot | _ChainFoot, gait: _Gait) -> tuple[Floats, float, Floats]:
+    """As `_unfiltered`: whether a walk is in reach is asked for before it is walked."""
+    plan = _unfiltered if gait.ticks <= _LONGEST_KEPT else _unfiltered.__wrapped__
+    return plan(foot, gait)
+
+
+@lru_cache(maxsize=_KEPT)
+def _unfiltered(foot: _KneeUpFoot | _ChainFoot, gait: _Gait) -> tuple[Floats, float, Floats]:
     """Angles (T, 3) [rad], the largest miss [m], and by joint the largest excess (3,) [rad]."""
-    cycles, own = time / gait.cycle_time, foot.gait
+    cycles, own = gait.time() / gait.cycle_time, foot.gait
     forward, lift = _CURVES[gait.curve](
         np.mod(cycles + own.phase, 1.0),
         stride=own.stride,
@@ -292,9 +295,9 @@ def _check_reach(robot: Robot, scenario: Scenario) -> None:
     """`require_reachable`, which every job asks for of the scenarios that most jobs have."""
     gait = _Gait.of(scenario)
     gait = replace(gait, ticks=min(gait.ticks, _CHECKED_TICKS))
-    time, feet = gait.time(), _feet(robot, scenario)
+    feet = _feet(robot, scenario)
     # The filter is left out: it smooths angles, and a target is missed before.
-    planned = {foot: _unfiltered(foot, gait, time)[1:] for foot in dict.fromkeys(feet)}
+    planned = {foot: _planned(foot, gait)[1:] for foot in dict.fromkeys(feet)}
     worst = max(range(len(feet)), key=lambda leg: planned[feet[leg]][0])
     miss, _ = planned[feet[worst]]
     if miss > 0.0:

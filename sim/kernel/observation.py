@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import NamedTuple
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -130,15 +131,12 @@ def walk_log(robot: Robot, setup: WalkSetup, states: NDArray[np.float64]) -> Wal
     Returns:
         The log; rows after an early end stay NaN.
     """
-    # Logs are rare: they alone need CasADi in a process that has a compiled kernel.
-    from sim.kernel.dynamics.physics_step import physics_model  # noqa: PLC0415
-
-    observe = physics_model(robot).observe
     feet, ticks = len(robot.legs), len(states)
     kept = split_states(robot, states)
     position, orientation, angle, twist, rate, internal_state, _, duty = kept
     walked = int(np.isfinite(states).all(axis=1).sum())
-    seen = [np.full((ticks, observe.numel_out(k)), np.nan) for k in range(5)]
+    joints = robot.n_joints
+    seen = [np.full((ticks, size), np.nan) for size in (joints, joints, joints, 3 * feet, 1)]
     if walked:
         disturbance = np.zeros_like(angle) if setup.disturbance is None else setup.disturbance
         q = np.concatenate([position, orientation, angle], axis=1)
@@ -147,7 +145,7 @@ def walk_log(robot: Robot, setup: WalkSetup, states: NDArray[np.float64]) -> Wal
         parameters = np.tile(setup.parameters, (walked, 1))
         pushes = Layout(robot).slices["push"]
         parameters[:begin, pushes] = parameters[end:, pushes] = 0.0
-        parts = observe.map(walked)(*(part[:walked].T for part in inputs), parameters.T)
+        parts = _observing(robot, walked)(*(part[:walked].T for part in inputs), parameters.T)
         for target, part in zip(seen, parts, strict=False):
             target[:walked] = np.array(part).T
     current, voltage, load, force, supply = seen
@@ -166,6 +164,15 @@ def walk_log(robot: Robot, setup: WalkSetup, states: NDArray[np.float64]) -> Wal
         foot_force=force.reshape(ticks, feet, 3),
         supply=supply[:, 0],
     )
+
+
+@lru_cache(maxsize=16)
+def _observing(robot: Robot, instants: int) -> Any:
+    """What is observed at so many instants; many walks are as long as others."""
+    # Logs are rare: they alone need CasADi in a process that has a compiled kernel.
+    from sim.kernel.dynamics.physics_step import physics_model  # noqa: PLC0415
+
+    return physics_model(robot).observe.map(instants)
 
 
 def sensed_currents(

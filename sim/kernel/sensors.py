@@ -143,11 +143,19 @@ class Sensors:
             Angles and currents, (J,) each. Where a reading of before the walk is asked for, the
             first one.
         """
-        seed = np.array([self._errors.seed], dtype=np.uint64)
-        (sums,) = byte_sums(seed, self._tick, len(angle))
+        noise = self._noise(len(angle))
         self._tick += 1
         seen = []
-        for k, (exact, kept) in enumerate(zip((angle, current), self._kept, strict=True)):
-            kept.append(exact + sums[:, k] * self._errors.scales[k])
+        for exact, further, kept in zip((angle, current), noise, self._kept, strict=True):
+            kept.append(exact + further)
             seen.append(kept[0])
         return seen[0], seen[1]
+
+    def _noise(self, joints: int) -> tuple[Floats | float, Floats | float]:
+        """Of angles and currents, (J,) each; without any no random number is drawn."""
+        of_angle, of_current = self._errors.scales
+        if not (of_angle or of_current):
+            return 0.0, 0.0
+        seed = np.array([self._errors.seed], dtype=np.uint64)
+        (sums,) = byte_sums(seed, self._tick, joints)
+        return sums[:, 0] * of_angle, sums[:, 1] * of_current

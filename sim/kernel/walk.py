@@ -175,8 +175,9 @@ def coarsen(code: Ints, step: int) -> Ints:
 
 def _rounded(value: Floats, low: int, high: int) -> Ints:
     """Of a NaN, 0."""
-    with np.errstate(invalid="ignore"):
-        code: Ints = np.clip(np.nan_to_num(np.rint(value)), low, high).astype(np.int64)
+    whole = np.rint(value)
+    whole[np.isnan(whole)] = 0.0
+    code: Ints = np.minimum(np.maximum(whole, low), high).astype(np.int64)
     return code
 
 

@@ -75,7 +75,7 @@ class Ground(ABC):
         """
         touching, normal = self.press(position, velocity)
         rub, memory = self.friction(touching, self._mu * normal, velocity[:, :2], timestep)
-        return np.column_stack([rub, normal]), memory
+        return np.concatenate([rub, normal[:, None]], axis=1), memory
 
     @abstractmethod
     def friction(

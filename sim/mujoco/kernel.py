@@ -183,6 +183,13 @@ class _Stepper:
         self._d = mujoco.MjData(m)
         x, y, z, w = setup.start[3:7].tolist()
         self._d.qpos[:] = [*setup.start[:3], w, x, y, z, *setup.start[7:]]
+        self._velocity, self._acceleration = self._d.qvel, self._d.qacc
+        self._applied = self._d.qfrc_applied
+        self._angles, self._rates = self._d.qpos[7:], self._velocity[6:]
+        # The first body is the world, the next the robot's.
+        self._ahead = self._d.xmat[1, 0:6:3]
+        # Of the feet, by MuJoCo's sensors: positions [m], and velocities [m/s].
+        self._of_feet: tuple[Floats, Floats] = tuple(self._d.sensordata.reshape(2, -1, 3))
         self._gears = gears_of(robot, numbers, setup.start[7:])
         self._ground = GROUNDS[robot.description.contact_law](numbers)
         self._resistance = robot.actuators().resistance
@@ -214,7 +221,7 @@ class _Stepper:
     def landing(self, time: float) -> bool:
         """Whether a foot may come down within a time [s]."""
         self._derive()
-        return self._ground.landing(*self._of_feet(), time)
+        return self._ground.landing(*self._of_feet, time)
 
     def refine(self, timestep: float) -> None:
         """Set the length of the steps that follow [s]."""
@@ -222,45 +229,45 @@ class _Stepper:
 
     def encoders(self) -> Floats:
         """What the encoders see, (J,) [rad]."""
-        return self._gears.encoders(self._d.qpos[7:]).copy()
+        return self._gears.encoders(self._angles).copy()
 
     def motors(self) -> tuple[Floats, Floats]:
         """Angles [rad] and rates [rad/s] that the encoders see, (J,) each."""
         rotors = self._gears.memory
-        return (rotors[0], rotors[1]) if rotors else (self._d.qpos[7:], self._d.qvel[6:])
+        return (rotors[0], rotors[1]) if rotors else (self._angles, self._rates)
 
     def step(self, duty: Floats, further: Floats | None, *, shoved: bool) -> tuple[Floats, Floats]:
         """One step; `INTEGRANDS` and absolute currents (J,) [A] at its beginning."""
         m, d, numbers, timestep = self._m, self._d, self._numbers, self._m.opt.timestep
         self._derive()
-        angles, rates = d.qpos[7:], d.qvel[6:]
+        angles, rates, applied = self._angles, self._rates, self._applied
         displaced = 0.0 if further is None or not self._displaced else further
         actuation = self._gears.actuate(duty, angles, rates, displaced)
         torque = actuation.torque
         if further is not None and not self._displaced:
             torque = torque + further
-        d.qfrc_applied[:3] = numbers["push"] if shoved else 0.0
-        d.qfrc_applied[3:6] = 0.0
-        d.qfrc_applied[6:] = torque
+        applied[:3] = numbers["push"] if shoved else 0.0
+        applied[3:6] = 0.0
+        applied[6:] = torque
         if self._jammed:
-            d.qfrc_applied[6:] -= (
+            applied[6:] -= (
                 numbers["jam_stiffness"] * (angles - numbers["jam_angle"])
                 + numbers["jam_damping"] * rates
             )
         if self._pushed:
             self._push_feet()
-        # The first body is the world, the next the robot's.
-        ahead_x, ahead_y = d.xmat[1, 0], d.xmat[1, 3]
-        forward = (ahead_x * d.qvel[0] + ahead_y * d.qvel[1]) / math.hypot(ahead_x, ahead_y)
+        (ahead_x, ahead_y), (x, y) = self._ahead.tolist(), self._velocity[:2].tolist()
+        forward = (ahead_x * x + ahead_y * y) / math.hypot(ahead_x, ahead_y)
         mujoco.mj_fwdActuation(m, d)
         mujoco.mj_fwdAcceleration(m, d)
         mujoco.mj_fwdConstraint(m, d)
         mujoco.mj_Euler(m, d)
-        self.diverged = not d.qvel @ d.qvel < _HUGE * _HUGE
+        self.diverged = not self._velocity @ self._velocity < _HUGE * _HUGE
         self._gears.kick(actuation, timestep)
         self._gears.drift(timestep)
-        load = float(np.abs(torque - self._gears.armature * d.qacc[6:]).sum())
-        drive, acceleration, turn = actuation.drive, d.qacc[:3], d.qacc[3:6]
+        gained = self._acceleration
+        load = float(np.abs(torque - self._gears.armature * gained[6:]).sum())
+        drive, acceleration, turn = actuation.drive, gained[:3], gained[3:6]
         current = np.abs(drive.current)
         power = drive.voltage * drive.current
         integrands = np.array(
@@ -287,19 +294,14 @@ class _Stepper:
         mujoco.mj_fwdVelocity(m, d)
         mujoco.mj_sensorVel(m, d)
 
-    def _of_feet(self) -> tuple[Floats, Floats]:
-        """Positions [m] and velocities [m/s] of the feet, (L, 3) each, by MuJoCo's sensors."""
-        position, velocity = self._d.sensordata.reshape(2, -1, 3)
-        return position, velocity
-
     def _push_feet(self) -> None:
         """The ground's forces, beside those that are applied already."""
         m, d = self._m, self._d
-        position, velocity = self._of_feet()
+        position, velocity = self._of_feet
         forces, self._ground.memory = self._ground.forces(position, velocity, m.opt.timestep)
-        for foot in np.flatnonzero(forces[:, 2]).tolist():
+        for foot in forces[:, 2].nonzero()[0].tolist():
             mujoco.mj_applyFT(
-                m, d, forces[foot], _NOTHING, position[foot], self._feet[foot], d.qfrc_applied
+                m, d, forces[foot], _NOTHING, position[foot], self._feet[foot], self._applied
             )
 
 

@@ -163,7 +163,7 @@ def reach_below(robot: Robot, number: int) -> float:
     """
     leg = robot.description.legs[number]
     kinematics = _kinematics(leg.name, (chain := chain_of(robot.urdf, leg)), chain.foot)
-    feet, _ = kinematics.feet(tried_angles(kinematics))
+    feet = kinematics.ends(tried_angles(kinematics))
     return max(leg.hip[2] for leg in robot.legs) - float(feet[:, 2].min())
 
 
@@ -217,7 +217,7 @@ def _reached(urdf: Urdf, chain: Sequence[Joint], bounds: MeshBounds) -> tuple[Ch
     """A chain as a leg, and where its end gets, (n, 3) [m]."""
     end = end_of(urdf, chain[-1].child, bounds).at
     leg = chain_leg(urdf, [joint.name for joint in chain], end)
-    return leg, leg.feet(tried_angles(leg))[0]
+    return leg, leg.ends(tried_angles(leg))
 
 
 def _found(urdf: Urdf, chain: Sequence[Joint], bounds: MeshBounds) -> FoundLeg:

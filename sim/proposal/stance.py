@@ -67,9 +67,9 @@ def choose_stance(legs: Sequence[ChainLeg]) -> Stance:
     Raises:
         RobotFileError: No angles within the limits put the feet of all legs on one level.
     """
-    tried = [(angles := tried_angles(leg), *leg.feet(angles)) for leg in legs]
+    tried = [(angles := tried_angles(leg), leg.ends(angles)) for leg in legs]
     hips = max(leg.hip[2] for leg in legs)
-    ground = hips - _HEIGHT * (hips - max(float(feet[:, 2].min()) for _, feet, _ in tried))
+    ground = hips - _HEIGHT * (hips - max(float(feet[:, 2].min()) for _, feet in tried))
     chosen = [_best(leg, *of, ground, hips - ground) for leg, of in zip(legs, tried, strict=True)]
     feet = np.array([leg.foot(angles.tolist()) for leg, angles in zip(legs, chosen, strict=True)])
     radius = float(np.median(np.abs(feet[:, 1])))
@@ -85,9 +85,7 @@ def choose_stance(legs: Sequence[ChainLeg]) -> Stance:
     return Stance(tuple(apart), hips - ground, tuple(radii))
 
 
-def _best(
-    leg: ChainLeg, angles: Floats, feet: Floats, slopes: Floats, ground: float, height: float
-) -> Floats:
+def _best(leg: ChainLeg, angles: Floats, feet: Floats, ground: float, height: float) -> Floats:
     """The best of the tried angles (3,)."""
     near = np.abs(feet[:, 2] - ground) < _BAND * height
     if not near.any():
@@ -96,7 +94,8 @@ def _best(
             f" with the others: its joint limits keep it from {height:.3f} m below the highest hip,"
             " three quarters of what all legs reach; look at these, and at where it is mounted"
         )
-    angles, feet, slopes = angles[near], feet[near], slopes[near]
+    angles = angles[near]
+    feet, slopes = leg.feet(angles)
     length = sum(leg.lengths)
     # Freedom: the volume that small turns of all joints sweep; torque: of a vertical unit force.
     freedom = np.log(np.maximum(np.abs(np.linalg.det(slopes)) / length**3, 1e-12))

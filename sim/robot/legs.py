@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final, Protocol
 
 import numpy as np
@@ -111,7 +112,7 @@ class ChainLeg:
     @property
     def side(self) -> float:
         """Where the foot is when the leg stands: 1 left, -1 right, 0 in the middle."""
-        lateral = self.foot(self.stance.tolist())[1]
+        lateral = self.stand[1]
         return 0.0 if abs(lateral) < _MIDDLE else math.copysign(1.0, lateral)
 
     @property
@@ -127,10 +128,26 @@ class ChainLeg:
         )
         return first, second, third
 
+    @property
+    def stand(self) -> tuple[float, float, float]:
+        """Where the foot is when the leg stands, in the body's frame [m]."""
+        return _stand_of(self)
+
     def foot(self, angles: Sequence[float]) -> tuple[float, float, float]:
         """Where the leg ends, in the body's frame."""
-        x, y, z = self.feet(np.asarray([angles], dtype=np.float64))[0][0].tolist()
+        x, y, z = self.ends(np.asarray([angles], dtype=np.float64))[0].tolist()
         return x, y, z
+
+    def ends(self, angles: Floats) -> Floats:
+        """Where the leg ends.
+
+        Args:
+            angles: (T, 3) [rad].
+
+        Returns:
+            The foot in the body's frame, (T, 3) [m].
+        """
+        return np.asarray(self._moved(angles, slopes=False)[0])
 
     def feet(self, angles: Floats) -> tuple[Floats, Floats]:
         """Where the leg ends, and how that changes with the angles.
@@ -142,39 +159,57 @@ class ChainLeg:
             The foot in the body's frame, (T, 3) [m]; and its derivatives by angle, (T, 3, 3) [m],
             a joint's in the last index.
         """
-        point = np.broadcast_to(self.end, (len(angles), 3))
+        moved = self._moved(angles, slopes=True)
+        return moved[0], np.stack(tuple(moved[:0:-1]), axis=-1)
+
+    def _moved(self, angles: Floats, *, slopes: bool) -> Floats:
+        """The foot, (1, T, 3) [m], and if asked for its derivatives by angle, the last joint's
+        first, (4, T, 3) [m].
+        """
+        sines, cosines = np.sin(angles), np.cos(angles)
+        moved = np.empty((1 + slopes * len(self.axes), len(angles), 3))
+        seen = np.broadcast_to(self.end, moved[:1].shape)
         # From the foot inwards: each joint turns all that is behind it.
-        behind: list[Floats] = []
         for k in (2, 1, 0):
-            axis, sine, cosine = self.axes[k], np.sin(angles[:, k]), np.cos(angles[:, k])
-            behind = [turned(vector, axis, sine, cosine) for vector in behind]
-            point = turned(point, axis, sine, cosine)
-            behind.append(_across(axis, point))
-            behind = [vector @ self.rotations[k].T for vector in behind]
-            point = point @ self.rotations[k].T + self.offsets[k]
-        return np.asarray(point), np.stack(behind[::-1], axis=-1)
+            behind = turned(seen, self.axes[k], sines[:, k], cosines[:, k])
+            if slopes:
+                behind = np.concatenate([behind, _across(self.axes[k], behind[:1])])
+            seen = moved[: len(behind)]
+            np.matmul(behind, self.rotations[k].T, out=seen)
+            moved[0] += self.offsets[k]
+        return moved
+
+
+@lru_cache(maxsize=128)
+def _stand_of(leg: ChainLeg) -> tuple[float, float, float]:
+    return leg.foot(leg.stance.tolist())
 
 
 def turned(vector: Floats, axis: Floats, sine: Floats, cosine: Floats) -> Floats:
     """Turn vectors about an axis, by Rodrigues' formula.
 
     Args:
-        vector: (T, 3), or (3,).
+        vector: (..., T, 3).
         axis: Of unit length, (3,).
         sine: Of the angles, (T,).
         cosine: Of the angles, (T,).
 
     Returns:
-        (T, 3).
+        (..., T, 3).
     """
-    along = (vector @ axis)[:, None] * axis
-    across = _across(axis, vector)
-    return np.asarray(along + cosine[:, None] * (vector - along) + sine[:, None] * across)
+    # One factor for each number: numpy is slow to take each of three numbers at a time.
+    sine, cosine = (np.repeat(factor, 3).reshape(-1, 3) for factor in (sine, cosine))
+    along = (vector @ axis)[..., None] * axis
+    turned = cosine * (vector - along)
+    turned += along
+    turned += sine * _across(axis, vector)
+    return turned
 
 
 def _across(axis: Floats, vector: Floats) -> Floats:
     """Cross product of one vector and many: `numpy.cross` to the bit, but much faster."""
-    (x, y, z), (a, b, c) = axis.tolist(), vector.T
+    x, y, z = axis.tolist()
+    a, b, c = vector[..., 0], vector[..., 1], vector[..., 2]
     found = np.empty(vector.shape)
     found[..., 0] = y * c - z * b
     found[..., 1] = z * a - x * c

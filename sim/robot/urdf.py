@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from types import MappingProxyType
 from typing import Final, Literal, cast
 from xml.etree import ElementTree as ET
@@ -171,9 +172,15 @@ def parse_urdf(text: str, held: Mapping[str, float] = _NONE_HELD) -> Urdf:
         RobotFileError: It breaks a bound of `sim.robot.bounds`, is no XML, a number cannot be
             read, its links are not one tree, or a held joint is not there or does not turn.
     """
+    return _read(text, tuple(held.items()))
+
+
+@lru_cache(maxsize=4)
+def _read(text: str, held: tuple[tuple[str, float], ...]) -> Urdf:
+    """Whoever proposes a robot reads its file several times."""
     check_urdf(text)
     with by_line(text):
-        return _parsed(text, held)
+        return _parsed(text, dict(held))
 
 
 def _parsed(text: str, held: Mapping[str, float]) -> Urdf:

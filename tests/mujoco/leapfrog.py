@@ -84,11 +84,11 @@ class Leapfrog:
         actuation = self._gears.actuate(duty, d.qpos[7:], d.qvel[6:])
         d.qfrc_applied[:6] = 0.0
         d.qfrc_applied[6:] = actuation.torque + disturbance
-        apply_forces(m, d, self._robot, force_on_feet)
+        apply_forces(m, d, self._bodies, force_on_feet)
         inertia = np.zeros((m.nv, m.nv))
         mujoco.mj_fullM(m, d, inertia)
         force = d.qfrc_applied - d.qfrc_bias
-        inertia[range(6, m.nv), range(6, m.nv)] += half * self._damping(actuation)
+        inertia.reshape(-1)[6 * (m.nv + 1) :: m.nv + 1] += half * self._damping(actuation)
         for leg in np.flatnonzero(damping.any(axis=(1, 2))).tolist():
             jacobian, gain = self._foot(leg)
             resistance = half * jacobian.T @ damping[leg]

@@ -5,7 +5,7 @@ The step is ours alone, and so are these derivatives; MuJoCo's own steps do with
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 
 import mujoco
@@ -136,10 +136,11 @@ def feet_of(d: mujoco.MjData) -> tuple[Floats, Floats]:
     return position, velocity
 
 
-def apply_forces(m: mujoco.MjModel, d: mujoco.MjData, robot: Robot, forces: Floats) -> None:
-    """Add forces on the feet (L, 3) [N] to qfrc_applied."""
+def apply_forces(
+    m: mujoco.MjModel, d: mujoco.MjData, bodies: Sequence[int], forces: Floats
+) -> None:
+    """Add forces on the feet (L, 3) [N] to qfrc_applied. bodies: that these are on, by leg."""
     position, _ = feet_of(d)
-    nothing = np.zeros(3)
+    nothing, applied = np.zeros(3), d.qfrc_applied
     for leg in np.flatnonzero(forces[:, 2]).tolist():
-        body = int(m.site_bodyid[m.site(robot.description.legs[leg].foot).id])
-        mujoco.mj_applyFT(m, d, forces[leg], nothing, position[leg], body, d.qfrc_applied)
+        mujoco.mj_applyFT(m, d, forces[leg], nothing, position[leg], bodies[leg], applied)

@@ -111,6 +111,7 @@ def test_driven_on_the_ground_both_engines_accelerate_alike(
     exported = model(robot, scenario=scenario)
     d = mujoco.MjData(exported)
     ground = own_ground(robot)
+    feet = [int(exported.site_bodyid[exported.site(leg.foot).id]) for leg in robot.description.legs]
     friction = np.array([contact.friction for contact in robot.contacts()])
     rng = np.random.default_rng(7)
     held, slid, worst = 0, 0, 0.0
@@ -128,7 +129,7 @@ def test_driven_on_the_ground_both_engines_accelerate_alike(
         d.qfrc_applied[:6] = 0.0
         d.qfrc_applied[6:] = gears.actuate(duty, q[7:], v[6:]).torque + disturbance
         forces, _ = ground.forces(*feet_of(d), 0.0)
-        apply_forces(exported, d, robot, forces)
+        apply_forces(exported, d, feet, forces)
         limit = friction * forces[:, 2]
         rub = np.hypot(forces[:, 0], forces[:, 1])
         slid += int((rub > 0.99 * limit)[limit > 0.0].sum())

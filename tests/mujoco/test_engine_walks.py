@@ -41,8 +41,8 @@ def cycles(number: float, scenario: Scenario) -> Scenario:
 one_cycle = partial(cycles, 1.0)
 """A third of the walk, in which every foot has been lifted and set down."""
 
-into_the_second_cycle = partial(cycles, 1.5)
-"""One and a half cycles: the second begins where the first one ended."""
+into_the_second_cycle = partial(cycles, 1.1)
+"""One cycle and a tenth: the second begins where the first one ended."""
 
 half_a_cycle = partial(cycles, 0.5)
 """Half of the feet have been lifted and set down: enough to see how they stand and slip."""

@@ -219,6 +219,21 @@ def test_a_resolution_that_the_kernel_would_divide_by_is_one_at_least(
         dataclasses.replace(control_steps(robot)[0], **{name: 0})
 
 
+def test_a_reading_that_is_no_number_has_the_code_0_and_a_large_one_the_last_code(
+    robot: Robot,
+) -> None:
+    coding, _ = control_steps(robot)
+    readings = np.array([np.nan, np.inf, -np.inf, 0.5 / coding.angle_counts])
+    last = coding.angle_codes(np.array([1e300]))[0]
+    assert last > 100_000
+    assert coding.angle_codes(readings).tolist() == [0, last, -last, 0]
+    assert coding.current_codes(readings[:3]).tolist() == [
+        0,
+        coding.current_codes(readings[1:2])[0],
+        0,
+    ]
+
+
 @pytest.mark.parametrize(
     "name",
     ["proportional_gain", "integral_gain", "derivative_gain", "output_gain", "error_gain"],

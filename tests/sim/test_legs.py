@@ -138,12 +138,24 @@ def test_a_leg_of_turned_frames_puts_its_foot_on_the_path() -> None:
     assert np.abs(np.diff(angles, axis=0)).max() < 0.1
 
 
+def test_a_target_has_the_same_angles_to_the_bit_wherever_it_comes_and_comes_back() -> None:
+    leg = chain(quadruped())
+    begin, way = np.array(leg.foot(leg.stance.tolist())), np.linspace(-1.0, 1.0, 9)[:, None]
+    targets = begin + way * [0.03, 0.01, -0.02]
+    angles, miss = chain_angles(leg, targets)
+    order = np.array([3, 8, 3, 0, 1, 2, 2, 7, 6, 5, 4, 0])
+    again, missed = chain_angles(leg, targets[order])
+    np.testing.assert_array_equal(again, angles[order])
+    np.testing.assert_array_equal(missed, miss[order])
+
+
 def test_a_target_out_of_reach_is_missed_by_its_distance() -> None:
     leg = chain(quadruped())
     x, y, z = leg.hip
     coxa, femur, tibia = leg.lengths
     below = np.array([[x, y - coxa, z - 0.3], [x, y - coxa - femur - tibia - 0.02, z]])
-    _, miss = chain_angles(leg, below)
+    angles, miss = chain_angles(leg, below)
+    assert miss.tolist() == np.linalg.norm(below - leg.ends(angles), axis=1).tolist()
     _, expected = leg_angles(
         leg.lengths, np.zeros(2), np.array([coxa, coxa + femur + tibia + 0.02]), below[:, 2] - z
     )

@@ -80,7 +80,7 @@ def test_a_motor_that_pushes_at_an_obstacle_is_hot_and_loads_its_gear() -> None:
 
 @pytest.mark.parametrize("variant", [RobotVariant(), RobotVariant(backlash=(2.5, 1.0, 1.0))])
 def test_kernels_agree_on_a_jammed_leg_that_is_dropped(variant: RobotVariant) -> None:
-    scenario = short_walk(stuck_leg="left_rear", drop=0.01, cycle_time=0.4)
+    scenario = short_walk(stuck_leg="left_rear", drop=0.01, cycle_time=0.25)
     fast, slow = (
         walk(scenario, PI, "pi", robot=variant, backend=backend)
         for backend in ("native", "reference")

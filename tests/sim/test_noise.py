@@ -18,7 +18,7 @@ from sim.studies.accuracy import Deviation, noise_on_links
 from tests.examples.walks import short_walk, walk
 
 PI = {"P": 0.45, "I": 0.1}
-BRIEF = short_walk(cycle_time=0.4)
+BRIEF = short_walk(cycle_time=0.25)
 
 
 @pytest.fixture(scope="module")

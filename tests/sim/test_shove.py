@@ -83,7 +83,7 @@ def test_a_log_has_the_push_in_the_ticks_of_the_shove_alone() -> None:
 @pytest.mark.parametrize("variant", [RobotVariant(), RobotVariant(backlash=(2.5, 1.0, 1.0))])
 def test_kernels_agree_on_a_shove(variant: RobotVariant) -> None:
     scenario = short_walk(
-        shove=2.0, shove_direction=-60.0, shove_at=0.3, cycle_time=0.4, slope=5.0, drop=0.002
+        shove=2.0, shove_direction=-60.0, shove_at=0.3, cycle_time=0.25, slope=5.0, drop=0.002
     )
     fast, slow = (
         walk(scenario, PI, "pi", robot=variant, backend=backend)

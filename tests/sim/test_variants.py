@@ -27,7 +27,7 @@ from tests.examples.robots import changed
 pytestmark = pytest.mark.slow
 
 PI = np.array([[0.45, 0.1]])
-BRIEF = SCENARIOS[0].model_copy(update={"cycles": 1.0, "cycle_time": 0.5})
+BRIEF = SCENARIOS[0].model_copy(update={"cycles": 1.0, "cycle_time": 0.3})
 KARNOPP = RobotVariant(name="szabadka2", contact_law="karnopp")
 DEAD_ZONE = RobotVariant(name="szabadka2", contact_law="dead_zone")
 STICK = RobotVariant(name="szabadka2", contact_law="stick")

@@ -7,10 +7,11 @@ the tests hold against Pinocchio and MuJoCo. The compiled kernel has the same fo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import threading
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, reduce
-from typing import Any, Generic, TypeVar, TypeVarTuple
+from typing import Any, Final, Generic, TypeVar, TypeVarTuple
 
 import casadi as ca
 import numpy as np
@@ -23,7 +24,7 @@ from sim.kernel.dynamics.inertia import Force
 from sim.kernel.dynamics.kinds import LimbKind, limb_kinds
 from sim.kernel.dynamics.limb import After, Before, Environment, LimbState, Scalars, after, before
 from sim.kernel.dynamics.spatial import Scalar, add
-from sim.kernel.dynamics.traced import Traced
+from sim.kernel.dynamics.traced import Traced, outline
 from sim.kernel.parameters import Layout, internal_state_size
 from sim.robot import Robot
 from sim.robot.chain import Placement
@@ -119,7 +120,7 @@ class PhysicsModel:
         return _step(self._robot, self._limbs, self.layout, self._symbols, timestep)
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=16)
 def physics_model(robot: Robot) -> PhysicsModel:
     """Derive the step from a robot's URDF.
 
@@ -203,7 +204,8 @@ def _step(
     ) -> Before:
         return before(limb, law, base, state, around, dict(zip(layout.by_limb, p, strict=True)))
 
-    before_of, after_of = _ByKind(limbs, limb_before), _ByKind(limbs, after)
+    before_of = _ByKind(limbs, limb_before, law, *layout.by_limb)
+    after_of = _ByKind(limbs, after)
     parts = s.q[7:], s.v[6:], s.duty, s.disturbance, motors[:n], motors[n:], carried
     befores = [
         before_of(
@@ -241,25 +243,48 @@ def _step(
     )
 
 
-class _ByKind(Generic[*Trees, T]):
-    """A function of limbs, traced once for all of a kind."""
+_traces: Final[dict[Hashable, Any]] = {}
+"""Functions of limbs, by all that they depend on: other robots have limbs of such kinds, too."""
 
-    def __init__(self, limbs: Sequence[Limb], function: Callable[[Limb, *Trees], T]) -> None:
+_TRACES_KEPT: Final = 64
+
+_tracing: Final = threading.Lock()
+
+
+class _ByKind(Generic[*Trees, T]):
+    """A function of limbs, traced once for all of a kind.
+
+    Args:
+        limbs: Of a robot.
+        function: Of a limb and trees.
+        given: All that the function depends on besides.
+    """
+
+    def __init__(
+        self, limbs: Sequence[Limb], function: Callable[[Limb, *Trees], T], *given: str
+    ) -> None:
         self._limbs = list(zip(limbs, limb_kinds(limbs), strict=True))
-        self._function = function
+        self._function, self._given = function, (function.__qualname__, *given)
         self._traced: dict[LimbKind, Traced[Scalars, *Trees, T]] = {}
 
     def __call__(self, number: int, *arguments: *Trees) -> T:
         limb, kind = self._limbs[number]
         constants: Scalars = tuple(kind.numbers_of(limb))
         if kind not in self._traced:
-
-            def of_constants(symbols: Scalars, *rest: *Trees) -> T:
-                return self._function(kind.symbolic(limb, symbols), *rest)
-
-            examples: Scalars = tuple(ca.SX.sym("constant") for _ in constants)
-            self._traced[kind] = Traced(of_constants, examples, *arguments)
+            key = self._given, kind, outline(arguments)
+            with _tracing:
+                traced = _traces.pop(key, None) or self._trace(limb, kind, *arguments)
+                self._traced[kind] = _traces[key] = traced
+                if len(_traces) > _TRACES_KEPT:
+                    del _traces[next(iter(_traces))]
         return self._traced[kind](constants, *arguments)
+
+    def _trace(self, limb: Limb, kind: LimbKind, *arguments: *Trees) -> Traced[Scalars, *Trees, T]:
+        def of_constants(symbols: Scalars, *rest: *Trees) -> T:
+            return self._function(kind.symbolic(limb, symbols), *rest)
+
+        examples: Scalars = tuple(ca.SX.sym("constant") for _ in kind.numbers_of(limb))
+        return Traced(of_constants, examples, *arguments)
 
 
 def _of_limb(values: Sequence[Scalar], k: int, n_limbs: int) -> tuple[Scalar, ...]:

@@ -54,6 +54,18 @@ class Traced(Generic[*Trees, T]):
         return mapped(self._made, lambda leaf: next(found) if _is_symbolic(leaf) else leaf)
 
 
+def outline(tree: object) -> str:
+    """All of a tree but its symbols: trees with one outline are traced alike.
+
+    Args:
+        tree: Examples for `Traced`.
+
+    Returns:
+        Its shape and numbers.
+    """
+    return repr(mapped(tree, lambda leaf: "symbol" if _is_symbolic(leaf) else float(leaf)))
+
+
 def _is_symbolic(leaf: Scalar) -> bool:
     """Also of a number in CasADi's type: another limb may have a symbol there."""
     return isinstance(leaf, ca.SX)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import signal
 import socket
-import subprocess
 import threading
 import time
 from collections.abc import Iterator
@@ -19,36 +18,17 @@ from gaitswarm.settings import Settings
 from services.optimizer.jobs.job import Job, JobState
 from services.optimizer.service import JobService
 from services.optimizer.store.sql_store import SqlStore
+from tests.api import server_process
 from tests.api.conftest import Serve
+from tests.examples.forked import ForkedCommand
 from tests.examples.jobs import LONG_SPEC
-from tests.examples.processes import eventually, loaded_by, output, start_python
+from tests.examples.processes import eventually, loaded_by, output
 from tests.examples.servers import ServerProcess
-
-PROGRAM = """
-import sys
-from api.app import create_app
-from api.server import ApiServer
-from gaitswarm.settings import Settings
-from services.optimizer.service import JobService
-from services.optimizer.store.sql_store import SqlStore
-from tests.api.conftest import Serve
-from tests.examples.jobs import LONG_SPEC
-from services.optimizer.store.sql_store import open_store
-
-store = open_store(sys.argv[1])
-settings = Settings(api_event_poll_seconds=60.0)
-app = create_app(JobService(store), settings=settings)
-server = ApiServer(app, host="127.0.0.1", port=0, shutdown_seconds=60)
-print(server.url, flush=True)
-server.run()
-store.close()
-print("closed", flush=True)
-"""
 
 
 @pytest.fixture
-def process(database: Path) -> Iterator[subprocess.Popen[str]]:
-    with start_python("-c", PROGRAM, database, stderr=None) as process:
+def process(database: Path) -> Iterator[ForkedCommand]:
+    with ForkedCommand(database, program=server_process.main, stderr=None) as process:
         yield process
         process.kill()
 
@@ -56,7 +36,7 @@ def process(database: Path) -> Iterator[subprocess.Popen[str]]:
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_ends_the_process_within_seconds_in_spite_of_open_streams(
-    process: subprocess.Popen[str], job: Job, number: signal.Signals
+    process: ForkedCommand, job: Job, number: signal.Signals
 ) -> None:
     said = output(process.stdout)
     url = said.readline().strip()

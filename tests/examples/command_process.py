@@ -1,14 +1,12 @@
-"""What a process runs that is forked for a command of `gaitswarm`."""
+"""What a process runs that is forked for a command of `gaitswarm`, or for another program."""
 
 from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from multiprocessing.connection import Connection
-
-import cli.main
 
 # Commands import these when they run: here, in the process that is forked, once for all of them.
 for _name in (
@@ -19,6 +17,7 @@ for _name in (
     "cli.embedded",
     "cli.inputs.robots",
     "cli.inputs.spec_file",
+    "cli.main",
     "cli.tables.views",
     "gaitswarm.jobs.database.jobs",
     "numpy.random",
@@ -35,19 +34,22 @@ for _name in (
 
 
 def main(
+    program: Callable[[], object],
     arguments: Sequence[str],
     environment: Mapping[str, str],
-    streams: tuple[Connection, Connection],
+    streams: Mapping[int, Connection],
     new_session: bool,
 ) -> None:
-    """Be the command. streams: standard output and error."""
+    """Be the program. streams: standard ones, by number; output and error are among them."""
     if new_session:
         os.setsid()
-    for number, stream in enumerate(streams, start=1):
+    for number, stream in streams.items():
         os.dup2(stream.fileno(), number)
         stream.close()
     os.environ.clear()
     os.environ.update(environment)
+    if 0 in streams:
+        sys.stdin = open(0, encoding="utf-8", closefd=False)  # noqa: SIM115
     # A line is written at once.
     sys.stdout, sys.stderr = (
         open(  # noqa: SIM115
@@ -56,4 +58,4 @@ def main(
         for number, errors in ((1, "strict"), (2, "backslashreplace"))
     )
     sys.argv = ["gaitswarm", *arguments]
-    cli.main.main()
+    program()

@@ -1,8 +1,9 @@
 """Processes of `gaitswarm` that are forked from one which has imported what commands need.
 
-They are the command line in a process of its own: with its signals, streams and exit code. What
-they leave out is the start of the interpreter with its imports, a second each; so tests of how
-`gaitswarm` starts, or ends as an interpreter, start it as users do (`COMMAND_LINE`).
+They are the command line in a process of its own: with its signals, streams and exit code; or
+another program, as a test has it. What they leave out is the start of the interpreter with its
+imports, a second each; so tests of how `gaitswarm` starts, or ends as an interpreter, start it as
+users do (`COMMAND_LINE`).
 """
 
 from __future__ import annotations
@@ -12,12 +13,13 @@ import os
 import signal
 import subprocess
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import IO, Any, Self
 
+from cli.main import main
 from tests.examples import command_process
 from tests.examples.processes import environment_of_process
 
@@ -33,33 +35,41 @@ Stream = IO[Any] | int | None
 class ForkedCommand:
     """A command in a process, used as `subprocess.Popen` is.
 
-    arguments: of `gaitswarm`; environment: beside this process's.
+    arguments: of `gaitswarm`; environment: beside this process's; program: a function of a module
+    that a process runs in place of `gaitswarm`.
     """
 
     def __init__(
         self,
         *arguments: str | Path,
         environment: Mapping[str, str] | None = None,
+        program: Callable[[], object] = main,
+        stdin: Stream = None,
         stdout: Stream = subprocess.PIPE,
         stderr: Stream = subprocess.PIPE,
         start_new_session: bool = False,
     ) -> None:
-        self.stdout, out = _stream(stdout, 1)
-        self.stderr, err = _stream(stderr, 2)
+        self.stdin: IO[str] | None = None
+        streams = {}
+        if stdin is not None:
+            self.stdin, streams[0] = _stream(stdin, 0)
+        self.stdout, streams[1] = _stream(stdout, 1)
+        self.stderr, streams[2] = _stream(stderr, 2)
         self._process = PROCESSES.Process(
             target=command_process.main,
             args=(
+                program,
                 [str(argument) for argument in arguments],
                 environment_of_process(environment),
-                (out, err),
+                streams,
                 start_new_session,
             ),
             # At the end of the tests nobody waits for it.
             daemon=True,
         )
         self._process.start()
-        out.close()
-        err.close()
+        for stream in streams.values():
+            stream.close()
         assert self._process.pid is not None
         self.pid = self._process.pid
 
@@ -115,7 +125,7 @@ class ForkedCommand:
         self.wait()
 
     def _close(self) -> None:
-        for stream in (self.stdout, self.stderr):
+        for stream in (self.stdin, self.stdout, self.stderr):
             if stream is not None:
                 with suppress(OSError):
                     stream.close()
@@ -139,9 +149,11 @@ def run_forked(
 
 
 def _stream(given: Stream, number: int) -> tuple[IO[str] | None, Connection]:
-    """Where this process reads, and what the other one writes to."""
+    """Where this process reads or writes, and what the other one has in its place."""
     if given != subprocess.PIPE:
         own = number if given is None else given if isinstance(given, int) else given.fileno()
         return None, Connection(os.dup(own), readable=False)
     reading, writing = os.pipe()
+    if number == 0:
+        return open(writing, "w", encoding="utf-8"), Connection(reading, writable=False)  # noqa: PTH123
     return open(reading, encoding="utf-8"), Connection(writing, readable=False)  # noqa: PTH123

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import sqlite3
 import subprocess
-import sys
 import threading
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -21,7 +21,9 @@ from services.optimizer.store.rows.tables import metadata
 from services.optimizer.store.schema.migrate import lock_for_migration
 from services.optimizer.store.schema.revisions import MIGRATIONS, head
 from services.optimizer.store.sql_store import SqlStore, open_store
-from tests.examples.processes import loaded_by
+from tests.examples.forked import ForkedCommand
+from tests.examples.processes import loaded_by, output
+from tests.store import worker_process
 from tests.store.examples import LEASE, spec
 
 
@@ -181,19 +183,20 @@ def test_a_migration_under_way_elsewhere_is_waited_for(fresh_url: str) -> None:
 
 @pytest.mark.slow
 def test_a_database_can_be_opened_by_several_processes_at_once(fresh_url: str) -> None:
-    code = (
-        "import sys; from services.optimizer.store.sql_store import open_store;"
-        "sys.stdin.readline(); open_store(sys.argv[1]).ping()"
-    )
-    processes = [
-        subprocess.Popen([sys.executable, "-c", code, fresh_url], stdin=subprocess.PIPE)
-        for _ in range(3)
-    ]
-    for process in processes:
-        assert process.stdin is not None
-        process.stdin.write(b"go\n")
-        process.stdin.close()
-    assert [process.wait(timeout=60) for process in processes] == [0, 0, 0]
+    with ExitStack() as stack:
+        pipes = {"stdin": subprocess.PIPE, "stderr": None}
+        processes = [
+            stack.enter_context(
+                ForkedCommand(fresh_url, program=worker_process.open_when_told, **pipes)
+            )
+            for _ in range(3)
+        ]
+        for process in processes:
+            assert output(process.stdout).readline() == "ready\n"
+        for process in processes:
+            output(process.stdin).write("go\n")
+            output(process.stdin).flush()
+        assert [process.wait(timeout=60) for process in processes] == [0, 0, 0]
 
 
 def test_a_closed_store_can_be_closed_again(store: SqlStore) -> None:

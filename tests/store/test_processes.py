@@ -17,7 +17,9 @@ from services.optimizer.errors import Conflict
 from services.optimizer.jobs.job import Claim, Command, Job, JobState
 from services.optimizer.store.connections.engine import connect, parse_url
 from services.optimizer.store.sql_store import SqlStore, open_store
-from tests.examples.processes import output, start_python
+from tests.examples.forked import ForkedCommand
+from tests.examples.processes import output
+from tests.store import worker_process
 from tests.store.examples import LEASE, Clock, ask, spec
 from tests.store.worker_process import PARTICLES
 
@@ -44,10 +46,11 @@ def at_once(n: int, act: Callable[[int], None]) -> None:
 
 
 @contextmanager
-def worker(what: str, url: str) -> Iterator[subprocess.Popen[str]]:
+def worker(what: str, url: str) -> Iterator[ForkedCommand]:
     """A worker process that is ready and waits for a line; killed in the end."""
-    arguments = ("-m", "tests.store.worker_process", what, url)
-    with start_python(*arguments, stdin=subprocess.PIPE, stderr=None) as process:
+    with ForkedCommand(
+        what, url, program=worker_process.main, stdin=subprocess.PIPE, stderr=None
+    ) as process:
         try:
             assert output(process.stdout).readline() == "ready\n"
             yield process
@@ -55,7 +58,7 @@ def worker(what: str, url: str) -> Iterator[subprocess.Popen[str]]:
             process.kill()
 
 
-def say_go(process: subprocess.Popen[str]) -> None:
+def say_go(process: ForkedCommand) -> None:
     output(process.stdin).write("go\n")
     output(process.stdin).flush()
 

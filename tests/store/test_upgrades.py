@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 from contextlib import closing
 
 import pytest
@@ -17,11 +16,12 @@ from services.optimizer.store.schema.in_use import exclusive
 from services.optimizer.store.schema.migrate import upgrade
 from services.optimizer.store.schema.revisions import MIGRATIONS, head, read_revision
 from services.optimizer.store.sql_store import open_store
-from tests.examples.paths import ROOT
+from tests.examples.forked import ForkedCommand
+from tests.examples.processes import output
+from tests.store import worker_process
 from tests.store.examples import spec
 from tests.store.test_opening import edit
-
-OLDER = "0002"
+from tests.store.worker_process import OLDER
 
 JOB = "bcdfghjkmnpq"
 
@@ -88,41 +88,20 @@ def test_no_upgrade_touches_what_a_newer_gaitswarm_has_made(fresh_url: str) -> N
         upgrade(fresh_url)
 
 
-USER = """
-import sys
-from services.optimizer.store.schema import revisions
-revisions.head = lambda: "0002"
-from services.optimizer.store.connections.engine import connect, parse_url
-from services.optimizer.store.schema.in_use import admit
-database = connect(parse_url(sys.argv[1]))
-admit(database)
-with database.transaction(write=False):
-    pass
-print("open", flush=True)
-sys.stdin.readline()
-"""
-"""A process of that older revision, which has the database open and does nothing."""
-
-
 @pytest.mark.slow
 def test_a_database_that_an_idle_process_has_open_is_not_upgraded(fresh_url: str) -> None:
     store_older(fresh_url)
-    process = subprocess.Popen(
-        [sys.executable, "-c", USER, fresh_url],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-        cwd=ROOT,
+    process = ForkedCommand(
+        fresh_url, program=worker_process.stay_open, stdin=subprocess.PIPE, stderr=None
     )
     with process:
-        assert process.stdin is not None and process.stdout is not None
-        assert process.stdout.readline() == "open\n"
+        assert output(process.stdout).readline() == "ready\n"
         with pytest.raises(Conflict, match=r"in use by .*end all that use it first") as refused:
             upgrade(fresh_url)
         if fresh_url.startswith("postgresql"):
             assert f":{process.pid}" in str(refused.value)
-        process.stdin.write("end\n")
-        process.stdin.flush()
+        output(process.stdin).write("end\n")
+        output(process.stdin).flush()
         process.wait(timeout=30.0)
     assert upgrade(fresh_url) == OLDER
 

@@ -1,4 +1,4 @@
-"""A runner in a process of its own: `python -m tests.store.worker_process claim|commit URL`.
+"""Programs of processes that use a store; `main` is a runner: `claim URL` or `commit URL`.
 
 It begins when a line comes on its standard input, and prints what it has done, line by line.
 """
@@ -7,10 +7,16 @@ from __future__ import annotations
 
 import sys
 
+from services.optimizer.store.connections.engine import connect, parse_url
+from services.optimizer.store.schema import revisions
+from services.optimizer.store.schema.in_use import admit
 from services.optimizer.store.sql_store import SqlStore, open_store
 from tests.store.examples import ask, completed
 
 PARTICLES = 25
+
+OLDER = "0002"
+"""A revision that is not the newest."""
 
 
 def say(word: object) -> None:
@@ -40,9 +46,32 @@ def commit_for_ever(store: SqlStore) -> None:
         index += 1
 
 
-if __name__ == "__main__":
+def main() -> None:
+    """Do what is asked for, when a line has come."""
     what, url = sys.argv[1:]
     opened = open_store(url)
     say("ready")
     sys.stdin.readline()
     {"claim": claim_all, "commit": commit_for_ever}[what](opened)
+
+
+def open_when_told() -> None:
+    """Open a database, which may have to be made, when a line has come."""
+    say("ready")
+    sys.stdin.readline()
+    open_store(sys.argv[1]).ping()
+
+
+def stay_open() -> None:
+    """Have the database of an older revision open, and do nothing, until a line comes."""
+    revisions.head = lambda: OLDER
+    database = connect(parse_url(sys.argv[1]))
+    admit(database)
+    with database.transaction(write=False):
+        pass
+    say("ready")
+    sys.stdin.readline()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,23 @@
+"""A server of the store whose URL is its argument, in a process of its own."""
+
+from __future__ import annotations
+
+import sys
+
+from api.app import create_app
+from api.server import ApiServer
+from gaitswarm.settings import Settings
+from services.optimizer.service import JobService
+from services.optimizer.store.sql_store import open_store
+
+
+def main() -> None:
+    """Print where it listens, and serve until a signal comes."""
+    store = open_store(sys.argv[1])
+    settings = Settings(api_event_poll_seconds=60.0)
+    app = create_app(JobService(store), settings=settings)
+    server = ApiServer(app, host="127.0.0.1", port=0, shutdown_seconds=60)
+    sys.stdout.write(f"{server.url}\n")
+    server.run()
+    store.close()
+    sys.stdout.write("closed\n")

@@ -63,7 +63,6 @@ class State(TypedDict):
     the jobs that it runs, if it runs any. answers: that are remembered.
     """
 
-    service: JobService
     settings: Settings
     slots: ComputingSlots
     analyses: ComputingSlots
@@ -81,16 +80,14 @@ class State(TypedDict):
 
 
 def lifespan(
-    service: JobService,
     settings: Settings,
     components: Sequence[Component],
     metrics: Metrics,
     activity: Activity | None = None,
 ) -> Callable[[FastAPI], AbstractAsyncContextManager[State]]:
-    """The lifespan of an application around a service.
+    """The lifespan of an application.
 
     Args:
-        service: answers the requests; its store stays its owner's to close.
         settings: of the application.
         components: parts of the process beside the database.
         metrics: of this process.
@@ -107,7 +104,6 @@ def lifespan(
         workers, queue = settings.api_simulation_workers, settings.api_simulation_queue
         analysts, waiting = settings.api_analysis_workers, settings.api_analysis_queue
         yield State(
-            service=service,
             settings=settings,
             slots=ComputingSlots("simulations", workers, queue),
             analyses=ComputingSlots("analyses", analysts, waiting),
@@ -129,12 +125,12 @@ def lifespan(
 
 
 async def service(request: Request) -> JobService:
-    """The application's service; tests may override it.
+    """The application's service.
 
     Args:
         request: under way.
     """
-    return cast(JobService, request.state.service)
+    return service_of(request.scope)
 
 
 def service_of(scope: Scope) -> JobService:
@@ -143,8 +139,7 @@ def service_of(scope: Scope) -> JobService:
     Args:
         scope: of a request under way.
     """
-    replaced = scope["app"].dependency_overrides.get(service)
-    return cast(JobService, scope["state"]["service"] if replaced is None else replaced())
+    return cast(JobService, scope["app"].state.service)
 
 
 async def settings(request: Request) -> Settings:

@@ -13,7 +13,8 @@ from services.optimizer.store.sql_store import open_store
 from tests.cli.conftest import Finished, Gaitswarm
 from tests.store.examples import spec
 from tests.store.test_opening import edit
-from tests.store.test_upgrades import OLDER, store_older
+from tests.store.test_upgrades import store_older
+from tests.store.worker_process import OLDER
 
 
 def test_commands_refuse_an_older_database_until_it_is_upgraded(

@@ -183,11 +183,11 @@ def test_a_migration_under_way_elsewhere_is_waited_for(fresh_url: str) -> None:
 
 @pytest.mark.slow
 def test_a_database_can_be_opened_by_several_processes_at_once(fresh_url: str) -> None:
+    program = worker_process.open_when_told
     with ExitStack() as stack:
-        pipes = {"stdin": subprocess.PIPE, "stderr": None}
         processes = [
             stack.enter_context(
-                ForkedCommand(fresh_url, program=worker_process.open_when_told, **pipes)
+                ForkedCommand(fresh_url, program=program, stdin=subprocess.PIPE, stderr=None)
             )
             for _ in range(3)
         ]

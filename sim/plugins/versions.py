@@ -57,9 +57,15 @@ def version_of(distribution: str) -> str:
     if distribution in known:
         return known[distribution]
     try:
-        return metadata.version(distribution)
+        return _installed(distribution)
     except metadata.PackageNotFoundError:
         return MISSING
+
+
+@lru_cache(maxsize=256)
+def _installed(distribution: str) -> str:
+    """As it is at the first call: every job asks, and to read it takes a millisecond."""
+    return metadata.version(distribution)
 
 
 @lru_cache(maxsize=1)

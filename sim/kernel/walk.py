@@ -177,8 +177,7 @@ def _rounded(value: Floats, low: int, high: int) -> Ints:
     """Of a NaN, 0."""
     whole = np.rint(value)
     whole[np.isnan(whole)] = 0.0
-    code: Ints = np.minimum(np.maximum(whole, low), high).astype(np.int64)
-    return code
+    return np.minimum(np.maximum(whole, low), high).astype(np.int64)
 
 
 def current_smoothing(time_constant: float, timestep: float) -> float:

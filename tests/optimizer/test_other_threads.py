@@ -76,7 +76,7 @@ IN_SCENARIOS = LOGARITHMS[: DESIGNS // 5, :, None].repeat(6, axis=2)
     [
         lambda: geometric_mean(LOGARITHMS),
         lambda: Judgement(LOGARITHMS[:, 0], LOGARITHMS).utilities,
-        lambda: judge(IN_SCENARIOS, np.zeros(IN_SCENARIOS.shape[:2]) > 0, PREFERENCES["A"]),
+        lambda: judge(IN_SCENARIOS, IN_SCENARIOS[..., 0] < 0, PREFERENCES["A"]),
     ],
     ids=["fitness", "utilities", "judgement"],
 )

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 
 import pytest
 
-from sim.kernel.emitted.order import PATIENCE, Statement, ordered
+from sim.kernel.emitted.order import PATIENCE, REGISTERS, Statement, ordered
 
 
 def value(name: str, *reads: str, operations: int = 1, latency: int = 4) -> Statement:
@@ -55,6 +55,47 @@ def test_each_statement_comes_once_and_after_what_it_reads(seed: int) -> None:
 
 def test_the_order_is_the_same_on_every_machine() -> None:
     assert list(ordered(some_function(1))) == list(ordered(some_function(1)))
+
+
+def by_the_definition(statements: Sequence[Statement]) -> list[str]:
+    """Operations in order, of which all is asked anew before each."""
+    operations = [s for s in statements if s.operations]
+    number = {name: k for k, s in enumerate(operations) for name in s.defines}
+    sources = [{number[name] for name in s.reads if name in number} for s in operations]
+    readers = [[j for j, of in enumerate(sources) if k in of] for k in range(len(operations))]
+    to_end = [0] * len(operations)
+    for k in reversed(range(len(operations))):
+        to_end[k] = operations[k].latency + max((to_end[j] for j in readers[k]), default=0)
+    written: dict[int, int] = {}
+    kept, now = 0, 0
+
+    def more_kept(k: int) -> int:
+        last = [j for j in sources[k] if all(r in written or r == k for r in readers[j])]
+        return bool(readers[k]) - len(last)
+
+    def preference(k: int) -> tuple[int, ...]:
+        there = max((written[j] + operations[j].latency for j in sources[k]), default=0)
+        late, newest = max(0, there - now), max((written[j] for j in sources[k]), default=0)
+        if kept >= REGISTERS:
+            return more_kept(k), late, -to_end[k], -newest, k
+        return max(0, late - PATIENCE), -to_end[k], -newest, k
+
+    while len(written) < len(operations):
+        ready = [k for k, of in enumerate(sources) if k not in written and of <= written.keys()]
+        k = min(ready, key=preference)
+        kept += more_kept(k)
+        there = max((written[j] + operations[j].latency for j in sources[k]), default=0)
+        now = max(now + 1, there)
+        written[k] = now
+    return [operations[k].text for k in written]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_of_those_that_are_ready_the_preferred_one_is_next(seed: int) -> None:
+    statements = some_function(seed, 200)
+    assert most_kept(list(ordered(statements))) >= REGISTERS
+    found = [s.text for s in ordered(statements) if s.operations]
+    assert found == by_the_definition(statements)
 
 
 def test_values_that_are_used_late_are_defined_late() -> None:

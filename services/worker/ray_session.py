@@ -43,6 +43,8 @@ _BEFORE_IMPORT: Final = {
     "RAY_DISABLE_FAILURE_SIGNAL_HANDLER": "1",
     # The behaviour that later versions have in any case; without it, init warns.
     "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
+    # Where nobody asks what became of a task any more, as when we close, nobody is to be told.
+    "RAY_IGNORE_UNHANDLED_ERRORS": "1",
 }
 
 _UNUSED: Final = ("start_api_server", "start_monitor", "start_log_monitor")

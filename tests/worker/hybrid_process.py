@@ -61,7 +61,16 @@ def close(state: str) -> str:
     evaluator.evaluate(replace(WANTED, iterations_left=left), never)
     if state == "while Ray is started":
         eventually(lambda: bool(descendants(os.getpid())))
+    if state == "while a worker of Ray dies":
+        eventually(lambda: bool(importing()))
+        for worker in importing():
+            os.kill(worker, signal.SIGKILL)
     return left_by(evaluator)
+
+
+def importing() -> list[int]:
+    """Ray's workers that import what walks need, before any walk."""
+    return [p.pid for p in descendants(os.getpid()) if "ray::warm_up" in p.title]
 
 
 def left_by(evaluator: HybridEvaluator) -> str:

@@ -148,7 +148,9 @@ def test_a_cluster_that_cannot_be_connected_is_an_error_with_its_reason(opening:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("state", ["in threads", "while Ray is started"])
+@pytest.mark.parametrize(
+    "state", ["in threads", "while Ray is started", "while a worker of Ray dies"]
+)
 def test_closed_before_ray_is_open_it_leaves_nothing_behind_and_says_nothing(state: str) -> None:
     done = python("-m", "tests.worker.hybrid_process", "close", state)
     assert (done.stdout, done.stderr, done.returncode) == ("nothing left\n", "", 0)

@@ -7,6 +7,8 @@ import json
 from collections.abc import Mapping
 from typing import Any, Final
 
+from pydantic_core import from_json
+
 from gaitswarm.zip_archive import BadArchive, zipped
 
 FORMAT: Final = "gaitswarm-evidence"
@@ -75,6 +77,9 @@ def check_hashes(members: Mapping[str, bytes]) -> list[str]:
 def parsed_json(content: bytes, name: str) -> Any:
     """Read a JSON document as the standard has it: no NaN, no infinities, no endless nesting.
 
+    By a parser that takes none of Python's stack: where that ran out, whatever Python cleans up at
+    that moment, of anybody's, would not be cleaned up.
+
     Args:
         content: Its bytes.
         name: Of the member, for messages.
@@ -88,14 +93,10 @@ def parsed_json(content: bytes, name: str) -> Any:
     if len(content) > LARGEST_TEXT:
         raise BadArchive(f"{name} is larger than {LARGEST_TEXT >> 20} MiB")
     try:
-        return json.loads(content, parse_constant=_refuse)
-    except (ValueError, RecursionError) as error:
-        raise BadArchive(f"{name} is not valid JSON: {type(error).__name__}") from error
+        return from_json(content, allow_inf_nan=False)
+    except ValueError as error:
+        raise BadArchive(f"{name} is not valid JSON: {error}") from error
 
 
 def _hash(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
-
-
-def _refuse(constant: str) -> float:
-    raise ValueError(f"{constant} is no number of JSON")

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import inspect
 import io
 import json
 import random
+import sys
 import zipfile
 from collections.abc import Callable
 
@@ -14,7 +16,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import gaitswarm
-from gaitswarm.evidence.archive import MANIFEST, archived
+from gaitswarm.evidence.archive import MANIFEST, archived, parsed_json
 from gaitswarm.zip_archive import unzipped
 from sim.errors import ProcessEnded
 from sim.robot import check, variant
@@ -103,6 +105,17 @@ DOCUMENTS: dict[str, bytes] = {
 def test_documents_that_are_none_are_refused(proved: Proved, document: bytes) -> None:
     for name in ("spec.json", "job.json", "provenance.json"):
         assert name in refusal(tampered(proved.content, {name: lambda _: document}))
+
+
+def test_nesting_takes_none_of_the_stack_that_cleaning_up_needs() -> None:
+    nested = b"[" * 150 + b"]" * 150
+    most = sys.getrecursionlimit()
+    sys.setrecursionlimit(len(inspect.stack()) + 60)
+    try:
+        document = parsed_json(nested, "nested.json")
+    finally:
+        sys.setrecursionlimit(most)
+    assert json.dumps(document).encode() == nested
 
 
 def test_a_manifest_that_is_none_is_refused(proved: Proved) -> None:

@@ -77,8 +77,8 @@ def check_hashes(members: Mapping[str, bytes]) -> list[str]:
 def parsed_json(content: bytes, name: str) -> Any:
     """Read a JSON document as the standard has it: no NaN, no infinities, no endless nesting.
 
-    By a parser that takes none of Python's stack: where that ran out, whatever Python cleans up at
-    that moment, of anybody's, would not be cleaned up.
+    The parser takes none of Python's stack. The standard library's goes to its end before it
+    refuses deep nesting, and finalizers that run at that moment fail.
 
     Args:
         content: Its bytes.

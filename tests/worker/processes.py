@@ -16,7 +16,12 @@ class Process:
 
     @property
     def title(self) -> str:
-        return Path(f"/proc/{self.pid}/cmdline").read_bytes().replace(b"\0", b" ").decode()
+        """Its command; none of one that has ended."""
+        try:
+            command = Path(f"/proc/{self.pid}/cmdline").read_bytes()
+        except (FileNotFoundError, ProcessLookupError):
+            return ""
+        return command.replace(b"\0", b" ").decode()
 
     @property
     def resident(self) -> int:

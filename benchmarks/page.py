@@ -24,7 +24,7 @@ from playwright.sync_api import Page, sync_playwright
 from benchmarks.large_store import fill
 from services.runtime import open_store
 from tests.examples.servers import ServerProcess
-from tests.web.chromium import ARGUMENTS, find_chromium
+from tests.web.chromium import ARGUMENTS, find_browser
 from tests.web.pages import Pages
 from tests.web.visit import Visit
 
@@ -137,7 +137,7 @@ def main() -> None:
         try:
             newest = server.client.get("/v1/jobs", params={"search": "long"}).json()["items"][0]
             with sync_playwright() as playwright:
-                chromium = str(find_chromium())
+                chromium = str(find_browser())
                 browser = playwright.chromium.launch(executable_path=chromium, args=ARGUMENTS)
                 found = measure(Pages(browser), server.url, newest["id"], rounds=options.rounds)
                 browser.close()

@@ -18,7 +18,7 @@ from tests.examples import requirements
 from tests.examples.jobs import SMALL_SPEC
 from tests.examples.servers import QUICK_EVENTS, Server, ServerProcess
 from tests.examples.walks import SHORT_WALK
-from tests.web.chromium import ARGUMENTS, find_chromium
+from tests.web.chromium import ARGUMENTS, SHELL, find_shell
 from tests.web.pages import Pages
 from tests.web.visit import Visit
 
@@ -39,9 +39,9 @@ SMALL_JOB: dict[str, Any] = SMALL_SPEC | {
 @pytest.fixture(scope="session")
 def _chromium() -> str:
     """Path of the browser; skips all tests of the page where browser or page are missing."""
-    found = find_chromium()
+    found = find_shell()
     requirements.PAGE.check(
-        "" if found else "Chromium is not installed (Debian: apt install chromium)",
+        "" if found else f"Chromium is not installed (Debian: apt install {SHELL})",
         "" if is_built() else "the page is not built (make page)",
     )
     return str(found)

@@ -122,6 +122,22 @@ DOUBLE_CLICK_WITH_AN_ITERATION = """() => new Promise((done) => {
 """After the page has the iteration, and before its chart draws that."""
 
 
+DOUBLE_CLICK_ON_A_NEW_CHART = """() => new Promise((done) => {
+    const chart = document.querySelector('.chart-box')
+    const drawn = (_, observer) => {
+        observer.disconnect()
+        Promise.resolve().then(() => {
+            const twice = new MouseEvent('dblclick', { bubbles: true })
+            chart.querySelector('.u-over').dispatchEvent(twice)
+            done()
+        })
+    }
+    new MutationObserver(drawn).observe(chart, { childList: true })
+    document.querySelector('.chart-frame input[type=checkbox]:checked').click()
+})"""
+"""Before anything else happens: what draws it anew is another scale."""
+
+
 def chart_range(page: Page) -> list[float]:
     """Of the horizontal axis of the first chart."""
     text = page.locator(".uplot").first.get_attribute("data-range")
@@ -158,6 +174,18 @@ def test_a_zoom_stays_while_iterations_arrive(
     expect(page).not_to_have_url(re.compile("zoom="))
     wait_for_iteration(page, last + 10)
     assert chart_range(page)[0] == 0.0
+
+
+def test_a_chart_that_was_just_drawn_anew_shows_all_when_asked(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url).go(f"/jobs/{finished_job}?zoom=1:3")
+    expect(page.locator(".uplot").first).to_have_attribute("data-range", "1 3")
+
+    page.evaluate(DOUBLE_CLICK_ON_A_NEW_CHART)
+
+    expect(page).not_to_have_url(re.compile("zoom="))
+    expect(page.locator(".uplot").first).to_have_attribute("data-range", FROM_ZERO)
 
 
 def test_a_new_order_begins_on_the_first_page(

@@ -97,8 +97,9 @@ export function LineChart(props: LineChartProps) {
     plot.current = drawn
     const wanted = zoom.current
     if (wanted) drawn.setScale('x', { min: wanted[0], max: wanted[1] })
-    // What it shows first was chosen by nobody.
-    const settled = setTimeout(() => {
+    // What it shows first was chosen by nobody. uPlot shows it in a microtask that is queued by now;
+    // whatever comes after that one is a change by hand.
+    queueMicrotask(() => {
       drawn.root.dataset.settled = 'true'
     })
     describeCanvas(drawn.ctx.canvas, {
@@ -110,7 +111,6 @@ export function LineChart(props: LineChartProps) {
     })
     observer.observe(parent)
     return () => {
-      clearTimeout(settled)
       observer.disconnect()
       drawn.destroy()
       plot.current = null

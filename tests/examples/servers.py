@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
+import sys
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -51,7 +52,7 @@ class Served:
         ends = time.monotonic() + seconds
         while (job := self.job(job_id))["state"] != state:
             assert job["state"] not in ("failed", "cancelled"), job["error"]
-            assert time.monotonic() < ends, f"the job is {job['state']} still"
+            assert time.monotonic() < ends, f"the job is {job['state']} still ({job['waiting']})"
             time.sleep(0.1)
         return job
 
@@ -137,11 +138,15 @@ class ServerProcess(Served):
         self.url = line_with(self.process.stderr, r"serves (http://[\d.:]+) and")[1]
         self.client = httpx2.Client(base_url=self.url, timeout=60.0, verify=False)
         # A full pipe would stop the server.
-        self._drain = threading.Thread(target=output(self.process.stderr).read)
+        self._said = ""
+        self._drain = threading.Thread(target=self._listen)
         self._drain.start()
 
+    def _listen(self) -> None:
+        self._said = output(self.process.stderr).read()
+
     def close(self) -> None:
-        """Let it end."""
+        """Let it end. What it said is shown with the test that fails."""
         self.client.close()
         self.process.terminate()
         try:
@@ -150,6 +155,7 @@ class ServerProcess(Served):
             self.process.kill()
             self._drain.join()
             output(self.process.stderr).close()
+            sys.stderr.write(self._said)
 
 
 def operations(app: FastAPI) -> list[APIRoute]:

@@ -23,8 +23,8 @@ from tests.examples.servers import ServerProcess
 from tests.worker import cluster_host
 from tests.worker.cluster_host import Process
 
-KILLED: Final = LONG_SPEC | {"iterations": 4}
-"""Long enough that a head is killed in the midst of it."""
+KILLED: Final = LONG_SPEC | {"iterations": 2}
+"""Long enough that a head is killed in the midst of its last iteration."""
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 

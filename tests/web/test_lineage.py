@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable
 
 import pytest
-from playwright.sync_api import expect
+from playwright.sync_api import Route, expect
 
 import gaitswarm
 from tests.examples.servers import ServerProcess
@@ -51,6 +51,29 @@ def test_a_fork_and_its_parent_lead_to_each_other(
     page.goto(f"{server.url}/jobs")
     row = page.get_by_role("row").filter(has_text="another way")
     expect(row).to_contain_text(f"fork of {finished_job}")
+
+
+def test_no_button_moves_when_the_forks_of_a_job_are_known(
+    server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
+) -> None:
+    (job,) = server.client.get("/v1/jobs", params={"search": finished_job}).json()["items"]
+    lineage = {"from_iteration": 2, "changed": ["optimizer", "preference"]}
+    forks = [job | {"id": f"fork{n}", "lineage": lineage} for n in range(12)]
+    asked: list[Route] = []
+
+    def hold(route: Route) -> None:
+        asked.append(route)
+
+    visited = visit(server.url)
+    visited.page.route("**/v1/jobs?parent=*", hold)
+    page = visited.go(f"/jobs/{finished_job}")
+    button = page.get_by_role("button", name="Extend…")
+    expect(page.get_by_text("Computing time", exact=True)).to_be_visible()
+    before = button.bounding_box()
+
+    asked[0].fulfill(json={"items": forks, "next": None})
+    expect(page.locator("[data-forks='12']")).to_be_visible()
+    assert button.bounding_box() == before is not None
 
 
 def test_evidence_is_downloaded_and_verified(

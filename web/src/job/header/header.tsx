@@ -15,7 +15,7 @@ import type { LiveJob } from '../live/use-job'
 import { startDesigns } from '../start'
 import { JobActions } from './actions'
 import { EndNotice } from './end-notice'
-import { LineageNote } from './lineage'
+import { Forks, Parent } from './lineage'
 import { WalkPreview } from './walk-preview'
 import { WorldsNote } from './worlds-note'
 import './header.css'
@@ -55,7 +55,7 @@ export function JobHeader({ live, job, gain }: { live: LiveJob; job: StoredJob; 
               </p>
             )}
             {isReadable(job) && <WorldsNote job={job} />}
-            <LineageNote job={job} />
+            {job.lineage && <Parent lineage={job.lineage} />}
           </div>
           <JobActions job={job} onJob={live.replace} onDeleting={live.hold} />
         </div>
@@ -88,6 +88,7 @@ export function JobHeader({ live, job, gain }: { live: LiveJob; job: StoredJob; 
           gain={gain}
           committed={Math.max(job.iterations, followed.iterations.length)}
         />
+        <Forks job={job} />
       </div>
       {isReadable(job) && job.kind === 'tuning' && job.best && <WalkPreview job={job} />}
     </section>

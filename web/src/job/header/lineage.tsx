@@ -10,33 +10,29 @@ const SHOWN = 12
 
 type Lineage = NonNullable<StoredJob['lineage']>
 
-export function LineageNote({ job }: { job: StoredJob }) {
+/** Comes after what can be pressed: nothing may move away under a finger when it arrives. */
+export function Forks({ job }: { job: StoredJob }) {
   const forks = useResource(job.id, (signal) =>
     get('/v1/jobs', { query: { parent: job.id, limit: SHOWN + 1 }, signal }).then(
       (page) => page.items,
     ),
   )
   const found = forks.data ?? []
-  return (
-    <>
-      {job.lineage && <Parent lineage={job.lineage} />}
-      {found.length > 0 && (
-        <p class="small" data-forks={found.length}>
-          Forks:{' '}
-          {found.slice(0, SHOWN).map((fork, index) => (
-            <span key={fork.id}>
-              {index > 0 && ', '}
-              <a href={jobPath(fork.id)}>{fork.id}</a> <span class="muted">{forkWords(fork)}</span>
-            </span>
-          ))}
-          {found.length > SHOWN && ' and more'}
-        </p>
-      )}
-    </>
+  return found.length === 0 ? null : (
+    <p class="small" data-forks={found.length}>
+      Forks:{' '}
+      {found.slice(0, SHOWN).map((fork, index) => (
+        <span key={fork.id}>
+          {index > 0 && ', '}
+          <a href={jobPath(fork.id)}>{fork.id}</a> <span class="muted">{forkWords(fork)}</span>
+        </span>
+      ))}
+      {found.length > SHOWN && ' and more'}
+    </p>
   )
 }
 
-function Parent({ lineage }: { lineage: Lineage }) {
+export function Parent({ lineage }: { lineage: Lineage }) {
   return (
     <p class="small" data-parent={lineage.parent}>
       Fork of <a href={jobPath(lineage.parent)}>{lineage.parent}</a>

@@ -15,7 +15,7 @@ DB_OPTION := --db $(DB)
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help demo serve page manual wheel bench test test-firefox unit lint lint-code lint-page format architecture pictures lock clean setup setup-dev setup-manual page-if-possible
+.PHONY: help demo serve page manual wheel bench test test-all test-firefox unit lint lint-code lint-page format architecture pictures lock clean setup setup-dev setup-manual page-if-possible
 
 help: ## Show this list.
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' Makefile
@@ -44,19 +44,23 @@ bench: setup ## Measure the simulator on one core of this machine.
 	@$(BIN)/gaitswarm bench $(ARGS)
 
 # Tests start hundreds of processes: compiling every module anew would be a third of what one takes.
-test unit: export PYTHONDONTWRITEBYTECODE =
+test test-all unit: export PYTHONDONTWRITEBYTECODE =
 
-test: setup-dev ## Run all tests; those of the page need node with npm, and Chromium.
+test: EACH_ONCE = -m "not thorough"
+test test-all: setup-dev
 	@scripts/npm.sh --if-possible test
 	@scripts/page.sh --if-possible
-	@$(BIN)/python -m pytest $(WORKERS) $(ARGS)
+	@$(BIN)/python -m pytest $(WORKERS) $(EACH_ONCE) $(ARGS)
+
+test: ## Test all that the program does; what is of the page needs node with npm, and Chromium.
+test-all: ## Test it with other robots, methods and processors too, and at length; CI does.
 
 test-firefox: setup-dev page ## Go the page's main path in Firefox; installs Debian's where there is none.
 	@scripts/browser.sh firefox
 	@GAITSWARM_REQUIRE_FIREFOX=1 $(BIN)/python -m pytest tests/web/test_firefox.py $(ARGS)
 
 unit: setup-dev ## Run the fast tests only.
-	@$(BIN)/python -m pytest $(WORKERS) -m "not slow" $(ARGS)
+	@$(BIN)/python -m pytest $(WORKERS) -m "not slow and not thorough" $(ARGS)
 
 lint: lint-code lint-page ## Check style, types, imports between packages and declared dependencies.
 

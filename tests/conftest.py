@@ -11,10 +11,12 @@ import shutil
 from collections.abc import Callable, Generator, Iterator
 from contextlib import ExitStack, closing
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from hypothesis import settings
+
+from tests.examples.variants import left_out
 
 if TYPE_CHECKING:
     from services.optimizer.store.sql_store import SqlStore
@@ -43,16 +45,45 @@ def pytest_make_collect_report(
     return report
 
 
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Put tests into the order that all processes of a test run must agree on.
+@pytest.hookimpl(wrapper=True)
+def pytest_pycollect_makeitem(
+    collector: pytest.Module | pytest.Class, name: str
+) -> Generator[None, Any, Any]:
+    """Mark what `variants` leaves out of a test as thorough, before one is chosen by its id."""
+    made = yield
+    found = made if isinstance(made, list) else []
+    instances = [item for item in found if isinstance(item, pytest.Function)]
+    mark = instances[0].get_closest_marker("variants") if len(instances) > 1 else None
+    if mark:
+        by_id = {item.callspec.id: item for item in instances}
+        try:
+            more = left_out(by_id, *mark.args, **mark.kwargs)
+        except ValueError as error:
+            raise collector.CollectError(f"{name}: {error}") from None
+        for each in more:
+            by_id[each].add_marker("thorough")
+    return made
 
-    It begins with the tests that start Ray clusters. The processes are dealt consecutive tests, so
-    that one of them runs all of these: two clusters at a time would wait for each other's
-    processors until their time is out. And they wait often, while the other processes compute.
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Put the chosen tests into the order that all processes of a test run must agree on.
+
+    Each process is dealt as many consecutive tests, and takes the last ones of another when it has
+    done. The first process begins with tests that start Ray clusters: two clusters at a time would
+    wait for each other's processors until their time is out. And they wait often, while the other
+    processes compute. The second one begins with tests of the page: each process that takes one of
+    them starts a server, walks a job, and opens a browser.
     """
-    if hasattr(config, "workerinput"):
+    input_of_worker = getattr(config, "workerinput", None)
+    if input_of_worker:
         items.sort(key=lambda item: item.path.parts)
     items.sort(key=lambda item: item.path.parent.name != "worker")
+    if input_of_worker:
+        of_page = [item for item in items if item.path.parent.name == "web"]
+        others = [item for item in items if item.path.parent.name != "web"]
+        second = len(items) // input_of_worker["workercount"]
+        items[:] = [*others[:second], *of_page, *others[second:]]
 
 
 @pytest.fixture(autouse=True)
@@ -135,5 +166,5 @@ def pytest_collection_finish() -> None:
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
     """Leave out, of a run of the fast tests, a module that takes seconds only to be collected."""
-    fast_only = config.getoption("markexpr", "") == "not slow"
+    fast_only = "not slow" in config.getoption("markexpr", "")
     return True if fast_only and collection_path.name == "test_conformance.py" else None

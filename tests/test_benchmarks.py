@@ -12,6 +12,8 @@ import pytest
 
 from tests.robots.known import QUADRUPEDS, urdf_of
 
+pytestmark = pytest.mark.thorough("programs that measure, through which nobody's job runs")
+
 Told = Callable[..., Any]
 
 

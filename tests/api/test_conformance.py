@@ -166,6 +166,7 @@ def is_as_documented(case: schemathesis.Case[Any], url: str, connected: Session)
     case.call_and_validate(base_url=url, session=connected, checks=CHECKS, timeout=120.0)
 
 
+@pytest.mark.variants(without=("POST /v1/jobs", "POST /v1/jobs/{job_id}/fork"))
 @pytest.mark.slow
 @pytest.mark.parametrize("operation", _OPERATIONS)
 def test_every_answer_is_as_documented(operation: str, url: str) -> None:
@@ -195,6 +196,7 @@ def test_every_operation_of_the_document_is_among_them() -> None:
     } == set(_OPERATIONS)
 
 
+@pytest.mark.thorough("test_every_answer_is_as_documented, one answer after another")
 @pytest.mark.slow
 def test_sequences_along_the_links_of_the_document_are_answered_as_documented() -> None:
     """The short version of `python -m tests.api.conformance`."""

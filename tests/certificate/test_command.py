@@ -61,6 +61,10 @@ def test_the_summary_says_how_often_it_fails_how_bad_it_gets_and_where(files: Pa
         assert words in shown.out
 
 
+@pytest.mark.thorough(
+    "test_differences_are_shares_of_ours_by_scenario_and_objective",
+    "test_under_the_runner_our_rows_have_the_bits_of_a_certificate_without_engines",
+)
 @pytest.mark.slow
 def test_another_engine_is_compared_by_scenario_and_objective(files: Path) -> None:
     asked = ("--worlds", 5, "--engine", "mujoco", "--engine", "mujoco-contacts")
@@ -189,6 +193,10 @@ def test_bad_input_names_the_option(
     assert code == 3 or not db.exists()
 
 
+@pytest.mark.thorough(
+    "test_resumed_job_equals_one_never_killed",
+    "test_the_same_command_walks_nothing_again_and_more_worlds_only_the_rest",
+)
 @pytest.mark.slow
 def test_a_certificate_that_is_killed_and_goes_on_has_the_same_numbers(files: Path) -> None:
     asked = ("--worlds", "240", "--engine", "mujoco", "--json")

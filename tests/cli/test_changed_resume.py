@@ -71,6 +71,7 @@ def history(job: Finished, gaitswarm: Gaitswarm) -> Any:
     return gaitswarm("history", job.id, "--db", job.db, "--json").json
 
 
+@pytest.mark.variants
 @pytest.mark.parametrize(
     ("change", "said"),
     [

@@ -46,6 +46,7 @@ def writing_commands(finished: Finished) -> dict[str, tuple[str | Path, ...]]:
 WRITING = ["help", "help of a command", "version", "JSON, written as it is read", "a table"]
 
 
+@pytest.mark.variants(without=("JSON, written as it is read-", "a table-unbuffered"))
 @pytest.mark.slow
 @pytest.mark.parametrize("buffered", [BUFFERED, {"PYTHONUNBUFFERED": "1"}], ids=["", "unbuffered"])
 @pytest.mark.parametrize("kind", WRITING)
@@ -58,6 +59,7 @@ def test_a_full_device_is_said_and_exit_code_5(
     assert done.stderr == "gaitswarm: standard output cannot be written: No space left on device\n"
 
 
+@pytest.mark.variants(without="JSON, written as it is read")
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", WRITING)
 def test_a_reader_that_has_seen_enough_is_no_error(finished: Finished, kind: str) -> None:
@@ -70,6 +72,7 @@ def test_a_reader_that_has_seen_enough_is_no_error(finished: Finished, kind: str
     assert (done.returncode, done.stderr) == (ExitCode.OK, "")
 
 
+@pytest.mark.variants
 @pytest.mark.slow
 @pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
 def test_streams_that_are_closed_are_no_error(finished: Finished, closed: str) -> None:
@@ -86,6 +89,9 @@ def test_streams_that_are_closed_are_no_error(finished: Finished, closed: str) -
     assert (done.returncode, done.stderr) == (ExitCode.OK, "")
 
 
+@pytest.mark.thorough(
+    "test_a_full_device_is_said_and_exit_code_5", "test_streams_that_are_closed_are_no_error"
+)
 @pytest.mark.slow
 def test_messages_that_cannot_be_written_change_no_exit_code(finished: Finished) -> None:
     with Path("/dev/full").open("w") as full:

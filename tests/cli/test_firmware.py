@@ -72,6 +72,7 @@ def test_a_job_gives_its_best_its_robot_and_its_scenarios(
     assert tested.code == 0, tested.out + tested.err
 
 
+@pytest.mark.variants("robot0")
 @pytest.mark.parametrize(
     "robot",
     [(), ("--robot", '{"contact_law": "linear_zone"}')],

@@ -86,6 +86,7 @@ def test_a_precision_that_there_is_not_is_refused_by_name(
     assert not db.exists()
 
 
+@pytest.mark.variants("pi-7")
 @pytest.mark.parametrize(("controller", "searched"), [("fuzzy-pi-3", 17), ("pi", 7)])
 def test_controller_and_gait_are_searched_together(
     gaitswarm: Gaitswarm, db: Path, controller: str, searched: int

@@ -45,6 +45,7 @@ def spec() -> Any:
     return calibrations(Size(1, 2, 1, 2, 1))[0]
 
 
+@pytest.mark.thorough("the whole study in small, whose parts the other tests of this file show")
 @pytest.mark.slow
 def test_the_command_reports_and_computes_nothing_twice(
     gaitswarm: Gaitswarm, db: Path, tmp_path: Path
@@ -114,6 +115,7 @@ def test_random_designs_are_those_of_the_seed_and_in_bounds() -> None:
         assert variable.low <= column.min() < column.max() <= variable.high
 
 
+@pytest.mark.variants
 @pytest.mark.parametrize("known", [{}, {0: 8.0, 4: 20.0}, {0: 8.0, 1: 1.0, 3: 80.0}])
 def test_no_objectives_have_a_greater_product_than_the_bound(known: dict[int, float]) -> None:
     preference, fitness = PREFERENCES["A"], 23.0

@@ -43,6 +43,7 @@ def test_a_design_is_judged_as_a_job_of_the_folder_judges_it(dog: Path, tmp_path
     assert other["fitness"] != again["fitness"]
 
 
+@pytest.mark.variants("study steps")
 @pytest.mark.slow
 @pytest.mark.parametrize("study", ["study steps", "study noise"])
 def test_studies_take_the_folders_controller(study: str, dog: Path) -> None:

@@ -101,6 +101,7 @@ def test_a_reader_that_goes_away_is_no_error(finished: Finished, command: str) -
         assert process.wait(timeout=60) == ExitCode.OK
 
 
+@pytest.mark.variants("single")
 @pytest.mark.slow
 @pytest.mark.parametrize("precision", ["double", "single"])
 def test_bench_tells_speed_lanes_and_backend(gaitswarm: Gaitswarm, precision: Precision) -> None:

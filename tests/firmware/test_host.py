@@ -24,6 +24,7 @@ TRAPPING = "CFLAGS=-O1 -fsanitize=undefined -fsanitize-undefined-trap-on-error"
 PID = {"P": 0.4, "I": 0.1, "D": 0.003}
 
 
+@pytest.mark.variants("A", "fuzzy-pso-ps", "pid")
 @pytest.mark.parametrize(
     ("controller", "design", "robot"),
     [
@@ -53,6 +54,7 @@ def test_every_sample_of_the_six_walks_is_the_simulators(
     assert f"{view.samples} desired angles compared, 0 differing" in tested.out
 
 
+@pytest.mark.variants("four legs")
 @pytest.mark.parametrize(
     "robot",
     [

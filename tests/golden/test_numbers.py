@@ -94,6 +94,7 @@ def test_the_demos_search_begins_as_it_did(backend: Backend) -> None:
     assert [len(iteration.fitness) for iteration in iterations] == [10] * ITERATIONS
 
 
+@pytest.mark.variants("AVX2")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("narrow", "without"),

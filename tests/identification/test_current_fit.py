@@ -24,6 +24,7 @@ from tests.sim.test_identifiable import described_values
 pytestmark = pytest.mark.slow
 
 
+@pytest.mark.variants(without="backlash")
 @pytest.mark.parametrize(
     "source",
     [

@@ -101,7 +101,16 @@ def portal() -> Iterator[BlockingPortal]:
 Reach = Callable[[Path], gaitswarm.Jobs]
 
 
-@pytest.fixture(params=["database", "server", "async database", "async server"])
+# Either way comes blocking and as coroutines, which are made of the same: one of each is enough for
+# `make test`.
+@pytest.fixture(
+    params=[
+        "database",
+        pytest.param("server", marks=pytest.mark.thorough),
+        pytest.param("async database", marks=pytest.mark.thorough),
+        "async server",
+    ]
+)
 def reach(
     request: pytest.FixtureRequest, serve: Callable[[Path], str], portal: BlockingPortal
 ) -> Iterator[Reach]:

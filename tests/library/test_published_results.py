@@ -46,6 +46,10 @@ def test_optimum_a_is_worth_what_was_printed_and_c_about_that() -> None:
     assert 0.5 < c / 1_396_908 < 2.0
 
 
+@pytest.mark.thorough(
+    "240 designs walk beside that of",
+    "test_optimum_a_is_worth_what_was_printed_and_c_about_that",
+)
 def test_optima_a_and_b_are_among_the_best_twentieth_of_random_designs() -> None:
     variables = gaitswarm.CONTROLLERS["fuzzy-pi"].variables
     generator = np.random.Generator(np.random.Philox(key=[1, 0]))

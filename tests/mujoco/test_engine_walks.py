@@ -84,6 +84,7 @@ def deviations(trace: Trace | WalkLog, log: WalkLog, seconds: float = np.inf) ->
     }
 
 
+@pytest.mark.variants
 @pytest.mark.parametrize(
     ("variant", "drive", "scenario"),
     [
@@ -109,6 +110,7 @@ def test_a_walk_is_the_same_in_mujoco_to_rounding(
     np.testing.assert_allclose(trace.objectives, objectives, rtol=1e-8)
 
 
+@pytest.mark.variants
 @pytest.mark.parametrize("variant", [PLAIN, KARNOPP, STICK, LOOSE], ids=named)
 def test_what_parts_us_from_mujocos_own_steps_vanishes_with_their_length(
     variant: RobotVariant,
@@ -127,6 +129,7 @@ def test_what_parts_us_from_mujocos_own_steps_vanishes_with_their_length(
     assert apart < 0.6 * max(deviations(coarse, log).values())
 
 
+@pytest.mark.variants
 @pytest.mark.parametrize(
     ("variant", "drive"),
     [
@@ -156,6 +159,7 @@ def test_in_mujocos_own_steps_a_walk_is_worth_the_same_within_two_percent(
     np.testing.assert_allclose(found[:5], objectives[:5], rtol=0.02)
 
 
+@pytest.mark.variants
 @pytest.mark.parametrize(
     ("scenario", "drive"),
     list(zip(map(one_cycle, SCENARIOS), cycle(DRIVES), strict=False)),
@@ -175,6 +179,10 @@ def test_speed_and_energy_agree_within_15_percent_under_mujocos_own_contacts(
     np.testing.assert_allclose(found[1:3], 1.0, atol=0.15)
 
 
+@pytest.mark.thorough(
+    "explains the difference that is bounded by",
+    "test_speed_and_energy_agree_within_15_percent_under_mujocos_own_contacts",
+)
 def test_most_of_the_torques_difference_is_the_lever_of_the_sole() -> None:
     """In long strides, MuJoCo's forces at the tibia's end bring the gear torques nearer."""
     scenario = one_cycle(LOADED_SLOW.model_copy(update=walks.LONG_STRIDES))

@@ -45,6 +45,7 @@ def rows(worlds: np.ndarray, *engines: float) -> np.ndarray:
 NOMINAL = np.array([[variable.default for variable in PERTURBATIONS]], dtype=np.float64)
 
 
+@pytest.mark.variants
 @pytest.mark.parametrize("mishap", MISHAPS)
 def test_mishaps_happen_in_mujoco_as_they_do_here(mishap: str) -> None:
     walk = world_walk(STEP.model_copy(update=MISHAPS[mishap]))
@@ -58,6 +59,7 @@ def test_mishaps_happen_in_mujoco_as_they_do_here(mishap: str) -> None:
     assert np.abs(ours[:5] / calm[:5] - 1.0).max() > 2.0 * apart
 
 
+@pytest.mark.thorough("test_mishaps_happen_in_mujoco_as_they_do_here")
 def test_a_world_is_another_one_in_mujoco_too_but_for_our_own_engine_nothing_changes() -> None:
     """All perturbations at once: masses, soles, battery, gears, noise, delays, slope and start."""
     walk, worlds = world_walk(STEP), sample_worlds(2, 3)

@@ -30,6 +30,7 @@ def files() -> tuple[RobotFiles, dict[str, Any]]:
     return RobotFiles(toml=proposal.toml, urdf=proposal.urdf), proposal.job["scenarios"][1]
 
 
+@pytest.mark.thorough("test_a_walk_is_the_same_in_mujoco_to_rounding, with another robot")
 def test_a_cycle_of_a1_is_the_same_in_mujoco(
     files: tuple[RobotFiles, dict[str, Any]],
 ) -> None:

@@ -22,6 +22,7 @@ DRIVES = {
 WALK = short_walk(cycles=1.0, cycle_time=0.5)
 
 
+@pytest.mark.variants
 @pytest.mark.parametrize("controller", DRIVES)
 def test_a_walk_is_worth_the_same_in_mujocos_own_steps(controller: str) -> None:
     ours = walk(WALK, DRIVES[controller], controller, robot=FILES).outcome.objectives[0]

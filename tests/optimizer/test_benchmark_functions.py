@@ -224,6 +224,7 @@ def test_the_minimum_is_reached_at_the_minimizer_by_every_draw(function: Benchma
     assert (function.value(np.tile(point, (100, 1)), r) == function.minimum).all()
 
 
+@pytest.mark.variants("D4*")
 def test_nothing_is_found_below_the_minimum(function: BenchmarkFunction) -> None:
     from scipy.optimize import Bounds, differential_evolution
 

@@ -31,6 +31,9 @@ def test_a_narrow_valley_across_the_axes_is_learned() -> None:
     assert float(ridge(np.vstack(asked)).min()) < 1e-6
 
 
+@pytest.mark.thorough(
+    "how fast it learns, which test_a_narrow_valley_across_the_axes_is_learned shows for one"
+)
 def test_scales_of_the_variables_are_learned_faster_than_valleys_across_them() -> None:
     scales = 10.0 ** np.linspace(0.0, 6.0, 10)
     box = Space.continuous([-5.0] * 10, [5.0] * 10)

@@ -61,6 +61,7 @@ def objectives(store: SqlStore, job: Job, iterations: int) -> list[bytes]:
     return [row.design.tobytes() + row.objectives.tobytes() for row in rows]
 
 
+@pytest.mark.variants("3-*")
 @pytest.mark.parametrize("method", ["pso", "hype", *REPLAYED])
 @pytest.mark.parametrize("iteration", [1, 3, 6])
 def test_a_fork_with_the_same_settings_goes_on_bit_for_bit_as_its_parent(

@@ -25,9 +25,9 @@ def test_a_population_and_then_its_offspring_are_asked_for() -> None:
 
 def test_where_no_new_child_can_be_bred_another_population_begins() -> None:
     space = Space([Axis(0.0, 3.0, "integer"), Axis(0.0, 1.0, "categorical")])
-    asked = designs_asked("ga", space, lambda x: x.sum(axis=1), 48, population=8, particles=8)
+    asked = designs_asked("ga", space, lambda x: x.sum(axis=1), 32, population=8, particles=8)
     assert all(len(np.unique(designs, axis=0)) == len(designs) for designs in asked)
-    assert len(np.vstack(asked)) == 48
+    assert len(np.vstack(asked)) == 32
 
 
 def test_without_crossover_and_mutation_nothing_new_is_bred() -> None:

@@ -232,6 +232,7 @@ def by_nsga2(seed: int) -> Floats:
     return max(runs, key=hypervolume)
 
 
+@pytest.mark.thorough("how good it is beside another method")
 def test_it_finds_more_hypervolume_of_five_objectives_than_nsga_ii() -> None:
     own = [hypervolume(found_by(search(seed=seed))) for seed in range(3)]
     others = [hypervolume(by_nsga2(seed)) for seed in range(2)]

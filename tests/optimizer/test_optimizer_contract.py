@@ -30,6 +30,7 @@ def test_every_method_is_tested_where_its_libraries_can_be_had() -> None:
     assert set(METHODS.built_in) - set(INSTALLED) <= WITHOUT_WHEEL
 
 
+@pytest.mark.variants(without=("bayesian", "mads"))
 class TestBuiltIn(SearchContract):
     @pytest.fixture(autouse=True, params=INSTALLED)
     def method(self, request: pytest.FixtureRequest) -> None:

@@ -74,6 +74,7 @@ def test_the_start_is_asked_for_first_and_counts_as_budget(
     assert len(found) == optimizer.evaluations == BUDGET
 
 
+@pytest.mark.variants(without=("*-mads", "*-bayesian"))
 @METHOD
 @STARTS
 def test_a_started_search_resumes_to_the_bit_after_every_tell(
@@ -101,6 +102,7 @@ def test_a_started_search_resumes_to_the_bit_after_every_tell(
     assert found == straight
 
 
+@pytest.mark.variants(without="bayesian")
 @METHOD
 def test_a_method_learns_from_the_start_if_it_says_so(method: MethodName) -> None:
     started = bits(path(search(method, GOOD)))[len(GOOD) :]
@@ -121,6 +123,7 @@ def test_a_start_outside_the_bounds_or_too_late_is_refused(method: MethodName) -
         optimizer.start_from(GOOD)
 
 
+@pytest.mark.variants(without="bayesian")
 @METHOD
 def test_no_start_is_the_search_as_ever(method: MethodName) -> None:
     none = np.empty((0, SPACE.dimension))

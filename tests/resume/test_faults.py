@@ -58,6 +58,11 @@ KINDS_OF: dict[DatabaseKind, list[str]] = {
 """Tried with each database."""
 
 
+@pytest.mark.thorough(
+    "ten kinds of faults with all processes of a deployment",
+    "test_resumed_job_equals_one_never_killed",
+    "test_a_crash_of_the_server_in_mid_run_changes_no_bit_of_a_history",
+)
 @pytest.mark.slow
 @pytest.mark.parametrize("database", KINDS_OF)
 def test_processes_and_services_that_fail_cost_no_bit_and_nobodys_time(

@@ -127,6 +127,7 @@ class Life:
         return code
 
 
+@pytest.mark.variants("double")
 @pytest.mark.parametrize(
     "given",
     [
@@ -163,6 +164,10 @@ def test_resumed_job_equals_one_never_killed(
     assert walked(store, job_id) == walked(store, whole)
 
 
+@pytest.mark.thorough(
+    "test_resumed_job_equals_one_never_killed",
+    "test_another_process_goes_on_with_the_same_bits, for all methods",
+)
 def test_a_job_of_any_method_killed_in_its_middle_equals_one_never_killed(
     store: Store, url: str, evaluator: Evaluator
 ) -> None:

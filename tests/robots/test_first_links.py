@@ -33,6 +33,7 @@ def stances(made: Proposal) -> list[tuple[float, float, float] | None]:
     return [leg.stance for leg in parse_robot(made.toml, made.urdf).description.legs]
 
 
+@pytest.mark.variants("*-urdf1-body")
 @pytest.mark.parametrize(
     ("urdf", "first"), [(dog(), "trunk"), (QUADRUPED, "body"), (radial_robot(6), "base")]
 )

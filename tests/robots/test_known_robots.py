@@ -78,6 +78,7 @@ def turn(model: pin.Model, q: Floats, name: str, angle: float) -> None:
     q[at : at + joint.nq] = [math.cos(angle), math.sin(angle)] if joint.nq == 2 else [angle]
 
 
+@pytest.mark.variants("a1", "solo12")
 def test_it_has_four_legs_and_its_walks_can_be_planned(folder: Path, robot: Robot) -> None:
     assert len(robot.legs) == 4
     assert sorted(leg.phase for leg in robot.description.legs) == [0.0, 0.0, 0.5, 0.5]
@@ -121,6 +122,7 @@ def test_its_bodies_have_the_inertia_that_pinocchio_reads(
         np.testing.assert_allclose(ours.rotational, theirs.inertia, rtol=1e-10, atol=1e-10)
 
 
+@pytest.mark.variants("a1", "solo12")
 def test_its_accelerations_and_mass_matrix_are_pinocchios(
     robot: Robot, model: PhysicsModel
 ) -> None:
@@ -155,6 +157,7 @@ def test_its_accelerations_and_mass_matrix_are_pinocchios(
             np.testing.assert_allclose(shares, np.eye(6 + n)[:, 6:], rtol=0.0, atol=room)
 
 
+@pytest.mark.variants("a1", "solo12")
 def test_it_stands_with_its_weight_on_all_feet(robot: Robot) -> None:
     """In the interpreter, which walks the same second as a compiled kernel."""
     controller, design = standing_drive(robot)

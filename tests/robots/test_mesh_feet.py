@@ -61,6 +61,7 @@ def init(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Init:
     return made
 
 
+@pytest.mark.variants("turned")
 @pytest.mark.parametrize(
     ("urdf", "length"),
     [

@@ -41,6 +41,7 @@ def made(layout: str, limit: float = 0.8) -> tuple[Proposal, Robot]:
     return proposal, parse_robot(proposal.toml, proposal.urdf)
 
 
+@pytest.mark.variants("four-*", "six-*", "five-*")
 @pytest.mark.parametrize("limit", [0.8, 1.57])
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_every_leg_stands_where_it_points_and_both_walks_are_in_reach(
@@ -66,6 +67,7 @@ def test_neighbours_of_a_round_hexapod_step_in_turns() -> None:
         assert phases in ([0.0, 0.5] * 3, [0.5, 0.0] * 3)
 
 
+@pytest.mark.variants("four", "six")
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_a_round_robot_carries_its_weight_on_its_feet(layout: str) -> None:
     proposal, _ = made(layout)
@@ -74,6 +76,7 @@ def test_a_round_robot_carries_its_weight_on_its_feet(layout: str) -> None:
     assert checked.standing.normal_forces == pytest.approx(checked.standing.weight, rel=0.02)
 
 
+@pytest.mark.variants("four", "six")
 @pytest.mark.parametrize("layout", [layout for layout in LAYOUTS if layout != "two"])
 def test_of_some_designs_a_round_robot_walks_both_of_its_walks(layout: str) -> None:
     proposal, robot = made(layout)

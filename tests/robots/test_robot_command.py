@@ -94,6 +94,7 @@ def test_guesses_of_shorter_walks_are_in_the_folder_too() -> None:
     assert sum("reach no further" in guess for guess in guessed) == 2
 
 
+@pytest.mark.variants("its own", "none")
 @pytest.mark.parametrize(
     ("given", "name"),
     [('name="Rex 2"', "Rex 2"), ('name="a/b"', "file"), ("", "file"), ('name=" "', "file")],

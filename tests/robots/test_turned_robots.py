@@ -102,6 +102,7 @@ def test_who_says_that_z_points_up_is_believed() -> None:
     assert len(feet_of(urdf, Frame(up="z"))) == 4
 
 
+@pytest.mark.variants("urdf1-True", "urdf4-False", "urdf6-False")
 @pytest.mark.parametrize(
     ("urdf", "warned"),
     [

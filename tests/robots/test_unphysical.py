@@ -52,6 +52,7 @@ def warnings_of(urdf: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> 
     ]
 
 
+@pytest.mark.variants(without="negative off the diagonal")
 @pytest.mark.parametrize(
     ("urdf", "link", "said"),
     [

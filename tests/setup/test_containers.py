@@ -74,6 +74,7 @@ def options_of_ray(words: list[str], command: str) -> list[str]:
     return words[3:] if is_node else []
 
 
+@pytest.mark.variants
 @pytest.mark.slow
 @pytest.mark.parametrize("command", ["start", "health-check"])
 def test_options_given_to_ray_exist(command: str) -> None:

@@ -42,12 +42,14 @@ def manual(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "api" / "manual"
 
 
+@pytest.mark.thorough("the manual is built, which `make manual` does")
 @pytest.mark.slow
 def test_every_page_of_docs_is_in_it(manual: Path) -> None:
     pages = {path.relative_to(ROOT).with_suffix(".html") for path in (ROOT / "docs").rglob("*.md")}
     assert pages <= {path.relative_to(manual) for path in manual.rglob("*.html")}
 
 
+@pytest.mark.thorough("the manual is built, which `make manual` does")
 @pytest.mark.slow
 def test_reference_is_made_from_the_code(manual: Path) -> None:
     def text(page: str) -> str:
@@ -61,6 +63,7 @@ def test_reference_is_made_from_the_code(manual: Path) -> None:
     assert "GAITSWARM_LEASE_SECONDS" in text("settings.html")
 
 
+@pytest.mark.thorough("the manual is built, which `make manual` does")
 @pytest.mark.slow
 def test_it_needs_no_other_server(manual: Path) -> None:
     for page in ("docs/index.html", "docs/cli.html", "docs/reference/python.html"):

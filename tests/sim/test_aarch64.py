@@ -28,6 +28,7 @@ def emulator() -> Iterator[list[str]]:
         yield tools_for_arm(monkeypatch)
 
 
+@pytest.mark.variants("plain-double")
 @pytest.mark.parametrize(
     ("name", "precision"),
     [

@@ -43,6 +43,7 @@ def quadruped() -> RobotFiles:
     return RobotFiles(toml=toml, urdf=urdf)
 
 
+@pytest.mark.variants("stick-double")
 @pytest.mark.parametrize(
     ("robot", "precision"),
     [
@@ -71,6 +72,7 @@ def test_a_robots_kernel_compiles_without_a_warning(
     assert load_kernel(load_robot(robot), precision, extra_flags=STRICT) is not None
 
 
+@pytest.mark.variants("Target(lanes=4,*")
 @pytest.mark.skipif(host_architecture() != X86, reason="these are levels of x86-64")
 @pytest.mark.parametrize("wanted", [*X86_TARGETS, Target(2, "", X86)], ids=str)
 def test_kernels_of_every_level_compile_without_a_warning(wanted: Target) -> None:
@@ -144,6 +146,7 @@ OTHERS: list[Kind] = [
 ]
 
 
+@pytest.mark.variants("all internal state")
 @pytest.mark.parametrize("kinds", [INTERNAL_STATE, OTHERS], ids=["all internal state", "others"])
 def test_walks_and_falls_read_and_write_what_is_theirs_only(kinds: list[Kind]) -> None:
     """And what they are compiled from gives no warning."""

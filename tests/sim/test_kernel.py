@@ -336,6 +336,7 @@ def test_quasi_static_current_equals_the_exact_one(robot: Robot) -> None:
     assert charge == pytest.approx(quasi, rel=0.02)
 
 
+@pytest.mark.variants("Target(lanes=4,*")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "narrower", [Target(4, "x86-64-v3"), Target(2, "x86-64-v2"), Target(2)], ids=str

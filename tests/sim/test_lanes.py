@@ -84,6 +84,7 @@ def kernel_and_coding(
     return kernel, control_steps(robot)[0]
 
 
+@pytest.mark.variants(without=("stick-single", "karnopp-single"))
 @pytest.mark.slow
 @pytest.mark.parametrize("precision", ["double", "single"])
 @pytest.mark.parametrize("variant", VARIANTS.values(), ids=VARIANTS)

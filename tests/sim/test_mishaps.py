@@ -78,6 +78,7 @@ def test_a_motor_that_pushes_at_an_obstacle_is_hot_and_loads_its_gear() -> None:
     assert abs(pushed[at_its_worst]) > 2.0
 
 
+@pytest.mark.variants("variant0")
 @pytest.mark.parametrize("variant", [RobotVariant(), RobotVariant(backlash=(2.5, 1.0, 1.0))])
 def test_kernels_agree_on_a_jammed_leg_that_is_dropped(variant: RobotVariant) -> None:
     scenario = short_walk(stuck_leg="left_rear", drop=0.01, cycle_time=0.25)
@@ -162,6 +163,7 @@ def test_the_small_weight_of_optimum_c_protects_nothing() -> None:
     assert peak_and_heat("C") == pytest.approx((1.0, 1.0), abs=0.03)
 
 
+@pytest.mark.variants("A")
 @pytest.mark.parametrize("study", ["A", "fuzzy-pso-ps"])
 def test_without_the_low_pass_of_the_current_the_protection_chatters(study: str) -> None:
     """A reversed motor's current falls at once, so that it is driven ahead again, and so on."""

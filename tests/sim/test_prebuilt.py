@@ -172,6 +172,7 @@ def test_who_names_a_compiler_gets_what_it_makes(
         load_library("robot", b"", refuse)
 
 
+@pytest.mark.thorough("kernels of all machines are built, which `make wheel` does")
 def test_kernels_are_built_for_other_machines_and_old_ones_removed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -132,6 +132,7 @@ def test_a_drive_follows_what_its_encoders_told_it(robot: Robot) -> None:
     assert np.abs(np.diff(told - angles, axis=0)).max() > 1e-3
 
 
+@pytest.mark.variants
 @pytest.mark.parametrize(
     "variant",
     [RobotVariant(name="szabadka2"), RobotVariant(), RobotVariant(backlash=(2.5, 1.0, 1.0))],

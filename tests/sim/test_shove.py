@@ -80,6 +80,7 @@ def test_a_log_has_the_push_in_the_ticks_of_the_shove_alone() -> None:
     assert abs(more[60] - more[59]) > 1.0
 
 
+@pytest.mark.variants("variant0")
 @pytest.mark.parametrize("variant", [RobotVariant(), RobotVariant(backlash=(2.5, 1.0, 1.0))])
 def test_kernels_agree_on_a_shove(variant: RobotVariant) -> None:
     scenario = short_walk(

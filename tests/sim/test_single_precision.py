@@ -101,6 +101,7 @@ def test_objectives_are_those_of_double_precision_unless_the_last_bit_of_a_float
     assert np.median(sensitivity) < 10.0 * TOLERANCE
 
 
+@pytest.mark.variants("Target(lanes=4,*")
 @pytest.mark.slow
 @pytest.mark.parametrize("narrower", [Target(4, "x86-64-v3"), Target(2, "")], ids=str)
 def test_floats_have_the_same_bits_at_every_vector_width(narrower: Target, robot: Robot) -> None:

@@ -52,6 +52,7 @@ def test_it_is_linear_in_a_narrow_zone_and_full_against_the_motion_beyond(
     np.testing.assert_allclose(reaction[True] - reaction[False], expected, atol=1e-9)
 
 
+@pytest.mark.variants
 @pytest.mark.parametrize("backlash", [0.0, 0.02])
 def test_kernels_agree_with_static_friction(robot: Robot, backlash: float) -> None:
     machine = changed(rough(robot), actuators={"backlash": backlash})

@@ -52,6 +52,7 @@ def test_an_unknown_drive_is_answered_with_those_that_exist() -> None:
         find_drive("2012")
 
 
+@pytest.mark.thorough("the inference itself walks, which takes the slow kernel")
 def test_finer_tables_are_closer_to_the_inference() -> None:
     # Shorter than a cycle, a walk tells more of single steps than of tables.
     cycle = SCENARIOS[0].model_copy(update={"cycles": 1.0})
@@ -71,6 +72,7 @@ def test_an_inference_is_refused_by_the_compiled_kernel() -> None:
         kernel.walk([plan(FuzzyPi().without_table(PUBLISHED_A))], Coding.of(robot, 10), log=False)
 
 
+@pytest.mark.variants
 @pytest.mark.parametrize("robot", [DEFAULT_ROBOT, "szabadka2"])
 def test_steps_of_walks_are_short_enough(robot: RobotName) -> None:
     """Of a fast and of a slow walk. Landings, which are faster than a step, have shorter ones."""

@@ -74,6 +74,7 @@ def test_every_controller_walks_and_both_kernels_agree(controller: str) -> None:
         np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.variants(without="{'backlash': 0.02}")
 @pytest.mark.parametrize(
     "options", [{"rate": 2500}, {"rate": 500}, {"backlash": 0.02}, {"line": False}], ids=str
 )
@@ -109,6 +110,7 @@ def bytes_of(result: WalkResult) -> tuple[object, ...]:
     return result.status, result.sums.tobytes(), result.end.tobytes(), result.states.tobytes()
 
 
+@pytest.mark.variants("Target(lanes=4,*")
 @pytest.mark.parametrize(
     "narrower", [Target(4, "x86-64-v3"), Target(2, "x86-64-v2"), Target(2)], ids=str
 )

@@ -35,6 +35,7 @@ LASH = RobotVariant(name="szabadka2", backlash=(2.5, 1.0, 1.0))
 VARIANTS = pytest.mark.parametrize("variant", [KARNOPP, STICK, DEAD_ZONE, LASH], ids=str)
 
 
+@pytest.mark.variants
 @VARIANTS
 def test_kernels_agree_on_every_variant(variant: RobotVariant) -> None:
     fast, slow = (
@@ -49,6 +50,7 @@ def test_kernels_agree_on_every_variant(variant: RobotVariant) -> None:
     np.testing.assert_allclose(ours.motor_angle, theirs.motor_angle, atol=1e-9)
 
 
+@pytest.mark.variants("normal-fast-*", "turn-right-fast-*'stick'*")
 @VARIANTS
 @pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda s: s.name)
 def test_every_variant_walks_every_scenario(variant: RobotVariant, scenario: Scenario) -> None:

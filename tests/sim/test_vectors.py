@@ -169,6 +169,7 @@ SIGNS: Final = ((1, 1), (1, -1), (-1, 1))
 """Of product and addend in a b + c, a b - c and c - a b."""
 
 
+@pytest.mark.variants("single")
 @pytest.mark.parametrize("precision", PRECISIONS)
 def test_products_and_sums_are_rounded_once(precision: Precision) -> None:
     columns = triples(precision)

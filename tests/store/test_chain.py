@@ -153,6 +153,7 @@ def execute(database_url: str, statement: str, **values: object) -> None:
     database.close()
 
 
+@pytest.mark.variants("sqlite-*", "postgresql-an objective")
 @pytest.mark.parametrize(("statement", "index"), TAMPERED.values(), ids=TAMPERED)
 def test_what_was_changed_is_found_and_its_iteration_named(
     store: SqlStore, database_url: str, statement: str, index: int

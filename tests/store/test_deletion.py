@@ -48,6 +48,7 @@ def large(particles: int = 6000) -> CompletedIteration:
     return completed(0, [float(k) for k in range(particles)])
 
 
+@pytest.mark.variants("*-2")
 @pytest.mark.parametrize("particles", [2, 6000])
 def test_all_of_a_job_goes_and_nothing_of_another(
     store: SqlStore, database_url: str, particles: int

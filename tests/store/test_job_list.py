@@ -209,6 +209,7 @@ def test_search_order_and_state_go_together(store: SqlStore, clock: Clock) -> No
     assert found == ["walk a", "walk c"]
 
 
+@pytest.mark.variants("sqlite-*", "postgresql-created")
 @pytest.mark.parametrize("order", list(JobOrder))
 def test_jobs_made_between_two_pages_repeat_nothing(
     store: SqlStore, clock: Clock, order: JobOrder
@@ -221,6 +222,7 @@ def test_jobs_made_between_two_pages_repeat_nothing(
     assert len(set(ids)) == len(ids) and made <= set(ids)
 
 
+@pytest.mark.variants("sqlite-*", "postgresql-created")
 @pytest.mark.parametrize("order", list(JobOrder))
 def test_a_cursor_belongs_to_its_order(store: SqlStore, clock: Clock, order: JobOrder) -> None:
     named(store, clock, "a", "b", "c")

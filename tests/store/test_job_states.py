@@ -67,6 +67,7 @@ def test_a_refusal_says_what_is_possible_instead() -> None:
         commanded(JobState.SUCCEEDED, Command.RESUME)
 
 
+@pytest.mark.variants("sqlite-*", "postgresql-running-*")
 @pytest.mark.parametrize(("state", "command"), EVERY_PAIR)
 def test_the_store_applies_a_command_or_changes_nothing(
     store: SqlStore, state: JobState, command: Command

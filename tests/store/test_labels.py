@@ -92,6 +92,7 @@ def test_a_robot_without_a_name_is_called_own(name: str) -> None:
     assert robot_name({"toml": name, "urdf": ""}) == "own"
 
 
+@pytest.mark.variants("sqlite-*", "postgresql-created")
 @pytest.mark.parametrize("order", list(JobOrder))
 def test_every_job_is_reached_page_by_page_in_every_order(store: SqlStore, order: JobOrder) -> None:
     jobs = [submitted(store, name=f"job {k % 3}") for k in range(7)]

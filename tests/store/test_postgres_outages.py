@@ -83,6 +83,7 @@ def run_to_its_end(store: SqlStore, lease_seconds: float, disturb: threading.Eve
     return store.job(job.id)
 
 
+@pytest.mark.variants
 @pytest.mark.parametrize("lease_seconds", [30.0, 0.5], ids=["within-a-lease", "past-a-lease"])
 def test_a_crash_of_the_server_in_mid_run_changes_no_bit_of_a_history(
     server: PostgresServer, undisturbed: list[Bits], lease_seconds: float

@@ -79,6 +79,7 @@ def damaged(store: SqlStore, write_spec: Write, unreadable: str) -> Job:
     return store.job(job.id)
 
 
+@pytest.mark.variants("sqlite-*", "postgresql-newer")
 def test_the_next_job_is_claimed_and_the_unreadable_one_has_failed_with_its_reason(
     store: SqlStore, clock: Clock, damaged: Job
 ) -> None:
@@ -93,6 +94,7 @@ def test_the_next_job_is_claimed_and_the_unreadable_one_has_failed_with_its_reas
     assert "cannot be read" in failed.error and "resume" in failed.error
 
 
+@pytest.mark.variants("sqlite-*", "postgresql-newer")
 def test_nothing_else_of_its_row_is_touched(
     store: SqlStore, clock: Clock, damaged: Job, database_url: str, unreadable: str
 ) -> None:
@@ -105,6 +107,7 @@ def test_nothing_else_of_its_row_is_touched(
     assert after["spec"] == unreadable
 
 
+@pytest.mark.variants("sqlite-*", "postgresql-newer")
 def test_lists_show_it_among_the_others(store: SqlStore, clock: Clock, damaged: Job) -> None:
     clock.advance(1.0)
     sound, _ = store.create_job(spec(name="sound"))
@@ -120,6 +123,7 @@ def test_lists_show_it_among_the_others(store: SqlStore, clock: Clock, damaged: 
     assert store.jobs(kind="tournament").items == ()
 
 
+@pytest.mark.variants("sqlite-*", "postgresql-newer")
 def test_its_spec_is_refused_with_the_reason_to_whoever_needs_it(
     store: SqlStore, damaged: Job
 ) -> None:
@@ -130,6 +134,7 @@ def test_its_spec_is_refused_with_the_reason_to_whoever_needs_it(
         store.extend(damaged.id, 40)
 
 
+@pytest.mark.variants("sqlite-*", "postgresql-newer")
 def test_it_can_be_resumed_by_a_version_that_can_read_it_and_by_no_other(
     store: SqlStore, damaged: Job, write_spec: Write
 ) -> None:
@@ -147,10 +152,12 @@ def test_it_can_be_resumed_by_a_version_that_can_read_it_and_by_no_other(
     assert claim is not None and claim.job.spec == spec(name="mine").resolved()
 
 
+@pytest.mark.variants("sqlite-*", "postgresql-newer")
 def test_it_can_be_cancelled(store: SqlStore, damaged: Job) -> None:
     assert store.command(damaged.id, Command.CANCEL).state is JobState.CANCELLED
 
 
+@pytest.mark.variants("sqlite-*", "postgresql-newer")
 def test_its_key_still_means_it(store: SqlStore, damaged: Job) -> None:
     assert store.create_job(spec(), idempotency_key="damaged") == (damaged, False)
     with pytest.raises(IdempotencyConflict, match="cannot be read"):
@@ -302,6 +309,7 @@ def test_a_job_whose_provenance_cannot_be_read_is_set_aside_too(
     assert error is not None and "provenance" in error
 
 
+@pytest.mark.variants("sqlite-*", "postgresql-newer")
 def test_what_a_new_job_costs_is_not_asked_of_one_that_cannot_be_read(
     store: SqlStore, damaged: Job
 ) -> None:

@@ -156,6 +156,10 @@ def test_bad_input_names_the_option(
     assert not (tmp_path / "jobs.db").exists()
 
 
+@pytest.mark.thorough(
+    "test_resumed_job_equals_one_never_killed",
+    "test_the_same_command_runs_nothing_again_and_more_only_what_is_missing",
+)
 @pytest.mark.slow
 def test_a_tournament_that_is_killed_and_goes_on_has_the_same_numbers(tmp_path: Path) -> None:
     whole, killed = tmp_path / "whole", tmp_path / "killed"

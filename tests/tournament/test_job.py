@@ -118,6 +118,7 @@ def test_a_run_is_broken_off_when_nobody_waits_for_it() -> None:
     assert time.monotonic() < begun + 10.0
 
 
+@pytest.mark.variants("pso")
 @pytest.mark.parametrize("method", ["pso", "cma", "auto"])
 def test_a_run_in_another_process_has_the_same_bits(method: str) -> None:
     walking = {"name": "walk", "job": {"controller": "pi", "scenarios": [SHORT_WALK]}}

@@ -104,6 +104,7 @@ def test_checkpoints_are_ten_in_a_decade_and_end_with_the_budget() -> None:
     assert default_checkpoints(10) == (10,)
 
 
+@pytest.mark.variants(without="bayesian")
 @METHOD
 def test_every_method_spends_its_budget_to_the_last_evaluation_inside_the_box(name: str) -> None:
     problem = Bowl()
@@ -114,6 +115,7 @@ def test_every_method_spends_its_budget_to_the_last_evaluation_inside_the_box(na
     assert (designs == MIXED.designs(MIXED.positions(designs))).all()
 
 
+@pytest.mark.variants(without=("bayesian", "optuna-tpe"))
 @METHOD
 def test_every_method_depends_on_its_seed_alone(name: str) -> None:
     first = run_of(name)
@@ -123,6 +125,7 @@ def test_every_method_depends_on_its_seed_alone(name: str) -> None:
     assert run_of(name, seed=6).best.tobytes() != first.best.tobytes()
 
 
+@pytest.mark.variants(without="optuna-tpe")
 @pytest.mark.parametrize("name", [n for n in RIVALS if n in INSTALLED])
 def test_every_rival_finds_more_than_chance_does(name: str) -> None:
     best = np.median([run_of(name, evaluations=120, seed=s).best[-1] for s in (1, 2, 3)])
@@ -130,6 +133,7 @@ def test_every_rival_finds_more_than_chance_does(name: str) -> None:
     assert best < random
 
 
+@pytest.mark.variants(without="pso-ps")
 @pytest.mark.parametrize("name", settings_models())
 def test_a_method_takes_what_is_drawn_at_whichever_ends_of_the_ranges(name: str) -> None:
     """Any two settings at the ends that fit each other least, the rest at either."""

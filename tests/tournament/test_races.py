@@ -191,6 +191,7 @@ def test_a_tournament_on_functions_is_kept_by_its_last_best_and_ranked_by_group(
         functions.read(kept)
 
 
+@pytest.mark.thorough("the tables of a document, of all recorded runs")
 def test_the_document_has_the_tables_of_the_recorded_runs() -> None:
     text = DOCUMENT.read_text(encoding="utf-8")
     tables = all_tables(read_all())

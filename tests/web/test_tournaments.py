@@ -148,6 +148,7 @@ def test_what_is_not_there_yet_or_at_all_says_so(
     expect(page.get_by_text("gaitswarm tournament thesis")).to_be_visible()
 
 
+@pytest.mark.variants("list")
 @pytest.mark.parametrize("path", ["", "/{id}?problem=D7C0R1I1"], ids=["list", "one"])
 def test_every_eye_hand_and_width_can_use_it(
     raced: Raced, visit: Callable[..., Visit], path: str

@@ -81,6 +81,7 @@ def findings(page: Page) -> dict[str, list[str]]:
     return {check: elements for check, elements in found.items() if elements}
 
 
+@pytest.mark.variants("jobs", "nothing there")
 @pytest.mark.parametrize("kind", VIEWS)
 def test_every_eye_hand_and_width_can_use_it(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit], kind: str

@@ -182,6 +182,7 @@ def holds_one_leg_still(walk: Recording) -> bool:
     return [max(leg) < 0.05 for leg in walk.travel()].count(True) == 1
 
 
+@pytest.mark.variants("drop-*")
 @pytest.mark.parametrize(
     ("scenario", "shows"),
     [

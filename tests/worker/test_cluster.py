@@ -121,6 +121,7 @@ def test_walks_of_a_node_that_is_lost_are_walked_by_others_to_the_same_bits(
     eventually(lambda: runner.run(cluster_runner.slots) == 1)
 
 
+@pytest.mark.thorough("test_walks_that_kill_their_workers_are_tried_on_three_and_then_given_up")
 @pytest.mark.slow
 @pytest.mark.timeout(120)
 def test_walks_that_kill_their_worker_are_tried_on_another_node_before_they_are_on_the_same(

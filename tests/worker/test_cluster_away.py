@@ -74,6 +74,10 @@ def head_alone(spec: dict[str, Any], folder: Path) -> str | None:
         return run_embedded(store, evaluator, job.id).progress.head
 
 
+@pytest.mark.thorough(
+    "test_a_runner_that_waits_for_its_cluster_ends_when_it_is_told_to",
+    "test_a_cluster_that_was_lost_is_noticed_and_opened_again_with_the_same_bits",
+)
 def test_a_server_waits_for_its_cluster_and_a_job_whose_head_is_killed_has_the_same_bits(
     host: Process, database: Path, tmp_path: Path
 ) -> None:

@@ -28,6 +28,7 @@ pytestmark = pytest.mark.slow
 MORE_CASES_THAN_SLOTS = (*SCENARIOS, short_walk(name="slower", cycle_time=1.2))
 
 
+@pytest.mark.variants("*-1-2", "*-7-3", "in_process-41-3")
 @pytest.mark.parametrize("scenarios", [SCENARIOS, MORE_CASES_THAN_SLOTS], ids=["2", "3"])
 @pytest.mark.parametrize("count", [1, 7, 41])
 def test_results_are_those_of_one_batch_in_index_order_to_the_bit(

@@ -147,6 +147,7 @@ def test_a_cluster_that_cannot_be_connected_is_an_error_with_its_reason(opening:
         RayEvaluator("127.0.0.1:6379").wait_until_open(never)
 
 
+@pytest.mark.variants("in threads", "while Ray is started")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "state", ["in threads", "while Ray is started", "while a worker of Ray dies"]

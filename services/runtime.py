@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 import signal
 import threading
+from collections import deque
 from collections.abc import Callable, Collection, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
+from queue import SimpleQueue
 from types import FrameType
 from typing import TYPE_CHECKING, Any, Final
 
@@ -235,6 +237,32 @@ def open_runtime(
 
 
 @contextmanager
+def set_by_signals() -> Iterator[Callable[[threading.Event], None]]:
+    """Let handlers of signals set events that their own thread may be waiting for.
+
+    A handler comes upon its thread anywhere, within `Event.wait` as well, which holds the lock
+    that `Event.set` takes: the thread would wait for itself, for ever.
+
+    Yields:
+        What a handler calls with an event: another thread sets it, in the order of the calls.
+    """
+    asked: SimpleQueue[threading.Event | None] = SimpleQueue()
+
+    def set_them() -> None:
+        while (event := asked.get()) is not None:
+            event.set()
+
+    thread = threading.Thread(target=set_them, name="signals", daemon=True)
+    thread.start()
+    try:
+        # Unlike all else that wakes a thread, it may be interrupted by another call of itself.
+        yield asked.put
+    finally:
+        asked.put(None)
+        thread.join()
+
+
+@contextmanager
 def stop_on_signals(
     stop: threading.Event, at_once: threading.Event | None = None
 ) -> Iterator[None]:
@@ -249,24 +277,28 @@ def stop_on_signals(
     Yields:
         Nothing.
     """
+    left = deque(event for event in (stop, at_once) if event is not None)
 
     def _handle(number: int, _frame: FrameType | None) -> None:
-        unset = [event for event in (stop, at_once) if event is not None and not event.is_set()]
-        if unset:
-            unset[0].set()
-        elif number == signal.SIGINT:
+        with suppress(IndexError):
+            while (event := left.popleft()).is_set():
+                pass
+            set_event(event)
+            return
+        if number == signal.SIGINT:
             raise KeyboardInterrupt
 
     before: dict[int, Any] = {}
-    try:
-        for number in (signal.SIGINT, signal.SIGTERM):
-            before[number] = signal.signal(number, _handle)
-        yield
-    finally:
-        for caught, handler in before.items():
-            # None stands for a handler that was not set from Python, which cannot be put back.
-            if handler is not None:
-                signal.signal(caught, handler)
+    with set_by_signals() as set_event:
+        try:
+            for number in (signal.SIGINT, signal.SIGTERM):
+                before[number] = signal.signal(number, _handle)
+            yield
+        finally:
+            for caught, handler in before.items():
+                # None stands for a handler that was not set from Python, which cannot be put back.
+                if handler is not None:
+                    signal.signal(caught, handler)
 
 
 __all__ = [
@@ -276,5 +308,6 @@ __all__ = [
     "open_runtime",
     "open_store",
     "run_embedded",
+    "set_by_signals",
     "stop_on_signals",
 ]

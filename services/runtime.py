@@ -237,7 +237,7 @@ def open_runtime(
 
 
 @contextmanager
-def set_by_signals() -> Iterator[Callable[[threading.Event], None]]:
+def _set_by_signals() -> Iterator[Callable[[threading.Event], None]]:
     """Let handlers of signals set events that their own thread may be waiting for.
 
     A handler comes upon its thread anywhere, within `Event.wait` as well, which holds the lock
@@ -289,7 +289,7 @@ def stop_on_signals(
             raise KeyboardInterrupt
 
     before: dict[int, Any] = {}
-    with set_by_signals() as set_event:
+    with _set_by_signals() as set_event:
         try:
             for number in (signal.SIGINT, signal.SIGTERM):
                 before[number] = signal.signal(number, _handle)
@@ -308,6 +308,5 @@ __all__ = [
     "open_runtime",
     "open_store",
     "run_embedded",
-    "set_by_signals",
     "stop_on_signals",
 ]

@@ -18,7 +18,7 @@ from services.optimizer.jobs.job import Claim, Command, Job, JobState
 from services.optimizer.jobs.spec import Spec
 from services.optimizer.run.evaluator import Evaluator
 from services.optimizer.service import JobService
-from services.runtime import EvaluatorKind, open_evaluator, run_embedded, set_by_signals
+from services.runtime import EvaluatorKind, open_evaluator, run_embedded
 
 _TAKEN_UP: Final = (JobState.PAUSED, JobState.PAUSING, JobState.FAILED)
 """States in which going on with a job needs the command to."""
@@ -237,12 +237,11 @@ def _ctrl_c(stop: threading.Event) -> Iterator[threading.Event]:
     def handle(_number: int, _frame: Any) -> None:
         if pressed.is_set():
             raise KeyboardInterrupt
-        set_event(pressed)
-        set_event(stop)
+        pressed.set()
+        stop.set()
 
-    with set_by_signals() as set_event:
-        signal.signal(signal.SIGINT, handle)
-        try:
-            yield pressed
-        finally:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGINT, handle)
+    try:
+        yield pressed
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -29,6 +30,9 @@ OnNews = Callable[[str], None]
 
 _POLL_SECONDS: Final = 0.5
 """Between looks at a job that another process holds."""
+
+_GLANCE: Final = 0.05
+"""Between looks, meanwhile, whether it is to stop."""
 
 _UNDER_WAY: Final = (JobState.QUEUED, JobState.RUNNING, JobState.PAUSING)
 
@@ -201,7 +205,10 @@ class _EmbeddedRun:
             self.following = True
         self._catch_up()
         if self.job.state in _UNDER_WAY:
-            self.stop.wait(_POLL_SECONDS)
+            # `stop.wait` would hold the lock that a signal's handler takes when it sets `stop`.
+            until = time.monotonic() + _POLL_SECONDS
+            while time.monotonic() < until and not self.stop.is_set():
+                time.sleep(_GLANCE)
 
     def _catch_up(self) -> None:
         """Tell of the iterations that another process has stored meanwhile."""

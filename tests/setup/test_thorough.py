@@ -66,15 +66,10 @@ def _tests() -> Iterator[tuple[str, list[str] | None]]:
             for mark in (node.value.elts if isinstance(node.value, ast.List) else [node.value])
         ]
         for node in ast.walk(module):
-            if (
-                isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
-                and node.name[:5] == "test_"
-            ):
+            if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
                 marks = [mark for mark in (*of_module, *node.decorator_list) if _is_thorough(mark)]
-                yield (
-                    node.name,
-                    [why for mark in marks for why in _reasons(mark)] if marks else None,
-                )
+                why = [reason for mark in marks for reason in _reasons(mark)]
+                yield node.name, why if marks else None
 
 
 def _is_thorough(mark: ast.expr) -> bool:

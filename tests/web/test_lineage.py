@@ -66,7 +66,8 @@ def test_no_button_moves_when_the_forks_of_a_job_are_known(
 
     visited = visit(server.url)
     visited.page.route("**/v1/jobs?parent=*", hold)
-    page = visited.go(f"/jobs/{finished_job}")
+    with visited.page.expect_request("**/v1/jobs?parent=*"):
+        page = visited.go(f"/jobs/{finished_job}")
     button = page.get_by_role("button", name="Extend…")
     expect(page.get_by_text("Computing time", exact=True)).to_be_visible()
     before = button.bounding_box()

@@ -306,3 +306,19 @@ def test_a_run_that_is_told_to_stop_leaves_a_job_alone_that_another_process_took
     clock.advance(EMBEDDED_LEASE_SECONDS + 1.0)
     assert store.claim("another", lease_seconds=60.0) is not None
     assert run_embedded(store, no_workers, mine, stop=stop).state is JobState.RUNNING
+
+
+class NeverWaitedFor(threading.Event):
+    """Whoever waits for it holds its lock, which a signal's handler in the same thread needs."""
+
+    def wait(self, timeout: float | None = None) -> bool:
+        raise AssertionError(f"waited {timeout} s for what a handler is to set")
+
+
+def test_who_follows_a_job_looks_whether_to_stop_and_never_waits_for_it(store: Store) -> None:
+    stop, claim = NeverWaitedFor(), held_by_another(store)
+    later = threading.Timer(0.1, stop.set)
+    later.start()
+    job = run_embedded(store, no_workers, claim.job.id, stop=stop)
+    later.join()
+    assert job.state is JobState.RUNNING

@@ -153,8 +153,11 @@ def serve_database(lasting_server: Server) -> Iterator[Callable[[Path], str]]:
 
 
 def pytest_configure() -> None:
-    """What is imported and collected lasts: nothing of it is garbage."""
+    """Before anything is collected, let alone run."""
+    # What is imported and collected lasts: nothing of it is garbage.
     gc.disable()
+    # Ray's workers of the tests compute beside other tests, and not once these have done.
+    os.environ.setdefault("RAY_worker_niceness", "1")
 
 
 def pytest_collection_finish() -> None:

@@ -7,8 +7,11 @@ import logging
 import threading
 import time
 from collections.abc import Callable
+from contextlib import closing
 from functools import partialmethod
+from pathlib import Path
 from typing import cast
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -25,11 +28,13 @@ from services.optimizer.run.execution import Surroundings, run_claim
 from services.optimizer.run.outage import Backoff
 from services.optimizer.run.runner import Runner
 from services.optimizer.store.port.base import Store
+from services.optimizer.store.sql_store import open_store
 from sim.errors import KernelBuildError, SimulationInputError
 from sim.outcome import Outcome
 from tests.examples.jobs import history
 from tests.examples.processes import eventually
 from tests.optimizer.formula import SINGLE, SPEC, FormulaEvaluator, queue, run
+from tests.store.examples import Clock
 
 
 def test_a_claimed_job_runs_to_its_end(store: Store) -> None:
@@ -76,19 +81,27 @@ def test_a_cancellation_drops_the_walks_under_way(store: Store) -> None:
     assert history(store, job_id) == []
 
 
-def test_a_job_longer_than_its_lease_is_kept_by_its_heartbeat(store: Store) -> None:
-    job_id = queue(store)
-    evaluator = FormulaEvaluator()
-    evaluator.hold.set()
-    stop = threading.Event()
-    thread = threading.Thread(target=run, args=(store, evaluator, stop))
-    thread.start()
-    evaluator.entered.wait()
-    time.sleep(0.6)
-    assert store.claim("thief", lease_seconds=1.0, job_id=job_id) is None
-    evaluator.hold.clear()
-    thread.join()
-    assert store.job(job_id).state is JobState.SUCCEEDED
+def test_a_job_longer_than_its_lease_is_kept_by_its_heartbeat(database: Path) -> None:
+    clock = Clock()
+    with (
+        closing(open_store(str(database), clock=clock)) as store,
+        patch.object(store, "renew", side_effect=store.renew) as renew,
+    ):
+        job_id = queue(store)
+        evaluator = FormulaEvaluator()
+        evaluator.hold.set()
+        thread = threading.Thread(target=run, args=(store, evaluator))
+        thread.start()
+        evaluator.entered.wait()
+        for _ in range(3):
+            clock.advance(0.2)
+            # One may have been under way, and gone by the time before.
+            wanted = renew.call_count + 2
+            eventually(lambda wanted=wanted: renew.call_count >= wanted)  # type: ignore[misc]
+        assert store.claim("thief", lease_seconds=1.0, job_id=job_id) is None
+        evaluator.hold.clear()
+        thread.join()
+        assert store.job(job_id).state is JobState.SUCCEEDED
 
 
 def set_after(awaited: threading.Event, following: threading.Event) -> None:

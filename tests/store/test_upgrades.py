@@ -8,12 +8,13 @@ from contextlib import closing
 import pytest
 from alembic import command
 from alembic.config import Config
-from sqlalchemy import text
+from sqlalchemy import Connection, text
 
 from services.optimizer.errors import Conflict, StoreUnavailable
 from services.optimizer.store.connections.engine import connect, parse_url
+from services.optimizer.store.rows.tables import metadata
 from services.optimizer.store.schema.in_use import exclusive
-from services.optimizer.store.schema.migrate import upgrade
+from services.optimizer.store.schema.migrate import create, upgrade
 from services.optimizer.store.schema.revisions import MIGRATIONS, head, read_revision
 from services.optimizer.store.sql_store import open_store
 from tests.examples.forked import ForkedCommand
@@ -26,14 +27,41 @@ from tests.store.worker_process import OLDER
 JOB = "bcdfghjkmnpq"
 
 
+def alembic(connection: Connection) -> Config:
+    """Of Alembic's commands, which run in a transaction of ours."""
+    config = Config()
+    config.set_main_option("script_location", str(MIGRATIONS))
+    config.attributes["connection"] = connection
+    return config
+
+
+def schema(connection: Connection) -> list[str]:
+    """Every table, column and index, in the words of the database itself."""
+    if connection.dialect.name == "sqlite":
+        return sorted(" ".join(row.sql.split()) for row in connection.execute(_SQLITE_SCHEMA))
+    return [str(row) for query in _POSTGRESQL_SCHEMA for row in connection.execute(query)]
+
+
+_SQLITE_SCHEMA = text("SELECT sql FROM sqlite_master WHERE name NOT LIKE 'sqlite_%'")
+_POSTGRESQL_SCHEMA = [
+    text(
+        "SELECT table_name, column_name, data_type, is_nullable, column_default, is_identity"
+        " FROM information_schema.columns WHERE table_schema = 'public'"
+        " ORDER BY table_name, ordinal_position"
+    ),
+    text("SELECT indexdef FROM pg_indexes WHERE schemaname = 'public' ORDER BY indexname"),
+    text(
+        "SELECT conrelid::regclass, conname, pg_get_constraintdef(oid) FROM pg_constraint"
+        " WHERE connamespace = 'public'::regnamespace ORDER BY conrelid::regclass::text, conname"
+    ),
+]
+
+
 def store_older(url: str, *, state: str = "queued", lease_expires_at: str | None = None) -> None:
     """Make a database of an older revision, with a job in it."""
     database = connect(parse_url(url), for_migration=True)
-    config = Config()
-    config.set_main_option("script_location", str(MIGRATIONS))
     with database.transaction(write=True) as connection:
-        config.attributes["connection"] = connection
-        command.upgrade(config, OLDER)
+        command.upgrade(alembic(connection), OLDER)
         connection.execute(
             text(
                 "INSERT INTO jobs (id, state, spec, created_at, updated_at, lease_owner,"
@@ -57,6 +85,32 @@ def revision(url: str) -> str | None:
         database.transaction(write=False) as connection,
     ):
         return read_revision(connection)
+
+
+def test_a_new_database_is_as_all_migrations_make_one(fresh_url: str) -> None:
+    with closing(connect(parse_url(fresh_url), for_migration=True)) as database:
+        with database.transaction(write=True) as connection:
+            command.upgrade(alembic(connection), "head")
+            migrated, revision = schema(connection), read_revision(connection)
+            metadata.drop_all(connection)
+            connection.execute(text("DROP TABLE alembic_version"))
+            assert schema(connection) == []
+        create(parse_url(fresh_url))
+        with database.transaction(write=False) as connection:
+            assert len(migrated) > len(metadata.tables)
+            assert schema(connection) == migrated
+            assert read_revision(connection) == revision == head()
+
+
+def test_a_database_whose_migrations_were_all_taken_back_is_made_ready(fresh_url: str) -> None:
+    with (
+        closing(connect(parse_url(fresh_url), for_migration=True)) as database,
+        database.transaction(write=True) as connection,
+    ):
+        command.upgrade(alembic(connection), "head")
+        command.downgrade(alembic(connection), "base")
+        assert read_revision(connection) is None
+    open_store(fresh_url).close()
 
 
 def test_an_older_database_is_refused_and_left_as_it_is(fresh_url: str) -> None:

@@ -78,8 +78,6 @@ def ray_environment(directory: Path) -> dict[str, str]:
         "RAY_AUTH_TOKEN": secrets.token_hex(16),
         "RAY_USAGE_STATS_ENABLED": "0",
         "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
-        # Nice workers would stand back behind all other tests, and be given next to nothing.
-        "RAY_worker_niceness": "0",
         # So that the end of a node is noticed by Ray within a test's time.
         "RAY_health_check_period_ms": "1000",
         "RAY_health_check_timeout_ms": "1000",

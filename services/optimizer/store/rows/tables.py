@@ -190,14 +190,14 @@ jobs: Final = Table(
     Column("deleted_at", UtcDateTime),
     # Whether it stays, however long ago it ended; NULL is false.
     Column("kept", Boolean),
-    # What people have written on it, `Labels`; NULL for nothing.
-    Column("labels", Document(none_as_null=True)),
-    # Whether it is out of the way in lists; NULL is false.
-    Column("archived", Boolean),
     # Of all walks of all designs of its budget [s]; NULL where nobody has asked.
     Column("simulated_seconds", Double),
     # The higher, the sooner it is claimed.
     Column("priority", Integer, nullable=False, server_default="0"),
+    # What people have written on it, `Labels`; NULL for nothing.
+    Column("labels", Document(none_as_null=True)),
+    # Whether it is out of the way in lists; NULL is false.
+    Column("archived", Boolean),
     # What its best is measured against, `Reference`; NULL while nobody has found that out.
     Column("reference", Document(none_as_null=True)),
     PrimaryKeyConstraint("id"),

@@ -35,6 +35,12 @@ SPEC = JobSpec.model_validate(
 SINGLE = SPEC.model_copy(update={"precision": "single"})
 """The same job, searched in single precision."""
 
+LEASE = 3.0
+"""Of a job that is run here [s]: no machine is so busy that no beat comes for so long."""
+
+BRISK = 0.3
+"""The same where a beat is waited for."""
+
 
 HERE = JobProvenance(
     gaitswarm="1.0",
@@ -123,9 +129,14 @@ def queue(store: Store, spec: JobSpec = SPEC) -> str:
 
 
 def run(
-    store: Store, evaluator: FormulaEvaluator, stop: threading.Event | None = None, **given: object
+    store: Store,
+    evaluator: FormulaEvaluator,
+    stop: threading.Event | None = None,
+    *,
+    lease_seconds: float = LEASE,
+    **given: object,
 ) -> Job:
-    claim = store.claim("runner", lease_seconds=0.3)
+    claim = store.claim("runner", lease_seconds=lease_seconds)
     assert claim is not None
-    around = replace(Surroundings(store, evaluator, lease_seconds=0.3), **given)  # type: ignore[arg-type]
+    around = replace(Surroundings(store, evaluator, lease_seconds=lease_seconds), **given)  # type: ignore[arg-type]
     return run_claim(claim, around, stop)

@@ -6,12 +6,10 @@ import errno
 import logging
 import threading
 import time
-from collections.abc import Callable
-from contextlib import closing
+from collections.abc import Callable, Iterator
 from functools import partialmethod
 from pathlib import Path
-from typing import cast
-from unittest.mock import patch
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -33,7 +31,7 @@ from sim.errors import KernelBuildError, SimulationInputError
 from sim.outcome import Outcome
 from tests.examples.jobs import history
 from tests.examples.processes import eventually
-from tests.optimizer.formula import SINGLE, SPEC, FormulaEvaluator, queue, run
+from tests.optimizer.formula import BRISK, SINGLE, SPEC, FormulaEvaluator, queue, run
 from tests.store.examples import Clock
 
 
@@ -76,32 +74,55 @@ def test_a_cancellation_drops_the_walks_under_way(store: Store) -> None:
         target=lambda: (evaluator.entered.wait(), store.command(job_id, Command.CANCEL))
     )
     canceller.start()
-    assert run(store, evaluator).state is JobState.CANCELLED
+    assert run(store, evaluator, lease_seconds=BRISK).state is JobState.CANCELLED
     canceller.join()
     assert history(store, job_id) == []
 
 
-def test_a_job_longer_than_its_lease_is_kept_by_its_heartbeat(database: Path) -> None:
-    clock = Clock()
-    with (
-        closing(open_store(str(database), clock=clock)) as store,
-        patch.object(store, "renew", side_effect=store.renew) as renew,
-    ):
-        job_id = queue(store)
-        evaluator = FormulaEvaluator()
-        evaluator.hold.set()
-        thread = threading.Thread(target=run, args=(store, evaluator))
-        thread.start()
-        evaluator.entered.wait()
-        for _ in range(3):
-            clock.advance(0.2)
-            # One may have been under way, and gone by the time before.
-            wanted = renew.call_count + 2
-            eventually(lambda wanted=wanted: renew.call_count >= wanted)  # type: ignore[misc]
-        assert store.claim("thief", lease_seconds=1.0, job_id=job_id) is None
-        evaluator.hold.clear()
-        thread.join()
-        assert store.job(job_id).state is JobState.SUCCEEDED
+class StandingStore:
+    """A store whose clock stands until leases are to be outlived."""
+
+    def __init__(self, database: Path) -> None:
+        self._clock = Clock()
+        self.store = open_store(str(database), clock=self._clock)
+        self._renew = self.store.renew
+        self._renewed = 0
+        self.store.renew = self._counted  # type: ignore[method-assign]
+
+    def _counted(self, *arguments: Any, **options: Any) -> Any:
+        renewal = self._renew(*arguments, **options)
+        self._renewed += 1
+        return renewal
+
+    def outlive(self, lease_seconds: float) -> None:
+        """Let two leases' time pass, and whoever renews them do so in time."""
+        for _ in range(4):
+            self._clock.advance(0.5 * lease_seconds)
+            # One may have been under way, by the time before.
+            wanted = self._renewed + 2
+            eventually(lambda wanted=wanted: self._renewed >= wanted)  # type: ignore[misc]
+
+
+@pytest.fixture
+def standing(database: Path) -> Iterator[StandingStore]:
+    opened = StandingStore(database)
+    yield opened
+    opened.store.close()
+
+
+def test_a_job_longer_than_its_lease_is_kept_by_its_heartbeat(standing: StandingStore) -> None:
+    store = standing.store
+    job_id = queue(store)
+    evaluator = FormulaEvaluator()
+    evaluator.hold.set()
+    thread = threading.Thread(target=run, args=(store, evaluator), kwargs={"lease_seconds": BRISK})
+    thread.start()
+    evaluator.entered.wait()
+    standing.outlive(BRISK)
+    assert store.claim("thief", lease_seconds=1.0, job_id=job_id) is None
+    evaluator.hold.clear()
+    thread.join()
+    assert store.job(job_id).state is JobState.SUCCEEDED
 
 
 def set_after(awaited: threading.Event, following: threading.Event) -> None:
@@ -175,20 +196,20 @@ class AwayEvaluator(FormulaEvaluator):
         return super().evaluate(request, should_stop)
 
 
-def test_a_job_says_what_it_waits_for_keeps_its_lease_and_goes_on_by_itself(store: Store) -> None:
+def test_a_job_says_what_it_waits_for_keeps_its_lease_and_goes_on_by_itself(
+    standing: StandingStore,
+) -> None:
+    store = standing.store
     job_id = queue(store)
     evaluator = AwayEvaluator()
-    thread = threading.Thread(
-        target=run, args=(store, evaluator), kwargs={"backoff": Backoff(0.01, longest=0.1)}
-    )
+    brisk = {"backoff": Backoff(0.01, longest=0.1), "lease_seconds": BRISK}
+    thread = threading.Thread(target=run, args=(store, evaluator), kwargs=brisk)
     thread.start()
     eventually(lambda: store.job(job_id).waiting == "no route to host")
     waiting = store.job(job_id)
     assert waiting.state is JobState.RUNNING
     assert time_left(waiting, waiting.updated_at).eta_seconds is None
-    # Longer than the lease, which the heartbeat renews.
-    tried = evaluator.calls
-    eventually(lambda: evaluator.calls > tried + 10)
+    standing.outlive(BRISK)
     assert store.claim("thief", lease_seconds=1.0, job_id=job_id) is None
     evaluator.back.set()
     thread.join()
@@ -453,7 +474,10 @@ def test_recorded_designs_are_what_was_evaluated(store: Store) -> None:
     np.testing.assert_array_equal(recorded, np.concatenate(evaluator.designs))
 
 
-def test_a_change_of_priority_reaches_the_workers_and_changes_no_bit(store: Store) -> None:
+def test_a_change_of_priority_reaches_the_workers_and_changes_no_bit(
+    standing: StandingStore,
+) -> None:
+    store = standing.store
     whole = queue(store)
     run(store, FormulaEvaluator())
     job, _ = store.create_job(SPEC, priority=-1)
@@ -471,10 +495,15 @@ def test_a_change_of_priority_reaches_the_workers_and_changes_no_bit(store: Stor
             store.prioritize(job.id, 4)
             # Of the next iterations, one begins after a heartbeat that has heard of it.
             evaluator.hold.set()
-            threading.Timer(0.5, evaluator.hold.clear).start()
+            threading.Thread(target=let_go_after_a_beat).start()
+
+    def let_go_after_a_beat() -> None:
+        standing.outlive(BRISK)
+        evaluator.hold.clear()
 
     evaluator = Prioritized()
-    assert run(store, evaluator, on_commit=prioritize).state is JobState.SUCCEEDED
+    ended = run(store, evaluator, on_commit=prioritize, lease_seconds=BRISK)
+    assert ended.state is JobState.SUCCEEDED
     assert (given[0], given[-1]) == (0.5, 16.0)
     assert history(store, job.id) == history(store, whole)
 

@@ -196,6 +196,7 @@ def test_a_worker_takes_at_most_500_megabytes_and_has_loaded_only_what_walks_nee
 
 @pytest.mark.slow
 def test_a_second_ray_in_the_same_process_is_refused(ray_evaluator: RayEvaluator) -> None:
+    ray_evaluator.wait_until_open(never)
     with pytest.raises(EvaluatorUnavailable, match="already"):
         RayEvaluator(cpus=1).wait_until_open(never)
 

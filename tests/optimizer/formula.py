@@ -36,7 +36,7 @@ SINGLE = SPEC.model_copy(update={"precision": "single"})
 """The same job, searched in single precision."""
 
 LEASE = 3.0
-"""Of a job that is run here [s]: no machine is so busy that no beat comes for so long."""
+"""Of a job that is run here [s]: long enough that beats come in time on a busy machine."""
 
 BRISK = 0.3
 """The same where a beat is waited for."""

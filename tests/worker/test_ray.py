@@ -237,7 +237,8 @@ def test_after_closing_nothing_runs_nothing_lies_about_and_nothing_was_said(
     with driver("close", tmp_path) as started:
         below = descendants(started.pid)
         # As Ray itself has them; those of other tests are hardly nice (tests/conftest.py).
-        assert all(os.getpriority(os.PRIO_PROCESS, p.pid) > 4 for p in walkers(started.pid))
+        niceness = {os.getpriority(os.PRIO_PROCESS, p.pid) for p in walkers(started.pid)}
+        assert min(niceness) > 4
         assert traces(started.pid)
         _, said = started.communicate("now\n", timeout=60)
         assert started.returncode == 0

@@ -10,6 +10,7 @@ import os
 import shutil
 from collections.abc import Callable, Generator, Iterator
 from contextlib import ExitStack, closing
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -86,15 +87,21 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         items[:] = [*others[:second], *of_page, *others[second:]]
 
 
+_numbers = count()
+
+
 @pytest.fixture(autouse=True)
-def _no_user_data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A data directory of the test's own, and none of the user's settings."""
+def user_data(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A data directory of the test's own, not made yet, and none of the user's settings."""
     for name in os.environ:
         if name.startswith("GAITSWARM_"):
             monkeypatch.delenv(name)
-    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "user-data"))
+    # Not within the test's folder: most tests have no use for one, and making it takes as long.
+    own = tmp_path_factory.getbasetemp() / f"user-data-{next(_numbers)}"
+    monkeypatch.setenv("XDG_DATA_HOME", str(own))
     # A job that is run again, to be compared with the first, is to walk again.
     monkeypatch.setenv("GAITSWARM_CACHE", "0")
+    return own
 
 
 @pytest.fixture(scope="session")

@@ -46,7 +46,7 @@ def writing_commands(finished: Finished) -> dict[str, tuple[str | Path, ...]]:
 WRITING = ["help", "help of a command", "version", "JSON, written as it is read", "a table"]
 
 
-@pytest.mark.variants(without=("JSON, written as it is read-", "a table-unbuffered"))
+@pytest.mark.variants("help-unbuffered", "JSON, written as it is read-unbuffered", "a table-")
 @pytest.mark.slow
 @pytest.mark.parametrize("buffered", [BUFFERED, {"PYTHONUNBUFFERED": "1"}], ids=["", "unbuffered"])
 @pytest.mark.parametrize("kind", WRITING)
@@ -59,7 +59,7 @@ def test_a_full_device_is_said_and_exit_code_5(
     assert done.stderr == "gaitswarm: standard output cannot be written: No space left on device\n"
 
 
-@pytest.mark.variants(without="JSON, written as it is read")
+@pytest.mark.variants("version", "a table")
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", WRITING)
 def test_a_reader_that_has_seen_enough_is_no_error(finished: Finished, kind: str) -> None:

@@ -166,11 +166,11 @@ def test_a_database_that_is_not_there_is_not_made_by_reading(
 
 
 def test_without_options_commands_share_the_database_of_the_user(
-    gaitswarm: Gaitswarm, small_spec: Path, tmp_path: Path
+    gaitswarm: Gaitswarm, small_spec: Path, user_data: Path
 ) -> None:
     submitted = gaitswarm("submit", "--spec", small_spec).out.strip()
     assert [job["id"] for job in gaitswarm("list", "--json").json] == [submitted]
-    assert (tmp_path / "user-data" / "gaitswarm" / "gaitswarm.db").exists()
+    assert (user_data / "gaitswarm" / "gaitswarm.db").exists()
 
 
 def test_the_environment_names_a_database_and_an_option_goes_before_it(

@@ -88,9 +88,9 @@ def test_progress_is_told_after_each_iteration_is_stored(db: Path) -> None:
     assert result.job.iterations == 2
 
 
-def test_without_a_place_the_job_is_in_the_users_own_database(tmp_path: Path) -> None:
+def test_without_a_place_the_job_is_in_the_users_own_database(user_data: Path) -> None:
     result = gaitswarm.optimize(**{**SMALL, "iterations": 1, "scenarios": "1"})
-    assert result.db == str(tmp_path / "user-data" / "gaitswarm" / "gaitswarm.db")
+    assert result.db == str(user_data / "gaitswarm" / "gaitswarm.db")
     with gaitswarm.open() as jobs:
         assert jobs.job(result.job.id) == result.job
 

@@ -10,9 +10,10 @@ from pathlib import Path
 
 import pytest
 
+from tests.examples.forked import run_forked
 from tests.examples.paths import ROOT
-from tests.examples.plugins import install
-from tests.examples.processes import COMMAND_LINE, python
+from tests.examples.plugins import install, installed
+from tests.examples.processes import python
 
 pytestmark = pytest.mark.slow
 
@@ -39,14 +40,18 @@ def test_its_package_keeps_to_the_contracts(site: Path, path: dict[str, str]) ->
     assert " passed" in done.stdout
 
 
-def test_its_commands_run(site: Path, path: dict[str, str]) -> None:
+def test_its_commands_run(
+    site: Path, path: dict[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(site)
     (block,) = re.findall(r"^```sh\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
     printed = ""
-    for line in block.splitlines():
-        _, *words = shlex.split(line)
-        extra = ["--evaluator", "in-process"] if words[0] == "optimize" else []
-        done = python(*COMMAND_LINE, *words, *extra, environment=path, cwd=site)
-        assert done.returncode == 0, done.stderr
-        printed += done.stdout
+    with installed(site):
+        for line in block.splitlines():
+            _, *words = shlex.split(line)
+            extra = ["--evaluator", "in-process"] if words[0] == "optimize" else []
+            done = run_forked(*words, *extra, environment=path)
+            assert done.returncode == 0, done.stderr
+            printed += done.stdout
     assert "refused" not in printed
     assert all(name in printed for name in ("pd", "hill", "damped", "share"))

@@ -215,6 +215,10 @@ def test_a_job_that_is_extended_and_killed_equals_one_that_is_only_extended(
     assert digests(store, killed) == digests(store, whole)
 
 
+@pytest.mark.thorough(
+    "test_resumed_job_equals_one_never_killed",
+    "test_results_are_those_of_one_batch_in_index_order_to_the_bit",
+)
 def test_a_job_resumed_on_ray_equals_one_run_in_threads(
     store: Store, url: str, alone: Walked
 ) -> None:

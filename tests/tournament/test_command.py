@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import cli.tournament.report
 from cli.tournament.plan import PRESETS, Size, tournament_jobs
 from cli.tournament.runs import read_runs
 from services.optimizer.jobs.kinds.problem import TuningProblem
@@ -23,7 +24,7 @@ from tests.examples.forked import ForkedCommand
 from tests.examples.processes import output
 
 TWO = "D4C1R0I1,D7C0R0I1"
-"""A page has two pictures and one of every problem, which take longer than the runs."""
+"""A page has two pictures and one of every problem."""
 
 
 def small(problems: str) -> tuple[Any, ...]:
@@ -45,6 +46,12 @@ def numbers(folder: Path) -> dict[tuple[str, str], tuple[bytes, bytes]]:
         for problem, by_method in read_runs(folder / "report", "output").items()
         for method, runs in by_method.items()
     }
+
+
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reports without pictures, which take longer than the runs."""
+    monkeypatch.setattr(cli.tournament.report, "_picture", lambda _: "")
 
 
 def jobs(folder: Path) -> dict[str, int]:
@@ -79,6 +86,7 @@ def test_the_report_holds_what_was_measured(tmp_path: Path) -> None:
     assert "inertia_start: 0.7 to 1" in page  # what was drawn
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_table_on_the_terminal_names_every_method_and_problem(tmp_path: Path) -> None:
     result = command(tmp_path, "--repetitions", 1, "--settings", "default", problems=TWO)
     assert result.code == 0, result.err
@@ -86,7 +94,9 @@ def test_the_table_on_the_terminal_names_every_method_and_problem(tmp_path: Path
         assert word in result.out
 
 
-def test_the_same_command_runs_nothing_again_and_more_only_what_is_missing(tmp_path: Path) -> None:
+def test_the_same_command_runs_nothing_again_and_more_only_what_is_missing(
+    tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
     assert command(tmp_path, "--repetitions", 2).code == 0
     first, page = numbers(tmp_path), (tmp_path / "report" / "report.html").read_bytes()
     again = command(tmp_path, "--repetitions", 2)
@@ -97,6 +107,7 @@ def test_the_same_command_runs_nothing_again_and_more_only_what_is_missing(tmp_p
     )
     assert (tmp_path / "report" / "report.html").read_bytes() == page
 
+    request.getfixturevalue("undrawn")
     more = command(tmp_path, "--repetitions", 2, methods="pso,random,ps")
     assert re.findall(r"^(\w+): run", more.err, re.MULTILINE) == ["ps", "ps"]
     assert {key: numbers(tmp_path)[key] for key in first} == first
@@ -111,6 +122,7 @@ def test_the_same_command_runs_nothing_again_and_more_only_what_is_missing(tmp_p
     assert numbers(tmp_path) == first
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_settings_of_your_own_have_a_label(tmp_path: Path) -> None:
     file = tmp_path / "methods.json"
     file.write_text('{"tiny swarm": {"name": "pso", "particles": 4}}', encoding="utf-8")
@@ -121,6 +133,7 @@ def test_settings_of_your_own_have_a_label(tmp_path: Path) -> None:
     assert set(result.json["mean_ranks"]) == {"pso", "random", "tiny swarm"}
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_ranks_are_compared_with_those_of_an_earlier_report(tmp_path: Path) -> None:
     methods = "pso,random,ps"
     assert command(tmp_path, "--repetitions", 2, methods=methods).code == 0
@@ -208,6 +221,7 @@ def test_the_robot_races_on_chapter_4_and_on_chapter_3_with_its_gait() -> None:
     assert {job.precision for job in jobs.values()} == {"single"}
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_race_on_the_robot_is_reported_like_any_other(tmp_path: Path) -> None:
     result = run_command(
         "tournament", "robot", "--methods", "pso,random", "--problems", "chapter-3.pi",

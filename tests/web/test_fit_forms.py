@@ -110,8 +110,7 @@ def test_a_log_is_uploaded_read_and_identified_from(
 def test_what_a_log_tells_is_calibrated_to_beside_what_is_typed(
     server: ServerProcess, log: Path, visit: Callable[..., Visit]
 ) -> None:
-    visited = visit(server.url, allowed="422", bypass_csp=True)
-    page = visited.go("/jobs/new?kind=calibration")
+    page = visit(server.url, allowed="422").go("/jobs/new?kind=calibration")
     page.get_by_label("Cycles").fill("1")
     upload(page, log)
     value = page.get_by_label("value of target 1")
@@ -121,7 +120,6 @@ def test_what_a_log_tells_is_calibrated_to_beside_what_is_typed(
     page.get_by_label("value of target 3").fill("fast")
     expect(page.get_by_text("entry 3, value:")).to_be_visible()
     page.get_by_label("value of target 3").fill("0.15")
-    assert findings(page) == {}
     page.get_by_label("Particles").fill("4")
     page.get_by_label("Iterations").fill("1")
     measured = float(value.input_value())
@@ -136,6 +134,17 @@ def test_what_a_log_tells_is_calibrated_to_beside_what_is_typed(
     assert spec["targets"][0]["value"] == measured
     assert spec["walks"][0]["design"] == PUBLISHED_A
     assert spec["walks"][0]["scenarios"][0]["cycles"] == 1.0
+
+
+@pytest.mark.thorough("test_every_eye_hand_and_width_can_use_it")
+def test_every_eye_hand_and_width_can_use_targets_of_a_log(
+    server: ServerProcess, log: Path, visit: Callable[..., Visit]
+) -> None:
+    page = visit(server.url, allowed="422", bypass_csp=True).go("/jobs/new?kind=calibration")
+    page.get_by_label("Cycles").fill("1")
+    upload(page, log)
+    expect(page.get_by_label("value of target 1")).not_to_have_value("")
+    assert findings(page) == {}
 
 
 def test_what_is_wrong_with_a_log_is_told_at_its_field(

@@ -160,6 +160,7 @@ def test_the_first_view_of_a_long_job_is_small_and_then_complete(
     )
 
 
+@pytest.mark.thorough("the benchmark of the page")
 @pytest.mark.timeout(600)
 def test_the_pages_benchmark_measures_first_views_and_what_moves(
     large_server: Server, long_job: str, pages: Pages

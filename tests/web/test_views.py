@@ -47,7 +47,10 @@ BACKGROUND = "getComputedStyle(document.body).backgroundColor"
 
 PHONE: Final[ViewportSize] = {"width": 360, "height": 740}
 
-REFUSED: Final = {"nothing there": "status of 404", "jobs": "status of 422"}
+REFUSED: Final = {
+    "nothing there": "status of 404",
+    "other forms, and jobs compared": "status of 422",
+}
 """What the console says by kind of view: of a job that is not there, and of one without a robot."""
 
 TOO_WIDE = """() => {

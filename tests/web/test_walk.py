@@ -130,13 +130,13 @@ def test_a_replay_is_saved_as_a_video_of_the_chosen_size_and_speed(
 
     page.get_by_role("button", name="Save as video").click()
     dialog = page.get_by_role("dialog", name="Save as video")
+    dialog.get_by_label("Size").select_option(label="640 × 360")
     # What is stopped is not saved.
     dialog.get_by_label("Speed").select_option("0.1")
     dialog.get_by_role("button", name="Record").click()
     expect(dialog.get_by_role("progressbar")).to_be_visible()
     dialog.get_by_role("button", name="Stop recording").click()
 
-    dialog.get_by_label("Size").select_option(label="640 × 360")
     dialog.get_by_label("Speed").select_option("4")
     duration = float((shown.locator(".moment").inner_text()).split()[2])
     expect(dialog).to_contain_text(f"It takes {duration / 4:.1f}")

@@ -13,6 +13,8 @@ VIEWS: Final[Mapping[str, Mapping[str, str]]] = {
     "jobs": {
         "jobs": "/jobs",
         "new-job": "/jobs/new",
+    },
+    "other forms, and jobs compared": {
         "new-identification": "/jobs/new?kind=identification",
         "own-robot": "/jobs/new?robot=own",
         "compare": "/compare?jobs={job}",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Iterable
@@ -21,6 +22,7 @@ from numpy.typing import NDArray
 from services.optimizer.errors import EvaluatorUnavailable
 from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped
 from services.worker.cluster import nodes, pump, ray_nodes
+from services.worker.cluster.shares import REPORT_SECONDS
 from services.worker.ray_evaluator import RayEvaluator
 from sim.case import Walk
 from sim.kernel.walk import Precision
@@ -66,6 +68,18 @@ class Sleep(InPlaceOfWalk):
         while time.monotonic() < until:
             time.sleep(0.01)  # at most so long a cancellation waits, as between steps of a search
         raise AssertionError("it was not cancelled")
+
+
+@dataclass(frozen=True, slots=True)
+class Slow(InPlaceOfWalk):
+    """A walk that begins after a while, in which others may compute."""
+
+    name = "slow"
+    duration = 1000.0
+
+    def run(self, designs: NDArray[np.float64]) -> Outcome:
+        time.sleep(0.2)
+        return self.walk.run(designs)
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,18 +159,24 @@ def slots() -> int:
     return _evaluator.slots
 
 
-def least_slots(request: EvaluationRequest, seconds: float) -> int:
-    """The fewest slots that this runner had while it walked for some seconds."""
-    seen: list[int] = []
-    until = time.monotonic() + seconds
+def least_slots(request: EvaluationRequest, expected: int) -> int:
+    """The fewest slots that this runner had while it walked, for half a minute at most.
+
+    Once these are as expected, it walks on until each runner has reported once more.
+    """
+    fewest = sys.maxsize
+    until = time.monotonic() + 30.0
 
     def look() -> bool:
-        seen.append(_evaluator.slots)
+        nonlocal fewest, until
+        before, fewest = fewest, min(fewest, _evaluator.slots)
+        if fewest <= expected < before:
+            until = time.monotonic() + 2.0 * REPORT_SECONDS
         return time.monotonic() > until
 
     with suppress(EvaluationStopped):
         _evaluator.evaluate(request, look)
-    return min(seen)
+    return fewest
 
 
 def demand_shown(request: EvaluationRequest | None, expected: int) -> int:

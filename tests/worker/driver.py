@@ -6,13 +6,15 @@ import os
 import signal
 import sys
 import threading
-import time
+from dataclasses import replace
 from unittest.mock import patch
 
 from services.optimizer.errors import EvaluatorUnavailable
 from services.optimizer.run.evaluator import EvaluationStopped
 from services.worker.ray_evaluator import RayEvaluator
 from services.worker.ray_session import RaySession, open_ray
+from sim.case import Walk
+from tests.worker.cluster_runner import Sleep
 from tests.worker.processes import descendants
 from tests.worker.requests import bits, never, request
 
@@ -69,16 +71,16 @@ def terminated() -> str:
 
 
 def until_lost(evaluator: RayEvaluator) -> str:
-    """What is said when the loss is noticed; walks may go on for a while without the head.
+    """What is said when the loss is noticed, during a request.
 
-    Seconds of walks at a time: of a loss between two requests nobody is told, the next opens Ray.
+    Of a loss between two requests nobody is told: the next opens Ray.
     """
-    deadline = time.monotonic() + 50.0
-    while time.monotonic() < deadline:
-        try:
-            evaluator.evaluate(request(300), never)
-        except EvaluatorUnavailable as error:
-            return str(error)
+    (walk, *_) = request(1).cases
+    assert isinstance(walk, Walk)
+    try:
+        evaluator.evaluate(replace(request(1), cases=(Sleep(walk),)), never)
+    except EvaluatorUnavailable as error:
+        return str(error)
     return "the loss went unnoticed"
 
 

@@ -25,8 +25,8 @@ def walked(here: Mock) -> int:
     return sum(part.stop - part.start for task in tasks for part in task.parts)
 
 
-def take_over(evaluator: HybridEvaluator) -> None:
-    """Ray takes over, is lost, and takes over again."""
+def take_over(evaluator: HybridEvaluator, then: str) -> None:
+    """Ray takes over; then that is all, or it is lost and takes over again."""
     walks = len(WANTED.designs) * len(WANTED.cases)
     expected = bits(walked_at_once(WANTED))
 
@@ -40,6 +40,10 @@ def take_over(evaluator: HybridEvaluator) -> None:
     assert [walked_here(), walked_here()] == [walks, walks]
     eventually(lambda: evaluator.on_ray)
     assert walked_here() == 0
+    sys.stdout.write("took over\n")
+    if then == "is all":
+        return
+
     # All that is said from here on is said of the loss.
     sys.stderr.write("loses Ray\n")
     for process in descendants(os.getpid()):
@@ -51,7 +55,7 @@ def take_over(evaluator: HybridEvaluator) -> None:
         eventually(lambda: walked_here() > 0)
     eventually(lambda: evaluator.on_ray)
     assert walked_here() == 0
-    sys.stdout.write("took over\n")
+    sys.stdout.write("took over again\n")
 
 
 def reach(evaluator: HybridEvaluator, state: str) -> None:
@@ -91,7 +95,7 @@ def main(what: str, *arguments: str) -> None:
     evaluator = HybridEvaluator(2 if what == "take-over" else 1, long_job_seconds=0.0)
     try:
         if what == "take-over":
-            take_over(evaluator)
+            take_over(evaluator, *arguments)
         else:
             reach(evaluator, *arguments)
     finally:

@@ -23,7 +23,7 @@ from tests.examples.paths import ROOT
 from tests.examples.processes import eventually, within
 from tests.worker import cluster_host, cluster_runner
 from tests.worker.cluster_host import Process
-from tests.worker.cluster_runner import Deadly, Sleep
+from tests.worker.cluster_runner import Deadly, Sleep, Slow
 from tests.worker.requests import bits, request, walked_at_once
 
 WANTED = request(300)
@@ -148,9 +148,9 @@ def test_walks_that_kill_their_worker_are_tried_on_another_node_before_they_are_
 @pytest.mark.slow
 @pytest.mark.timeout(120)
 def test_after_all_nodes_are_gone_and_another_has_come_the_bits_are_the_same(
-    host: Process, runner: Process, two_nodes: list[str], alone: list[tuple[bytes, bytes]]
+    host: Process, runner: Process, alone: list[tuple[bytes, bytes]]
 ) -> None:
-    for node in two_nodes:
+    for node in host.run(cluster_host.nodes) or [host.run(cluster_host.add)]:
         host.run(cluster_host.lose, node)
     said = runner.run(cluster_runner.why_not, WANTED)
     assert "no node of the Ray cluster has a CPU" in said
@@ -178,12 +178,14 @@ def test_tasks_that_nobody_waits_for_any_more_leave_their_slots(
 def test_two_runners_share_the_slots_while_both_have_jobs(
     address: str, runner: Process, two_nodes: list[str], alone: list[tuple[bytes, bytes]]
 ) -> None:
-    long = request(20_000, job_id="long")
+    case = WANTED.cases[0]
+    assert isinstance(case, Walk)
+    long = replace(request(2_000, job_id="long"), cases=(Slow(case),))
     with Process() as other:
         # From a machine that is none of the cluster's: it joins, without CPUs, and leaves.
         other.run(cluster_runner.connect_from_elsewhere, address)
         assert sorted(runner.run(cluster_runner.nodes_of_cluster)) == [0, 0, 1, 1]
-        both = [process.begin(cluster_runner.least_slots, long, 6.0) for process in (runner, other)]
+        both = [process.begin(cluster_runner.least_slots, long, 1) for process in (runner, other)]
         assert [least() for least in both] == [1, 1]
         assert runner.run(cluster_runner.evaluate, WANTED) == alone
         other.run(cluster_runner.disconnect)

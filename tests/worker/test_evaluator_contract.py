@@ -87,6 +87,7 @@ def test_work_is_dropped_when_it_is_told_to_stop(evaluator: Evaluator) -> None:
     assert time.monotonic() - begun < 10.0
 
 
+@pytest.mark.variants(without="hybrid")
 def test_whether_to_stop_is_asked_at_least_once_a_second(
     evaluator: Evaluator, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -158,10 +158,22 @@ def test_closed_before_ray_is_open_it_leaves_nothing_behind_and_says_nothing(sta
 
 
 @pytest.mark.slow
-def test_ray_takes_over_is_lost_and_takes_over_again_to_the_same_bits_and_leaves_nothing() -> None:
+def test_ray_takes_over_to_the_same_bits_and_leaves_nothing() -> None:
+    """Every chunk is walked once, here or there."""
+    done = python("-m", "tests.worker.hybrid_process", "take-over", "is all")
+    assert (done.stdout, done.stderr, done.returncode) == ("took over\nnothing left\n", "", 0)
+
+
+@pytest.mark.thorough(
+    "test_ray_takes_over_to_the_same_bits_and_leaves_nothing",
+    "test_a_cluster_that_was_lost_is_noticed_and_opened_again_with_the_same_bits",
+)
+@pytest.mark.slow
+def test_ray_that_took_over_is_lost_and_takes_over_again_to_the_same_bits() -> None:
     """Every chunk is walked once, here or there; here, too, until a Ray that was lost is open."""
-    done = python("-m", "tests.worker.hybrid_process", "take-over")
-    assert (done.stdout, done.returncode) == ("took over\nnothing left\n", 0), done.stderr
+    done = python("-m", "tests.worker.hybrid_process", "take-over", "is lost")
+    said = "took over\ntook over again\nnothing left\n"
+    assert (done.stdout, done.returncode) == (said, 0), done.stderr
     before, _, after = done.stderr.partition("loses Ray\n")
     assert before == ""
     assert "walks go on in this process until Ray is open again" in after

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from importlib.util import find_spec
+from statistics import NormalDist
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.stats import norm
 
 from services.optimizer.search.model.gaussian_process import GaussianProcess
 from services.optimizer.search.space import Axis, Space
@@ -50,10 +50,11 @@ def test_each_design_of_a_batch_is_chosen_as_if_those_before_were_as_expected() 
     assert fitted is not None
     mean, covariance = fitted.predict(designs / 10.0, return_cov=True)
     least, expected = float(fitted.y_train_.min()), list[int]()
+    cdf, pdf = np.vectorize(NormalDist().cdf), np.vectorize(NormalDist().pdf)
     for _ in range(10):
         deviation = np.sqrt(np.maximum(np.diag(covariance), 1e-12))
         z = (least - mean) / deviation
-        improvement = deviation * (z * norm.cdf(z) + norm.pdf(z))
+        improvement = deviation * (z * cdf(z) + pdf(z))
         improvement[expected] = -1.0
         pick = int(np.argmax(improvement))
         expected.append(pick)

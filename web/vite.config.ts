@@ -24,7 +24,7 @@ export default defineConfig({
     include: ['tests/**/*.test.ts'],
     // Stylesheets are read by the test of their classes.
     css: true,
-    // Modules keep nothing that tests change. A process for each file takes twenty times what its tests take.
+    // Files share modules: a process for each of them takes twenty times what its tests take.
     isolate: false,
     pool: 'threads',
     unstubGlobals: true,

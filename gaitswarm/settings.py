@@ -11,7 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationError
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 from services.optimizer.errors import InvalidRequest, StoreUnavailable
-from services.optimizer.jobs.job import QUARANTINE_AFTER
+from services.optimizer.jobs.job import LONGEST_LEASE_SECONDS, QUARANTINE_AFTER
 from services.worker import EvaluatorKind
 from sim.compiler.cache import DEFAULT_SIZE
 from sim.input.wording import message_of
@@ -97,7 +97,7 @@ class Settings(BaseSettings):
     lease_seconds: float = Field(
         default=30.0,
         ge=3.0,
-        le=3600.0,
+        le=LONGEST_LEASE_SECONDS,
         description="After so long without a word from its process a job is taken over [s].",
     )
     quarantine_after: int = Field(

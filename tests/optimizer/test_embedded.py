@@ -64,6 +64,13 @@ def no_workers() -> Evaluator:
 
 
 @contextmanager
+def clock_ahead(clock: Clock, seconds: float) -> Iterator[None]:
+    clock.advance(seconds)
+    yield
+    clock.advance(-seconds)
+
+
+@contextmanager
 def running(store: Store, claim: Claim, *, after: threading.Event) -> Iterator[None]:
     """Another process, which runs its job to the end once something has happened."""
 
@@ -289,6 +296,15 @@ def test_a_run_that_is_told_to_stop_leaves_the_job_queued(store: Store) -> None:
     claim = submitted(store)
     job = run_embedded(store, FormulaEvaluator(), claim, on_commit=lambda *_: stop.set(), stop=stop)
     assert (job.state, job.progress.iterations) == (JobState.QUEUED, 1)
+
+
+def test_a_job_whose_process_was_killed_with_its_clock_ahead_is_taken_over(
+    store: Store, clock: Clock, told: Told
+) -> None:
+    with clock_ahead(clock, 86400.0):
+        claim = held_by_another(store)
+    job = run_embedded(store, FormulaEvaluator(), claim.job.id, **told.callbacks())
+    assert (job.state, told.committed) == (JobState.SUCCEEDED, ALL)
 
 
 def test_a_run_that_is_told_to_stop_before_it_begins_leaves_the_job_queued(store: Store) -> None:

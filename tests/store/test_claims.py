@@ -8,9 +8,17 @@ import numpy as np
 import pytest
 
 from services.optimizer.errors import LeaseLost
-from services.optimizer.jobs.job import QUARANTINE_AFTER, Claim, Command, JobState
+from services.optimizer.jobs.job import (
+    LONGEST_LEASE_SECONDS,
+    QUARANTINE_AFTER,
+    Claim,
+    Command,
+    JobState,
+)
 from services.optimizer.store.sql_store import SqlStore
 from tests.store.examples import LEASE, Clock, ask, begun, completed, spec
+
+DAY = 86400.0
 
 
 def taken(store: SqlStore, runner: str = "runner-b", job_id: str | None = None) -> Claim:
@@ -72,6 +80,62 @@ def test_a_job_is_nobody_elses_while_its_lease_lives(store: SqlStore, clock: Clo
     begun(store)
     clock.advance(LEASE - 0.001)
     assert store.claim("runner-b", lease_seconds=LEASE) is None
+
+
+def test_the_longest_lease_is_alive_until_its_end(store: SqlStore, clock: Clock) -> None:
+    store.create_job(spec())
+    assert store.claim("runner-a", lease_seconds=LONGEST_LEASE_SECONDS) is not None
+    assert store.claim("runner-b", lease_seconds=LEASE) is None
+    clock.advance(LONGEST_LEASE_SECONDS - 0.001)
+    assert store.claim("runner-b", lease_seconds=LEASE) is None
+    clock.advance(0.001)
+    assert taken(store).taken_from == "runner-a"
+
+
+@pytest.fixture
+def killed_with_its_clock_ahead(store: SqlStore, clock: Clock) -> Claim:
+    """A claim by a runner whose clock was a day ahead, after which the clock was set right."""
+    clock.advance(DAY)
+    claim = begun(store)
+    clock.advance(-DAY)
+    return claim
+
+
+def test_a_job_is_claimed_whose_runner_died_with_its_clock_ahead(
+    store: SqlStore, killed_with_its_clock_ahead: Claim
+) -> None:
+    claim = taken(store, job_id=killed_with_its_clock_ahead.job.id)
+    assert claim.taken_from == "runner-a" and claim.ask is not None
+    assert store.claim("runner-c", lease_seconds=LEASE) is None
+
+
+def test_a_job_is_paused_and_resumed_whose_runner_died_with_its_clock_ahead(
+    store: SqlStore, killed_with_its_clock_ahead: Claim
+) -> None:
+    job_id = killed_with_its_clock_ahead.job.id
+    assert store.command(job_id, Command.PAUSE).state is JobState.PAUSED
+    assert store.command(job_id, Command.RESUME).state is JobState.QUEUED
+
+
+@pytest.mark.parametrize("before", [JobState.RUNNING, JobState.PAUSING])
+def test_a_job_under_way_is_queued_by_resume_once_its_runner_died(
+    store: SqlStore, clock: Clock, before: JobState
+) -> None:
+    claim = begun(store)
+    if before is JobState.PAUSING:
+        store.command(claim.job.id, Command.PAUSE)
+    clock.advance(DAY)
+    assert store.command(claim.job.id, Command.RESUME).state is JobState.QUEUED
+    assert taken(store).ask is not None
+
+
+def test_resume_takes_a_job_from_a_runner_whose_clock_is_ahead(
+    store: SqlStore, killed_with_its_clock_ahead: Claim
+) -> None:
+    resumed = store.command(killed_with_its_clock_ahead.job.id, Command.RESUME)
+    assert resumed.state is JobState.QUEUED
+    with pytest.raises(LeaseLost):
+        store.renew(killed_with_its_clock_ahead, lease_seconds=LEASE)
 
 
 def test_a_heartbeat_prolongs_the_lease(store: SqlStore, clock: Clock) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 from contextlib import closing
+from datetime import UTC, datetime, timedelta
 
 import pytest
 from alembic import command
@@ -11,6 +12,7 @@ from alembic.config import Config
 from sqlalchemy import Connection, text
 
 from services.optimizer.errors import Conflict, StoreUnavailable
+from services.optimizer.jobs.job import LONGEST_LEASE_SECONDS
 from services.optimizer.store.connections.engine import connect, parse_url
 from services.optimizer.store.rows.tables import metadata
 from services.optimizer.store.schema.in_use import exclusive
@@ -160,11 +162,14 @@ def test_a_database_that_an_idle_process_has_open_is_not_upgraded(fresh_url: str
     assert upgrade(fresh_url) == OLDER
 
 
-def test_a_database_with_a_job_under_way_is_not_upgraded(fresh_url: str) -> None:
-    store_older(fresh_url, state="running", lease_expires_at="2126-01-01 00:00:00")
+@pytest.mark.parametrize("year", ["2026", "2126"])
+def test_a_database_with_a_job_under_way_is_not_upgraded(fresh_url: str, year: str) -> None:
+    expires = datetime.now(UTC) + timedelta(seconds=LONGEST_LEASE_SECONDS / 2)
+    store_older(fresh_url, state="running", lease_expires_at=f"{expires:%Y-%m-%d %H:%M:%S}")
     with pytest.raises(Conflict, match=f"job {JOB} is run by elsewhere:7"):
         upgrade(fresh_url)
-    edit(fresh_url, "UPDATE jobs SET lease_expires_at = '2026-01-01 00:00:00'")
+    given_up = "UPDATE jobs SET lease_expires_at = 'YEAR-01-01 00:00:00'"
+    edit(fresh_url, given_up.replace("YEAR", year))
     assert upgrade(fresh_url) == OLDER
 
 

@@ -115,6 +115,9 @@ def commanded(state: JobState, command: Command) -> JobState:
 QUARANTINE_AFTER: Final = 5
 """Runner processes in a row that go down with a job before it is quarantined."""
 
+LONGEST_LEASE_SECONDS: Final = 3600.0
+"""No lease lasts longer; one that ends later was written by a clock that is wrong."""
+
 LARGEST_BUDGET: Final = 1_000_000
 """Iterations, as in a spec."""
 

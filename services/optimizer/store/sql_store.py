@@ -45,7 +45,7 @@ from services.optimizer.store.schema.migrate import create
 from services.optimizer.store.schema.revisions import check_revision
 from services.optimizer.store.statements.audit import audit_page, note_change, note_submission
 from services.optimizer.store.statements.claims import (
-    lease_is_live,
+    has_live_lease,
     take_job,
 )
 from services.optimizer.store.statements.job_cursors import cursor_of
@@ -277,9 +277,14 @@ class SqlStore(SqlDeletion, SqlHistory, SqlRecordings, SqlRuns):
             row = job_row(connection, job_id, lock=True)
             now = self._clock(connection)
             before = JobState(row["state"])
-            state = commanded(before, command)
-            if state is JobState.PAUSING and not lease_is_live(row, now):
-                # Its runner has gone, so nobody would ever complete the pause.
+            under_way = before in (JobState.RUNNING, JobState.PAUSING)
+            abandoned = under_way and not has_live_lease(connection, job_id, now)
+            if abandoned and command is Command.RESUME:
+                state = JobState.QUEUED
+            else:
+                state = commanded(before, command)
+            if abandoned and state is JobState.PAUSING:
+                # No runner would complete the pause.
                 state = JobState.PAUSED
             if state is JobState.QUEUED:
                 require_readable(row)

@@ -175,6 +175,8 @@ class Store(CommittedHistory, Deletions, KeptRecordings, Labelling, Runs, Protoc
     ) -> Job:
         """Apply a command of a user; see `commanded` for what is possible.
 
+        A job under way without a live lease is paused at once, and queued when it is resumed.
+
         Cancelling clears the lease, so a runner's next write is refused.
 
         Args:

@@ -28,6 +28,9 @@ class Runs(Protocol):
 
         Of these, one of the highest priority that there is, the oldest of them.
 
+        A lease that ends more than `LONGEST_LEASE_SECONDS` from now, as a clock that was ahead has
+        written it, counts as one that ran out.
+
         The claimed job is running, its token one higher than any before. A pausing job without a
         live lease becomes paused; one that cannot be read fails with the reason, and so does one
         that is quarantined. None of them is claimed, and none keeps others from being claimed.
@@ -37,7 +40,8 @@ class Runs(Protocol):
 
         Args:
             runner: Name of whoever takes it.
-            lease_seconds: For how long, unless the claim is renewed [s].
+            lease_seconds: For how long, unless the claim is renewed; at most
+                `LONGEST_LEASE_SECONDS` [s].
             job_id: The only job that is wanted; None for any.
             quarantine_after: A job with so many crashes in a row fails instead of being claimed.
 

@@ -14,6 +14,7 @@ from services.optimizer.jobs.job import JobState
 from services.optimizer.store.connections.engine import Database, database_time
 from services.optimizer.store.rows.tables import jobs
 from services.optimizer.store.schema.revisions import require_newest
+from services.optimizer.store.statements.claims import lease_is_alive
 
 # "gaitswarm is in use", as a number that no other program is likely to lock by.
 _IN_USE: Final = 0x6761_6974_7377_6D02
@@ -87,7 +88,7 @@ def _require_no_lease(connection: Connection, name: str) -> None:
         return
     columns = (jobs.c.id, jobs.c.lease_owner)
     under_way = jobs.c.state.in_((JobState.RUNNING, JobState.PAUSING))
-    live = jobs.c.lease_expires_at > database_time(connection)
+    live = lease_is_alive(database_time(connection))
     row = connection.execute(select(*columns).where(under_way, live).limit(1)).first()
     if row is not None:
         raise Conflict(

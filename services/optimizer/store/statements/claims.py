@@ -6,11 +6,16 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, Select, and_, or_, select
+from sqlalchemy import ColumnElement, Connection, Select, and_, not_, or_, select
 
 from services.optimizer.errors import BudgetChanged, LeaseLost, NotFound, Unreadable
 from services.optimizer.jobs.iteration import Answered, Ask
-from services.optimizer.jobs.job import Claim, JobState, UnreadableSpec
+from services.optimizer.jobs.job import (
+    LONGEST_LEASE_SECONDS,
+    Claim,
+    JobState,
+    UnreadableSpec,
+)
 from services.optimizer.store.rows.evaluation_rows import Row
 from services.optimizer.store.rows.job_rows import (
     budget,
@@ -59,22 +64,40 @@ def claimable(now: datetime, job_id: str | None) -> Select[*tuple[Any, ...]]:
 def _abandoned(now: datetime) -> ColumnElement[bool]:
     return and_(
         jobs.c.state.in_((JobState.RUNNING, JobState.PAUSING)),
-        or_(jobs.c.lease_expires_at.is_(None), jobs.c.lease_expires_at <= now),
+        not_(lease_is_alive(now)),
     )
 
 
-def lease_is_live(row: Row, now: datetime) -> bool:
-    """Whether a runner has the job and has been heard of lately.
+def lease_is_alive(now: datetime) -> ColumnElement[bool]:
+    """Match jobs that a runner holds, by a lease that has not run out.
+
+    A lease that ends further ahead than any lease lasts was written by a clock that was ahead, and
+    would otherwise outlive its runner by as much.
 
     Args:
-        row: The job's row.
+        now: The time by which leases are judged.
+
+    Returns:
+        A condition on `jobs`, never NULL.
+    """
+    expires = jobs.c.lease_expires_at
+    latest = now + timedelta(seconds=LONGEST_LEASE_SECONDS)
+    return and_(expires.is_not(None), expires > now, expires <= latest)
+
+
+def has_live_lease(connection: Connection, job_id: str, now: datetime) -> bool:
+    """Tell whether a runner holds a job.
+
+    Args:
+        connection: An open transaction.
+        job_id: Of the job.
         now: The time by which its lease is judged.
 
     Returns:
-        False for a job that anybody may claim.
+        False for a job that any runner may claim.
     """
-    expires = row["lease_expires_at"]
-    return expires is not None and expires > now
+    query = select(jobs.c.id).where(jobs.c.id == job_id, lease_is_alive(now))
+    return connection.execute(query).first() is not None
 
 
 def crashes_before(row: Row, runner: str) -> int:

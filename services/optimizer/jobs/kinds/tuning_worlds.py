@@ -111,7 +111,9 @@ class TuningWorlds(BaseModel):
             (n, K) logarithms; +inf where as many walks failed that the aggregate has no value: for
             a quantile more than 1 - `level` of them, for any other a single one.
         """
-        by_scenario = log_utilities.reshape(len(log_utilities), -1, self.count)
+        # Not -1: the number of scenarios cannot be inferred from an array of no designs.
+        designs, walks = log_utilities.shape
+        by_scenario = log_utilities.reshape(designs, walks // self.count, self.count)
         rows = [[self._aggregate(worlds) for worlds in row] for row in by_scenario.tolist()]
         return np.array(rows, dtype=np.float64).reshape(by_scenario.shape[:2])
 

@@ -69,7 +69,6 @@ def test_titles_and_crumbs_name_what_is_shown(
         (f"/compare?jobs={finished_job}", "small · compared", ["All jobs", "Compared jobs"]),
         (f"/jobs/new?clone={finished_job}", "New job from small", ["All jobs", "small", "New job"]),
         ("/jobs/new?kind=calibration", "New calibration", ["All jobs", "New calibration"]),
-        ("/tournaments", "Tournaments", ["All jobs", "Tournaments"]),
     ):
         page = visited.go(path)
         expect(page).to_have_title(f"{title} · gaitswarm")

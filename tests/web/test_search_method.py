@@ -27,50 +27,54 @@ def test_a_method_is_chosen_and_set_in_the_form_and_shown_with_its_job(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url, allowed="status of 422").go("/jobs/new")
-    fill_in(page, "a simplex", iterations=2)
+    fill_in(page, "differential evolution", iterations=2)
     expect(page.get_by_label(re.compile("^Sigma"))).to_have_value("0.25")
-    page.get_by_label("Method").select_option("nelder-mead")
+    page.get_by_label("Method").select_option("de")
     expect(page.get_by_label(re.compile("^Sigma"))).to_have_count(0)
     # How many designs an iteration has stays; all else is the method's own.
     expect(page.get_by_label(re.compile("^Particles"))).to_have_value("8")
 
-    simplex = page.get_by_label(re.compile("^Simplex"))
-    simplex.fill("7")
+    crossover = page.get_by_label(re.compile("^Crossover"))
+    crossover.fill("7")
     page.get_by_role("button", name="Submit the job").click()
-    expect(simplex).to_have_attribute("aria-invalid", "true")
-    expect(simplex).to_be_focused()
-    simplex.fill("0.125")
-    expect(page.get_by_text("Default: 0.25.")).to_be_visible()
+    expect(crossover).to_have_attribute("aria-invalid", "true")
+    expect(crossover).to_be_focused()
+    crossover.fill("0.125")
+    expect(page.get_by_text("Default: 0.9.")).to_be_visible()
     page.get_by_role("button", name="Submit the job").click()
 
     job_id = submitted(page)
     optimizer = server.job(job_id)["spec"]["optimizer"]
-    assert (optimizer["name"], optimizer["simplex"]) == ("nelder-mead", 0.125)
-    expect(page.get_by_text("nelder-mead").first).to_be_visible()
+    assert (optimizer["name"], optimizer["crossover"]) == ("de", 0.125)
+    expect(page.get_by_text(re.compile(r"\bde\b")).first).to_be_visible()
     page.get_by_role("link", name="Spec", exact=True).click()
-    expect(page.get_by_role("heading", name="Search method: nelder-mead")).to_be_visible()
-    expect(page.locator("tr[data-setting='simplex']")).to_have_attribute("data-changed", "true")
-    assert setting(page, "simplex") == ["0.125", "0.25"]
-    assert setting(page, "sample") == ["10", "the same"]
+    expect(page.get_by_role("heading", name="Search method: de")).to_be_visible()
+    expect(page.locator("tr[data-setting='crossover']")).to_have_attribute("data-changed", "true")
+    assert setting(page, "crossover") == ["0.125", "0.9"]
+    assert setting(page, "memory") == ["10", "the same"]
 
 
 def test_a_job_of_small_iterations_shows_designs_and_can_be_looked_through(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:
     job_id = server.submit(
-        SMALL_JOB | {"optimizer": {"name": "nelder-mead", "particles": 4}, "name": "by and by"}
+        SMALL_JOB
+        | {
+            "optimizer": {"name": "cma-es", "particles": 5, "population": 4},
+            "name": "small iterations",
+        }
     )
     job = server.wait_for(job_id, "succeeded")
     assert job["iterations"] > job["iterations_planned"]
     page = visit(server.url).go(f"/jobs/{job_id}")
     expect_state(page, "succeeded")
     bar = page.get_by_role("progressbar")
-    expect(bar).to_have_attribute("aria-label", "24 of 24 designs")
-    expect(page.get_by_text(f"{job['iterations']}, of 4 designs at most")).to_be_visible()
+    expect(bar).to_have_attribute("aria-label", "30 of 30 designs")
+    expect(page.get_by_text(f"{job['iterations']}, of 5 designs at most")).to_be_visible()
     expect(page.get_by_role("img", name=re.compile("^Convergence over"))).to_be_visible()
 
     page.get_by_role("button", name="Extend…").click()
-    expect(page.get_by_text("24 of 24 designs are done")).to_be_visible()
+    expect(page.get_by_text("30 of 30 designs are done")).to_be_visible()
     expect(page.get_by_label(re.compile("^Iterations in all"))).to_have_attribute("min", "7")
     page.get_by_role("button", name="Back").click()
 
@@ -78,9 +82,9 @@ def test_a_job_of_small_iterations_shows_designs_and_can_be_looked_through(
     rows = page.get_by_role("table", name="Iterations").locator("tbody tr")
     expect(rows).to_have_count(job["iterations"])
     page.get_by_role("link", name="Variables", exact=True).click()
-    expect(page.get_by_text("24 of 24 designs selected")).to_be_visible()
+    expect(page.get_by_text("30 of 30 designs selected")).to_be_visible()
     page.goto("/jobs")
-    expect(page.get_by_text("24 of 24 designs").first).to_be_visible()
+    expect(page.get_by_text("30 of 30 designs").first).to_be_visible()
 
 
 def test_a_search_starts_from_the_best_of_a_job_and_says_so(

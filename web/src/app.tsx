@@ -17,7 +17,6 @@ import { setTitle } from './title'
 const NewJobPage = lazyPage('the form', () => import('./submission/page'))
 const JobPage = lazyPage('the job', () => import('./job/page'))
 const ComparePage = lazyPage('the comparison', () => import('./compare/page'))
-const TournamentsPage = lazyPage('the tournaments', () => import('./tournaments/page'))
 const WalkPage = lazyPage('the walk', () => import('./walk/page'))
 const ControllerPage = lazyPage('the controller', () => import('./controller/page'))
 
@@ -34,7 +33,6 @@ const TITLES: Readonly<Record<Route['page'], string>> = {
   'new-job': 'New job',
   job: 'Job',
   compare: 'Compared jobs',
-  tournaments: 'Tournaments',
   walk: 'Walk',
   controller: 'Controller',
   'not-found': 'No such page',
@@ -113,8 +111,6 @@ function Page({ route }: { route: Route }) {
       return <JobPage id={route.id} tab={route.tab} />
     case 'compare':
       return <ComparePage />
-    case 'tournaments':
-      return <TournamentsPage id={route.id} />
     case 'walk':
       return <WalkPage />
     case 'controller':
@@ -146,6 +142,6 @@ function ThemeToggle() {
 }
 
 function isUnder(route: Route, page: Route['page']): boolean {
-  const under: readonly Route['page'][] = ['job', 'compare', 'tournaments']
+  const under: readonly Route['page'][] = ['job', 'compare']
   return route.page === page || (page === 'jobs' && under.includes(route.page))
 }

@@ -27,10 +27,7 @@ export type PreferencePreset = Schemas['PreferenceView']
 export type RobotPreset = Schemas['RobotView']
 export type ScenarioPreset = Schemas['ScenarioView']
 export type Controller = Schemas['ControllerView']
-export type PsoSettings = Schemas['PsoSettings']
 export type OptimizerPreset = Schemas['OptimizerView']
-export type RobotVariant = Schemas['RobotVariant']
-export type RobotFiles = Schemas['RobotFiles']
 export type ReferenceView = Schemas['ReferenceView']
 export type Simulation = Schemas['SimulationView']
 export type HistoryVerification = Schemas['HistoryVerificationView']
@@ -43,15 +40,9 @@ export type RobustnessIndex = Schemas['IndexView']
 export type Objective = Schemas['ObjectiveView']
 export type IdentificationSpec = Schemas['IdentificationSpec']
 export type CalibrationSpec = Schemas['CalibrationSpec']
-export type TournamentSpec = Schemas['TournamentSpec']
 export type CertificateSpec = Schemas['CertificateSpec']
 /** A spec of any kind. */
-export type AnySpec =
-  | JobSpec
-  | IdentificationSpec
-  | CalibrationSpec
-  | TournamentSpec
-  | CertificateSpec
+export type AnySpec = JobSpec | IdentificationSpec | CalibrationSpec | CertificateSpec
 export type Certificate = Schemas['CertificateView']
 export type CertifiedScenario = Schemas['CertifiedScenarioView']
 export type ComparedEngine = Schemas['ComparedEngineView']
@@ -73,11 +64,6 @@ export type MeasuredWalk = Schemas['MeasuredWalkView']
 export type MeasuredWalkRequest = Schemas['MeasuredWalkRequest']
 export type PluginCase = Schemas['CaseView']
 export type Estimate = Schemas['EstimateView']
-export type Tournament = Schemas['TournamentView']
-export type TournamentStandings = Schemas['TournamentStandingsView']
-export type TournamentProfile = Schemas['ProfileView']
-export type Standing = Schemas['StandingView']
-export type ProblemRuns = Schemas['ProblemRunsView']
 export type Front = Schemas['FrontView']
 export type FrontDesign = Schemas['FrontDesignView']
 export type FrontWinner = Schemas['FrontWinnerView']

@@ -32,14 +32,15 @@ export interface CaseWords {
 
 const MEAN = 'What the fitness is the mean of'
 
-const WORDS: Readonly<Record<Job['kind'], CaseWords>> = {
-  tuning: {
-    one: 'scenario',
-    many: 'scenarios',
-    worth: 'utility',
-    worths: 'utilities',
-    bars: MEAN,
-  },
+const SCENARIOS: CaseWords = {
+  one: 'scenario',
+  many: 'scenarios',
+  worth: 'utility',
+  worths: 'utilities',
+  bars: MEAN,
+}
+
+const WORDS: Readonly<Partial<Record<Job['kind'], CaseWords>>> = {
   identification: {
     one: 'recording',
     many: 'recordings',
@@ -54,22 +55,8 @@ const WORDS: Readonly<Record<Job['kind'], CaseWords>> = {
     worths: 'misfits',
     bars: 'Root mean square of how many tolerances the fitted targets of a walk are off',
   },
-  tournament: {
-    one: 'problem',
-    many: 'problems',
-    worth: 'best value',
-    worths: 'best values',
-    bars: MEAN,
-  },
-  certificate: {
-    one: 'scenario',
-    many: 'scenarios',
-    worth: 'utility',
-    worths: 'utilities',
-    bars: MEAN,
-  },
 }
 
 export function caseWords(kind: Job['kind']): CaseWords {
-  return WORDS[kind]
+  return WORDS[kind] ?? SCENARIOS
 }

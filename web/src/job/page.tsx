@@ -91,7 +91,7 @@ const ONLY: Readonly<Partial<Record<string, readonly Job['kind'][]>>> = {
   certificate: ['certificate'],
   targets: ['calibration'],
   // Which world is best says nothing.
-  scenarios: ['tuning', 'identification', 'calibration', 'tournament'],
+  scenarios: ['tuning', 'identification', 'calibration'],
   parameters: ['identification', 'calibration'],
   robustness: ['tuning'],
   analysis: ['tuning', 'identification', 'calibration'],

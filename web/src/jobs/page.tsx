@@ -36,14 +36,9 @@ export function JobsPage() {
     <>
       <header class="page-header">
         <h1>Jobs</h1>
-        <span class="row">
-          <a class="button" href="/tournaments">
-            Tournaments
-          </a>
-          <a class="button primary" href="/jobs/new">
-            New job
-          </a>
-        </span>
+        <a class="button primary" href="/jobs/new">
+          New job
+        </a>
       </header>
       <div class="stack">
         {error !== null && (

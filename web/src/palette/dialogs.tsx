@@ -74,7 +74,6 @@ function Palette({ onClose, onHelp }: { onClose: () => void; onHelp: () => void 
       kind: 'page',
       run: () => navigate('/jobs/new?robot=own'),
     },
-    { key: 'compare', label: 'Tournaments', kind: 'page', run: () => navigate('/tournaments') },
     { key: 'api', label: 'API', kind: 'page', run: () => location.assign('/docs') },
     ...(manual ? [MANUAL] : []),
     { key: 'theme', label: 'Light or dark', kind: 'command', run: toggleTheme },

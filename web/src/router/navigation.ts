@@ -74,7 +74,7 @@ function isHere({ pathname, search }: HTMLAnchorElement): boolean {
 
 /** Other paths of the server, such as /docs and /v1, are left to the browser. */
 function isOwnPath(path: string): boolean {
-  return path === '/' || /^\/(jobs|compare|tournaments|walk|controller)(\/|$)/.test(path)
+  return path === '/' || /^\/(jobs|compare|walk|controller)(\/|$)/.test(path)
 }
 
 function split(href: string): [path: string, query: string] {

@@ -6,7 +6,6 @@ export type Route =
   | { readonly page: 'new-job' }
   | { readonly page: 'job'; readonly id: string; readonly tab: string }
   | { readonly page: 'compare' }
-  | { readonly page: 'tournaments'; readonly id: string | null }
   | { readonly page: 'walk' }
   | { readonly page: 'controller' }
   | { readonly page: 'not-found' }
@@ -24,9 +23,6 @@ export function routeOf(path: string): Route {
       return { page: 'job', id: second, tab: rest.join('/') }
     case 'compare':
       return second === undefined ? { page: 'compare' } : { page: 'not-found' }
-    case 'tournaments':
-      if (rest.length > 0) return { page: 'not-found' }
-      return { page: 'tournaments', id: second ?? null }
     case 'walk':
       return second === undefined ? { page: 'walk' } : { page: 'not-found' }
     case 'controller':
@@ -45,11 +41,6 @@ export function jobPath(id: string, tab = ''): string {
 /** The path of a comparison of jobs. */
 export function comparePath(ids: readonly string[]): string {
   return `/compare?jobs=${ids.map(encodeURIComponent).join(',')}`
-}
-
-/** The path of a tournament; any of its jobs stands for it. */
-export function tournamentPath(job: string): string {
-  return `/tournaments/${encodeURIComponent(job)}`
 }
 
 /** A path with the values that are set as its query. */

@@ -7,7 +7,6 @@ import { Progress } from '../../components/progress'
 import { STATE_TONES, StateBadge } from '../../components/state-badge'
 import { change, formatCount, formatNumber, percent, quantity } from '../../format/number'
 import { formatAge, formatClock, formatDuration, formatMoment } from '../../format/time'
-import { tournamentPath } from '../../router/routes'
 import { budgetSpent } from '../budget'
 import { caseWords, fitnessUnit } from '../fitness'
 import type { Gain } from '../gain'
@@ -47,11 +46,6 @@ export function JobHeader({ live, job, gain }: { live: LiveJob; job: StoredJob; 
               <p class="small" data-labels>
                 {marks.join(' · ')}
                 {job.note && <span class="job-note">{job.note}</span>}
-              </p>
-            )}
-            {job.kind === 'tournament' && (
-              <p class="small">
-                <a href={tournamentPath(job.id)}>Its tournament: all methods compared</a>
               </p>
             )}
             {isReadable(job) && <WorldsNote job={job} />}

@@ -23,15 +23,12 @@ import { Verdicts } from './verdicts'
 /** How often the parameters of a job that runs are asked for again [ms]. */
 const RENEW_MS = 15_000
 
-/** Among which designs runs are to agree. */
-const AGREEMENT: Readonly<Record<Job['kind'], string>> = {
-  tuning: 'at 5 %',
-  identification: 'at 5 %',
-  tournament: 'at 5 %',
-  certificate: 'at 5 %',
-  calibration:
-    'among designs whose sum of squared differences, in tolerances, exceeds that of their run’s' +
-    ' best by 4 at most',
+/** Share of the designs, or distance from the best design, within which runs must agree. */
+function agreementOf(kind: Job['kind']): string {
+  return kind === 'calibration'
+    ? 'among designs whose sum of squared differences, in tolerances, exceeds that of their run’s' +
+        ' best by 4 at most'
+    : 'at 5 %'
 }
 
 export function ParametersPanel({ job }: { job: Job }) {
@@ -146,7 +143,7 @@ function Parameters({
             found={found}
             shown={shown}
             labels={labels}
-            agreement={AGREEMENT[job.kind]}
+            agreement={agreementOf(job.kind)}
           />
           {categorical.length > 0 && (
             <ChoicesCard shown={categorical} labels={labels} unit={fitnessUnit(job)} />

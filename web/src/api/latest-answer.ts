@@ -1,6 +1,6 @@
 /** Questions that come faster than answers: only the last one counts. */
 
-export interface LatestPorts {
+interface LatestPorts {
   /** Call back after some time [ms]; returns what cancels it. */
   later(call: () => void, milliseconds: number): () => void
 }

@@ -7,7 +7,7 @@ import type { JobSummary } from '../api/types'
 /** Requests under way at once. */
 const AT_ONCE = 4
 
-export interface Refused {
+interface Refused {
   readonly id: string
   readonly name: string
   /** Why the job stays. */

@@ -3,7 +3,7 @@
 import ts from 'typescript'
 
 /** A module or a stylesheet. Paths are within the sources. */
-export interface Source {
+interface Source {
   readonly path: string
   readonly text: string
   /** What is loaded with it. */

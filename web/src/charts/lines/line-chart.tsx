@@ -18,10 +18,6 @@ export interface Series {
   readonly dash?: readonly number[]
   /** Holds each value until the next. */
   readonly stepped?: boolean
-  /** Draws points without a line. */
-  readonly dots?: boolean
-  /** Left out of the readout under the pointer. */
-  readonly silent?: boolean
 }
 
 /** An area between two series, by their indices. */
@@ -156,7 +152,7 @@ function shapeOf({
   yUnit,
   yRange,
 }: LineChartProps) {
-  const lines = series.map((s) => [s.label, s.colour, s.width, s.dash, s.dots, s.stepped, s.silent])
+  const lines = series.map((s) => [s.label, s.colour, s.width, s.dash, s.stepped])
   const axes = [logarithmic, xLogarithmic, fromZero, Boolean(yRange), xLabel, yLabel, xUnit, yUnit]
   return JSON.stringify([lines, bands, axes])
 }
@@ -253,8 +249,8 @@ function options(
           stroke: s.width === 0 ? undefined : themeColour(s.colour),
           width: s.width ?? 1.5,
           dash: s.dash ? [...s.dash] : undefined,
-          paths: pathsOf(s),
-          points: pointsOf(s),
+          paths: s.stepped ? uPlot.paths.stepped?.({ align: 1 }) : undefined,
+          points: { show: s.width === 0 ? false : undefined, size: 4 },
         }),
       ),
     ],
@@ -306,16 +302,6 @@ function scaleOfY(props: { current: LineChartProps }): uPlot.Scale {
   return fromZero ? { range: (_, __, high) => [0, high > 0 ? high * 1.05 : 1] } : {}
 }
 
-function pathsOf({ dots, stepped }: Series): uPlot.Series.PathBuilder | undefined {
-  if (dots) return () => null
-  return stepped ? uPlot.paths.stepped?.({ align: 1 }) : undefined
-}
-
-function pointsOf({ dots, width, colour }: Series): uPlot.Series.Points {
-  if (dots) return { show: true, size: 6, width: 0, fill: themeColour(colour) }
-  return { show: width === 0 ? false : undefined, size: 4 }
-}
-
 function showReadout(u: uPlot, props: LineChartProps, element: HTMLElement) {
   const { idx } = u.cursor
   if (idx === null || idx === undefined) {
@@ -323,8 +309,9 @@ function showReadout(u: uPlot, props: LineChartProps, element: HTMLElement) {
     return
   }
   const unit = (value: string, of = '1') => (of === '1' ? value : `${value}\u00a0${of}`)
-  const shown = props.series.filter((s) => !s.silent)
-  const parts = shown.map((s) => `${s.label} ${unit(formatNumber(s.values[idx]), props.yUnit)}`)
+  const parts = props.series.map(
+    (s) => `${s.label} ${unit(formatNumber(s.values[idx]), props.yUnit)}`,
+  )
   const at = unit(formatExact(props.x[idx]), props.xUnit)
   element.textContent = [`${props.xLabel} ${at}`, ...parts].join('  ·  ')
 }

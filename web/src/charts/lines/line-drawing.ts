@@ -101,14 +101,13 @@ function ticksOf({ min, max }: uPlot.Scale, logarithmic: boolean | undefined, wa
 function drawSeries(
   context: Context,
   plot: uPlot,
-  { colour, width = 1.5, dash = [], dots, stepped }: Series,
+  { colour, width = 1.5, dash = [], stepped }: Series,
   index: number,
   ratio: number,
 ): void {
-  if (width === 0 && !dots) return
+  if (width === 0) return
   const [xs, ys] = [plot.data[0], plot.data[index]]
   context.strokeStyle = themeColour(colour)
-  context.fillStyle = themeColour(colour)
   context.lineWidth = width * ratio
   context.setLineDash(dash.map((length) => length * ratio))
   context.beginPath()
@@ -121,18 +120,14 @@ function drawSeries(
       continue
     }
     const [x, y] = [plot.valToPos(xs[k], 'x', true), plot.valToPos(value, 'y', true)]
-    if (dots) {
-      context.beginPath()
-      context.arc(x, y, 3 * ratio, 0, 2 * Math.PI)
-      context.fill()
-    } else if (before === null) context.moveTo(x, y)
+    if (before === null) context.moveTo(x, y)
     else {
       if (stepped) context.lineTo(x, before)
       context.lineTo(x, y)
     }
     before = y
   }
-  if (!dots) context.stroke()
+  context.stroke()
   context.setLineDash([])
 }
 

@@ -181,7 +181,7 @@ function Header<R>({
   )
 }
 
-export function Pager({
+function Pager({
   caption,
   page,
   pages,

@@ -16,7 +16,7 @@ export interface Bar {
 /** Tasks that do not overlap. */
 export type Lane = readonly Bar[]
 
-export interface WorkerLanes {
+interface WorkerLanes {
   readonly worker: string
   readonly lanes: readonly Lane[]
 }

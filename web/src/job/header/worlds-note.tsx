@@ -18,7 +18,7 @@ export function WorldsNote({ job }: { job: Job }) {
 }
 
 /** What utilities in many worlds come to, in words. */
-export function judgedBy({ aggregate, level = 0.75 }: TuningWorlds): string {
+function judgedBy({ aggregate, level = 0.75 }: TuningWorlds): string {
   switch (aggregate) {
     case 'mean':
       return 'the mean of its utilities in all of them'

@@ -6,7 +6,7 @@ import type { Value } from '../../format/value'
 export type Trust = NonNullable<FittedParameter['trust']>
 
 /** From the best to the worst. */
-export const TRUSTS: readonly Trust[] = ['trusted', 'rough', 'unknown']
+const TRUSTS: readonly Trust[] = ['trusted', 'rough', 'unknown']
 
 /** Thresholds whose widths are listed. */
 export const LISTED = [0.2, 0.1, 0.05, 0.02] as const

@@ -5,7 +5,7 @@ import { Segmented } from '../../components/fields/segmented'
 import { formatCount } from '../../format/number'
 import { type Trust, verdicts } from './intervals'
 
-export const TONES: Readonly<Record<Trust, 'good' | 'warn' | 'muted'>> = {
+const TONES: Readonly<Record<Trust, 'good' | 'warn' | 'muted'>> = {
   trusted: 'good',
   rough: 'warn',
   unknown: 'muted',

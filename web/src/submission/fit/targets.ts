@@ -17,7 +17,7 @@ export interface TargetDraft {
 }
 
 /** What a log tells of its walk by itself: currents. Peaks are noise's too, and so only predicted. */
-export function targetsOf(recording: RecordingView, key: number): readonly TargetDraft[] {
+function targetsOf(recording: RecordingView, key: number): readonly TargetDraft[] {
   const common = { recording: recording.id }
   return [
     {

@@ -11,7 +11,7 @@ import { withJob, withRobotJob } from './job'
 export type ActuatorChoice = NonNullable<RobotDraftRequest['actuator']>
 
 /** Files as they were chosen. */
-export interface Chosen {
+interface Chosen {
   readonly name: string
   readonly text: string
 }

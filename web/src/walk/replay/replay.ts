@@ -3,9 +3,9 @@
 import type { Scenario } from '../../api/types'
 
 /** Version of the format that is read here. */
-export const REPLAY_VERSION = 1
+const REPLAY_VERSION = 1
 
-export type Solid = 'capsule' | 'box' | 'sphere' | 'cylinder'
+type Solid = 'capsule' | 'box' | 'sphere' | 'cylinder'
 export type Role = 'body' | 'coxa' | 'femur' | 'tibia' | 'foot' | 'load'
 
 /** One solid, fixed to a link. */
@@ -29,7 +29,7 @@ export interface LinkMesh {
   readonly colour: readonly number[] | null
 }
 
-export interface Link {
+interface Link {
   readonly name: string
   readonly parent: string | null
   readonly shapes: readonly Shape[]
@@ -145,7 +145,7 @@ export function hasMeshes({ robot }: ReplayHeader): boolean {
 }
 
 /** Numbers that a channel has in a frame. */
-export function sizeOf(channel: Channel): number {
+function sizeOf(channel: Channel): number {
   return channel.shape.reduce((product, n) => product * n, 1)
 }
 

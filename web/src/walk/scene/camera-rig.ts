@@ -4,7 +4,7 @@ import { PerspectiveCamera, Spherical, Vector3 } from 'three'
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js'
 
 /** Directions to look from, x ahead, y left, z up; lengths are shares of the distance. */
-export const VIEWS = {
+const VIEWS = {
   'three-quarter': [0.5, -0.87, 0.48],
   side: [0, -1, 0.12],
   front: [1, -0.001, 0.2],

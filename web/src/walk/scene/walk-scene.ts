@@ -21,7 +21,7 @@ import { RobotFigure } from './robot-figure'
 import { type SlopeMark, slopeCorner, slopeMark } from './slope-mark'
 import { Trail } from './trail'
 
-export type Arrangement = 'ghost' | 'beside'
+type Arrangement = 'ghost' | 'beside'
 
 export interface SceneOptions {
   readonly arrangement: Arrangement

@@ -69,8 +69,9 @@ def readyz(service: Service, request: Request) -> ReadinessView | Response:
     """Answers ok, component by component, if none has failed; else 503, whose `errors` name those
     that have.
 
-    The database fails if it does not answer or has another schema than this version's, the runner
-    and the news for event streams if their thread has ended or is stuck. Once the server was told
+    The database fails if it does not answer, has another schema than this version's, or is a file
+    that was removed or replaced while it was open; the runner and the news for event streams fail
+    if their thread has ended or is stuck. Once the server was told
     to end, while jobs commit their iterations under way, the answer is a 503 of the type
     `draining`.
     """

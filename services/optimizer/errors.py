@@ -17,6 +17,7 @@ GaitswarmError
     ├── TooManyRequests     whoever asks does so too often; says when to try again (HTTP 429)
     ├── EvaluatorUnavailable    the workers cannot be reached
     └── StoreUnavailable        the database or server cannot be reached, or has another schema
+        └── StoreReplaced       the database's file was removed or replaced while it was open
 """
 
 from __future__ import annotations
@@ -116,3 +117,7 @@ class EvaluatorUnavailable(Unavailable):
 
 class StoreUnavailable(Unavailable):
     """The database or server cannot be reached, or holds another schema."""
+
+
+class StoreReplaced(StoreUnavailable):
+    """The database's file was removed or replaced while it was open; only a restart helps."""

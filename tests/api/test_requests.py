@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import shutil
+from pathlib import Path
+
 import httpx2
 import pytest
 
 from api.dependencies import Component
 from services.optimizer.errors import EvaluatorUnavailable, LeaseLost, StoreUnavailable
 from services.optimizer.jobs.job import Job
+from services.optimizer.jobs.kinds.tuning import JobSpec
 from services.optimizer.store.sql_store import SqlStore
 from sim.errors import KernelBuildError
 from tests.api.conftest import Commit, Serve
@@ -102,6 +106,23 @@ def test_without_a_database_the_server_is_alive_but_not_ready(
     answer = client.get("/v1/readyz")
     assert answer.status_code == 503
     assert "restore it" in answer.json()["detail"]
+
+
+@pytest.mark.parametrize("replaced", [False, True], ids=["removed", "replaced"])
+def test_a_database_file_that_is_no_longer_the_open_one_takes_no_jobs(
+    client: httpx2.Client, database: Path, spec: JobSpec, *, replaced: bool
+) -> None:
+    body = spec.model_dump(mode="json", exclude_unset=True)
+    assert client.post("/v1/jobs", json=body).status_code == 202
+    copy = Path(shutil.copy(database, database.with_name("copy.db")))
+    database.unlink()
+    if replaced:
+        copy.rename(database)
+
+    for answer in (client.post("/v1/jobs", json=body), client.get("/v1/readyz")):
+        assert answer.status_code == 503
+        assert "removed or replaced while it was open; restart" in answer.json()["detail"]
+    assert client.get("/v1/healthz").status_code == 200
 
 
 def test_a_component_that_has_failed_is_named_and_the_server_is_alive_but_not_ready(

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from services.optimizer.errors import EvaluatorUnavailable
+from services.optimizer.errors import EvaluatorUnavailable, StoreReplaced
 from services.optimizer.jobs.iteration import CompletedIteration
 from services.optimizer.jobs.job import Claim, Command, JobState, Renewal
 from services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS, run_embedded
@@ -305,6 +305,14 @@ def test_a_job_whose_process_was_killed_with_its_clock_ahead_is_taken_over(
         claim = held_by_another(store)
     job = run_embedded(store, FormulaEvaluator(), claim.job.id, **told.callbacks())
     assert (job.state, told.committed) == (JobState.SUCCEEDED, ALL)
+
+
+def test_a_run_ends_when_its_database_file_is_removed(store: Store, tmp_path: Path) -> None:
+    def remove(*_: object) -> None:
+        (tmp_path / "jobs.db").unlink()
+
+    with pytest.raises(StoreReplaced, match="restart"):
+        run_embedded(store, FormulaEvaluator(), submitted(store), on_commit=remove)
 
 
 def test_a_run_that_is_told_to_stop_before_it_begins_leaves_the_job_queued(store: Store) -> None:

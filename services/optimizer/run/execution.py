@@ -20,6 +20,7 @@ from services.optimizer.errors import (
     KilledWorker,
     LeaseLost,
     ProvenanceChanged,
+    StoreReplaced,
     StoreUnavailable,
     Unavailable,
 )
@@ -293,12 +294,15 @@ class _Run:
     def _stored(self, access: Callable[[], T]) -> T:
         """What the store answers, however long it takes: an evaluated iteration is expensive.
 
-        Raises EvaluationStopped when the process is to end, or another one has the job.
+        Raises EvaluationStopped when the process is to end, or another one has the job, and
+        StoreReplaced, which waiting does not end.
         """
         failures = 0
         while True:
             try:
                 answer = access()
+            except StoreReplaced:
+                raise
             except Exception as error:
                 if not is_infrastructure(error):
                     raise

@@ -352,6 +352,7 @@ class SqlStore(SqlDeletion, SqlHistory, SqlRecordings, SqlRuns):
     def ping(self) -> None:
         """Ask the database for its schema revision."""
         check_revision(self._database)
+        self._database.check_in_place()
 
     def verify(self) -> None:
         """Read an SQLite file anew; a PostgreSQL server watches over its own."""

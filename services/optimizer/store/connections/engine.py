@@ -34,6 +34,7 @@ from sqlalchemy.exc import (
 from sqlalchemy.exc import TimeoutError as PoolTimeout
 
 from services.optimizer.errors import StoreUnavailable
+from services.optimizer.store.connections.open_file import OpenFile
 from services.optimizer.store.connections.postgresql import postgresql_engine
 
 BUSY_SECONDS: Final = 15.0
@@ -112,10 +113,12 @@ class Database:
     Attributes:
         engine: Connections to the database.
         name: By which messages call the database, without password.
+        file: What is open of an SQLite file; None for a server and while one is migrated.
     """
 
     engine: Engine
     name: str
+    file: OpenFile | None = None
 
     @contextmanager
     def transaction(
@@ -136,6 +139,7 @@ class Database:
 
         Raises:
             StoreUnavailable: The database is unreachable, or locked for `BUSY_SECONDS`.
+            StoreReplaced: Its file was removed or replaced; what was written is rolled back.
         """
         with self._translated(), self.engine.connect() as connection:
             connection.execution_options(**{_WRITE: write})
@@ -145,6 +149,17 @@ class Database:
                 connection.execution_options(isolation_level="AUTOCOMMIT")
             with connection.begin():
                 yield connection
+                if write:
+                    self.check_in_place()
+
+    def check_in_place(self) -> None:
+        """Check that an SQLite file is still the one that is open.
+
+        Raises:
+            StoreReplaced: It was removed or replaced.
+        """
+        if self.file is not None:
+            self.file.check()
 
     @contextmanager
     def _translated(self) -> Iterator[None]:
@@ -195,7 +210,8 @@ def connect(url: URL, *, for_migration: bool = False) -> Database:
         options |= {"pool_use_lifo": True}
     if url.get_backend_name() == "sqlite":
         engine = _sqlite_engine(url, options, foreign_keys=not for_migration)
-        return Database(engine, url.database or "")
+        name = url.database or ""
+        return Database(engine, name, None if for_migration else OpenFile(name, name, engine))
     server = postgresql_engine(url, options, lock_seconds=BUSY_SECONDS, maintenance=for_migration)
     return Database(server, url.render_as_string(hide_password=True))
 
@@ -258,8 +274,9 @@ def check_file(database: Database) -> None:
         database: The database.
 
     Raises:
-        StoreUnavailable: The file is damaged, or gone.
+        StoreUnavailable: The file is damaged, gone, or another one.
     """
+    database.check_in_place()
     if database.engine.url.get_backend_name() != "sqlite":
         return
     path = Path(database.engine.url.database or "").absolute()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Awaitable, Callable
 from functools import partial
 from http.cookies import CookieError, SimpleCookie
@@ -25,6 +26,8 @@ from services.optimizer.errors import Forbidden, StoreUnavailable
 from services.optimizer.jobs.audit import LOCAL
 from services.optimizer.jobs.priority import DEFAULT, HIGHEST, LOWEST
 from services.optimizer.jobs.quota import Quota
+
+_log = logging.getLogger("gaitswarm.api")
 
 COOKIE: Final = "gaitswarm-token"
 """Of browsers, which cannot send a header with a link or an event stream."""
@@ -87,7 +90,8 @@ class AccessMiddleware:
         try:
             response = await self._refusal(scope, path)
         except StoreUnavailable as error:
-            response = problem(scope["path"], "unavailable", str(error))
+            _log.error("%s: %s", scope["path"], error)
+            response = problem(scope["path"], "unavailable", error.for_clients)
         await (response or self.app)(scope, receive, send)
 
     async def _refusal(self, scope: Scope, path: str) -> Response | None:

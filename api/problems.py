@@ -266,6 +266,11 @@ def add_problem_handlers(app: FastAPI) -> None:
         app.add_exception_handler(raised, domain_problem)
 
 
+def client_text(error: Exception) -> str:
+    """Return an error's text for clients; the text of a database's driver is for the log alone."""
+    return error.for_clients if isinstance(error, StoreUnavailable) else str(error)
+
+
 async def domain_problem(request: Request, error: Exception) -> Response:
     """Answer what the domain refuses.
 
@@ -286,7 +291,7 @@ async def domain_problem(request: Request, error: Exception) -> Response:
         raise error
     _, name = found
     status, _ = PROBLEMS[name]
-    detail = str(error)
+    detail = client_text(error)
     errors = []
     if isinstance(error, InvalidRequest | QuotaExceeded):
         message = detail.removeprefix(f"{error.field}: ")
@@ -294,7 +299,7 @@ async def domain_problem(request: Request, error: Exception) -> Response:
     elif isinstance(error, SimulationInputError):
         errors = [_short(FieldErrorView.from_message("", detail))]
     if status == HTTPStatus.SERVICE_UNAVAILABLE:
-        _log.error("%s %s: %s", request.method, request.url.path, detail)
+        _log.error("%s %s: %s", request.method, request.url.path, error)
         return problem(request.url.path, name, detail, headers=_RETRY)
     if status == HTTPStatus.UNAUTHORIZED:
         return unauthorized(request.url.path, detail)

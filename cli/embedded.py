@@ -17,6 +17,7 @@ from gaitswarm.jobs.open import database_to_write
 from gaitswarm.settings import read_settings
 from services.optimizer.analysis.reference import note_reference
 from services.optimizer.jobs.job import JobState
+from services.optimizer.masking import masked_url
 from services.optimizer.service import JobService
 from services.runtime import (
     check_address,
@@ -218,7 +219,7 @@ def run_seeds(
         submitted = [service.submit(spec)[0] for spec in specs]
         ids = [job.id for job in submitted]
         for number, job in enumerate(submitted, start=1):
-            note(f"run {number} of {len(specs)}: job {job.id} in database {url}")
+            note(f"run {number} of {len(specs)}: job {job.id} in database {masked_url(url)}")
             if embedded.run(jobs, store, job):
                 rest = [f"  gaitswarm optimize --resume {i}{jobs.place}" for i in ids[number - 1 :]]
                 last = f"  gaitswarm {again} {' '.join(ids)}{jobs.place}"

@@ -58,3 +58,5 @@ def log_to_stderr(level: str, log_format: LogFormat = "console") -> None:
     logging.basicConfig(level=level, handlers=[handler])
     # Every start would tell of migrations that are already done.
     logging.getLogger("alembic").setLevel(logging.WARNING)
+    # Its lines show URLs of webhooks in full, which may hold secrets.
+    logging.getLogger("httpx2").setLevel(logging.WARNING)

@@ -44,6 +44,7 @@ from services.optimizer.errors import (
     Unavailable,
     Unreadable,
 )
+from services.optimizer.masking import masked_url
 from sim.errors import SimulationError, SimulationInputError
 
 if TYPE_CHECKING:
@@ -78,7 +79,7 @@ class Interrupted(KeyboardInterrupt):
         left = "goes on elsewhere" if job.state == "running" else "was given back"
         super().__init__(
             f"job {job.id} {left} after {job.spent};"
-            f" go on with gaitswarm.optimize(resume={job.id!r}, db={db!r})"
+            f" go on with gaitswarm.optimize(resume={job.id!r}, db={masked_url(db)!r})"
         )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
@@ -36,7 +36,7 @@ class OptimizationResult:
 
     job: JobView
     iterations: tuple[IterationView, ...]
-    db: str
+    db: str = field(repr=False)
 
     @property
     def best(self) -> BestView:

@@ -66,6 +66,7 @@ class Settings(BaseSettings):
     )
     db: str | None = Field(
         default=None,
+        repr=False,
         description="Database of the jobs: a file name, sqlite:///FILE or"
         " postgresql://USER:PASSWORD@HOST/DATABASE. Default: gaitswarm/gaitswarm.db in the user's"
         " data directory.",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterator
 from typing import Literal
 
@@ -15,6 +16,8 @@ from api.problems import unavailable
 from gaitswarm.views import PREFIX, FieldErrorView, View
 from services.optimizer.errors import StoreUnavailable
 from services.optimizer.service import JobService
+
+_log = logging.getLogger("gaitswarm.api")
 
 router = APIRouter(prefix=PREFIX, tags=["health"])
 
@@ -93,7 +96,8 @@ def _components(service: JobService, request: Request) -> Iterator[ComponentView
     try:
         service.store.ping()
     except StoreUnavailable as error:
-        yield ComponentView(name="database", status="failed", detail=str(error))
+        _log.error("%s: %s", request.url.path, error)
+        yield ComponentView(name="database", status="failed", detail=error.for_clients)
     else:
         yield ComponentView(name="database", status="ok")
     for component in request.state.components:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -16,6 +17,8 @@ from services.monitoring.hosts import HostNames
 from services.monitoring.metrics import Metrics
 from services.optimizer.access import Tokens, secret_digest
 from services.optimizer.errors import EvaluatorUnavailable, StoreUnavailable
+
+_log = logging.getLogger(__name__)
 
 _REMEMBERED_SECONDS: Final = 5.0
 _MOST_REMEMBERED: Final = 64
@@ -131,7 +134,8 @@ def metrics_server(
         try:
             allowed = access.allows(environ.get("HTTP_AUTHORIZATION", ""))
         except StoreUnavailable as error:
-            return plain(HTTPStatus.SERVICE_UNAVAILABLE, f"{error}\n")
+            _log.error("%s: %s", path, error)
+            return plain(HTTPStatus.SERVICE_UNAVAILABLE, f"{error.for_clients}\n")
         if not allowed:
             return plain(HTTPStatus.UNAUTHORIZED, f"{REFUSAL}\n", ("WWW-Authenticate", "Bearer"))
         text, media_type = metrics.exposition(environ.get("HTTP_ACCEPT", ""))

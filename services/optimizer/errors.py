@@ -22,6 +22,8 @@ GaitswarmError
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 
 class GaitswarmError(Exception):
     """Base of every error that gaitswarm raises on purpose."""
@@ -116,8 +118,17 @@ class EvaluatorUnavailable(Unavailable):
 
 
 class StoreUnavailable(Unavailable):
-    """The database or server cannot be reached, or holds another schema."""
+    """The database or server cannot be reached, or holds another schema.
+
+    for_clients: text for clients of a server; an error's own may quote the database's driver.
+    """
+
+    for_clients: ClassVar[str] = "the database is unavailable; the server's log says why"
 
 
 class StoreReplaced(StoreUnavailable):
     """The database's file was removed or replaced while it was open; only a restart helps."""
+
+    for_clients: ClassVar[str] = (
+        "the database file was removed or replaced while it was open; restart the server"
+    )

@@ -84,7 +84,8 @@ def test_what_cannot_be_done_now_is_told_apart_from_bugs(
     answer = client.get("/v1/jobs")
 
     assert answer.status_code == status
-    assert answer.json()["detail"] == str(error)
+    said = error.for_clients if isinstance(error, StoreUnavailable) else str(error)
+    assert answer.json()["detail"] == said
     assert ("Retry-After" in answer.headers) == (status == 503)
 
 
@@ -94,8 +95,11 @@ def test_the_server_is_alive_and_ready(client: httpx2.Client) -> None:
     assert client.get("/v1/readyz").json() == ready
 
 
-def test_without_a_database_the_server_is_alive_but_not_ready(
-    client: httpx2.Client, store: SqlStore, monkeypatch: pytest.MonkeyPatch
+def test_without_a_database_the_server_is_alive_but_not_ready_and_only_the_log_says_why(
+    client: httpx2.Client,
+    store: SqlStore,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
 ) -> None:
     def away(_: object) -> None:
         raise StoreUnavailable("jobs.db is gone; restore it or start anew")
@@ -105,7 +109,8 @@ def test_without_a_database_the_server_is_alive_but_not_ready(
     assert client.get("/v1/healthz").status_code == 200
     answer = client.get("/v1/readyz")
     assert answer.status_code == 503
-    assert "restore it" in answer.json()["detail"]
+    assert answer.json()["detail"] == f"database: {StoreUnavailable.for_clients}"
+    assert "restore it" in caplog.text and "restore it" not in answer.text
 
 
 @pytest.mark.parametrize("replaced", [False, True], ids=["removed", "replaced"])

@@ -205,10 +205,24 @@ def test_a_file_that_is_no_database_is_named_and_kept(tmp_path: Path) -> None:
     assert path.read_text() == '{"iterations": 25}' * 100
 
 
-def test_a_server_that_does_not_answer_is_named_without_its_password() -> None:
+@pytest.mark.parametrize(
+    "url",
+    [
+        "postgresql://u:secret@127.0.0.1:1/d",
+        "postgresql://127.0.0.1:1/d?user=u&password=secret",
+        "postgresql://127.0.0.1:1/d?user=u&sslpassword=secret&passfile=/run/secret",
+    ],
+)
+def test_a_server_that_does_not_answer_is_named_without_its_password(url: str) -> None:
     with pytest.raises(StoreUnavailable) as refused:
-        open_store("postgresql://u:secret@127.0.0.1:1/d")
+        open_store(url)
     assert "127.0.0.1:1/d" in str(refused.value) and "secret" not in str(refused.value)
+
+
+def test_what_a_driver_says_is_shown_without_passwords() -> None:
+    database = connect(parse_url("postgresql://u:one@127.0.0.1:1/d?user=v&sslpassword=two"))
+    assert database.without_secrets("no v, one, two") == "no v, ***, ***"
+    database.close()
 
 
 def test_a_committed_iteration_survives_a_power_cut(tmp_path: Path) -> None:

@@ -56,6 +56,7 @@ def optimize(
     from gaitswarm.jobs.open import database_to_write
     from gaitswarm.settings import read_settings
     from services.optimizer.errors import InvalidRequest
+    from services.optimizer.masking import masked_url
     from services.optimizer.service import JobService
     from services.runtime import open_store
 
@@ -84,7 +85,7 @@ def optimize(
             job = claim.job
         else:
             job = resumed_job(service, resume or "", asked, accept_changes=accept_changes)
-        note(f"job {job.id} in database {url}")
+        note(f"job {job.id} in database {masked_url(url)}")
         interrupted = embedded.run(jobs, store, job, claim)
         beside = {}
         if compare_optimizer is not None and not interrupted:

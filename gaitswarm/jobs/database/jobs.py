@@ -31,6 +31,7 @@ from gaitswarm.views.firmware import FirmwareView
 from gaitswarm.views.identification import RecordingEntryView, RecordingView
 from services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState
 from services.optimizer.jobs.labels import ANY_JOB, JobFilter
+from services.optimizer.masking import masked_url
 from services.optimizer.run.evaluator import Evaluator
 from services.optimizer.service import JobService
 from services.optimizer.store.port.reading import Page
@@ -67,8 +68,13 @@ class DatabaseJobs(DatabaseFindings, LocalWalks, Jobs):
 
     @property
     def place(self) -> str:
-        """Options by which a command finds the same jobs; the default goes without saying."""
-        return "" if self._url == str(default_database()) else f" --db {shlex.quote(self._url)}"
+        """Options by which a command finds the same jobs; the default goes without saying.
+
+        A password is masked.
+        """
+        if self._url == str(default_database()):
+            return ""
+        return f" --db {shlex.quote(masked_url(self._url))}"
 
     def submit(
         self,

@@ -35,6 +35,7 @@ from gaitswarm.jobs.port import JobEvent
 from gaitswarm.jobs.server.call import Call
 from gaitswarm.views import IterationView, ProblemView, StateView
 from services.optimizer.jobs.job import JobState
+from services.optimizer.masking import masked_url
 from services.optimizer.run.outage import Backoff
 
 T = TypeVar("T")
@@ -230,8 +231,8 @@ def unreachable(url: str, error: Exception) -> StoreUnavailable:
         The error, to be raised.
     """
     return StoreUnavailable(
-        f"server {url}: {str(error) or type(error).__name__}; start one with `gaitswarm serve`, or"
-        " check the URL"
+        f"server {masked_url(url)}: {str(error) or type(error).__name__}; start one with"
+        " `gaitswarm serve`, or check the URL"
     )
 
 
@@ -245,7 +246,7 @@ def foreign(url: str) -> StoreUnavailable:
         The error, to be raised.
     """
     return StoreUnavailable(
-        f"server {url} does not answer as a gaitswarm server of this version does"
+        f"server {masked_url(url)} does not answer as a gaitswarm server of this version does"
     )
 
 
@@ -311,7 +312,9 @@ def server_url(url: str) -> str:
     except ValueError:
         valid = False
     if not valid:
-        raise InvalidRequest(f"{url!r} is not a URL like http://127.0.0.1:8000", field="server")
+        raise InvalidRequest(
+            f"{masked_url(url)!r} is not a URL like http://127.0.0.1:8000", field="server"
+        )
     return url.rstrip("/")
 
 

@@ -9,6 +9,7 @@ from urllib.parse import SplitResult, urlsplit
 from gaitswarm.errors import InvalidRequest
 from gaitswarm.jobs.server.attempts import server_url
 from gaitswarm.settings import Settings, is_loopback
+from services.optimizer.masking import masked_url
 
 _PORTS: Final = {"http": 80, "https": 443}
 
@@ -46,8 +47,8 @@ def with_token(
     guarded = asked.scheme == "https" or is_loopback(asked.hostname or "")
     if not guarded and not settings.token_over_http:
         raise InvalidRequest(
-            f"a token would go to {url} as plain text, which anybody on the way can read; use an"
-            " https:// URL (docs/security.md has a proxy for it) or a tunnel, or set"
+            f"a token would go to {masked_url(url)} as plain text, which anybody on the way can"
+            " read; use an https:// URL (docs/security.md has a proxy for it) or a tunnel, or set"
             " GAITSWARM_TOKEN_OVER_HTTP=true where the network is trusted",
             field="server",
         )

@@ -49,6 +49,7 @@ from gaitswarm.views.firmware import FirmwareView
 from gaitswarm.views.identification import RecordingEntryView, RecordingView
 from services.optimizer.jobs.job import Command, JobOrder, JobState
 from services.optimizer.jobs.labels import ANY_JOB, JobFilter
+from services.optimizer.masking import masked_url
 from services.optimizer.run.outage import Backoff
 from sim.identification.recorded_walk import RecordedWalk
 
@@ -108,7 +109,7 @@ class ServerJobs(ServerFindings, ServerWalks, Jobs):
     @property
     def place(self) -> str:
         """Options by which a command finds the same jobs."""
-        return f" --server {self._url}"
+        return f" --server {masked_url(self._url)}"
 
     def submit(
         self,

@@ -130,7 +130,8 @@ class SqlChanges:
             except Exception as error:  # noqa: BLE001
                 # Whatever it is, those who wait must not wait for a thread that has died.
                 if not failing:
-                    _log.warning("changes of jobs are polled for: %s", error)
+                    cause = self._database.without_secrets(str(error))
+                    _log.warning("changes of jobs are polled for: %s", cause)
                 failing = True
                 self._poll_if_possible()
             self._pause(stop)

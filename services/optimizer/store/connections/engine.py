@@ -34,6 +34,7 @@ from sqlalchemy.exc import (
 from sqlalchemy.exc import TimeoutError as PoolTimeout
 
 from services.optimizer.errors import StoreUnavailable
+from services.optimizer.masking import HARMLESS, masked_url
 from services.optimizer.store.connections.open_file import OpenFile
 from services.optimizer.store.connections.postgresql import postgresql_engine
 
@@ -169,7 +170,8 @@ class Database:
         except (DatabaseError, InterfaceError, PoolTimeout) as error:
             if not _is_infrastructure(error):
                 raise
-            raise StoreUnavailable(f"database {self.name}: {_cause(error)}") from error
+            cause = self.without_secrets(_cause(error))
+            raise StoreUnavailable(f"database {self.name}: {cause}") from error
 
     @contextmanager
     def outside_transactions(self) -> Iterator[Connection]:
@@ -184,6 +186,17 @@ class Database:
         engine = self.engine.execution_options(isolation_level="AUTOCOMMIT")
         with self._translated(), engine.connect() as connection:
             yield connection
+
+    def without_secrets(self, text: str) -> str:
+        """Return a driver's message without passwords of the database's URL."""
+        url = self.engine.url
+        secrets = {str(url.password or "")}
+        for name, values in url.query.items():
+            if name not in HARMLESS:
+                secrets |= {values} if isinstance(values, str) else {*values}
+        for secret in sorted(secrets - {""}, key=len, reverse=True):
+            text = text.replace(secret, "***")
+        return text
 
     def close(self) -> None:
         """Release the pooled connections. Idempotent."""
@@ -213,7 +226,7 @@ def connect(url: URL, *, for_migration: bool = False) -> Database:
         name = url.database or ""
         return Database(engine, name, None if for_migration else OpenFile(name, name, engine))
     server = postgresql_engine(url, options, lock_seconds=BUSY_SECONDS, maintenance=for_migration)
-    return Database(server, url.render_as_string(hide_password=True))
+    return Database(server, masked_url(url.render_as_string(hide_password=False)))
 
 
 def _sqlite_engine(url: URL, options: dict[str, Any], *, foreign_keys: bool) -> Engine:

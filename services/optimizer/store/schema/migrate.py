@@ -108,8 +108,9 @@ def _explained(database: Database) -> Iterator[None]:
     try:
         yield
     except DBAPIError as error:
+        cause = database.without_secrets(str(error.orig))
         raise StoreUnavailable(
-            f"database {database.name} cannot be migrated: {error.orig}; it needs a user who may"
+            f"database {database.name} cannot be migrated: {cause}; it needs a user who may"
             " create tables in it, and no other program's tables of the same names"
         ) from error
 

@@ -1,0 +1,55 @@
+"""URLs as messages show them, without passwords."""
+
+from __future__ import annotations
+
+import re
+from typing import Final
+from urllib.parse import unquote_plus
+
+HARMLESS: Final = frozenset(
+    {
+        *("user", "host", "hostaddr", "port", "dbname", "service", "application_name"),
+        *("sslmode", "connect_timeout", "target_session_attrs"),
+    }
+)
+"""Parameters of a database URL that are shown; the others may hold a secret or its place."""
+
+_HIDDEN: Final = "***"
+
+_HOST: Final = r"(?:\[[\w.:%]+\]|[\w.%-]*)(?::\d+)?"
+
+_ADDRESS: Final = re.compile(rf"{_HOST}(?:,{_HOST})*(?:/[^:@]*)?")
+"""Hosts, ports and path."""
+
+
+def masked_url(url: str) -> str:
+    """Return a URL that messages can show.
+
+    Args:
+        url: Of a database or a server; a file name or an SQLite URL is returned as it is.
+
+    Returns:
+        The URL with `***` in place of its password and of all parameters that are not known to be
+        harmless; of a URL that cannot be split reliably the scheme alone.
+    """
+    scheme, separator, rest = url.partition("://")
+    if not separator or scheme.startswith("sqlite"):
+        return url
+    head, _, query = rest.partition("?")
+    user_info, at, address = head.rpartition("@")
+    # An @ behind the ? may be that of a password that holds a ?.
+    if "@" in query or not _ADDRESS.fullmatch(address):
+        return f"{scheme}://{_HIDDEN}"
+    user, colon, _ = user_info.partition(":")
+    if at and scheme in ("http", "https"):
+        user = _HIDDEN  # A token may be given as the user.
+    hidden = f":{_HIDDEN}" if colon else ""
+    shown = [part for part in query.split("&") if _name(part) in HARMLESS]
+    if query and len(shown) < query.count("&") + 1:
+        shown.append(_HIDDEN)
+    return f"{scheme}://{user}{hidden}{at}{address}{'?' if query else ''}{'&'.join(shown)}"
+
+
+def _name(parameter: str) -> str:
+    name, equals, _ = parameter.partition("=")
+    return unquote_plus(name) if equals else ""

@@ -266,7 +266,7 @@ def add_problem_handlers(app: FastAPI) -> None:
         app.add_exception_handler(raised, domain_problem)
 
 
-def client_text(error: Exception) -> str:
+def _client_text(error: Exception) -> str:
     """Return an error's text for clients; the text of a database's driver is for the log alone."""
     return error.for_clients if isinstance(error, StoreUnavailable) else str(error)
 
@@ -291,7 +291,7 @@ async def domain_problem(request: Request, error: Exception) -> Response:
         raise error
     _, name = found
     status, _ = PROBLEMS[name]
-    detail = client_text(error)
+    detail = _client_text(error)
     errors = []
     if isinstance(error, InvalidRequest | QuotaExceeded):
         message = detail.removeprefix(f"{error.field}: ")

@@ -188,7 +188,11 @@ class Database:
             yield connection
 
     def without_secrets(self, text: str) -> str:
-        """Return a driver's message without passwords of the database's URL."""
+        """Return a driver's message without passwords of the database's URL.
+
+        Args:
+            text: The message.
+        """
         url = self.engine.url
         secrets = {str(url.password or "")}
         for name, values in url.query.items():

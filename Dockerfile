@@ -13,7 +13,7 @@ COPY services /src/services
 COPY gaitswarm /src/gaitswarm
 COPY api /src/api
 COPY cli /src/cli
-RUN cd /src && python -m api.document > /openapi.json
+RUN cd /src && python -m gaitswarm.api.document > /openapi.json
 
 FROM node:24-bookworm-slim AS page
 # The packages first, as above.
@@ -60,7 +60,7 @@ ENV PATH=/opt/gaitswarm/bin:$PATH \
     GAITSWARM_API_HOST=0.0.0.0
 USER gaitswarm
 WORKDIR /var/lib/gaitswarm
-RUN python -c "from sim.simulate import prepare; print('kernel:', prepare())"
+RUN python -c "from gaitswarm.sim.simulate import prepare; print('kernel:', prepare())"
 EXPOSE 8000
 VOLUME /var/lib/gaitswarm
 HEALTHCHECK --interval=10s --timeout=5s --start-period=30s --retries=3 \

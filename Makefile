@@ -15,7 +15,7 @@ DB_OPTION := --db $(DB)
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help demo serve page manual wheel bench test test-all test-firefox unit lint lint-code lint-page format architecture pictures lock clean setup setup-dev setup-manual page-if-possible
+.PHONY: help demo serve page manual wheel bench test test-all test-firefox unit lint lint-code lint-page format pictures lock clean setup setup-dev setup-manual page-if-possible
 
 help: ## Show this list.
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' Makefile
@@ -75,15 +75,12 @@ lint-page: setup-dev
 	@scripts/npm.sh --if-possible run check
 	@scripts/npm.sh --if-possible run lint
 
-architecture: setup-dev ## Draw docs/images/architecture.svg anew, from the imports of the code.
-	@$(BIN)/python -m scripts.architecture
-
 format: setup-dev ## Format the code and fix what can be fixed.
 	@$(BIN)/ruff check --fix .
 	@$(BIN)/ruff format .
 	@scripts/npm.sh --if-possible run format
 
-pictures: architecture ## Draw the pictures in docs/images anew: the page's, two walks, the concepts, and the architecture.
+pictures: setup-dev ## Draw the pictures in docs/images anew: the page's, two walks, and the concepts.
 	@$(BIN)/python -m scripts.concepts
 	@$(BIN)/python -m scripts.walks
 	@scripts/page.sh

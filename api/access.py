@@ -13,19 +13,19 @@ from fastapi import Depends, Header, Request, Response
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from api.dependencies import ExistingJob, ServerSettings
-from api.known_tokens import KnownTokens
-from api.monitoring import METRICS_PATH
-from api.problems import problem, too_many_requests, unauthorized
-from api.rates import RequestRate, address_of, is_local
+from gaitswarm.api.dependencies import ExistingJob, ServerSettings
+from gaitswarm.api.known_tokens import KnownTokens
+from gaitswarm.api.monitoring import METRICS_PATH
+from gaitswarm.api.problems import problem, too_many_requests, unauthorized
+from gaitswarm.api.rates import RequestRate, address_of, is_local
+from gaitswarm.services.monitoring.exposition import REFUSAL
+from gaitswarm.services.optimizer.access import Scope as TokenScope
+from gaitswarm.services.optimizer.access import Token, Tokens
+from gaitswarm.services.optimizer.errors import Forbidden, StoreUnavailable
+from gaitswarm.services.optimizer.jobs.audit import LOCAL
+from gaitswarm.services.optimizer.jobs.priority import DEFAULT, HIGHEST, LOWEST
+from gaitswarm.services.optimizer.jobs.quota import Quota
 from gaitswarm.views import PREFIX
-from services.monitoring.exposition import REFUSAL
-from services.optimizer.access import Scope as TokenScope
-from services.optimizer.access import Token, Tokens
-from services.optimizer.errors import Forbidden, StoreUnavailable
-from services.optimizer.jobs.audit import LOCAL
-from services.optimizer.jobs.priority import DEFAULT, HIGHEST, LOWEST
-from services.optimizer.jobs.quota import Quota
 
 _log = logging.getLogger("gaitswarm.api")
 

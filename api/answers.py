@@ -15,7 +15,7 @@ from typing import Final
 from fastapi import Request, Response
 from pydantic_core import to_json
 
-from services.optimizer.jobs.job import Job, JobState
+from gaitswarm.services.optimizer.jobs.job import Job, JobState
 
 LEAST_COMPRESSED: Final = 1024
 """Bytes of the shortest answer that is compressed."""

@@ -11,28 +11,28 @@ from fastapi import FastAPI
 from fastapi_offline import FastAPIOffline
 from starlette.middleware.gzip import DEFAULT_EXCLUDED_CONTENT_TYPES, GZipMiddleware
 
-from api.access import AccessMiddleware
-from api.answers import LEAST_COMPRESSED
-from api.dependencies import Component, lifespan
-from api.direct import DirectAnswers
-from api.documentation import ASSETS, DESCRIPTION, TAGS, add_documentation
-from api.manual import FOLDER as MANUAL
-from api.manual import add_manual
-from api.middleware import (
+from gaitswarm.api.access import AccessMiddleware
+from gaitswarm.api.answers import LEAST_COMPRESSED
+from gaitswarm.api.dependencies import Component, lifespan
+from gaitswarm.api.direct import DirectAnswers
+from gaitswarm.api.documentation import ASSETS, DESCRIPTION, TAGS, add_documentation
+from gaitswarm.api.manual import FOLDER as MANUAL
+from gaitswarm.api.manual import add_manual
+from gaitswarm.api.middleware import (
     BodyLimitMiddleware,
     HeaderLimitMiddleware,
     RequestIdMiddleware,
     SecurityHeadersMiddleware,
 )
-from api.monitoring import MetricsMiddleware, add_metrics
-from api.origin import HostMiddleware, SameOriginMiddleware
-from api.page import FOLDER, add_page
-from api.problems import add_problem_handlers
-from api.rates import RequestRate
-from api.routes import (
+from gaitswarm.api.monitoring import MetricsMiddleware, add_metrics
+from gaitswarm.api.origin import HostMiddleware, SameOriginMiddleware
+from gaitswarm.api.page import FOLDER, add_page
+from gaitswarm.api.problems import add_problem_handlers
+from gaitswarm.api.rates import RequestRate
+from gaitswarm.api.routes import (
     activity as activities,
 )
-from api.routes import (
+from gaitswarm.api.routes import (
     analysis,
     audit,
     calibration,
@@ -55,12 +55,12 @@ from api.routes import (
     simulations,
     tournaments,
 )
+from gaitswarm.services.monitoring.activity import Activity
+from gaitswarm.services.monitoring.collectors import QueueCollector
+from gaitswarm.services.monitoring.hosts import HostNames
+from gaitswarm.services.monitoring.metrics import Metrics
+from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.settings import Settings
-from services.monitoring.activity import Activity
-from services.monitoring.collectors import QueueCollector
-from services.monitoring.hosts import HostNames
-from services.monitoring.metrics import Metrics
-from services.optimizer.service import JobService
 
 # Event streams must not wait for a full block. Numbers in binary hardly become shorter, and
 # downloads are as long as a job's history: compressing either costs more time than it saves.

@@ -15,9 +15,9 @@ from fastapi import Body, Request
 from fastapi.exceptions import RequestValidationError
 from pydantic import TypeAdapter, ValidationError, WrapValidator
 
-from sim.errors import RobotFileError
-from sim.input.wording import with_known_keys
-from sim.robot.check import MOST_ROBOTS, Location, check_files, files_of, objects_in
+from gaitswarm.sim.errors import RobotFileError
+from gaitswarm.sim.input.wording import with_known_keys
+from gaitswarm.sim.robot.check import MOST_ROBOTS, Location, check_files, files_of, objects_in
 
 MOST_NAMES: Final = 10_000
 """Names of fields in a body, designs to start from aside: each may be an error to be told."""

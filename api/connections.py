@@ -21,7 +21,7 @@ from uvicorn.config import Config
 from uvicorn.protocols.http.h11_impl import H11Protocol, RequestResponseCycle
 from uvicorn.server import ServerState
 
-from api.problems import headers_too_large, problem, too_many_requests
+from gaitswarm.api.problems import headers_too_large, problem, too_many_requests
 from gaitswarm.settings import Settings
 
 _log = logging.getLogger("gaitswarm.api")

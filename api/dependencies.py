@@ -13,16 +13,16 @@ from fastapi import Depends, FastAPI, Path, Query, Request
 from pydantic import Field
 from starlette.types import Scope
 
-from api.answers import Answers
-from api.rates import OpenStreams
-from api.slots import AskersSlots, ComputingSlots
-from api.topics import Topics
+from gaitswarm.api.answers import Answers
+from gaitswarm.api.rates import OpenStreams
+from gaitswarm.api.slots import AskersSlots, ComputingSlots
+from gaitswarm.api.topics import Topics
+from gaitswarm.services.monitoring.activity import Activity
+from gaitswarm.services.monitoring.metrics import Metrics
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.settings import Settings
-from services.monitoring.activity import Activity
-from services.monitoring.metrics import Metrics
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.job import Job
-from services.optimizer.service import JobService
 
 _VALIDATIONS: Final = 2
 """Bodies that are validated at once: threads of Python take turns, the event loop's among them."""

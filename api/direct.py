@@ -13,13 +13,13 @@ from anyio.to_thread import run_sync
 from fastapi import Request, Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from api.answers import Answers, Encoded
-from api.dependencies import service_of
-from api.problems import DOMAIN_ERRORS, domain_problem
-from api.reads import Best, Evaluations, InFull, Iterations, JobList, JobQuestion
+from gaitswarm.api.answers import Answers, Encoded
+from gaitswarm.api.dependencies import service_of
+from gaitswarm.api.problems import DOMAIN_ERRORS, domain_problem
+from gaitswarm.api.reads import Best, Evaluations, InFull, Iterations, JobList, JobQuestion
+from gaitswarm.services.optimizer.jobs.job import JobOrder, JobState
+from gaitswarm.services.optimizer.jobs.labels import ANY_JOB, JobFilter
 from gaitswarm.views import PREFIX
-from services.optimizer.jobs.job import JobOrder, JobState
-from services.optimizer.jobs.labels import ANY_JOB, JobFilter
 
 _LIST: Final = f"{PREFIX}/jobs"
 

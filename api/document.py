@@ -1,4 +1,4 @@
-"""`python -m api.document`: the OpenAPI document as JSON on stdout.
+"""`python -m gaitswarm.api.document`: the OpenAPI document as JSON on stdout.
 
 It needs neither a server nor a database; the page's types are made from it.
 """
@@ -9,9 +9,9 @@ import json
 import sys
 from typing import cast
 
-from api.app import create_app
+from gaitswarm.api.app import create_app
+from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.settings import Settings
-from services.optimizer.service import JobService
 
 
 def document() -> str:

@@ -12,9 +12,9 @@ from fastapi.openapi.docs import get_swagger_ui_html
 from pydantic import BaseModel
 from pydantic.json_schema import JsonSchemaMode, models_json_schema
 
-from api.links import add_links
-from api.middleware import security_policy
-from api.problems import MEDIA_TYPE
+from gaitswarm.api.links import add_links
+from gaitswarm.api.middleware import security_policy
+from gaitswarm.api.problems import MEDIA_TYPE
 from gaitswarm.views import ParticlesHeaderView, ProblemView
 from gaitswarm.views.base import MEDIA_TYPE as BINARY
 from gaitswarm.views.replay import ReplayHeaderView

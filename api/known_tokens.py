@@ -9,8 +9,8 @@ from typing import Final
 
 from anyio.to_thread import run_sync
 
-from services.optimizer.access import Token, Tokens
-from services.optimizer.errors import StoreUnavailable
+from gaitswarm.services.optimizer.access import Token, Tokens
+from gaitswarm.services.optimizer.errors import StoreUnavailable
 
 REMEMBERED_SECONDS: Final = 5.0
 """So long a token that was revoked may still be used."""

@@ -10,8 +10,8 @@ from typing import Annotated, Final
 from fastapi import Depends, FastAPI, Request, Response
 from starlette.responses import FileResponse, HTMLResponse, RedirectResponse
 
-from api.documentation import policy_of
-from api.problems import problem
+from gaitswarm.api.documentation import policy_of
+from gaitswarm.api.problems import problem
 
 FOLDER: Final = Path(__file__).parent / "manual"
 """`make manual` builds it; wheels of `make wheel` and the image bring it."""

@@ -15,9 +15,9 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from api.problems import MOST_HEADERS, headers_too_large, internal_error, problem
-from services.optimizer.errors import GaitswarmError
-from services.optimizer.log_context import log_context
+from gaitswarm.api.problems import MOST_HEADERS, headers_too_large, internal_error, problem
+from gaitswarm.services.optimizer.errors import GaitswarmError
+from gaitswarm.services.optimizer.log_context import log_context
 
 _log = logging.getLogger("gaitswarm.api")
 
@@ -79,7 +79,7 @@ def _expected(error: Exception) -> GaitswarmError | None:
 class HeaderLimitMiddleware:
     """Refuses requests with very many or very long headers, or a very long path, with a problem.
 
-    Heads that do not come in one piece are refused before, by `api.connections`.
+    Heads that do not come in one piece are refused before, by `gaitswarm.api.connections`.
     """
 
     def __init__(self, app: ASGIApp, max_bytes: int) -> None:

@@ -8,7 +8,7 @@ from typing import Final
 from fastapi import FastAPI, Request, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from services.monitoring.metrics import Metrics
+from gaitswarm.services.monitoring.metrics import Metrics
 
 METRICS_PATH: Final = "/metrics"
 

@@ -9,8 +9,8 @@ from urllib.parse import urlsplit
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from api.problems import problem
-from services.monitoring.hosts import HostNames
+from gaitswarm.api.problems import problem
+from gaitswarm.services.monitoring.hosts import HostNames
 
 _READING: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 

@@ -14,7 +14,7 @@ from typing import Final
 from fastapi import FastAPI, Request, Response
 from starlette.responses import FileResponse, HTMLResponse, RedirectResponse
 
-from api.problems import problem
+from gaitswarm.api.problems import problem
 from gaitswarm.views import PREFIX
 
 FOLDER: Final = Path(__file__).parent / "page"

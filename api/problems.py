@@ -38,8 +38,7 @@ from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.routing import Match
 
-from gaitswarm.views import FieldErrorView, ProblemView, field_errors
-from services.optimizer.errors import (
+from gaitswarm.services.optimizer.errors import (
     Conflict,
     EvaluatorUnavailable,
     Forbidden,
@@ -54,8 +53,9 @@ from services.optimizer.errors import (
     Unauthorized,
     Unreadable,
 )
-from sim.errors import SimulationError, SimulationInputError
-from sim.robot.bounds import shortened
+from gaitswarm.sim.errors import SimulationError, SimulationInputError
+from gaitswarm.sim.robot.bounds import shortened
+from gaitswarm.views import FieldErrorView, ProblemView, field_errors
 
 _log = logging.getLogger("gaitswarm.api")
 

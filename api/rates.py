@@ -11,8 +11,8 @@ from typing import Final
 
 from starlette.types import Scope
 
+from gaitswarm.services.optimizer.errors import TooManyRequests
 from gaitswarm.settings import is_loopback
-from services.optimizer.errors import TooManyRequests
 
 _MOST_REMEMBERED: Final = 4096
 """Askers; of more, whoever asked longest ago begins anew."""

@@ -6,7 +6,12 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Protocol
 
-from api.answers import Answers, Encoded, page_of
+from gaitswarm.api.answers import Answers, Encoded, page_of
+from gaitswarm.services.optimizer.errors import NotFound
+from gaitswarm.services.optimizer.jobs.job import Job, JobOrder, JobState
+from gaitswarm.services.optimizer.jobs.labels import ANY_JOB, JobFilter
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.port.reading import Page
 from gaitswarm.views import (
     BestView,
     JobSummaryView,
@@ -14,11 +19,6 @@ from gaitswarm.views import (
     encoded_evaluations,
     encoded_iterations,
 )
-from services.optimizer.errors import NotFound
-from services.optimizer.jobs.job import Job, JobOrder, JobState
-from services.optimizer.jobs.labels import ANY_JOB, JobFilter
-from services.optimizer.service import JobService
-from services.optimizer.store.port.reading import Page
 
 
 class JobQuestion(Protocol):

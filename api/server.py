@@ -11,7 +11,7 @@ from types import FrameType
 import uvicorn
 from fastapi import FastAPI
 
-from api.connections import ConnectionLimits, limited_protocol
+from gaitswarm.api.connections import ConnectionLimits, limited_protocol
 
 _BACKLOG = 512
 _USUAL = ConnectionLimits()

@@ -11,7 +11,7 @@ from typing import Final, TypeVar
 import anyio
 from anyio.to_thread import run_sync
 
-from services.optimizer.errors import EvaluatorUnavailable, TooManyRequests
+from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, TooManyRequests
 
 T = TypeVar("T")
 

@@ -13,10 +13,10 @@ from typing import Final
 from anyio.to_thread import run_sync
 from fastapi.sse import format_sse_event
 
+from gaitswarm.services.optimizer.jobs.iteration import Iteration
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.views import IterationView, StateView
-from services.optimizer.jobs.iteration import Iteration
-from services.optimizer.jobs.job import Job
-from services.optimizer.service import JobService
 
 PAGE: Final = 200
 """Most iterations that are read at once."""

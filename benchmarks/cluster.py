@@ -20,10 +20,10 @@ import time
 from pathlib import Path
 from typing import Any
 
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.run.runner import Runner
-from services.optimizer.store.sql_store import open_store
-from services.runtime import open_evaluator, run_embedded
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.run.runner import Runner
+from gaitswarm.services.optimizer.store.sql_store import open_store
+from gaitswarm.services.runtime import open_evaluator, run_embedded
 from tests.examples.jobs import history
 from tests.worker import cluster_host
 from tests.worker.cluster_host import Process

@@ -32,18 +32,18 @@ import numpy as np
 from mujoco.rollout import Rollout
 
 from benchmarks.physics import ROBOT, pinocchio_aba
-from sim.assembly import PHYSICS_RATE, control_steps, plan_walk
-from sim.compiler.target import Target, target
-from sim.controllers import CONTROLLERS
-from sim.controllers.fixed_point import CONTROL_PERIOD
-from sim.kernel.compiled.native import load_kernel
-from sim.kernel.observation import WalkLog
-from sim.kernel.walk import Precision
-from sim.mujoco.mjcf import Surroundings
-from sim.mujoco.model import Feet, even_drags, model
-from sim.robot import load_robot
-from sim.scenario import SCENARIOS
-from sim.simulate import simulate
+from gaitswarm.sim.assembly import PHYSICS_RATE, control_steps, plan_walk
+from gaitswarm.sim.compiler.target import Target, target
+from gaitswarm.sim.controllers import CONTROLLERS
+from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
+from gaitswarm.sim.kernel.compiled.native import load_kernel
+from gaitswarm.sim.kernel.observation import WalkLog
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.mujoco.mjcf import Surroundings
+from gaitswarm.sim.mujoco.model import Feet, even_drags, model
+from gaitswarm.sim.robot import load_robot
+from gaitswarm.sim.scenario import SCENARIOS
+from gaitswarm.sim.simulate import simulate
 
 SCENARIO = SCENARIOS[0]
 PRECISIONS: Final[tuple[Precision, ...]] = ("double", "single")

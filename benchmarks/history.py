@@ -16,14 +16,14 @@ from collections.abc import Callable
 from pathlib import Path
 
 from benchmarks.large_store import fill
-from services.optimizer.analysis.distribution import distribution
-from services.optimizer.analysis.history_cache import HistoryCache
-from services.optimizer.analysis.ranking import rank
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.job import Job, JobOrder
-from services.optimizer.jobs.preference import PREFERENCES, judge
-from services.optimizer.store.port.base import Store
-from services.optimizer.store.sql_store import open_store
+from gaitswarm.services.optimizer.analysis.distribution import distribution
+from gaitswarm.services.optimizer.analysis.history_cache import HistoryCache
+from gaitswarm.services.optimizer.analysis.ranking import rank
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.job import Job, JobOrder
+from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, judge
+from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.store.sql_store import open_store
 
 ROW_BY_ROW = 100
 """Iterations that the slow variants read and judge; their times are scaled to the whole."""

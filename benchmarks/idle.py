@@ -25,18 +25,18 @@ import time
 from dataclasses import asdict, dataclass
 from unittest.mock import patch
 
-from services.optimizer.jobs.iteration import CompletedIteration
-from services.optimizer.jobs.job import JobState
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.search.swarm.pso import PsoSettings
-from services.optimizer.service import JobService
-from services.runtime import open_store, run_embedded
-from services.worker import EvaluatorKind
-from services.worker.dispatch import Dispatcher, Work
-from services.worker.in_process import InProcessEvaluator
-from services.worker.ray_evaluator import RayEvaluator
-from services.worker.tasks import Answer
-from sim.kernel.walk import LaneUse, Precision
+from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
+from gaitswarm.services.optimizer.jobs.job import JobState
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.search.swarm.pso import PsoSettings
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.runtime import open_store, run_embedded
+from gaitswarm.services.worker import EvaluatorKind
+from gaitswarm.services.worker.dispatch import Dispatcher, Work
+from gaitswarm.services.worker.in_process import InProcessEvaluator
+from gaitswarm.services.worker.ray_evaluator import RayEvaluator
+from gaitswarm.services.worker.tasks import Answer
+from gaitswarm.sim.kernel.walk import LaneUse, Precision
 
 
 @dataclass(frozen=True)

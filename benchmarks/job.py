@@ -18,7 +18,7 @@ import tempfile
 import time
 from pathlib import Path
 
-COMMAND = "from cli.main import main; main()"
+COMMAND = "from gaitswarm.cli.main import main; main()"
 
 
 def run(evaluator: str) -> dict[str, float | str]:

@@ -24,7 +24,7 @@ from typing import Any, Final
 
 from tests.robots.known import FOLDER, QUADRUPEDS
 
-COMMAND: Final = "from cli.main import main; main()"
+COMMAND: Final = "from gaitswarm.cli.main import main; main()"
 GRAVITY: Final = 9.81
 MOST_DESIGNS: Final = 1000
 

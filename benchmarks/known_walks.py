@@ -21,14 +21,14 @@ from typing import Final, TypeVar
 import numpy as np
 
 from benchmarks.large_store import optimizer_bounds, walk
-from services.optimizer.jobs.iteration import Ask, CompletedIteration
-from services.optimizer.jobs.job import Claim
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.provenance import job_provenance
-from services.optimizer.jobs.spec import judge_outcomes
-from services.optimizer.jobs.walk_keys import walk_keys
-from services.optimizer.store.port.base import Store
-from services.optimizer.store.sql_store import open_store
+from gaitswarm.services.optimizer.jobs.iteration import Ask, CompletedIteration
+from gaitswarm.services.optimizer.jobs.job import Claim
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.provenance import job_provenance
+from gaitswarm.services.optimizer.jobs.spec import judge_outcomes
+from gaitswarm.services.optimizer.jobs.walk_keys import walk_keys
+from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.store.sql_store import open_store
 
 T = TypeVar("T")
 

@@ -16,14 +16,14 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.jobs.iteration import Ask, CompletedIteration
-from services.optimizer.jobs.job import Claim, Command, Job
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.spec import create_optimizer, judge_outcomes
-from services.optimizer.search.optimizer import Optimizer
-from services.optimizer.store.port.base import Store
-from services.optimizer.store.sql_store import open_store
-from sim.outcome import Outcome, Status
+from gaitswarm.services.optimizer.jobs.iteration import Ask, CompletedIteration
+from gaitswarm.services.optimizer.jobs.job import Claim, Command, Job
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.spec import create_optimizer, judge_outcomes
+from gaitswarm.services.optimizer.search.optimizer import Optimizer
+from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.store.sql_store import open_store
+from gaitswarm.sim.outcome import Outcome, Status
 
 PARTICLES: Final = 25
 _LEASE: Final = 3600.0

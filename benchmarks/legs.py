@@ -20,13 +20,13 @@ from typing import Final
 import numpy as np
 
 from gaitswarm.robot_checks import standing_scenario
-from sim.assembly import PHYSICS_RATE
-from sim.kernel.batch import walk_together
-from sim.outcome import Status
-from sim.proposal.document import propose_robot
-from sim.robot import DEFAULT_ROBOT, Robot, load_robot, parse_robot
-from sim.scenario import SCENARIOS, Scenario
-from sim.simulate import simulating
+from gaitswarm.sim.assembly import PHYSICS_RATE
+from gaitswarm.sim.kernel.batch import walk_together
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.proposal.document import propose_robot
+from gaitswarm.sim.robot import DEFAULT_ROBOT, Robot, load_robot, parse_robot
+from gaitswarm.sim.scenario import SCENARIOS, Scenario
+from gaitswarm.sim.simulate import simulating
 from tests.examples.paths import QUADRUPED
 from tests.examples.walks import quadruped_files
 from tests.robots.known import FOLDER, QUADRUPEDS

@@ -22,7 +22,7 @@ from typing import Any, Final
 from playwright.sync_api import Page, sync_playwright
 
 from benchmarks.large_store import fill
-from services.runtime import open_store
+from gaitswarm.services.runtime import open_store
 from tests.examples.servers import ServerProcess
 from tests.web.chromium import ARGUMENTS, find_browser
 from tests.web.pages import Pages

@@ -17,13 +17,13 @@ from typing import Final
 import numpy as np
 import pinocchio as pin
 
-from sim.assembly import PHYSICS_RATE, plan_walk
-from sim.benchmark import measure
-from sim.controllers import CONTROLLERS
-from sim.kernel.dynamics.physics_step import physics_model
-from sim.kernel.readable.reference import Stepper
-from sim.robot import load_robot
-from sim.scenario import SCENARIOS
+from gaitswarm.sim.assembly import PHYSICS_RATE, plan_walk
+from gaitswarm.sim.benchmark import measure
+from gaitswarm.sim.controllers import CONTROLLERS
+from gaitswarm.sim.kernel.dynamics.physics_step import physics_model
+from gaitswarm.sim.kernel.readable.reference import Stepper
+from gaitswarm.sim.robot import load_robot
+from gaitswarm.sim.scenario import SCENARIOS
 
 ROBOT: Final = "szabadka2"
 """Whose feet all touch the ground alike: MuJoCo's own contacts are fitted to that."""

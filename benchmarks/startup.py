@@ -24,12 +24,12 @@ from pathlib import Path
 
 import httpx2
 
-COMMAND = "from cli.main import main; main()"
+COMMAND = "from gaitswarm.cli.main import main; main()"
 
 # Notes when a kernel is first called: the clock is the same for all processes of a machine.
 WALK = f"""
 import sys, time
-from sim.kernel.compiled.native import NativeKernel
+from gaitswarm.sim.kernel.compiled.native import NativeKernel
 walk = NativeKernel.walk
 def first(*arguments, **options):
     NativeKernel.walk = walk
@@ -131,7 +131,9 @@ def main() -> None:
     options = parser.parse_args()
     rounds: dict[str, list[float]] = defaultdict(list)
     # What is not compiled yet would make the first warm start a cold one.
-    subprocess.run([sys.executable, "-c", "import sim.simulate as s; s.prepare()"], check=True)
+    subprocess.run(
+        [sys.executable, "-c", "import gaitswarm.sim.simulate as s; s.prepare()"], check=True
+    )
     for _ in range(options.rounds):
         for name, seconds in measured(options.iterations).items():
             rounds[name].append(seconds)

@@ -19,16 +19,16 @@ from dataclasses import asdict, dataclass
 from typing import Final
 from unittest.mock import patch
 
-from sim.assembly import control_steps, plan_walk
-from sim.compiler.compilation import load_library
-from sim.compiler.target import X86_TARGETS, Target, cpu_flags, target
-from sim.controllers import CONTROLLERS
-from sim.kernel.compiled.native import NativeKernel
-from sim.kernel.emitted import emit_c
-from sim.kernel.emitted.source import kernel_source
-from sim.kernel.walk import Precision, WalkSetup
-from sim.robot import Robot, load_robot
-from sim.scenario import SCENARIOS
+from gaitswarm.sim.assembly import control_steps, plan_walk
+from gaitswarm.sim.compiler.compilation import load_library
+from gaitswarm.sim.compiler.target import X86_TARGETS, Target, cpu_flags, target
+from gaitswarm.sim.controllers import CONTROLLERS
+from gaitswarm.sim.kernel.compiled.native import NativeKernel
+from gaitswarm.sim.kernel.emitted import emit_c
+from gaitswarm.sim.kernel.emitted.source import kernel_source
+from gaitswarm.sim.kernel.walk import Precision, WalkSetup
+from gaitswarm.sim.robot import Robot, load_robot
+from gaitswarm.sim.scenario import SCENARIOS
 
 ROBOTS: Final = ("szabadka2", "szabadka2-reconstructed")
 PRECISIONS: Final[tuple[Precision, ...]] = ("double", "single")

@@ -18,12 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.physics import ROBOT
-from sim.assembly import PHYSICS_RATE, control_steps, judge, plan_walk
-from sim.controllers import CONTROLLERS
-from sim.mujoco.kernel import MujocoKernel
-from sim.robot import load_robot
-from sim.scenario import SCENARIOS
-from sim.simulate import simulate
+from gaitswarm.sim.assembly import PHYSICS_RATE, control_steps, judge, plan_walk
+from gaitswarm.sim.controllers import CONTROLLERS
+from gaitswarm.sim.mujoco.kernel import MujocoKernel
+from gaitswarm.sim.robot import load_robot
+from gaitswarm.sim.scenario import SCENARIOS
+from gaitswarm.sim.simulate import simulate
 
 SCENARIO = SCENARIOS[0]
 FINE: Final = 160_000

@@ -21,11 +21,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.preference import PREFERENCES, judge, objective_vectors
-from services.optimizer.search.registry import METHODS, create_search
-from sim.case import run_together
-from sim.outcome import Status
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, judge, objective_vectors
+from gaitswarm.services.optimizer.search.registry import METHODS, create_search
+from gaitswarm.sim.case import run_together
+from gaitswarm.sim.outcome import Status
 
 Floats = NDArray[np.float64]
 

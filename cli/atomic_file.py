@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
-from services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.errors import InvalidRequest
 
 
 @contextmanager

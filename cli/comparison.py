@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from gaitswarm.requests.walk import SimulationRequest, run_simulation
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.reference import on_the_jobs_terms, published_study
+from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.views import SimulationView
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.reference import on_the_jobs_terms, published_study
-from services.optimizer.jobs.spec import Spec
-from sim.controllers import CONTROLLERS
 
 
 def published_beside(spec: Spec) -> dict[str, SimulationView]:

@@ -8,36 +8,36 @@ from contextlib import closing, contextmanager
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
-from cli.exit_codes import JobEnded
-from cli.output import note, print_json, stdout_console
-from cli.progress import show_progress
+from gaitswarm.cli.exit_codes import JobEnded
+from gaitswarm.cli.output import note, print_json, stdout_console
+from gaitswarm.cli.progress import show_progress
 from gaitswarm.jobs.database.embedded import check_same, earlier_job, taken_up
 from gaitswarm.jobs.database.jobs import DatabaseJobs
 from gaitswarm.jobs.open import database_to_write
-from gaitswarm.settings import read_settings
-from services.optimizer.analysis.reference import note_reference
-from services.optimizer.jobs.job import JobState
-from services.optimizer.masking import masked_url
-from services.optimizer.service import JobService
-from services.runtime import (
+from gaitswarm.services.optimizer.analysis.reference import note_reference
+from gaitswarm.services.optimizer.jobs.job import JobState
+from gaitswarm.services.optimizer.masking import masked_url
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.runtime import (
     check_address,
     open_evaluator,
     open_store,
     run_embedded,
     stop_on_signals,
 )
+from gaitswarm.settings import read_settings
 
 if TYPE_CHECKING:
-    from cli.inputs.options import WorkerOptions
-    from cli.progress import Progress
+    from gaitswarm.cli.inputs.options import WorkerOptions
+    from gaitswarm.cli.progress import Progress
+    from gaitswarm.services.optimizer.jobs.documents import AnySpec
+    from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration, Iteration
+    from gaitswarm.services.optimizer.jobs.job import Claim, Job
+    from gaitswarm.services.optimizer.jobs.spec import Spec
+    from gaitswarm.services.optimizer.run.evaluator import Evaluator
+    from gaitswarm.services.optimizer.store.port.base import Store
     from gaitswarm.settings import Settings
     from gaitswarm.views import JobView
-    from services.optimizer.jobs.documents import AnySpec
-    from services.optimizer.jobs.iteration import CompletedIteration, Iteration
-    from services.optimizer.jobs.job import Claim, Job
-    from services.optimizer.jobs.spec import Spec
-    from services.optimizer.run.evaluator import Evaluator
-    from services.optimizer.store.port.base import Store
 
 
 def resumed_job(
@@ -283,8 +283,8 @@ def _how_to_go_on(job_id: str, place: str) -> str:
 
 
 def _report(job: JobView, place: str, *, compare: bool, beside: Mapping[str, JobView]) -> None:
-    from cli.comparison import published_beside
-    from cli.tables.views import design_table, results_table, search_line, worth
+    from gaitswarm.cli.comparison import published_beside
+    from gaitswarm.cli.tables.views import design_table, results_table, search_line, worth
 
     console = stdout_console()
     if job.best is None:

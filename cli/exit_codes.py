@@ -56,8 +56,8 @@ _OF_THE_MACHINE: Final = frozenset(
 
 def exit_code(error: BaseException) -> ExitCode | None:
     """Code of an error that is no bug of gaitswarm; None for any other."""
-    from services.optimizer import errors
-    from sim.errors import SimulationError, SimulationInputError
+    from gaitswarm.services.optimizer import errors
+    from gaitswarm.sim.errors import SimulationError, SimulationInputError
 
     kinds: tuple[tuple[type[BaseException], ExitCode], ...] = (
         (JobEnded, ExitCode.JOB_FAILED),

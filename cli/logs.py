@@ -27,7 +27,7 @@ class JsonFormatter(logging.Formatter):
         Returns:
             A JSON object without line breaks.
         """
-        from services.optimizer.log_context import log_fields
+        from gaitswarm.services.optimizer.log_context import log_fields
 
         document: dict[str, Any] = {
             "time": datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds"),

@@ -19,8 +19,8 @@ from typer.core import TyperGroup
 from typer.main import get_command, get_command_name
 from typer.models import CommandInfo
 
-from cli.commands.database import db
-from cli.commands.designs import (
+from gaitswarm.cli.commands.database import db
+from gaitswarm.cli.commands.designs import (
     certify,
     compare,
     firmware,
@@ -32,7 +32,7 @@ from cli.commands.designs import (
     scenarios,
     simulate,
 )
-from cli.commands.jobs import (
+from gaitswarm.cli.commands.jobs import (
     audit,
     delete,
     diff,
@@ -48,7 +48,7 @@ from cli.commands.jobs import (
     serve,
     token,
 )
-from cli.commands.robots import (
+from gaitswarm.cli.commands.robots import (
     calibrate,
     gaits,
     identify,
@@ -59,9 +59,15 @@ from cli.commands.robots import (
     synthesize,
     validate,
 )
-from cli.commands.studies import bench, study, tournament
-from cli.exit_codes import ExitCode, exit_code, explanation
-from cli.output import OutputClosed, Stdout, note, replace_closed_streams, warnings_as_notes
+from gaitswarm.cli.commands.studies import bench, study, tournament
+from gaitswarm.cli.exit_codes import ExitCode, exit_code, explanation
+from gaitswarm.cli.output import (
+    OutputClosed,
+    Stdout,
+    note,
+    replace_closed_streams,
+    warnings_as_notes,
+)
 
 
 class _HelpAtOnce(TyperGroup):

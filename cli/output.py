@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
-from cli.exit_codes import OutputFailed
+from gaitswarm.cli.exit_codes import OutputFailed
 
 if TYPE_CHECKING:
     from pydantic import BaseModel

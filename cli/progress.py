@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Final, Protocol
 
-from cli.exit_codes import JobEnded
-from cli.output import note, stderr_console
-from cli.tables.views import duration, number
+from gaitswarm.cli.exit_codes import JobEnded
+from gaitswarm.cli.output import note, stderr_console
+from gaitswarm.cli.tables.views import duration, number
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar

@@ -6,15 +6,15 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from cli.atomic_file import replacing
-from cli.tables.validation import alignment, confidence, percent, remarks
-from services.optimizer.errors import InvalidRequest
-from sim.measurement.measured_log import Quantity
-from sim.validation.measures import Tolerance
+from gaitswarm.cli.atomic_file import replacing
+from gaitswarm.cli.tables.validation import alignment, confidence, percent, remarks
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.sim.measurement.measured_log import Quantity
+from gaitswarm.sim.validation.measures import Tolerance
 
 if TYPE_CHECKING:
-    from sim.measurement.synchronise import Synchronised
-    from sim.validation.comparison import Agreement, Comparison, QuantityComparison
+    from gaitswarm.sim.measurement.synchronise import Synchronised
+    from gaitswarm.sim.validation.comparison import Agreement, Comparison, QuantityComparison
 
 REPORT: Final = "report.md"
 
@@ -26,8 +26,8 @@ def write_report(
 
     facts: what was compared, by heading. Raises InvalidRequest if the folder cannot be written.
     """
-    from cli.pictures.plots import save
-    from cli.pictures.validation import draw_errors, draw_leg, draw_spectra
+    from gaitswarm.cli.pictures.plots import save
+    from gaitswarm.cli.pictures.validation import draw_errors, draw_leg, draw_spectra
 
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from cli.atomic_file import replacing
+from gaitswarm.cli.atomic_file import replacing
 from gaitswarm.views import WalkLogView
 
 
 def write_walk_logs(path: Path, logs: Mapping[str, WalkLogView | None]) -> None:
     """One array per recorded quantity, 500 rows a second, float64, NaN where undefined.
 
-    Names are those of `sim.kernel.observation.WalkLog`; with several scenarios,
+    Names are those of `gaitswarm.sim.kernel.observation.WalkLog`; with several scenarios,
     `<scenario>/<name>`.
     Raises InvalidRequest if the file cannot be written; an earlier file is replaced at once.
     """

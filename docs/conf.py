@@ -12,7 +12,7 @@ root_doc = "docs/index"
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "scripts.manual"]
 include_patterns = ["README.md", "ARCHITECTURE.md", "CHANGELOG.md", "docs/**"]
 # Not to be walked through in search of pages.
-exclude_patterns = [".*", "api", "build", "dist", "sim", "tests", "web"]
+exclude_patterns = [".*", "api", "build", "dist", "gaitswarm", "sim", "tests", "web"]
 myst_heading_anchors = 4
 myst_enable_extensions = ["deflist"]
 autodoc_typehints = "description"

@@ -52,6 +52,44 @@ if TYPE_CHECKING:
     from gaitswarm.preferences import robust_preferences
     from gaitswarm.requests.firmware import FirmwareOptions
     from gaitswarm.requests.robustness import RobustnessOptions
+    from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
+    from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
+    from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
+    from gaitswarm.services.optimizer.jobs.kinds.tournament import TournamentSpec
+    from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+    from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
+    from gaitswarm.services.optimizer.jobs.labels import JobFilter
+    from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference
+    from gaitswarm.services.optimizer.run.outage import Backoff
+    from gaitswarm.services.optimizer.search.automatic import AutoSettings
+    from gaitswarm.services.optimizer.search.evolution.cma_es import CmaEsSettings
+    from gaitswarm.services.optimizer.search.evolution.differential_evolution import DeSettings
+    from gaitswarm.services.optimizer.search.evolution.genetic import GaSettings
+    from gaitswarm.services.optimizer.search.evolution.hype import HypeSettings
+    from gaitswarm.services.optimizer.search.local.annealing import AnnealingSettings
+    from gaitswarm.services.optimizer.search.local.directed_tabu import DirectedTabuSettings
+    from gaitswarm.services.optimizer.search.local.mads import MadsSettings
+    from gaitswarm.services.optimizer.search.local.nelder_mead import NelderMeadSettings
+    from gaitswarm.services.optimizer.search.local.pattern_search import PatternSearchSettings
+    from gaitswarm.services.optimizer.search.model.bayesian import BayesianSettings
+    from gaitswarm.services.optimizer.search.multistart.global_search import (
+        GlobalBfgsSettings,
+        GlobalNelderMeadSettings,
+        GlobalUnirandiSettings,
+    )
+    from gaitswarm.services.optimizer.search.random_search import RandomSearchSettings
+    from gaitswarm.services.optimizer.search.swarm.gsa import GsaSettings
+    from gaitswarm.services.optimizer.search.swarm.pso import PsoSettings
+    from gaitswarm.services.optimizer.search.swarm.pso_ps import PsoPsSettings
+    from gaitswarm.services.optimizer.search.swarm.tlbo import TlboSettings
+    from gaitswarm.sim.calibration.targets import Target, TargetWalk
+    from gaitswarm.sim.controllers import CONTROLLERS
+    from gaitswarm.sim.identification.recorded_walk import RecordedWalk
+    from gaitswarm.sim.kernel.observation import WalkLog
+    from gaitswarm.sim.outcome import MEASUREMENTS, OBJECTIVES, Status
+    from gaitswarm.sim.robot import RobotFiles, RobotVariant
+    from gaitswarm.sim.scenario import PRESETS, SCENARIOS, Scenario
+    from gaitswarm.sim.variables import Variable
     from gaitswarm.simulation import robustness, simulate
     from gaitswarm.simulation_result import ScenarioResult, SimulationResult
     from gaitswarm.specs import SpecOptions
@@ -84,44 +122,6 @@ if TYPE_CHECKING:
     )
     from gaitswarm.views.trade_offs import FrontView, PreferenceForView
     from gaitswarm.views.verification import VerificationView
-    from services.optimizer.jobs.kinds.calibration import CalibrationSpec
-    from services.optimizer.jobs.kinds.certificate import CertificateSpec
-    from services.optimizer.jobs.kinds.identification import IdentificationSpec
-    from services.optimizer.jobs.kinds.tournament import TournamentSpec
-    from services.optimizer.jobs.kinds.tuning import JobSpec
-    from services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
-    from services.optimizer.jobs.labels import JobFilter
-    from services.optimizer.jobs.preference import PREFERENCES, Preference
-    from services.optimizer.run.outage import Backoff
-    from services.optimizer.search.automatic import AutoSettings
-    from services.optimizer.search.evolution.cma_es import CmaEsSettings
-    from services.optimizer.search.evolution.differential_evolution import DeSettings
-    from services.optimizer.search.evolution.genetic import GaSettings
-    from services.optimizer.search.evolution.hype import HypeSettings
-    from services.optimizer.search.local.annealing import AnnealingSettings
-    from services.optimizer.search.local.directed_tabu import DirectedTabuSettings
-    from services.optimizer.search.local.mads import MadsSettings
-    from services.optimizer.search.local.nelder_mead import NelderMeadSettings
-    from services.optimizer.search.local.pattern_search import PatternSearchSettings
-    from services.optimizer.search.model.bayesian import BayesianSettings
-    from services.optimizer.search.multistart.global_search import (
-        GlobalBfgsSettings,
-        GlobalNelderMeadSettings,
-        GlobalUnirandiSettings,
-    )
-    from services.optimizer.search.random_search import RandomSearchSettings
-    from services.optimizer.search.swarm.gsa import GsaSettings
-    from services.optimizer.search.swarm.pso import PsoSettings
-    from services.optimizer.search.swarm.pso_ps import PsoPsSettings
-    from services.optimizer.search.swarm.tlbo import TlboSettings
-    from sim.calibration.targets import Target, TargetWalk
-    from sim.controllers import CONTROLLERS
-    from sim.identification.recorded_walk import RecordedWalk
-    from sim.kernel.observation import WalkLog
-    from sim.outcome import MEASUREMENTS, OBJECTIVES, Status
-    from sim.robot import RobotFiles, RobotVariant
-    from sim.scenario import PRESETS, SCENARIOS, Scenario
-    from sim.variables import Variable
 
     __version__: str
 
@@ -284,42 +284,42 @@ _MODULES: Final = {
     ),
     "gaitswarm.views.trade_offs": ("FrontView", "PreferenceForView"),
     "gaitswarm.views.verification": ("VerificationView",),
-    "services.optimizer.jobs.kinds.calibration": ("CalibrationSpec",),
-    "services.optimizer.jobs.kinds.certificate": ("CertificateSpec",),
-    "services.optimizer.jobs.labels": ("JobFilter",),
-    "services.optimizer.jobs.kinds.identification": ("IdentificationSpec",),
-    "services.optimizer.jobs.preference": ("PREFERENCES", "Preference"),
-    "services.optimizer.jobs.kinds.tournament": ("TournamentSpec",),
-    "services.optimizer.jobs.kinds.tuning": ("JobSpec",),
-    "services.optimizer.jobs.kinds.tuning_worlds": ("TuningWorlds",),
-    "services.optimizer.search.automatic": ("AutoSettings",),
-    "services.optimizer.search.evolution.cma_es": ("CmaEsSettings",),
-    "services.optimizer.search.evolution.differential_evolution": ("DeSettings",),
-    "services.optimizer.search.evolution.genetic": ("GaSettings",),
-    "services.optimizer.search.evolution.hype": ("HypeSettings",),
-    "services.optimizer.search.local.annealing": ("AnnealingSettings",),
-    "services.optimizer.search.local.directed_tabu": ("DirectedTabuSettings",),
-    "services.optimizer.search.local.mads": ("MadsSettings",),
-    "services.optimizer.search.local.nelder_mead": ("NelderMeadSettings",),
-    "services.optimizer.search.local.pattern_search": ("PatternSearchSettings",),
-    "services.optimizer.search.model.bayesian": ("BayesianSettings",),
-    "services.optimizer.search.multistart.global_search": (
+    "gaitswarm.services.optimizer.jobs.kinds.calibration": ("CalibrationSpec",),
+    "gaitswarm.services.optimizer.jobs.kinds.certificate": ("CertificateSpec",),
+    "gaitswarm.services.optimizer.jobs.labels": ("JobFilter",),
+    "gaitswarm.services.optimizer.jobs.kinds.identification": ("IdentificationSpec",),
+    "gaitswarm.services.optimizer.jobs.preference": ("PREFERENCES", "Preference"),
+    "gaitswarm.services.optimizer.jobs.kinds.tournament": ("TournamentSpec",),
+    "gaitswarm.services.optimizer.jobs.kinds.tuning": ("JobSpec",),
+    "gaitswarm.services.optimizer.jobs.kinds.tuning_worlds": ("TuningWorlds",),
+    "gaitswarm.services.optimizer.search.automatic": ("AutoSettings",),
+    "gaitswarm.services.optimizer.search.evolution.cma_es": ("CmaEsSettings",),
+    "gaitswarm.services.optimizer.search.evolution.differential_evolution": ("DeSettings",),
+    "gaitswarm.services.optimizer.search.evolution.genetic": ("GaSettings",),
+    "gaitswarm.services.optimizer.search.evolution.hype": ("HypeSettings",),
+    "gaitswarm.services.optimizer.search.local.annealing": ("AnnealingSettings",),
+    "gaitswarm.services.optimizer.search.local.directed_tabu": ("DirectedTabuSettings",),
+    "gaitswarm.services.optimizer.search.local.mads": ("MadsSettings",),
+    "gaitswarm.services.optimizer.search.local.nelder_mead": ("NelderMeadSettings",),
+    "gaitswarm.services.optimizer.search.local.pattern_search": ("PatternSearchSettings",),
+    "gaitswarm.services.optimizer.search.model.bayesian": ("BayesianSettings",),
+    "gaitswarm.services.optimizer.search.multistart.global_search": (
         "GlobalBfgsSettings", "GlobalNelderMeadSettings", "GlobalUnirandiSettings",
     ),
-    "services.optimizer.search.random_search": ("RandomSearchSettings",),
-    "services.optimizer.search.swarm.gsa": ("GsaSettings",),
-    "services.optimizer.search.swarm.pso": ("PsoSettings",),
-    "services.optimizer.search.swarm.pso_ps": ("PsoPsSettings",),
-    "services.optimizer.search.swarm.tlbo": ("TlboSettings",),
-    "services.optimizer.run.outage": ("Backoff",),
-    "sim.controllers": ("CONTROLLERS",),
-    "sim.calibration.targets": ("Target", "TargetWalk"),
-    "sim.identification.recorded_walk": ("RecordedWalk",),
-    "sim.kernel.observation": ("WalkLog",),
-    "sim.outcome": ("MEASUREMENTS", "OBJECTIVES", "Status"),
-    "sim.robot": ("RobotFiles", "RobotVariant"),
-    "sim.scenario": ("PRESETS", "SCENARIOS", "Scenario"),
-    "sim.variables": ("Variable",),
+    "gaitswarm.services.optimizer.search.random_search": ("RandomSearchSettings",),
+    "gaitswarm.services.optimizer.search.swarm.gsa": ("GsaSettings",),
+    "gaitswarm.services.optimizer.search.swarm.pso": ("PsoSettings",),
+    "gaitswarm.services.optimizer.search.swarm.pso_ps": ("PsoPsSettings",),
+    "gaitswarm.services.optimizer.search.swarm.tlbo": ("TlboSettings",),
+    "gaitswarm.services.optimizer.run.outage": ("Backoff",),
+    "gaitswarm.sim.controllers": ("CONTROLLERS",),
+    "gaitswarm.sim.calibration.targets": ("Target", "TargetWalk"),
+    "gaitswarm.sim.identification.recorded_walk": ("RecordedWalk",),
+    "gaitswarm.sim.kernel.observation": ("WalkLog",),
+    "gaitswarm.sim.outcome": ("MEASUREMENTS", "OBJECTIVES", "Status"),
+    "gaitswarm.sim.robot": ("RobotFiles", "RobotVariant"),
+    "gaitswarm.sim.scenario": ("PRESETS", "SCENARIOS", "Scenario"),
+    "gaitswarm.sim.variables": ("Variable",),
 }  # fmt: skip
 """Where each name is defined."""
 

@@ -27,7 +27,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from services.optimizer.errors import (
+from gaitswarm.services.optimizer.errors import (
     Conflict,
     EvaluatorUnavailable,
     Forbidden,
@@ -44,8 +44,8 @@ from services.optimizer.errors import (
     Unavailable,
     Unreadable,
 )
-from services.optimizer.masking import masked_url
-from sim.errors import SimulationError, SimulationInputError
+from gaitswarm.services.optimizer.masking import masked_url
+from gaitswarm.sim.errors import SimulationError, SimulationInputError
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
@@ -96,8 +96,8 @@ def invalid_request(
     Returns:
         An error that names every bad field; its `field` is the first.
     """
+    from gaitswarm.sim.input.wording import with_known_keys
     from gaitswarm.views import field_errors
-    from sim.input.wording import with_known_keys
 
     found = with_known_keys(error.errors(include_url=False), model)
     first, *others = field_errors(found, document)

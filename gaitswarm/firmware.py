@@ -13,12 +13,12 @@ from typing import Final
 from gaitswarm.errors import InvalidRequest
 from gaitswarm.requests import design_arguments
 from gaitswarm.requests.firmware import FirmwareRequest, firmware_view, run_firmware
+from gaitswarm.sim.controllers import ControllerName
+from gaitswarm.sim.firmware import FORMAT, MANIFEST
+from gaitswarm.sim.robot import DEFAULT_ROBOT
 from gaitswarm.simulation import ALL_SCENARIOS
 from gaitswarm.specs import RobotInput, ScenarioInput
 from gaitswarm.views.firmware import FirmwareView
-from sim.controllers import ControllerName
-from sim.firmware import FORMAT, MANIFEST
-from sim.robot import DEFAULT_ROBOT
 
 _BUILT: Final = "build"
 """Where the folder's Makefile puts what it makes."""

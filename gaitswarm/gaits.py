@@ -8,15 +8,15 @@ import numpy as np
 from pydantic import Field
 
 from gaitswarm.errors import simulation_errors
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.sim.errors import BeyondJointLimit, UnreachablePose
+from gaitswarm.sim.gait.gaits import GAITS, find_gait, suits
+from gaitswarm.sim.gait.leg_gaits import leg_gaits, supporting
+from gaitswarm.sim.gait.stability import static_stability
+from gaitswarm.sim.robot import Robot, RobotChoice, load_robot
+from gaitswarm.sim.scenario import GaitName, Scenario
 from gaitswarm.views.base import View
 from gaitswarm.views.simulation import PlannedGaitView
-from services.optimizer.errors import InvalidRequest
-from sim.errors import BeyondJointLimit, UnreachablePose
-from sim.gait.gaits import GAITS, find_gait, suits
-from sim.gait.leg_gaits import leg_gaits, supporting
-from sim.gait.stability import static_stability
-from sim.robot import Robot, RobotChoice, load_robot
-from sim.scenario import GaitName, Scenario
 
 COLUMNS: Final = 40
 """Moments of a cycle that a diagram shows."""

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Final, Literal
 
 from gaitswarm.meshes import mesh_names, mesh_places
-from services.optimizer.errors import NotFound
-from sim.errors import RobotFileError
-from sim.robot.bounds import LONGEST_URDF, check_urdf
+from gaitswarm.services.optimizer.errors import NotFound
+from gaitswarm.sim.errors import RobotFileError
+from gaitswarm.sim.robot.bounds import LONGEST_URDF, check_urdf
 
 MeshFormat = Literal["stl", "obj", "dae"]
 

@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 from gaitswarm.errors import InvalidRequest, JobEnded, NotFound, simulation_errors
 from gaitswarm.jobs.database.embedded import Workers, check_same
 from gaitswarm.jobs.open import open as open_database
+from gaitswarm.services.optimizer.jobs.job import JobState
+from gaitswarm.services.optimizer.run.evaluator import Evaluator
+from gaitswarm.services.runtime import EvaluatorKind
 from gaitswarm.specs import SpecInput, SpecOptions, chosen_spec
 from gaitswarm.tables import EvaluationTable, Table
 from gaitswarm.views import BestView, IterationView, JobView, OptimizerView, optimizer_views
-from services.optimizer.jobs.job import JobState
-from services.optimizer.run.evaluator import Evaluator
-from services.runtime import EvaluatorKind
 
 if TYPE_CHECKING:
-    from services.optimizer.jobs.documents import AnySpec
+    from gaitswarm.services.optimizer.jobs.documents import AnySpec
 
 
 @dataclass(frozen=True, slots=True)

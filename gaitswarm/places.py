@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import re
 
-from services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.errors import InvalidRequest
 
 
 def place_of(iteration: int, particle: int) -> str:

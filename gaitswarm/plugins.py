@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from services.optimizer.search.method import Method, from_generator
-from services.optimizer.search.optimizer import (
+from gaitswarm.services.optimizer.search.method import Method, from_generator
+from gaitswarm.services.optimizer.search.optimizer import (
     Optimizer,
     SearchSettings,
     checked_fitness,
@@ -11,13 +11,13 @@ from services.optimizer.search.optimizer import (
     matrix,
     parse_state,
 )
-from services.optimizer.search.random_stream import RandomNumbers
-from services.optimizer.search.replayed import Proposals
-from services.optimizer.search.space import Axis, Space
-from sim.case import Case, LongCase, Walk
-from sim.case_registry import CaseFamily, CaseSettings
-from sim.controllers.base import ControlLaw, Controller, Inference, LookupTable, Response
-from sim.controllers.fixed_point import (
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.replayed import Proposals
+from gaitswarm.services.optimizer.search.space import Axis, Space
+from gaitswarm.sim.case import Case, LongCase, Walk
+from gaitswarm.sim.case_registry import CaseFamily, CaseSettings
+from gaitswarm.sim.controllers.base import ControlLaw, Controller, Inference, LookupTable, Response
+from gaitswarm.sim.controllers.fixed_point import (
     CONTROL_PERIOD,
     FRACTION_BITS,
     INTEGRATOR_UNIT,
@@ -25,12 +25,12 @@ from sim.controllers.fixed_point import (
     required,
     to_fixed,
 )
-from sim.errors import SimulationInputError
-from sim.kernel.walk import Kernel
-from sim.outcome import OBJECTIVES, Objective, Outcome, Status
-from sim.robot import Robot, load_robot
-from sim.scenario import Scenario
-from sim.variables import Variable
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.kernel.walk import Kernel
+from gaitswarm.sim.outcome import OBJECTIVES, Objective, Outcome, Status
+from gaitswarm.sim.robot import Robot, load_robot
+from gaitswarm.sim.scenario import Scenario
+from gaitswarm.sim.variables import Variable
 
 __all__ = [
     "CONTROL_PERIOD",

@@ -9,11 +9,11 @@ import numpy as np
 from gaitswarm.jobs.port import Jobs
 from gaitswarm.requests import arguments
 from gaitswarm.requests.preferences import ranked_preferences, tuning_spec
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.outcome import Status
 from gaitswarm.tables import EvaluationTable
 from gaitswarm.views.preferences import RobustPreferencesView
-from services.optimizer.jobs.columns import EvaluationColumns
-from sim.kernel.walk import Precision
-from sim.outcome import Status
 
 
 def robust_preferences(

@@ -11,23 +11,23 @@ import numpy as np
 
 from gaitswarm.errors import simulation_errors
 from gaitswarm.meshes import find_mesh, mesh_names
+from gaitswarm.sim.controllers.joint_pd import LARGEST_GAIN
+from gaitswarm.sim.gait.trajectory import desired_angles, require_reachable
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.proposal.drive import GRAVITY
+from gaitswarm.sim.proposal.gait import walk_of_robot
+from gaitswarm.sim.proposal.legs import reach_below
+from gaitswarm.sim.robot import Robot, RobotFiles, load_robot
+from gaitswarm.sim.robot.identifiable import identifiable_variables
+from gaitswarm.sim.robot.legs import ChainLeg
+from gaitswarm.sim.robot.posture import feet_and_centre_of_mass, leg_points
+from gaitswarm.sim.robot.unphysical import unphysical
+from gaitswarm.sim.scenario import Scenario
+from gaitswarm.sim.simulate import simulate
 from gaitswarm.views.robot_check import CheckedLegView, MeshView, RobotCheckView, StandingStillView
-from sim.controllers.joint_pd import LARGEST_GAIN
-from sim.gait.trajectory import desired_angles, require_reachable
-from sim.outcome import Status
-from sim.proposal.drive import GRAVITY
-from sim.proposal.gait import walk_of_robot
-from sim.proposal.legs import reach_below
-from sim.robot import Robot, RobotFiles, load_robot
-from sim.robot.identifiable import identifiable_variables
-from sim.robot.legs import ChainLeg
-from sim.robot.posture import feet_and_centre_of_mass, leg_points
-from sim.robot.unphysical import unphysical
-from sim.scenario import Scenario
-from sim.simulate import simulate
 
 if TYPE_CHECKING:
-    from sim.simulate import Simulation
+    from gaitswarm.sim.simulate import Simulation
 
 _SECONDS: Final = 1.0
 _STIFF: Final = 20.0

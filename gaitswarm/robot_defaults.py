@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.preference import PreferenceName
-from sim.scenario import SCENARIOS
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.preference import PreferenceName
+from gaitswarm.sim.scenario import SCENARIOS
 
 JOB_FILE: Final = "job.json"
 """In a robot's folder: what a job of this robot has unless it says otherwise."""

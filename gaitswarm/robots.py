@@ -22,14 +22,14 @@ from gaitswarm.mesh_copies import MeshCopies, copy_meshes
 from gaitswarm.mesh_library import FORMS, LARGEST_MESH
 from gaitswarm.meshes import find_mesh
 from gaitswarm.robot_defaults import JOB_FILE
-from services.optimizer.errors import InvalidRequest
-from sim.errors import RobotFileError
-from sim.proposal.apart import walking_proposal
-from sim.proposal.document import Proposal
-from sim.proposal.drive import ActuatorChoice
-from sim.proposal.frame import Axis, Frame
-from sim.robot.bounds import LONGEST_URDF, check_urdf
-from sim.robot.mesh_bounds import mesh_bounds
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.sim.errors import RobotFileError
+from gaitswarm.sim.proposal.apart import walking_proposal
+from gaitswarm.sim.proposal.document import Proposal
+from gaitswarm.sim.proposal.drive import ActuatorChoice
+from gaitswarm.sim.proposal.frame import Axis, Frame
+from gaitswarm.sim.robot.bounds import LONGEST_URDF, check_urdf
+from gaitswarm.sim.robot.mesh_bounds import mesh_bounds
 
 _NAME: Final = re.compile(r"\w[^/\\]{0,99}")
 

@@ -10,11 +10,11 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationError
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
-from services.optimizer.errors import InvalidRequest, StoreUnavailable
-from services.optimizer.jobs.job import LONGEST_LEASE_SECONDS, QUARANTINE_AFTER
-from services.worker import EvaluatorKind
-from sim.compiler.cache import DEFAULT_SIZE
-from sim.input.wording import message_of
+from gaitswarm.services.optimizer.errors import InvalidRequest, StoreUnavailable
+from gaitswarm.services.optimizer.jobs.job import LONGEST_LEASE_SECONDS, QUARANTINE_AFTER
+from gaitswarm.services.worker import EvaluatorKind
+from gaitswarm.sim.compiler.cache import DEFAULT_SIZE
+from gaitswarm.sim.input.wording import message_of
 
 LogLevel = Annotated[Literal["DEBUG", "INFO", "WARNING", "ERROR"], BeforeValidator(str.upper)]
 

@@ -13,6 +13,22 @@ from gaitswarm.errors import InvalidRequest, simulation_errors
 from gaitswarm.requests import design_arguments
 from gaitswarm.requests.robustness import Progress, RobustnessOptions, run_robustness
 from gaitswarm.requests.walk import SimulationRequest
+from gaitswarm.services.optimizer.jobs.preference import judge
+from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
+from gaitswarm.services.runtime import open_evaluator
+from gaitswarm.sim.assembly import Backend
+from gaitswarm.sim.case import Case, MeasuredWalk
+from gaitswarm.sim.catalogue import design_catalogue
+from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
+from gaitswarm.sim.kernel.observation import WalkLog
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.outcome import N_OBJECTIVES, Outcome, Status
+from gaitswarm.sim.provenance import provenance_of
+from gaitswarm.sim.robot import DEFAULT_ROBOT
+from gaitswarm.sim.scenario import SCENARIOS, Scenario
+from gaitswarm.sim.simulate import Simulation
+from gaitswarm.sim.simulate import simulate as simulate_walk
+from gaitswarm.sim.worlds import MeasuredPerturbedWalk
 from gaitswarm.simulation_result import SimulationResult
 from gaitswarm.specs import (
     PreferenceInput,
@@ -20,22 +36,6 @@ from gaitswarm.specs import (
     ScenarioInput,
 )
 from gaitswarm.views.robustness import RobustnessView
-from services.optimizer.jobs.preference import judge
-from services.optimizer.run.evaluator import EvaluationRequest
-from services.runtime import open_evaluator
-from sim.assembly import Backend
-from sim.case import Case, MeasuredWalk
-from sim.catalogue import design_catalogue
-from sim.controllers import CONTROLLERS, ControllerName
-from sim.kernel.observation import WalkLog
-from sim.kernel.walk import Precision
-from sim.outcome import N_OBJECTIVES, Outcome, Status
-from sim.provenance import provenance_of
-from sim.robot import DEFAULT_ROBOT
-from sim.scenario import SCENARIOS, Scenario
-from sim.simulate import Simulation
-from sim.simulate import simulate as simulate_walk
-from sim.worlds import MeasuredPerturbedWalk
 
 Floats = NDArray[np.float64]
 

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from gaitswarm.services.optimizer.jobs.preference import Preference, figure_of_merit
+from gaitswarm.sim.catalogue import design_numbers
+from gaitswarm.sim.kernel.observation import WalkLog
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.outcome import MEASUREMENT_NAMES, OBJECTIVE_NAMES, Status
+from gaitswarm.sim.robot import RobotSource
 from gaitswarm.tables import Table
 from gaitswarm.views import SimulationView
-from services.optimizer.jobs.preference import Preference, figure_of_merit
-from sim.catalogue import design_numbers
-from sim.kernel.observation import WalkLog
-from sim.kernel.walk import Precision
-from sim.outcome import MEASUREMENT_NAMES, OBJECTIVE_NAMES, Status
-from sim.robot import RobotSource
 
 if TYPE_CHECKING:
     import pandas as pd

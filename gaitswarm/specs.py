@@ -11,21 +11,21 @@ from pydantic import ValidationError
 
 from gaitswarm.errors import InvalidRequest, invalid_request
 from gaitswarm.robot_defaults import robot_defaults
+from gaitswarm.services.optimizer.jobs.documents import SPECS, AnySpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
+from gaitswarm.services.optimizer.jobs.optimizer_choice import with_settings
+from gaitswarm.services.optimizer.jobs.preference import Preference, PreferenceName
+from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.services.optimizer.jobs.start import EarlierJobs
+from gaitswarm.services.optimizer.search.automatic import ChoiceName, ChosenSettings
+from gaitswarm.sim.case_registry import CaseSettings
+from gaitswarm.sim.controllers import ControllerName
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.robot import RobotFiles, RobotVariant
+from gaitswarm.sim.robot.shipped import SHIPPED
+from gaitswarm.sim.scenario import Scenario
+from gaitswarm.sim.variables import Variable
 from gaitswarm.start import StartFile, start_from
-from services.optimizer.jobs.documents import SPECS, AnySpec
-from services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
-from services.optimizer.jobs.optimizer_choice import with_settings
-from services.optimizer.jobs.preference import Preference, PreferenceName
-from services.optimizer.jobs.spec import Spec
-from services.optimizer.jobs.start import EarlierJobs
-from services.optimizer.search.automatic import ChoiceName, ChosenSettings
-from sim.case_registry import CaseSettings
-from sim.controllers import ControllerName
-from sim.kernel.walk import Precision
-from sim.robot import RobotFiles, RobotVariant
-from sim.robot.shipped import SHIPPED
-from sim.scenario import Scenario
-from sim.variables import Variable
 
 Document: TypeAlias = Mapping[str, Any]
 """A mapping as read from JSON."""

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any, Final, Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.spec import Spec
-from sim.outcome import Status
-from sim.variables import Variable
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.variables import Variable
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -58,7 +58,7 @@ fi
 key="$(cd .. && scripts/api_key.sh)"
 if [ "$(cat node_modules/.typed 2>/dev/null)" != "$key" ] || [ ! -f src/api/schema.d.ts ]; then
     new=node_modules/.openapi.json
-    (cd .. && "$venv/bin/python" -m api.document) > "$new"
+    (cd .. && "$venv/bin/python" -m gaitswarm.api.document) > "$new"
     if ! cmp -s "$new" openapi.json || [ ! -f src/api/schema.d.ts ]; then
         cp "$new" openapi.json
         run_npm --silent run types >/dev/null

@@ -14,13 +14,13 @@ from functools import partial
 from pathlib import Path
 from typing import Final, get_args
 
-from sim.compiler.compilation import PREBUILT, build_library
-from sim.compiler.target import ARM, ARM_TARGET, X86_TARGETS, Target
-from sim.compiler.toolchain import find_compiler
-from sim.controllers.native_inference import inference_source
-from sim.kernel.emitted.source import kernel_identity, kernel_source
-from sim.kernel.walk import Precision
-from sim.robot.shipped import SHIPPED, shipped_robot
+from gaitswarm.sim.compiler.compilation import PREBUILT, build_library
+from gaitswarm.sim.compiler.target import ARM, ARM_TARGET, X86_TARGETS, Target
+from gaitswarm.sim.compiler.toolchain import find_compiler
+from gaitswarm.sim.controllers.native_inference import inference_source
+from gaitswarm.sim.kernel.emitted.source import kernel_identity, kernel_source
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.robot.shipped import SHIPPED, shipped_robot
 
 TARGETS: Final[Mapping[str, Target]] = {
     **{aim.level: aim for aim in X86_TARGETS},

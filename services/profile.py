@@ -9,20 +9,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
-from services.optimizer.jobs.iteration import CompletedIteration
-from services.optimizer.jobs.job import JobState
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.run.embedded import run_embedded
-from services.optimizer.search.swarm.pso import PsoSettings
-from services.optimizer.store.port.base import Store
-from services.optimizer.store.sql_store import open_store
-from services.worker import EvaluatorKind
-from services.worker.in_process import InProcessEvaluator
-from services.worker.ray_evaluator import RayEvaluator
-from services.worker.tasks import TaskTotals
-from sim.assembly import kernel_of
-from sim.kernel.walk import Precision
-from sim.robot import DEFAULT_ROBOT, load_robot
+from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
+from gaitswarm.services.optimizer.jobs.job import JobState
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.run.embedded import run_embedded
+from gaitswarm.services.optimizer.search.swarm.pso import PsoSettings
+from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.store.sql_store import open_store
+from gaitswarm.services.worker import EvaluatorKind
+from gaitswarm.services.worker.in_process import InProcessEvaluator
+from gaitswarm.services.worker.ray_evaluator import RayEvaluator
+from gaitswarm.services.worker.tasks import TaskTotals
+from gaitswarm.sim.assembly import kernel_of
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.robot import DEFAULT_ROBOT, load_robot
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,25 +14,25 @@ from queue import SimpleQueue
 from types import FrameType
 from typing import TYPE_CHECKING, Any, Final
 
-from services.optimizer.analysis.reference import note_reference
-from services.optimizer.deletion import Housekeeping
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.job import QUARANTINE_AFTER
-from services.optimizer.run.embedded import run_embedded
-from services.optimizer.run.evaluator import Evaluator, Watched
-from services.optimizer.run.runner import Runner
-from services.optimizer.service import JobService
-from services.optimizer.store.port.base import Store
-from services.optimizer.store.sql_store import open_store
-from services.worker import EvaluatorKind
-from services.worker.hybrid import HybridEvaluator
-from services.worker.in_process import InProcessEvaluator
-from services.worker.ray_evaluator import RayEvaluator
+from gaitswarm.services.optimizer.analysis.reference import note_reference
+from gaitswarm.services.optimizer.deletion import Housekeeping
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.job import QUARANTINE_AFTER
+from gaitswarm.services.optimizer.run.embedded import run_embedded
+from gaitswarm.services.optimizer.run.evaluator import Evaluator, Watched
+from gaitswarm.services.optimizer.run.runner import Runner
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.store.sql_store import open_store
+from gaitswarm.services.worker import EvaluatorKind
+from gaitswarm.services.worker.hybrid import HybridEvaluator
+from gaitswarm.services.worker.in_process import InProcessEvaluator
+from gaitswarm.services.worker.ray_evaluator import RayEvaluator
 
 if TYPE_CHECKING:
-    from services.monitoring.activity import Activity
-    from services.monitoring.metrics import Metrics
-    from services.monitoring.tracing import Tracing
+    from gaitswarm.services.monitoring.activity import Activity
+    from gaitswarm.services.monitoring.metrics import Metrics
+    from gaitswarm.services.monitoring.tracing import Tracing
 
 
 _NICENESS: Final = 10
@@ -184,7 +184,7 @@ def open_runtime(
         store: Store = open_store(database)
         stack.callback(store.close)
         if metrics is not None:
-            from services.monitoring.measured_store import measured  # noqa: PLC0415
+            from gaitswarm.services.monitoring.measured_store import measured  # noqa: PLC0415
 
             store = measured(store, metrics)
         runners_store = store
@@ -192,7 +192,7 @@ def open_runtime(
             stack.callback(tracing.close)
             runners_store = tracing.traced_store(store)
         if webhook_hosts:
-            from services.monitoring.webhooks import Notifier  # noqa: PLC0415
+            from gaitswarm.services.monitoring.webhooks import Notifier  # noqa: PLC0415
 
             notifier = Notifier(store, webhook_hosts, webhook_secret)
             stack.callback(notifier.stop)
@@ -215,7 +215,7 @@ def open_runtime(
         )
         stack.callback(workers.close)
         if metrics is not None:
-            from services.monitoring.collectors import WorkersCollector  # noqa: PLC0415
+            from gaitswarm.services.monitoring.collectors import WorkersCollector  # noqa: PLC0415
 
             metrics.registry.register(WorkersCollector(lambda: workers.loads))
         seen: Evaluator = workers

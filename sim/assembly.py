@@ -11,26 +11,33 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.compiler.toolchain import find_compiler, without_compiler
-from sim.controllers import ControlLaw
-from sim.controllers.fixed_point import CONTROL_PERIOD
-from sim.errors import SimulationInputError
-from sim.gait.feed_forward import carrying_torques
-from sim.gait.trajectory import Trajectory, desired_angles
-from sim.kernel.compiled.native import native_kernel
-from sim.kernel.parameters import (
+from gaitswarm.sim.compiler.toolchain import find_compiler, without_compiler
+from gaitswarm.sim.controllers import ControlLaw
+from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.gait.feed_forward import carrying_torques
+from gaitswarm.sim.gait.trajectory import Trajectory, desired_angles
+from gaitswarm.sim.kernel.compiled.native import native_kernel
+from gaitswarm.sim.kernel.parameters import (
     GRAVITY,
     SHOVE_DURATION,
     gravity_on,
     internal_state_size,
     pack_parameters,
 )
-from sim.kernel.walk import Coding, Kernel, Precision, WalkResult, WalkSetup, current_smoothing
-from sim.noise import LinkNoise
-from sim.outcome import N_MEASUREMENTS, N_OBJECTIVES, Status
-from sim.robot import Robot
-from sim.robot.posture import resting_height
-from sim.scenario import Scenario
+from gaitswarm.sim.kernel.walk import (
+    Coding,
+    Kernel,
+    Precision,
+    WalkResult,
+    WalkSetup,
+    current_smoothing,
+)
+from gaitswarm.sim.noise import LinkNoise
+from gaitswarm.sim.outcome import N_MEASUREMENTS, N_OBJECTIVES, Status
+from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.posture import resting_height
+from gaitswarm.sim.scenario import Scenario
 
 Backend = Literal["auto", "native", "reference"]
 """`native` is the compiled kernel, `reference` the CasADi interpreter, `auto` the first that works
@@ -90,7 +97,7 @@ def kernel_of(
             stacklevel=3,
         )
     # The native kernel does without CasADi and Pinocchio, which are slow to import.
-    from sim.kernel.readable.reference import reference_kernel  # noqa: PLC0415
+    from gaitswarm.sim.kernel.readable.reference import reference_kernel  # noqa: PLC0415
 
     return reference_kernel(robot)
 
@@ -267,7 +274,7 @@ def measure(setup: WalkSetup, result: WalkResult, substeps: int) -> NDArray[np.f
         substeps: Physics steps a control tick.
 
     Returns:
-        (5,) in the order of `sim.outcome.MEASUREMENTS`, NaN for a walk that ended early.
+        (5,) in the order of `gaitswarm.sim.outcome.MEASUREMENTS`, NaN for a walk that ended early.
     """
     if result.status is not Status.OK:
         return np.full(N_MEASUREMENTS, np.nan)

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.assembly import PHYSICS_RATE, Backend, kernel_of
-from sim.controllers import CONTROLLERS
-from sim.kernel.batch import KernelTime, walk_together
-from sim.kernel.compiled.native import NativeKernel
-from sim.kernel.walk import Precision
-from sim.robot import DEFAULT_ROBOT, load_robot
-from sim.scenario import SCENARIOS, Scenario
-from sim.simulate import simulating
+from gaitswarm.sim.assembly import PHYSICS_RATE, Backend, kernel_of
+from gaitswarm.sim.controllers import CONTROLLERS
+from gaitswarm.sim.kernel.batch import KernelTime, walk_together
+from gaitswarm.sim.kernel.compiled.native import NativeKernel
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.robot import DEFAULT_ROBOT, load_robot
+from gaitswarm.sim.scenario import SCENARIOS, Scenario
+from gaitswarm.sim.simulate import simulating
 
 
 @dataclass(frozen=True, slots=True)

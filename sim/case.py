@@ -9,12 +9,12 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.kernel.batch import KernelTime, Walking, walk_together
-from sim.kernel.walk import Kernel, Precision
-from sim.outcome import MEASUREMENTS, OBJECTIVES, Objective, Outcome
-from sim.robot import RobotSource
-from sim.scenario import Scenario
-from sim.simulate import Simulation, simulating
+from gaitswarm.sim.kernel.batch import KernelTime, Walking, walk_together
+from gaitswarm.sim.kernel.walk import Kernel, Precision
+from gaitswarm.sim.outcome import MEASUREMENTS, OBJECTIVES, Objective, Outcome
+from gaitswarm.sim.robot import RobotSource
+from gaitswarm.sim.scenario import Scenario
+from gaitswarm.sim.simulate import Simulation, simulating
 
 
 @runtime_checkable

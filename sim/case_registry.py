@@ -8,10 +8,10 @@ from typing import Any, Final
 
 from pydantic import BaseModel, ConfigDict
 
-from sim.case import Case, Walk
-from sim.errors import SimulationInputError
-from sim.outcome import OBJECTIVES
-from sim.plugins import MISSING, Plugin, Registry, check_is, check_name, version_of
+from gaitswarm.sim.case import Case, Walk
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.outcome import OBJECTIVES
+from gaitswarm.sim.plugins import MISSING, Plugin, Registry, check_is, check_name, version_of
 
 
 class CaseSettings(BaseModel):

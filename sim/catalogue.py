@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from sim.controllers import CONTROLLERS
-from sim.errors import SimulationInputError
-from sim.gait_variables import GAIT_VARIABLES
-from sim.input.near_names import instead_of
-from sim.variables import VariableCatalogue
+from gaitswarm.sim.controllers import CONTROLLERS
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.gait_variables import GAIT_VARIABLES
+from gaitswarm.sim.input.near_names import instead_of
+from gaitswarm.sim.variables import VariableCatalogue
 
 
 def design_catalogue(controller: str) -> VariableCatalogue:

@@ -9,7 +9,7 @@ SimulationError
 ├── ProcessEnded            work in a process of its own took too much, or ended it
 └── KernelBuildError        a kernel cannot be compiled, stored or loaded on this machine
 
-What a walk may legitimately end in (divergence, a fall) is a `sim.outcome.Status`, never one of
+What a walk may legitimately end in (divergence, a fall) is a `gaitswarm.sim.outcome.Status`, never one of
 these.
 """
 

@@ -7,10 +7,10 @@ from typing import Any, Final
 
 from pydantic import ValidationError
 
-from sim.errors import SimulationInputError
-from sim.input.wording import message_of
-from sim.scenario import GAIT_NAMES, Scenario
-from sim.variables import Variable, VariableCatalogue, split_name
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.input.wording import message_of
+from gaitswarm.sim.scenario import GAIT_NAMES, Scenario
+from gaitswarm.sim.variables import Variable, VariableCatalogue, split_name
 
 GAIT_VARIABLES: Final[tuple[Variable, ...]] = (
     Variable(name="cycle_time", low=0.9, high=1.7, unit="s", description="Walking cycle."),

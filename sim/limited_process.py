@@ -19,11 +19,11 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
-from sim.errors import ProcessEnded, SimulationError, SimulationInputError
+from gaitswarm.sim.errors import ProcessEnded, SimulationError, SimulationInputError
 
 Document = Mapping[str, Any]
 
-_ROOT: Final = Path(__file__).parents[1]
+_ROOT: Final = Path(__file__).parents[2]
 
 _LONGEST_ANSWER: Final = 64 << 20
 """Characters of an answer; C text of a kernel takes a tenth of a million."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from sim.robot.description import JOINTS_PER_LEG
+from gaitswarm.sim.robot.description import JOINTS_PER_LEG
 
 LARGEST_ANGLE: Final = 0.5
 """Of the noise's standard deviations [rad]."""
@@ -18,7 +18,7 @@ class LinkNoise(BaseModel):
     """White noise between gearhead and link of all links of one kind, new at every control tick.
 
     An angle displaces the link against its gearhead, so the robot needs elastic shafts between the
-    two (`sim.robot.robot.with_shafts`); `sim.simulate.simulate` gives them to a robot without.
+    two (`gaitswarm.sim.robot.robot.with_shafts`); `gaitswarm.sim.simulate.simulate` gives them to a robot without.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)

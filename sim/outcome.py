@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.errors import SimulationInputError
+from gaitswarm.sim.errors import SimulationInputError
 
 
 class Status(IntEnum):
@@ -158,7 +158,7 @@ class Measurements:
         mean_current: mean over time and motors of the absolute current, (n,) [A].
         motor_heat: mean of what all windings turn to heat, R I^2, (n,) [W].
         power: mean electrical power of all motors, as far as it counts as spent
-            (`sim.robot.description.Supply.energy`), (n,) [W].
+            (`gaitswarm.sim.robot.description.Supply.energy`), (n,) [W].
         speed: mean, in the direction of the walk, (n,) [m/s].
     """
 

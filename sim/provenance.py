@@ -14,11 +14,11 @@ from typing import Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from sim.assembly import has_native_kernel
-from sim.kernel.walk import Precision
-from sim.outcome import OBJECTIVES_VERSION
-from sim.plugins import MISSING, source_digest, version_of
-from sim.robot import RobotSource, load_robot
+from gaitswarm.sim.assembly import has_native_kernel
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.outcome import OBJECTIVES_VERSION
+from gaitswarm.sim.plugins import MISSING, source_digest, version_of
+from gaitswarm.sim.robot import RobotSource, load_robot
 
 _ROOT: Final = Path(__file__).parent
 

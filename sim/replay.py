@@ -9,10 +9,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers.fixed_point import CONTROL_PERIOD
-from sim.kernel.observation import WalkLog
-from sim.robot import Robot
-from sim.robot.shapes import VisibleLink, visible_links
+from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
+from gaitswarm.sim.kernel.observation import WalkLog
+from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.shapes import VisibleLink, visible_links
 
 Floats = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.assembly import (
+from gaitswarm.sim.assembly import (
     PHYSICS_RATE,
     Backend,
     check_stuck_leg,
@@ -20,23 +20,23 @@ from sim.assembly import (
     measure,
     plan_walk,
 )
-from sim.compiler.target import target
-from sim.controllers import CONTROLLERS, ControlLaw, control_law, names_of
-from sim.controllers.fixed_point import CONTROL_PERIOD
-from sim.errors import SimulationInputError
-from sim.gait.leg_gaits import LegGait, leg_gaits
-from sim.gait.trajectory import desired_angles, require_reachable
-from sim.gait_variables import GAIT_CATALOGUE, with_gait
-from sim.input.near_names import instead_of
-from sim.kernel.batch import Walking, WantedWalk, walk_together
-from sim.kernel.gains import NO_JOINT_PD
-from sim.kernel.observation import WalkLog, walk_log
-from sim.kernel.walk import Kernel, Precision, WalkSetup
-from sim.noise import LinkNoise
-from sim.outcome import N_MEASUREMENTS, N_OBJECTIVES, Measurements, Outcome, Status
-from sim.robot import DEFAULT_ROBOT, Robot, RobotChoice, load_robot
-from sim.robot.robot import with_shafts
-from sim.scenario import Scenario
+from gaitswarm.sim.compiler.target import target
+from gaitswarm.sim.controllers import CONTROLLERS, ControlLaw, control_law, names_of
+from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.gait.leg_gaits import LegGait, leg_gaits
+from gaitswarm.sim.gait.trajectory import desired_angles, require_reachable
+from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
+from gaitswarm.sim.input.near_names import instead_of
+from gaitswarm.sim.kernel.batch import Walking, WantedWalk, walk_together
+from gaitswarm.sim.kernel.gains import NO_JOINT_PD
+from gaitswarm.sim.kernel.observation import WalkLog, walk_log
+from gaitswarm.sim.kernel.walk import Kernel, Precision, WalkSetup
+from gaitswarm.sim.noise import LinkNoise
+from gaitswarm.sim.outcome import N_MEASUREMENTS, N_OBJECTIVES, Measurements, Outcome, Status
+from gaitswarm.sim.robot import DEFAULT_ROBOT, Robot, RobotChoice, load_robot
+from gaitswarm.sim.robot.robot import with_shafts
+from gaitswarm.sim.scenario import Scenario
 
 _PLANS_KEPT: Final = 16
 """Scenarios whose walks are planned once; most take a quarter of a megabyte."""

@@ -26,12 +26,11 @@ def watch(event, arguments):
 
 sys.addaudithook(watch)
 names = []
-for package in ("sim", "services", "gaitswarm", "api", "cli"):
-    root = importlib.import_module(package)
-    names += [package, *(m.name for m in pkgutil.walk_packages(root.__path__, f"{package}."))]
+root = importlib.import_module("gaitswarm")
+names += ["gaitswarm", *(m.name for m in pkgutil.walk_packages(root.__path__, "gaitswarm."))]
 for name in names:
     # Alembic runs these two itself, with its own context around them.
-    if ".migrations" not in name:
+    if ".migrations" not in name and name != "gaitswarm.__main__":
         importlib.import_module(name)
 threads = [t.name for t in threading.enumerate() if t is not threading.main_thread()]
 print(json.dumps({"written": written, "reached": reached, "threads": threads, "n": len(names)}))

@@ -6,8 +6,8 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
-from api.dependencies import JobActivities, JobId, Service
-from api.documentation import problems
+from gaitswarm.api.dependencies import JobActivities, JobId, Service
+from gaitswarm.api.documentation import problems
 from gaitswarm.views import PREFIX
 from gaitswarm.views.activity import ActivityView, Level
 

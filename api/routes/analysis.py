@@ -7,8 +7,8 @@ from typing import Annotated, Final
 
 from fastapi import APIRouter, Depends, Query, Response
 
-from api.bodies import validated
-from api.dependencies import (
+from gaitswarm.api.bodies import validated
+from gaitswarm.api.dependencies import (
     LARGEST_INDEX,
     AfterIteration,
     Analysing,
@@ -19,7 +19,7 @@ from api.dependencies import (
     Slots,
     check_sampled_length,
 )
-from api.documentation import binary, problems
+from gaitswarm.api.documentation import binary, problems
 from gaitswarm.requests.families import TOLERANCE, run_scenario_families
 from gaitswarm.requests.importance import run_importance
 from gaitswarm.requests.preferences import PreferencesRequest, run_preferences
@@ -29,6 +29,8 @@ from gaitswarm.requests.trade_offs import (
     run_front,
     run_preference_for,
 )
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.views import (
     PREFIX,
     DistributionView,
@@ -42,8 +44,6 @@ from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.importance import ImportanceView
 from gaitswarm.views.preferences import RobustPreferencesView
 from gaitswarm.views.trade_offs import FrontView, PreferenceForView
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.job import Job
 
 PreferencesBody = Annotated[PreferencesRequest, Depends(validated(PreferencesRequest, "request"))]
 

@@ -6,9 +6,9 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query
 
-from api.access import may_administer
-from api.dependencies import JobIdText, Service
-from api.documentation import problems
+from gaitswarm.api.access import may_administer
+from gaitswarm.api.dependencies import JobIdText, Service
+from gaitswarm.api.documentation import problems
 from gaitswarm.views import PREFIX, PageView
 from gaitswarm.views.audit import AuditEntryView
 

@@ -6,12 +6,12 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
-from api.dependencies import Analysing, ExistingJob, JobIdText, Service
-from api.documentation import problems
+from gaitswarm.api.dependencies import Analysing, ExistingJob, JobIdText, Service
+from gaitswarm.api.documentation import problems
 from gaitswarm.requests.targets import run_targets
+from gaitswarm.services.optimizer.analysis.fits.targets import LeaveOut
 from gaitswarm.views import PREFIX
 from gaitswarm.views.calibration import TargetsView
-from services.optimizer.analysis.fits.targets import LeaveOut
 
 router = APIRouter(prefix=PREFIX)
 

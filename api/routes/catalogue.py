@@ -7,10 +7,12 @@ from typing import Annotated
 
 from fastapi import APIRouter, Path, Response
 
-from api.dependencies import Slots
-from api.documentation import problems
-from api.routes.simulations import NOT_STORED
+from gaitswarm.api.dependencies import Slots
+from gaitswarm.api.documentation import problems
+from gaitswarm.api.routes.simulations import NOT_STORED
 from gaitswarm.requests.surface import SurfaceRequest, run_surface
+from gaitswarm.services.optimizer.errors import NotFound
+from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
 from gaitswarm.views import (
     PREFIX,
     CaseView,
@@ -30,8 +32,6 @@ from gaitswarm.views import (
     scenario_views,
 )
 from gaitswarm.views.surface import SurfaceView
-from services.optimizer.errors import NotFound
-from sim.controllers import CONTROLLERS, ControllerName
 
 router = APIRouter(prefix=PREFIX, tags=["catalogue"])
 

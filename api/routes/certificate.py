@@ -6,12 +6,12 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
-from api.dependencies import Analysing, ExistingJob, Service
-from api.documentation import problems
+from gaitswarm.api.dependencies import Analysing, ExistingJob, Service
+from gaitswarm.api.documentation import problems
 from gaitswarm.requests.certificate import run_certificate
+from gaitswarm.services.optimizer.analysis.robustness.certificate import MOST_WORST
 from gaitswarm.views import PREFIX
 from gaitswarm.views.certificate import CertificateView
-from services.optimizer.analysis.robustness.certificate import MOST_WORST
 
 router = APIRouter(prefix=PREFIX)
 

@@ -6,12 +6,12 @@ from typing import Annotated
 
 from fastapi import APIRouter, Body, Depends, status
 
-from api.access import Actor, Asking, OwnersQuota, check_may_prioritize, may_command
-from api.dependencies import JobId, Service
-from api.documentation import problems
-from api.reads import job_in_full
+from gaitswarm.api.access import Actor, Asking, OwnersQuota, check_may_prioritize, may_command
+from gaitswarm.api.dependencies import JobId, Service
+from gaitswarm.api.documentation import problems
+from gaitswarm.api.reads import job_in_full
+from gaitswarm.services.optimizer.jobs.job import Command
 from gaitswarm.views import PREFIX, ExtensionRequest, JobView, PriorityRequest, ResumeRequest
-from services.optimizer.jobs.job import Command
 
 router = APIRouter(prefix=PREFIX, tags=["jobs"])
 

@@ -6,8 +6,8 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 
-from api.dependencies import Analysing, JobId, JobIdText, Service
-from api.documentation import problems
+from gaitswarm.api.dependencies import Analysing, JobId, JobIdText, Service
+from gaitswarm.api.documentation import problems
 from gaitswarm.requests.comparison import MOST_JOBS, run_comparison, run_convergences
 from gaitswarm.views import PREFIX
 from gaitswarm.views.comparison import ConvergencesView, JobComparisonView

@@ -12,8 +12,8 @@ from fastapi import APIRouter, Depends, Header, Query
 from fastapi.responses import StreamingResponse
 from fastapi.sse import format_sse_event
 
-from api.access import UntilRevoked
-from api.dependencies import (
+from gaitswarm.api.access import UntilRevoked
+from gaitswarm.api.dependencies import (
     LARGEST_INDEX,
     AfterIteration,
     ExistingJob,
@@ -24,13 +24,13 @@ from api.dependencies import (
     Stopping,
     counted_stream,
 )
-from api.documentation import problems
-from api.event_stream import EVENT_SCHEMA, EventStream
-from api.topics import PAGE, Topic
+from gaitswarm.api.documentation import problems
+from gaitswarm.api.event_stream import EVENT_SCHEMA, EventStream
+from gaitswarm.api.topics import PAGE, Topic
+from gaitswarm.services.monitoring.metrics import OpenStream
+from gaitswarm.services.optimizer.errors import NotFound, StoreUnavailable
+from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.views import PREFIX
-from services.monitoring.metrics import OpenStream
-from services.optimizer.errors import NotFound, StoreUnavailable
-from services.optimizer.jobs.job import JobState
 
 router = APIRouter(prefix=f"{PREFIX}/jobs/{{job_id}}", tags=["history"])
 

@@ -8,22 +8,22 @@ from typing import Annotated, Final
 
 from fastapi import APIRouter, Depends, Header, Query, Response, status
 
-from api.bodies import validated
-from api.dependencies import ExistingJob, ServerSettings, Service, Slots, check_length
-from api.documentation import Responses, binary, problems
+from gaitswarm.api.bodies import validated
+from gaitswarm.api.dependencies import ExistingJob, ServerSettings, Service, Slots, check_length
+from gaitswarm.api.documentation import Responses, binary, problems
 from gaitswarm.requests.firmware import (
     FirmwareRequest,
     firmware_request_of_best,
     firmware_view,
     run_firmware,
 )
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.settings import Settings
+from gaitswarm.sim.firmware import parsed_table_bits
 from gaitswarm.views import PREFIX, BestView
 from gaitswarm.views.firmware import FirmwareView
 from gaitswarm.zip_archive import MEDIA_TYPE, zipped
-from services.optimizer.jobs.job import Job
-from services.optimizer.service import JobService
-from sim.firmware import parsed_table_bits
 
 router = APIRouter(prefix=PREFIX)
 

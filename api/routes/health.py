@@ -10,12 +10,12 @@ from fastapi import APIRouter, FastAPI, Request, Response
 from pydantic import Field
 from starlette.responses import RedirectResponse
 
-from api.dependencies import Service
-from api.documentation import problems
-from api.problems import unavailable
+from gaitswarm.api.dependencies import Service
+from gaitswarm.api.documentation import problems
+from gaitswarm.api.problems import unavailable
+from gaitswarm.services.optimizer.errors import StoreUnavailable
+from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.views import PREFIX, FieldErrorView, View
-from services.optimizer.errors import StoreUnavailable
-from services.optimizer.service import JobService
 
 _log = logging.getLogger("gaitswarm.api")
 

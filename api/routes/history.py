@@ -8,7 +8,7 @@ from typing import Annotated
 from fastapi import APIRouter, Path, Query, Request, Response
 from fastapi.responses import StreamingResponse
 
-from api.dependencies import (
+from gaitswarm.api.dependencies import (
     LARGEST_INDEX,
     AfterIteration,
     Analysing,
@@ -19,10 +19,11 @@ from api.dependencies import (
     Service,
     Slots,
 )
-from api.documentation import binary, problems
-from api.reads import Best, Evaluations, Iterations
+from gaitswarm.api.documentation import binary, problems
+from gaitswarm.api.reads import Best, Evaluations, Iterations
 from gaitswarm.evidence.contents import evidence
 from gaitswarm.evidence.history import run_verification
+from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.settings import Settings
 from gaitswarm.tables import MEDIA_TYPES, TableFormat, encoded_table
 from gaitswarm.views import (
@@ -35,7 +36,6 @@ from gaitswarm.views import (
 )
 from gaitswarm.views.verification import HistoryVerificationView, VerificationRequest
 from gaitswarm.zip_archive import MEDIA_TYPE as ZIP
-from services.optimizer.errors import InvalidRequest
 
 router = APIRouter(prefix=f"{PREFIX}/jobs/{{job_id}}", tags=["history"])
 

@@ -8,9 +8,9 @@ from typing import Annotated, Final
 from anyio.to_thread import run_sync
 from fastapi import APIRouter, Depends, Path, Query, Response, status
 
-from api.access import Actor, may_submit
-from api.bodies import validated
-from api.dependencies import (
+from gaitswarm.api.access import Actor, may_submit
+from gaitswarm.api.bodies import validated
+from gaitswarm.api.dependencies import (
     Analysing,
     ExistingJob,
     JobIdText,
@@ -19,8 +19,10 @@ from api.dependencies import (
     Slots,
     check_length,
 )
-from api.documentation import problems
+from gaitswarm.api.documentation import problems
 from gaitswarm.requests.measured_walk import MeasuredWalkRequest, read_measured_walk
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.sim.identification.recorded_walk import RecordedWalk
 from gaitswarm.views import PREFIX, PageView
 from gaitswarm.views.identification import (
     IdentifiabilityView,
@@ -28,8 +30,6 @@ from gaitswarm.views.identification import (
     RecordingEntryView,
     RecordingView,
 )
-from services.optimizer.service import JobService
-from sim.identification.recorded_walk import RecordedWalk
 
 RecordingBody = Annotated[RecordedWalk, Depends(validated(RecordedWalk, "walk"))]
 

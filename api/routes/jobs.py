@@ -7,9 +7,9 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Header, Query, Request, Response, status
 
-from api.access import NewPriority, Owner, OwnersQuota
-from api.bodies import validated
-from api.dependencies import (
+from gaitswarm.api.access import NewPriority, Owner, OwnersQuota
+from gaitswarm.api.bodies import validated
+from gaitswarm.api.dependencies import (
     Analysing,
     JobId,
     JobIdText,
@@ -18,8 +18,13 @@ from api.dependencies import (
     Service,
     Slots,
 )
-from api.documentation import problems
-from api.reads import InFull, JobList, job_in_full
+from gaitswarm.api.documentation import problems
+from gaitswarm.api.reads import InFull, JobList, job_in_full
+from gaitswarm.services.optimizer.jobs.documents import AnySpec
+from gaitswarm.services.optimizer.jobs.fork import ForkRequest
+from gaitswarm.services.optimizer.jobs.job import JobOrder, JobState
+from gaitswarm.services.optimizer.jobs.labels import JobFilter
+from gaitswarm.services.optimizer.jobs.notification import check_url
 from gaitswarm.views import (
     PREFIX,
     EstimateView,
@@ -28,11 +33,6 @@ from gaitswarm.views import (
     PageView,
 )
 from gaitswarm.views.job import JobKind
-from services.optimizer.jobs.documents import AnySpec
-from services.optimizer.jobs.fork import ForkRequest
-from services.optimizer.jobs.job import JobOrder, JobState
-from services.optimizer.jobs.labels import JobFilter
-from services.optimizer.jobs.notification import check_url
 
 router = APIRouter(prefix=PREFIX, tags=["jobs"])
 

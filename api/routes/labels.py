@@ -6,13 +6,13 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query
 
-from api.access import Actor, may_command
-from api.dependencies import JobId, Service
-from api.documentation import problems
-from api.reads import job_in_full
+from gaitswarm.api.access import Actor, may_command
+from gaitswarm.api.dependencies import JobId, Service
+from gaitswarm.api.documentation import problems
+from gaitswarm.api.reads import job_in_full
+from gaitswarm.services.optimizer.jobs.labels import LabelsChange
 from gaitswarm.views import PREFIX, JobView
 from gaitswarm.views.labels import JobFacetsView
-from services.optimizer.jobs.labels import LabelsChange
 
 router = APIRouter(prefix=PREFIX, tags=["jobs"])
 

@@ -7,9 +7,9 @@ from typing import Annotated
 
 from fastapi import APIRouter, Header, Path, Response, status
 
-from api.dependencies import ServerSettings
-from api.documentation import binary, problems
-from api.routes.simulations import BinaryResponse
+from gaitswarm.api.dependencies import ServerSettings
+from gaitswarm.api.documentation import binary, problems
+from gaitswarm.api.routes.simulations import BinaryResponse
 from gaitswarm.mesh_library import MeshLibrary
 from gaitswarm.views import PREFIX, CatalogueView
 from gaitswarm.views.meshes import MeshFileView

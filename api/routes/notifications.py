@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from fastapi import APIRouter
 
-from api.dependencies import JobId, Service
-from api.documentation import problems
+from gaitswarm.api.dependencies import JobId, Service
+from gaitswarm.api.documentation import problems
 from gaitswarm.views import PREFIX
 from gaitswarm.views.notification import NotificationView
 

@@ -6,8 +6,8 @@ from functools import partial
 
 from fastapi import APIRouter
 
-from api.dependencies import JobId, Service, Slots
-from api.documentation import problems
+from gaitswarm.api.dependencies import JobId, Service, Slots
+from gaitswarm.api.documentation import problems
 from gaitswarm.views import PREFIX
 from gaitswarm.views.reference import JobReferenceView
 

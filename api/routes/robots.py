@@ -7,15 +7,15 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends
 
-from api.bodies import validated
-from api.dependencies import Slots
-from api.documentation import problems
+from gaitswarm.api.bodies import validated
+from gaitswarm.api.dependencies import Slots
+from gaitswarm.api.documentation import problems
 from gaitswarm.requests.robot_draft import RobotDraftRequest, run_robot_draft
 from gaitswarm.robot_checks import check_robot
+from gaitswarm.sim.robot import RobotFiles
 from gaitswarm.views import PREFIX
 from gaitswarm.views.robot_check import RobotCheckView
 from gaitswarm.views.robot_draft import RobotDraftView
-from sim.robot import RobotFiles
 
 router = APIRouter(prefix=f"{PREFIX}/robots", tags=["robots"])
 

@@ -7,13 +7,13 @@ from typing import Annotated
 from fastapi import APIRouter, Request, Response, status
 from pydantic import BaseModel, ConfigDict, Field
 
-from api.access import COOKIE, secret_of
-from api.dependencies import ServerSettings, Service
-from api.documentation import problems
-from api.manual import HasManual
+from gaitswarm.api.access import COOKIE, secret_of
+from gaitswarm.api.dependencies import ServerSettings, Service
+from gaitswarm.api.documentation import problems
+from gaitswarm.api.manual import HasManual
+from gaitswarm.services.optimizer.access import Scope, Token
+from gaitswarm.services.optimizer.errors import Unauthorized
 from gaitswarm.views import PREFIX, View
-from services.optimizer.access import Scope, Token
-from services.optimizer.errors import Unauthorized
 
 router = APIRouter(prefix=PREFIX, tags=["session"])
 

@@ -7,9 +7,9 @@ from typing import Annotated, Final
 
 from fastapi import APIRouter, Depends, Response
 
-from api.bodies import validated
-from api.dependencies import ServerSettings, Slots, check_length, check_sampled_length
-from api.documentation import binary, problems
+from gaitswarm.api.bodies import validated
+from gaitswarm.api.dependencies import ServerSettings, Slots, check_length, check_sampled_length
+from gaitswarm.api.documentation import binary, problems
 from gaitswarm.requests.design import resolved
 from gaitswarm.requests.replay import ReplayRequest, run_replay
 from gaitswarm.requests.robustness import RobustnessRequest, run_robustness

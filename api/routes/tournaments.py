@@ -6,8 +6,8 @@ from typing import Annotated
 
 from fastapi import APIRouter, Path, Query
 
-from api.dependencies import Analysing, JobId, JobIdText, Service
-from api.documentation import problems
+from gaitswarm.api.dependencies import Analysing, JobId, JobIdText, Service
+from gaitswarm.api.documentation import problems
 from gaitswarm.requests.tournament import run_problem, run_standings, run_tournaments
 from gaitswarm.views import PREFIX
 from gaitswarm.views.tournament import (

@@ -18,10 +18,10 @@ import httpx2
 from benchmarks.faults.deployment import Deployment
 from benchmarks.faults.kinds import KINDS
 from benchmarks.faults.plan import Planned
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.store.sql_store import SqlStore, open_store
-from services.runtime import run_embedded
-from services.worker.in_process import InProcessEvaluator
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.runtime import run_embedded
+from gaitswarm.services.worker.in_process import InProcessEvaluator
 from tests.examples.jobs import Bits, history
 from tests.examples.walks import SHORT_WALK
 

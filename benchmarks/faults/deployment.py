@@ -16,12 +16,12 @@ from typing import Final, Literal, Self
 
 from benchmarks.faults.machine import Clock, Disk, Network, can, process_group
 from benchmarks.faults.supervisor import Service
-from services.optimizer.errors import StoreUnavailable
-from services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.errors import StoreUnavailable
+from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
 from tests.store.postgres_server import postgres_binaries
 
 ROOT: Final = Path(__file__).parents[2]
-_COMMAND: Final = (sys.executable, "-u", "-c", "from cli.main import main; main()")
+_COMMAND: Final = (sys.executable, "-u", "-c", "from gaitswarm.cli.main import main; main()")
 _MEBIBYTES: Final = {"sqlite": 48, "postgresql": 400}
 _RUNNERS: Final = 2
 
@@ -161,7 +161,7 @@ class Deployment:
         port = free_port()
         files = Path(tempfile.mkdtemp(prefix="fr-", dir="/tmp"))
         self._stack.callback(shutil.rmtree, files, ignore_errors=True)
-        command = [sys.executable, "-m", "services.worker.ray_node", "--head"]
+        command = [sys.executable, "-m", "gaitswarm.services.worker.ray_node", "--head"]
         command += ["--port", str(port), "--num-cpus", "2", "--num-gpus", "0"]
         command += ["--include-dashboard", "false", "--include-log-monitor", "false"]
         command += ["--object-store-memory", str(80 << 20), "--temp-dir", str(files)]

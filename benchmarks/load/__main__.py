@@ -27,10 +27,10 @@ from sqlalchemy import create_engine
 
 from benchmarks.load.filled import fill_with
 from benchmarks.load.trial import Found, Load, run
-from services.optimizer.store.connections.engine import parse_url
-from services.optimizer.store.schema.backup import backup, restore
-from services.runtime import open_store
-from services.worker import EvaluatorKind
+from gaitswarm.services.optimizer.store.connections.engine import parse_url
+from gaitswarm.services.optimizer.store.schema.backup import backup, restore
+from gaitswarm.services.runtime import open_store
+from gaitswarm.services.worker import EvaluatorKind
 from tests.store.postgres_server import postgres_server, server_binaries
 
 

@@ -30,9 +30,9 @@ from benchmarks.large_store import run as run_job
 from benchmarks.load.client import Connection, Streams, Target
 from benchmarks.load.filled import fill_with
 from benchmarks.load.trial import computed, requests_to, waiting_jobs
-from services.optimizer.jobs.labels import LabelsChange
-from services.optimizer.store.port.base import Store
-from services.runtime import open_store
+from gaitswarm.services.optimizer.jobs.labels import LabelsChange
+from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.runtime import open_store
 from tests.examples.paths import ROOT
 from tests.examples.processes import COMMAND_LINE, line_with, start_python
 

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from typing import Final
 
 from benchmarks.large_store import PARTICLES, fill
-from services.optimizer.jobs.fork import ForkRequest
-from services.optimizer.jobs.job import Command, JobState
-from services.optimizer.service import JobService
-from services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.jobs.fork import ForkRequest
+from gaitswarm.services.optimizer.jobs.job import Command, JobState
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.port.base import Store
 
 LONG: Final = 100_000
 """Evaluations of the longest job."""

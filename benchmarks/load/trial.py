@@ -18,7 +18,7 @@ import httpx2
 import numpy as np
 
 from benchmarks.load.client import Answer, Streams, Target, ask_at_rate
-from services.worker import EvaluatorKind
+from gaitswarm.services.worker import EvaluatorKind
 from tests.examples.processes import COMMAND_LINE, line_with, start_python
 from tests.examples.servers import ServerProcess
 

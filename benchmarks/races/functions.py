@@ -13,8 +13,8 @@ import numpy as np
 
 from benchmarks.races.records import FOLDER, BadRecord
 from benchmarks.races.tables import markdown, shown
-from services.optimizer.analysis.tournaments.tournament import Results, Runs, mean_ranks
-from services.optimizer.tournament.functions import FUNCTIONS
+from gaitswarm.services.optimizer.analysis.tournaments.tournament import Results, Runs, mean_ranks
+from gaitswarm.services.optimizer.tournament.functions import FUNCTIONS
 
 KEPT: Final = FOLDER.parent / "test-functions.csv"
 """Runs that the document speaks of."""

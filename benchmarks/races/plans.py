@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Final
 
-from cli.tournament.plan import Size, tournament_jobs
-from services.optimizer.jobs.kinds.tournament import TournamentSpec
+from gaitswarm.cli.tournament.plan import Size, tournament_jobs
+from gaitswarm.services.optimizer.jobs.kinds.tournament import TournamentSpec
 
 CHECKPOINTS: Final = (25, 50, 100, 250, 625, 1250, 2500, 5000)
 """Evaluations after which the best so far is kept, as far as the budget reaches."""

@@ -11,9 +11,9 @@ import numpy as np
 
 from benchmarks.races.plans import CHECKPOINTS, Plan
 from benchmarks.races.records import Record, append, digest, read_all
-from services.optimizer.jobs.kinds.tournament import TournamentSpec
-from services.optimizer.jobs.provenance import job_provenance
-from services.optimizer.jobs.spec import create_optimizer
+from gaitswarm.services.optimizer.jobs.kinds.tournament import TournamentSpec
+from gaitswarm.services.optimizer.jobs.provenance import job_provenance
+from gaitswarm.services.optimizer.jobs.spec import create_optimizer
 
 
 def run_missing(plan: Plan, path: Path) -> Iterator[Record]:

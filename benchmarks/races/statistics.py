@@ -13,9 +13,9 @@ import numpy as np
 
 from benchmarks.races.plans import CHECKPOINTS, Plan
 from benchmarks.races.records import Record
-from services.optimizer.analysis.interval import Interval, percentile_interval
-from services.optimizer.analysis.ranks import average_ranks, spearman
-from services.optimizer.analysis.tournaments.tournament import (
+from gaitswarm.services.optimizer.analysis.interval import Interval, percentile_interval
+from gaitswarm.services.optimizer.analysis.ranks import average_ranks, spearman
+from gaitswarm.services.optimizer.analysis.tournaments.tournament import (
     Results,
     Runs,
     ranks,

@@ -22,8 +22,8 @@ from benchmarks.races.statistics import (
     results_of,
     with_more_runs,
 )
-from services.optimizer.analysis.tournaments.tournament import Results, Runs
-from services.optimizer.search.registry import OPTIMIZERS
+from gaitswarm.services.optimizer.analysis.tournaments.tournament import Results, Runs
+from gaitswarm.services.optimizer.search.registry import OPTIMIZERS
 
 _BUDGET: Final = 625
 _LOOKED_AT: Final = (100, 250, 625)

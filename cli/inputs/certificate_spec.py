@@ -5,14 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final, cast
 
-from cli.inputs.design_file import given_design, may_be_file
-from cli.inputs.job_ids import full_id
-from cli.inputs.robots import chosen_robot, chosen_scenarios, robot_defaults, scenario_data
-from cli.inputs.spec_file import parse_spec
-from services.optimizer.errors import InvalidRequest, NotFound
-from services.optimizer.jobs.kinds.certificate import CertificateSpec
-from services.optimizer.jobs.kinds.held_out import certificate_walks
-from sim.worlds import PERTURBATIONS
+from gaitswarm.cli.inputs.design_file import given_design, may_be_file
+from gaitswarm.cli.inputs.job_ids import full_id
+from gaitswarm.cli.inputs.robots import (
+    chosen_robot,
+    chosen_scenarios,
+    robot_defaults,
+    scenario_data,
+)
+from gaitswarm.cli.inputs.spec_file import parse_spec
+from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
+from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
+from gaitswarm.services.optimizer.jobs.kinds.held_out import certificate_walks
+from gaitswarm.sim.worlds import PERTURBATIONS
 
 _PLAIN: Final = ("worlds", "seed", "preference", "precision", "engines", "name")
 """Options that are fields of the spec."""

@@ -7,18 +7,18 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from cli.inputs.job_ids import full_id
-from cli.inputs.robots import chosen_robot, robot_defaults
-from cli.inputs.spec_file import json_object, read_json_object
-from services.optimizer.errors import InvalidRequest, NotFound
-from sim.controllers import CONTROLLERS, Controller, ControllerName
-from sim.gait_variables import GAIT_VARIABLES
-from sim.input.near_names import instead_of
-from sim.variables import Variable, VariableCatalogue
+from gaitswarm.cli.inputs.job_ids import full_id
+from gaitswarm.cli.inputs.robots import chosen_robot, robot_defaults
+from gaitswarm.cli.inputs.spec_file import json_object, read_json_object
+from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
+from gaitswarm.sim.controllers import CONTROLLERS, Controller, ControllerName
+from gaitswarm.sim.gait_variables import GAIT_VARIABLES
+from gaitswarm.sim.input.near_names import instead_of
+from gaitswarm.sim.variables import Variable, VariableCatalogue
 
 if TYPE_CHECKING:
-    from services.optimizer.jobs.kinds.tuning import JobSpec
-    from sim.robot import RobotFiles, RobotVariant
+    from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+    from gaitswarm.sim.robot import RobotFiles, RobotVariant
 
 _PUBLISHED: Final = "published:"
 _JOB: Final = "job:"
@@ -114,8 +114,8 @@ def _best_of_job(
     job_id: str, controller: str | None, server: str | None, db: str | None
 ) -> GivenDesign:
     from gaitswarm.jobs.open import open_jobs
-    from services.optimizer.jobs.kinds.tuning import JobSpec
-    from sim.catalogue import design_numbers
+    from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+    from gaitswarm.sim.catalogue import design_numbers
 
     with open_jobs(server, db) as jobs:
         job_id = full_id(jobs, job_id)

@@ -26,7 +26,7 @@ def full_id(jobs: Jobs, given: str) -> str:
     Raises:
         InvalidRequest: Several jobs' ids do; names them.
     """
-    from services.optimizer.errors import InvalidRequest
+    from gaitswarm.services.optimizer.errors import InvalidRequest
 
     if not 0 < len(given) < _LENGTH:
         return given
@@ -81,7 +81,7 @@ def completed_start(context: typer.Context, given: str | None) -> str | None:
     """
     if given is None or given.lower().endswith(".csv"):
         return given
-    from services.optimizer.errors import NotFound
+    from gaitswarm.services.optimizer.errors import NotFound
 
     ids = [one.strip() for one in given.split(",") if one.strip()]
     try:

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
-    from sim.measurement.measured_log import MeasuredLog
-    from sim.measurement.synchronise import Synchronised
-    from sim.measurement.walk import MeasuredWalk
-    from sim.robot import Robot
+    from gaitswarm.sim.measurement.measured_log import MeasuredLog
+    from gaitswarm.sim.measurement.synchronise import Synchronised
+    from gaitswarm.sim.measurement.walk import MeasuredWalk
+    from gaitswarm.sim.robot import Robot
 
 LARGEST_FILE: Final = 1 << 28
 """Largest log that is read [B]; a second takes about a megabyte."""
@@ -59,10 +59,10 @@ def read_walk(
     server, db: Where the job is, if the design is of one.
     Raises InvalidRequest or SimulationInputError that names what is wrong, NotFound.
     """
-    from cli.inputs.design_file import given_design
-    from cli.inputs.robots import chosen_scenarios
-    from sim.measurement.walk import MeasuredWalk
-    from sim.robot import load_robot
+    from gaitswarm.cli.inputs.design_file import given_design
+    from gaitswarm.cli.inputs.robots import chosen_scenarios
+    from gaitswarm.sim.measurement.walk import MeasuredWalk
+    from gaitswarm.sim.robot import load_robot
 
     given = given_design(design, controller, trajectory, robot=robot, server=server, db=db)
     unchecked: Mapping[str, Any] = given.values
@@ -83,8 +83,8 @@ def synchronised(
     path: Path, log: MeasuredLog, simulated: MeasuredLog, walk: MeasuredWalk
 ) -> Synchronised:
     """A log beside the simulated walk. Raises InvalidRequest that names the file."""
-    from sim.errors import MeasuredLogError
-    from sim.measurement.synchronise import synchronise
+    from gaitswarm.sim.errors import MeasuredLogError
+    from gaitswarm.sim.measurement.synchronise import synchronise
 
     try:
         return synchronise(log, simulated, walk.cycle_time)
@@ -94,8 +94,8 @@ def synchronised(
 
 def read_measured(path: Path, robot: Robot) -> MeasuredLog:
     """A log from a file. Raises InvalidRequest that names file, line, column and unit."""
-    from sim.errors import MeasuredLogError
-    from sim.measurement.measured_csv import parse_measured_log
+    from gaitswarm.sim.errors import MeasuredLogError
+    from gaitswarm.sim.measurement.measured_csv import parse_measured_log
 
     try:
         with path.open("rb") as file:

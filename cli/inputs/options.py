@@ -11,7 +11,7 @@ from typing import Annotated, Any, get_type_hints
 
 import typer
 
-from cli.inputs.job_ids import completed, completed_all, completed_start
+from gaitswarm.cli.inputs.job_ids import completed, completed_all, completed_start
 
 JobId = Annotated[
     str,

@@ -6,23 +6,23 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from services.optimizer.errors import InvalidRequest
-from sim.robot import DEFAULT_ROBOT
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.sim.robot import DEFAULT_ROBOT
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
 
     from gaitswarm.robot_defaults import RobotDefaults
-    from sim.robot import RobotFiles, RobotVariant
-    from sim.scenario import Scenario
+    from gaitswarm.sim.robot import RobotFiles, RobotVariant
+    from gaitswarm.sim.scenario import Scenario
 
 
 def chosen_robot(text: str | None) -> str | RobotVariant | RobotFiles:
     """A robot's name, a variant as JSON, or a folder. Raises InvalidRequest."""
     from pydantic import TypeAdapter, ValidationError
 
-    from sim.robot import RobotSource
-    from sim.robot.shipped import SHIPPED
+    from gaitswarm.sim.robot import RobotSource
+    from gaitswarm.sim.robot.shipped import SHIPPED
 
     data = robot_data(text)
     if isinstance(data, str) and data not in SHIPPED:
@@ -116,7 +116,7 @@ def one_scenario(text: str | None, robot: str | None, *, preset: str) -> Scenari
 
 
 def _found_scenario(entry: str | dict[str, Any]) -> Scenario:
-    from sim.scenario import find_scenario
+    from gaitswarm.sim.scenario import find_scenario
 
     return find_scenario(entry) if isinstance(entry, str) else _own_scenario(entry)
 
@@ -124,7 +124,7 @@ def _found_scenario(entry: str | dict[str, Any]) -> Scenario:
 def _own_scenario(data: dict[str, Any]) -> Scenario:
     from pydantic import ValidationError
 
-    from sim.scenario import Scenario
+    from gaitswarm.sim.scenario import Scenario
 
     try:
         return Scenario.model_validate(data)

@@ -7,13 +7,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from cli.inputs.robots import chosen_robot, robot_defaults, scenario_data
-from services.optimizer.errors import InvalidRequest
+from gaitswarm.cli.inputs.robots import chosen_robot, robot_defaults, scenario_data
+from gaitswarm.services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
-    from cli.inputs.options import SpecOptions
+    from gaitswarm.cli.inputs.options import SpecOptions
+    from gaitswarm.services.optimizer.jobs.documents import AnySpec
     from gaitswarm.start import StartFile
-    from services.optimizer.jobs.documents import AnySpec
 
 LARGEST_FILE: Final = 1 << 20
 """Largest JSON file that is read [B]; a spec takes a few kilobytes."""
@@ -53,7 +53,7 @@ def by_other_optimizer(spec: AnySpec, name: str) -> AnySpec:
 
     Raises InvalidRequest if the method cannot do the job.
     """
-    from services.optimizer.jobs.optimizer_choice import with_settings
+    from gaitswarm.services.optimizer.jobs.optimizer_choice import with_settings
 
     document = spec.model_dump(mode="json")
     document["optimizer"] = with_settings(name, {"particles": spec.optimizer.particles})
@@ -63,7 +63,7 @@ def by_other_optimizer(spec: AnySpec, name: str) -> AnySpec:
 
 def check_optimizer_name(name: str, option: str) -> None:
     """Raises InvalidRequest, with the option as its field, if no search method has the name."""
-    from services.optimizer.jobs.optimizer_choice import optimizer_settings
+    from gaitswarm.services.optimizer.jobs.optimizer_choice import optimizer_settings
 
     try:
         optimizer_settings(name)
@@ -117,7 +117,7 @@ def _add_start(chosen: dict[str, Any], data: Mapping[str, Any]) -> StartFile | N
 
 def _lay_settings(chosen: dict[str, Any], asked: object) -> None:
     """Settings and particles over `optimizer`; asked: that of the file. Raises InvalidRequest."""
-    from services.optimizer.jobs.optimizer_choice import with_settings
+    from gaitswarm.services.optimizer.jobs.optimizer_choice import with_settings
 
     text, particles = chosen.pop("optimizer_settings", None), chosen.pop("particles", None)
     settings = {} if text is None else json_object(text, "optimizer-settings")
@@ -190,7 +190,7 @@ def json_object(text: str, what: str) -> dict[str, Any]:
 
 
 def _searching_gait(spec: AnySpec) -> AnySpec:
-    from services.optimizer.jobs.kinds.tuning import JobSpec
+    from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 
     if not isinstance(spec, JobSpec):
         raise InvalidRequest("only a job that tunes a drive has a gait", field="with-gait")
@@ -204,7 +204,7 @@ def parse_spec(data: Mapping[str, Any]) -> AnySpec:
     from pydantic import ValidationError
 
     from gaitswarm.errors import invalid_request
-    from services.optimizer.jobs.documents import SPECS, AnySpec
+    from gaitswarm.services.optimizer.jobs.documents import SPECS, AnySpec
 
     try:
         spec = SPECS.validate_python(data)

@@ -8,9 +8,9 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from cli.inputs.design_file import read_design
-from cli.inputs.spec_file import read_json_object
-from services.optimizer.errors import InvalidRequest
+from gaitswarm.cli.inputs.design_file import read_design
+from gaitswarm.cli.inputs.spec_file import read_json_object
+from gaitswarm.services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -96,7 +96,7 @@ def _head(path: Path, line: int, columns: list[str]) -> list[str]:
 
 
 def _walk(path: Path, line: int, name: str, cells: Mapping[str, str]) -> dict[str, Any]:
-    from sim.calibration.targets import TargetWalk
+    from gaitswarm.sim.calibration.targets import TargetWalk
 
     for column, cell in cells.items():
         if not cell:
@@ -141,7 +141,7 @@ def _design(path: Path, line: int, cells: Mapping[str, str]) -> dict[str, Any]:
 def _target(
     path: Path, line: int, row: Mapping[str, str], walks: Mapping[str, dict[str, Any]]
 ) -> dict[str, Any]:
-    from sim.calibration.targets import QUANTITIES, Target
+    from gaitswarm.sim.calibration.targets import QUANTITIES, Target
 
     document: dict[str, Any] = {
         "walk": row["walk"],
@@ -173,8 +173,8 @@ def _checked(
     """columns: of the fields that are called otherwise in the table."""
     from pydantic import ValidationError
 
-    from sim.input.choice import without_tags
-    from sim.input.wording import message_of
+    from gaitswarm.sim.input.choice import without_tags
+    from gaitswarm.sim.input.wording import message_of
 
     try:
         return model.model_validate(document)

@@ -10,17 +10,17 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from cli.atomic_file import replacing
-from services.optimizer.errors import InvalidRequest
+from gaitswarm.cli.atomic_file import replacing
+from gaitswarm.services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from mpl_toolkits.mplot3d.axes3d import Axes3D
 
+    from gaitswarm.sim.controllers.surface import Surface
+    from gaitswarm.sim.studies.drives import WalkFigures
     from gaitswarm.views import IterationView
-    from sim.controllers.surface import Surface
-    from sim.studies.drives import WalkFigures
 
 _FORMATS: Final = ("png", "svg", "pdf")
 _INK: Final = "#1f3a5f"

@@ -6,19 +6,19 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sim.controllers.fixed_point import CONTROL_PERIOD
-from sim.measurement.measured_log import Quantity
-from sim.robot.description import JOINTS_PER_LEG
-from sim.validation.comparison import channels_of_link, columns_of
-from sim.validation.measures import Tolerance, amplitude_spectrum
+from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
+from gaitswarm.sim.measurement.measured_log import Quantity
+from gaitswarm.sim.robot.description import JOINTS_PER_LEG
+from gaitswarm.sim.validation.comparison import channels_of_link, columns_of
+from gaitswarm.sim.validation.measures import Tolerance, amplitude_spectrum
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from sim.measurement.measured_log import MeasuredLog
-    from sim.measurement.synchronise import Synchronised
-    from sim.validation.comparison import Comparison
+    from gaitswarm.sim.measurement.measured_log import MeasuredLog
+    from gaitswarm.sim.measurement.synchronise import Synchronised
+    from gaitswarm.sim.validation.comparison import Comparison
 
 _MEASURED: Final = "#1f3a5f"
 _SIMULATED: Final = "#d1495b"

@@ -10,17 +10,17 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.kinds.calibration import CalibrationSpec
-from sim.calibration.catalogue import ROBOT
-from sim.calibration.targets import TargetWalk
-from sim.calibration.walk import RESULTS, CalibrationWalk
-from sim.controllers import CONTROLLERS, ControllerName
-from sim.input.near_names import instead_of
-from sim.outcome import Outcome
-from sim.robot import load_robot
-from sim.scenario import SCENARIOS, Scenario, find_scenario
-from sim.variables import Variable
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
+from gaitswarm.sim.calibration.catalogue import ROBOT
+from gaitswarm.sim.calibration.targets import TargetWalk
+from gaitswarm.sim.calibration.walk import RESULTS, CalibrationWalk
+from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
+from gaitswarm.sim.input.near_names import instead_of
+from gaitswarm.sim.outcome import Outcome
+from gaitswarm.sim.robot import load_robot
+from gaitswarm.sim.scenario import SCENARIOS, Scenario, find_scenario
+from gaitswarm.sim.variables import Variable
 
 Floats = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from services.optimizer.jobs.preference import Preference
+from gaitswarm.services.optimizer.jobs.preference import Preference
 
 
 def greatest_product(preference: Preference, fitness: float, known: Mapping[int, float]) -> float:

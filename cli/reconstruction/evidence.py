@@ -14,34 +14,34 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
-from cli.atomic_file import replacing
-from cli.reconstruction.alternatives import (
+from gaitswarm.cli.atomic_file import replacing
+from gaitswarm.cli.reconstruction.alternatives import (
     Alternative,
     alternatives,
     default_choice,
     predicted,
     simulated_targets,
 )
-from cli.reconstruction.bound import greatest_product
-from cli.reconstruction.optimality import (
+from gaitswarm.cli.reconstruction.bound import greatest_product
+from gaitswarm.cli.reconstruction.optimality import (
     Optimality,
     optimality,
     published_designs,
     random_designs,
     walk_all,
 )
-from cli.reconstruction.plan import Size
-from services.optimizer.analysis.fits.identifiability import (
+from gaitswarm.cli.reconstruction.plan import Size
+from gaitswarm.services.optimizer.analysis.fits.identifiability import (
     Identifiability,
     ParameterIdentifiability,
     identifiability,
 )
-from services.optimizer.analysis.fits.targets import TargetResults, target_results
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.kinds.calibration import CalibrationSpec
-from services.optimizer.jobs.preference import PREFERENCES
-from services.optimizer.jobs.provenance import job_provenance
-from sim.plugins import source_digest
+from gaitswarm.services.optimizer.analysis.fits.targets import TargetResults, target_results
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
+from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
+from gaitswarm.services.optimizer.jobs.provenance import job_provenance
+from gaitswarm.sim.plugins import source_digest
 
 Floats = NDArray[np.float64]
 

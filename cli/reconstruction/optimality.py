@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from services.optimizer.jobs.design_space import DesignSpace
-from services.optimizer.jobs.preference import PREFERENCES, PreferenceName, judge
-from sim.calibration.catalogue import robot_variables, varied_robot
-from sim.controllers import CONTROLLERS
-from sim.robot import RobotSource
-from sim.scenario import SCENARIOS
-from sim.simulate import simulate
+from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
+from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, PreferenceName, judge
+from gaitswarm.sim.calibration.catalogue import robot_variables, varied_robot
+from gaitswarm.sim.controllers import CONTROLLERS
+from gaitswarm.sim.robot import RobotSource
+from gaitswarm.sim.scenario import SCENARIOS
+from gaitswarm.sim.simulate import simulate
 
 Floats = NDArray[np.float64]
 

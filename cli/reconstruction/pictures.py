@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from cli.reconstruction.evidence import PRINTED, Evidence
+from gaitswarm.cli.reconstruction.evidence import PRINTED, Evidence
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,11 +9,14 @@ from typing import Final
 
 import numpy as np
 
-from cli.atomic_file import replacing
-from cli.reconstruction.evidence import PRINTED, Evidence, Found
-from cli.reconstruction.optimality import OPTIMA
-from services.optimizer.analysis.fits.identifiability import ParameterIdentifiability, Trust
-from services.optimizer.analysis.fits.targets import Reached
+from gaitswarm.cli.atomic_file import replacing
+from gaitswarm.cli.reconstruction.evidence import PRINTED, Evidence, Found
+from gaitswarm.cli.reconstruction.optimality import OPTIMA
+from gaitswarm.services.optimizer.analysis.fits.identifiability import (
+    ParameterIdentifiability,
+    Trust,
+)
+from gaitswarm.services.optimizer.analysis.fits.targets import Reached
 
 REPORT: Final = "report.md"
 
@@ -37,8 +40,8 @@ def write_report(folder: Path, found: Evidence) -> Path:
     Raises:
         InvalidRequest: A file cannot be written.
     """
-    from cli.pictures.plots import save
-    from cli.reconstruction.pictures import draw_choices, draw_exclusion, draw_targets
+    from gaitswarm.cli.pictures.plots import save
+    from gaitswarm.cli.reconstruction.pictures import draw_choices, draw_exclusion, draw_targets
 
     save(draw_targets(found), folder / "targets.svg")
     save(draw_choices(found), folder / "choices.svg")

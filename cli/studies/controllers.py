@@ -6,14 +6,18 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Final
 
-from services.optimizer.analysis.ratio import MedianInterval, median_interval, median_ratio
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.optimizer_choice import with_settings
-from services.optimizer.jobs.preference import figure_of_merit
+from gaitswarm.services.optimizer.analysis.ratio import (
+    MedianInterval,
+    median_interval,
+    median_ratio,
+)
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.optimizer_choice import with_settings
+from gaitswarm.services.optimizer.jobs.preference import figure_of_merit
 
 if TYPE_CHECKING:
-    from cli.tables.fitted import Table
-    from services.optimizer.jobs.job import Job
+    from gaitswarm.cli.tables.fitted import Table
+    from gaitswarm.services.optimizer.jobs.job import Job
 
 THESIS: Final = {"chapter": 3, "gain_pso_ps": 6.887 / 5.644 - 1.0, "gain_average": 0.20}
 """How much greater F of the Fuzzy-PI is than that of the PI: table 3.6, and Thesis 5."""
@@ -200,8 +204,8 @@ def study_table(found: Sequence[Comparison]) -> Table:
     Args:
         found: comparisons whose jobs have been run.
     """
-    from cli.tables.fitted import Table
-    from cli.tables.views import interval_cells, number, relative_change
+    from gaitswarm.cli.tables.fitted import Table
+    from gaitswarm.cli.tables.views import interval_cells, number, relative_change
 
     table = Table(box=None, header_style="bold", pad_edge=False)
     for column in ("chapter", "robot", "controller"):

@@ -9,20 +9,20 @@ from typing import TYPE_CHECKING, Any, Final, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from gaitswarm.services.optimizer.analysis.ranking import rank_correlation
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.outcome import OBJECTIVE_NAMES, Status
+from gaitswarm.sim.robot import RobotVariant
+from gaitswarm.sim.robot.description import ContactLaw
+from gaitswarm.sim.scenario import SCENARIOS, Scenario
 from gaitswarm.simulation import simulate
 from gaitswarm.simulation_result import SimulationResult
-from services.optimizer.analysis.ranking import rank_correlation
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from sim.kernel.walk import Precision
-from sim.outcome import OBJECTIVE_NAMES, Status
-from sim.robot import RobotVariant
-from sim.robot.description import ContactLaw
-from sim.scenario import SCENARIOS, Scenario
 
 if TYPE_CHECKING:
-    from cli.tables.fitted import Table
-    from sim.robot.shipped import RobotName
+    from gaitswarm.cli.tables.fitted import Table
+    from gaitswarm.sim.robot.shipped import RobotName
 
 Floats = NDArray[np.float64]
 
@@ -245,7 +245,7 @@ def study_tables(found: Sequence[Agreement]) -> tuple[Table, Table]:
     Args:
         found: one for each variant.
     """
-    from cli.tables.fitted import Table
+    from gaitswarm.cli.tables.fitted import Table
 
     deviations, ranking = (
         Table(box=None, header_style="bold", pad_edge=False, padding=(0, 1, 0, 0)) for _ in range(2)

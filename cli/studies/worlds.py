@@ -6,16 +6,20 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Final
 
-from services.optimizer.analysis.ratio import MedianInterval, median_interval, median_ratio
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.kinds.certificate import CertificateSpec
-from services.optimizer.jobs.kinds.held_out import certificate_walks
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.optimizer_choice import with_settings
-from sim.catalogue import design_numbers
+from gaitswarm.services.optimizer.analysis.ratio import (
+    MedianInterval,
+    median_interval,
+    median_ratio,
+)
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
+from gaitswarm.services.optimizer.jobs.kinds.held_out import certificate_walks
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.optimizer_choice import with_settings
+from gaitswarm.sim.catalogue import design_numbers
 
 if TYPE_CHECKING:
-    from cli.tables.fitted import Table
+    from gaitswarm.cli.tables.fitted import Table
     from gaitswarm.views.certificate import CertificateView, ProportionView
 
 
@@ -251,8 +255,8 @@ def study_table(found: Sequence[Contestant]) -> Table:
     Args:
         found: Contestants whose jobs have been run, the search without worlds first.
     """
-    from cli.tables.fitted import Table
-    from cli.tables.views import interval_cells, number, relative_change
+    from gaitswarm.cli.tables.fitted import Table
+    from gaitswarm.cli.tables.views import interval_cells, number, relative_change
 
     table = Table(
         title="Medians over the runs", title_justify="left", box=None, padding=(0, 1, 0, 0)
@@ -281,8 +285,8 @@ def runs_table(found: Sequence[Contestant]) -> Table:
     Args:
         found: Contestants whose jobs have been run.
     """
-    from cli.tables.fitted import Table
-    from cli.tables.views import number
+    from gaitswarm.cli.tables.fitted import Table
+    from gaitswarm.cli.tables.views import number
 
     table = Table(title="Runs", title_justify="left", box=None, padding=(0, 1, 0, 0))
     table.add_column("search", no_wrap=True)

@@ -5,21 +5,21 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING
 
-from cli.output import note, print_text, stdout_console
-from cli.tables.engines import engine_table
-from cli.tables.fitted import Table
-from cli.tables.views import number
+from gaitswarm.cli.output import note, print_text, stdout_console
+from gaitswarm.cli.tables.engines import engine_table
+from gaitswarm.cli.tables.fitted import Table
+from gaitswarm.cli.tables.views import number
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
+    from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
     from gaitswarm.views.certificate import (
         CertificateView,
         ProportionView,
         SpreadView,
     )
-    from services.optimizer.jobs.kinds.certificate import CertificateSpec
 
 _STRONGEST = 5
 """Perturbations that are named."""
@@ -61,8 +61,8 @@ def show_world(spec: CertificateSpec, world: int, log: Path | None, *, as_json: 
     Raises:
         InvalidRequest: The file cannot be written.
     """
-    from cli.tables.views import results_table, worth
-    from cli.walk_log import write_walk_logs
+    from gaitswarm.cli.tables.views import results_table, worth
+    from gaitswarm.cli.walk_log import write_walk_logs
     from gaitswarm.requests.walk import SimulationRequest, run_simulation
 
     request = SimulationRequest(

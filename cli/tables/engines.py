@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from cli.tables.fitted import Table
-from cli.tables.views import MISSING, SHORT, number
-from sim.mujoco.engines import OWN
+from gaitswarm.cli.tables.fitted import Table
+from gaitswarm.cli.tables.views import MISSING, SHORT, number
+from gaitswarm.sim.mujoco.engines import OWN
 
 _COMPARED = ("torque", "acceleration", "angular_acceleration", "energy", "reciprocal_speed")
 """The loss of height, a difference near zero, is in the JSON."""

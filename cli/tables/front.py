@@ -8,14 +8,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
-from cli.tables.views import SHORT, number
+from gaitswarm.cli.tables.views import SHORT, number
 from gaitswarm.places import place_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from cli.tables.fitted import Table
+    from gaitswarm.cli.tables.fitted import Table
     from gaitswarm.views import SimulationView
     from gaitswarm.views.trade_offs import (
         FrontView,
@@ -31,7 +31,7 @@ _ACCENT: Final = "#d1495b"
 
 def marked_table(view: FrontView) -> Table:
     """Knees, the best in each objective, and the winners of preferences."""
-    from cli.tables.fitted import Table
+    from gaitswarm.cli.tables.fitted import Table
 
     table = Table(box=None, padding=(0, 1, 0, 0))
     table.add_column("", no_wrap=True)
@@ -157,7 +157,7 @@ def front_csv(view: FrontView) -> bytes:
 
 def fits_table(view: PreferenceForView) -> Table:
     """Preferences that suit a design, one for each set of biases, the best first."""
-    from cli.tables.fitted import Table
+    from gaitswarm.cli.tables.fitted import Table
 
     table = Table(box=None, padding=(0, 2, 0, 0))
     for head in ("biases of", "rank", "margin %", "rival", "bias", "exponent"):

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cli.tables.fitted import Table
+    from gaitswarm.cli.tables.fitted import Table
     from gaitswarm.views.identification import IdentifiabilityView, ParameterView
 
 _SHOWN: Final = (0.2, 0.1, 0.05, 0.02)
@@ -22,7 +22,7 @@ _STYLES: Final = {"trusted": "green", "rough": "yellow", "unknown": "red"}
 
 def read_truth(path: Path | None) -> dict[str, float]:
     """True values by name; none without a file. Raises InvalidRequest."""
-    from cli.inputs.spec_file import read_json_object
+    from gaitswarm.cli.inputs.spec_file import read_json_object
 
     values = {} if path is None else read_json_object(path, "truth")
     for name, value in values.items():
@@ -35,7 +35,7 @@ def show_parameters(
     found: IdentifiabilityView, truth: Mapping[str, float], *, as_json: bool
 ) -> None:
     """The command's result."""
-    from cli.output import note, print_json, stdout_console
+    from gaitswarm.cli.output import note, print_json, stdout_console
 
     if as_json:
         print_json(found)
@@ -52,8 +52,8 @@ def parameters_table(found: IdentifiabilityView, truth: Mapping[str, float]) -> 
     """Parameters as rows: best value, true one, and widths of the intervals in percent."""
     from rich.text import Text
 
-    from cli.tables.fitted import Table
-    from cli.tables.views import number
+    from gaitswarm.cli.tables.fitted import Table
+    from gaitswarm.cli.tables.views import number
 
     title = "Fitted parameters; widths of their intervals in % of the range searched"
     table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0))

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from rich.text import Text
 
-from cli.tables.fitted import Table
-from cli.tables.views import MISSING, number
+from gaitswarm.cli.tables.fitted import Table
+from gaitswarm.cli.tables.views import MISSING, number
 
 if TYPE_CHECKING:
     from gaitswarm.views.identification import RecordingEntryView

@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
-from cli.tables.views import MISSING, SHORT, number
+from gaitswarm.cli.tables.views import MISSING, SHORT, number
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cli.tables.fitted import Table
+    from gaitswarm.cli.tables.fitted import Table
     from gaitswarm.views.robustness import IndexView, RobustnessView
 
 
 def scenarios_table(view: RobustnessView) -> Table:
     """One row a scenario: index, interval, and what each objective adds to it."""
-    from cli.tables.fitted import Table
+    from gaitswarm.cli.tables.fitted import Table
 
     table = Table(title="Robustness index", title_justify="left", box=None, padding=(0, 1, 0, 0))
     table.add_column("scenario", no_wrap=True)
@@ -41,7 +41,7 @@ def scenarios_table(view: RobustnessView) -> Table:
 
 def variables_table(view: RobustnessView) -> Table:
     """One row a variable: to which the objectives answer most, over all scenarios and in each."""
-    from cli.tables.fitted import Table
+    from gaitswarm.cli.tables.fitted import Table
 
     table = Table(title="By variable", title_justify="left", box=None, padding=(0, 1, 0, 0))
     table.add_column("variable", no_wrap=True)

@@ -5,15 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from cli.tables.fitted import Table
+    from gaitswarm.cli.tables.fitted import Table
     from gaitswarm.views.calibration import ReachedView, TargetsView
     from gaitswarm.views.identification import IdentifiabilityView
 
 
 def show_targets(reached: TargetsView, parameters: IdentifiabilityView) -> None:
     """The result of the commands `calibrate` and `targets`."""
-    from cli.output import note, stdout_console
-    from cli.tables.parameters import parameters_table
+    from gaitswarm.cli.output import note, stdout_console
+    from gaitswarm.cli.tables.parameters import parameters_table
     from gaitswarm.places import place_of
 
     console = stdout_console()
@@ -34,8 +34,8 @@ def show_targets(reached: TargetsView, parameters: IdentifiabilityView) -> None:
 
 def targets_table(reached: TargetsView) -> Table:
     """Targets as rows: what was printed or measured, what is simulated, and how far off it is."""
-    from cli.tables.fitted import Table
-    from cli.tables.views import number
+    from gaitswarm.cli.tables.fitted import Table
+    from gaitswarm.cli.tables.views import number
 
     left_out = any(target.left_out is not None for target in reached.targets)
     title = "Targets; off: in tolerances"
@@ -63,8 +63,8 @@ def targets_table(reached: TargetsView) -> Table:
 
 def choices_table(parameters: IdentifiabilityView) -> Table:
     """Choices as rows: the least misfit with each, over all runs and of each run."""
-    from cli.tables.fitted import Table
-    from cli.tables.views import number
+    from gaitswarm.cli.tables.fitted import Table
+    from gaitswarm.cli.tables.views import number
 
     title = "Least misfit by choice"
     table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0))
@@ -86,13 +86,13 @@ def choices_table(parameters: IdentifiabilityView) -> Table:
 
 
 def _left_out(reached: ReachedView | None) -> tuple[str, str]:
-    from cli.tables.views import MISSING, number
+    from gaitswarm.cli.tables.views import MISSING, number
 
     return (MISSING if reached is None else number(reached.simulated)), _off(reached)
 
 
 def _off(reached: ReachedView | None) -> str:
-    from cli.tables.views import MISSING
+    from gaitswarm.cli.tables.views import MISSING
 
     if reached is None or reached.difference is None:
         return MISSING

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Final
 
 from rich.text import Text
 
-from cli.tables.fitted import Table
-from sim.validation.measures import Tolerance
+from gaitswarm.cli.tables.fitted import Table
+from gaitswarm.sim.validation.measures import Tolerance
 
 if TYPE_CHECKING:
-    from sim.validation.comparison import Agreement, Comparison, QuantityComparison
+    from gaitswarm.sim.validation.comparison import Agreement, Comparison, QuantityComparison
 
 STYLES: Final = {
     Tolerance.GREEN: "green",
@@ -95,7 +95,7 @@ def alignment(comparison: Comparison) -> str:
 
 def remarks(comparison: Comparison) -> list[str]:
     """What to know before one believes the table."""
-    from sim.measurement.measured_log import Quantity
+    from gaitswarm.sim.measurement.measured_log import Quantity
 
     said = []
     if comparison.synthetic:

@@ -8,9 +8,15 @@ from typing import TYPE_CHECKING, Final
 
 from rich.text import Text
 
-from cli.tables.fitted import Table
+from gaitswarm.cli.tables.fitted import Table
 
 if TYPE_CHECKING:
+    from gaitswarm.services.optimizer.analysis.ratio import MedianInterval
+    from gaitswarm.services.optimizer.jobs.fork import Lineage
+    from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
+    from gaitswarm.services.optimizer.jobs.spec import Spec
+    from gaitswarm.sim.outcome import Objective
+    from gaitswarm.sim.variables import Variable
     from gaitswarm.views import (
         BestView,
         EvaluationView,
@@ -25,12 +31,6 @@ if TYPE_CHECKING:
         SimulatedScenarioView,
         SimulationView,
     )
-    from services.optimizer.analysis.ratio import MedianInterval
-    from services.optimizer.jobs.fork import Lineage
-    from services.optimizer.jobs.provenance import JobProvenance
-    from services.optimizer.jobs.spec import Spec
-    from sim.outcome import Objective
-    from sim.variables import Variable
 
 MISSING: Final = "–"
 
@@ -180,7 +180,7 @@ def results_table(
 
 def measurements_table(results: Mapping[str, SimulatedScenarioView]) -> Table:
     """Scenarios as rows, what their walks tell beside the objectives as columns."""
-    from sim.outcome import MEASUREMENTS
+    from gaitswarm.sim.outcome import MEASUREMENTS
 
     table = Table(title="Measured", title_justify="left", box=None, padding=(0, 1, 0, 0))
     table.add_column("scenario", no_wrap=True)
@@ -255,7 +255,7 @@ def ranking_table(ranking: RankingView) -> Table:
 
 def print_job(job: JobView) -> None:
     """What `status` shows."""
-    from cli.output import stdout_console
+    from gaitswarm.cli.output import stdout_console
 
     console = stdout_console()
     rows = {
@@ -322,7 +322,7 @@ def _iterations(job: JobView) -> str:
 
 def print_best(best: BestView, job: JobView) -> None:
     """The best design of a job, its results by case, and what a search in single made of it."""
-    from cli.output import stdout_console
+    from gaitswarm.cli.output import stdout_console
 
     console = stdout_console()
     console.print(design_table(job.spec, {"best": best.design}))

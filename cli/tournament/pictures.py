@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from services.optimizer.analysis.interval import Interval
-from services.optimizer.analysis.tournaments.standings import Profile
-from services.optimizer.analysis.tournaments.tournament import Runs
+from gaitswarm.services.optimizer.analysis.interval import Interval
+from gaitswarm.services.optimizer.analysis.tournaments.standings import Profile
+from gaitswarm.services.optimizer.analysis.tournaments.tournament import Runs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

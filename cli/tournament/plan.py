@@ -6,16 +6,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
-from cli.inputs.spec_file import parse_spec
-from services.optimizer.analysis.tournaments.entrants import NAME_PREFIX
-from services.optimizer.analysis.tournaments.standings import looked_at
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.kinds.tournament import TournamentSpec
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.search.method import missing_of
-from services.optimizer.search.registry import METHODS, OPTIMIZERS
-from services.optimizer.tournament.functions import FUNCTIONS
-from services.optimizer.tournament.methods import (
+from gaitswarm.cli.inputs.spec_file import parse_spec
+from gaitswarm.services.optimizer.analysis.tournaments.entrants import NAME_PREFIX
+from gaitswarm.services.optimizer.analysis.tournaments.standings import looked_at
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.kinds.tournament import TournamentSpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.search.method import missing_of
+from gaitswarm.services.optimizer.search.registry import METHODS, OPTIMIZERS
+from gaitswarm.services.optimizer.tournament.functions import FUNCTIONS
+from gaitswarm.services.optimizer.tournament.methods import (
     is_multi_objective,
     libraries_of,
     method_names,
@@ -24,9 +24,9 @@ from services.optimizer.tournament.methods import (
     settings_models,
     why_unknown,
 )
-from services.optimizer.tournament.race import default_checkpoints
-from services.optimizer.tournament.rivals import RIVALS
-from sim.input.near_names import instead_of
+from gaitswarm.services.optimizer.tournament.race import default_checkpoints
+from gaitswarm.services.optimizer.tournament.rivals import RIVALS
+from gaitswarm.sim.input.near_names import instead_of
 
 PresetName = Literal["thesis", "robot"]
 

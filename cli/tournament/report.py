@@ -9,15 +9,15 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from cli.atomic_file import replacing
-from cli.tournament.pictures import draw_problem, draw_profiles, draw_ranks
-from services.optimizer.analysis.tournaments.standings import NEAR, Standings, profiles_of
+from gaitswarm.cli.atomic_file import replacing
+from gaitswarm.cli.tournament.pictures import draw_problem, draw_profiles, draw_ranks
+from gaitswarm.services.optimizer.analysis.tournaments.standings import NEAR, Standings, profiles_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cli.tournament.runs import Entry
-    from services.optimizer.analysis.interval import Interval
+    from gaitswarm.cli.tournament.runs import Entry
+    from gaitswarm.services.optimizer.analysis.interval import Interval
 
 REPORT: Final = "report.html"
 

@@ -14,27 +14,27 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from cli.atomic_file import replacing
-from cli.exit_codes import JobEnded
-from cli.output import note
+from gaitswarm.cli.atomic_file import replacing
+from gaitswarm.cli.exit_codes import JobEnded
+from gaitswarm.cli.output import note
 from gaitswarm.jobs.database.embedded import earlier_job, taken_up
 from gaitswarm.jobs.open import database_to_write
+from gaitswarm.services.optimizer.analysis.tournaments.entrants import by_problem
+from gaitswarm.services.optimizer.analysis.tournaments.tournament import Results, Runs, runs_of
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.job import Job, JobState
+from gaitswarm.services.optimizer.jobs.kinds.tournament import TournamentSpec
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.runtime import open_evaluator, open_store, run_embedded, stop_on_signals
 from gaitswarm.settings import read_settings
 from gaitswarm.tables import Table
-from services.optimizer.analysis.tournaments.entrants import by_problem
-from services.optimizer.analysis.tournaments.tournament import Results, Runs, runs_of
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.job import Job, JobState
-from services.optimizer.jobs.kinds.tournament import TournamentSpec
-from services.optimizer.service import JobService
-from services.runtime import open_evaluator, open_store, run_embedded, stop_on_signals
 
 if TYPE_CHECKING:
-    from cli.inputs.options import WorkerOptions
+    from gaitswarm.cli.inputs.options import WorkerOptions
+    from gaitswarm.services.optimizer.run.evaluator import Evaluator
+    from gaitswarm.services.optimizer.store.port.base import Store
     from gaitswarm.settings import Settings
-    from services.optimizer.run.evaluator import Evaluator
-    from services.optimizer.store.port.base import Store
 
 RUNS_FILE: Final = "runs.parquet"
 
@@ -164,7 +164,7 @@ def _await(runs: list[Future[None]], stop: threading.Event) -> None:
 
 
 def _cpus() -> int:
-    from services.worker.in_process import available_cpus
+    from gaitswarm.services.worker.in_process import available_cpus
 
     return available_cpus()
 

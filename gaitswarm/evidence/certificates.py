@@ -11,14 +11,14 @@ from typing import Any, Final
 import numpy as np
 
 from gaitswarm.evidence.archive import parsed_json
+from gaitswarm.services.optimizer.analysis.robustness.certificate import certificate
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.documents import AnySpec
+from gaitswarm.services.optimizer.jobs.job import Job, JobState
+from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.views.certificate import CertificateView
-from services.optimizer.analysis.robustness.certificate import certificate
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.documents import AnySpec
-from services.optimizer.jobs.job import Job, JobState
-from services.optimizer.jobs.kinds.certificate import CertificateSpec
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.service import JobService
 
 FOLDER: Final = "certificates"
 """Of an archive: a folder in it for each certificate, by its id."""

@@ -16,20 +16,20 @@ from gaitswarm.evidence.contents import BEST, CHAIN, best_of
 from gaitswarm.evidence.history import chain_check
 from gaitswarm.evidence.reading import Evidence, by_iteration
 from gaitswarm.places import place_of
+from gaitswarm.services.optimizer.analysis.search_path import retraced
+from gaitswarm.services.optimizer.analysis.verification import BrokenChain, Chain, judged
+from gaitswarm.services.optimizer.jobs.chain import VERSION as CHAIN_VERSION
+from gaitswarm.services.optimizer.jobs.chain import ChainDocuments, Link, Outcomes
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.documents import SPECS, AnySpec
+from gaitswarm.services.optimizer.jobs.fork import Lineage
+from gaitswarm.services.optimizer.jobs.iteration import Reevaluation, best_particle
+from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
+from gaitswarm.services.optimizer.jobs.provenance import RECORDS, job_provenance
+from gaitswarm.services.optimizer.search.registry import METHODS
+from gaitswarm.sim.kernel.emitted.source import kernel_identity
+from gaitswarm.sim.robot import load_robot
 from gaitswarm.views import BestView
-from services.optimizer.analysis.search_path import retraced
-from services.optimizer.analysis.verification import BrokenChain, Chain, judged
-from services.optimizer.jobs.chain import VERSION as CHAIN_VERSION
-from services.optimizer.jobs.chain import ChainDocuments, Link, Outcomes
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.documents import SPECS, AnySpec
-from services.optimizer.jobs.fork import Lineage
-from services.optimizer.jobs.iteration import Reevaluation, best_particle
-from services.optimizer.jobs.kinds.certificate import CertificateSpec
-from services.optimizer.jobs.provenance import RECORDS, job_provenance
-from services.optimizer.search.registry import METHODS
-from sim.kernel.emitted.source import kernel_identity
-from sim.robot import load_robot
 
 Floats = NDArray[np.float64]
 

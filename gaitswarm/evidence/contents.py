@@ -18,23 +18,23 @@ from gaitswarm.evidence.certificates import FOLDER, SUMMARY, certificates_of, su
 from gaitswarm.evidence.page import CertificateOnPage, page
 from gaitswarm.evidence.pictures import bars, convergence, heat_map
 from gaitswarm.requests.surface import SurfaceRequest, run_surface
+from gaitswarm.services.optimizer.analysis.fork import budgets_of
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.chain import VERSION as CHAIN_VERSION
+from gaitswarm.services.optimizer.jobs.chain import Link
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.documents import AnySpec
+from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Reevaluation, best_particle
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.provenance import job_provenance
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.sim.kernel.emitted.source import kernel_identity
+from gaitswarm.sim.robot import RobotFiles, RobotSource, RobotVariant, load_robot
 from gaitswarm.tables import encoded_table
 from gaitswarm.views import BestView, IterationView
 from gaitswarm.views.certificate import CertificateView
-from services.optimizer.analysis.fork import budgets_of
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.chain import VERSION as CHAIN_VERSION
-from services.optimizer.jobs.chain import Link
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.documents import AnySpec
-from services.optimizer.jobs.iteration import Evaluation, Reevaluation, best_particle
-from services.optimizer.jobs.job import Job
-from services.optimizer.jobs.kinds.certificate import CertificateSpec
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.provenance import job_provenance
-from services.optimizer.service import JobService
-from sim.kernel.emitted.source import kernel_identity
-from sim.robot import RobotFiles, RobotSource, RobotVariant, load_robot
 
 JOB: Final = "job.json"
 SPEC: Final = "spec.json"
@@ -322,7 +322,7 @@ def _robot(folder: str, source: RobotSource) -> dict[str, bytes]:
     if isinstance(source, RobotFiles):
         return {**files, f"{folder}/robot.toml": source.toml.encode()}
     name = source.name if isinstance(source, RobotVariant) else source
-    for file in (resources.files("sim.robot") / name).iterdir():
+    for file in (resources.files("gaitswarm.sim.robot") / name).iterdir():
         if file.name.endswith(".toml"):
             files[f"{folder}/{file.name}"] = file.read_bytes()
     return files

@@ -18,20 +18,20 @@ from gaitswarm.evidence.replay import (
     simulated_differences,
     why_no_replay,
 )
+from gaitswarm.services.optimizer.errors import NotFound
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.estimate import duration
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.provenance import job_provenance
+from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.views.verification import (
     CheckView,
     HistoryVerificationView,
     VerificationRequest,
 )
-from services.optimizer.errors import NotFound
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.estimate import duration
-from services.optimizer.jobs.job import Job
-from services.optimizer.jobs.provenance import job_provenance
-from services.optimizer.service import JobService
 
 if TYPE_CHECKING:
-    from services.optimizer.analysis.verification import HistoryCheck
+    from gaitswarm.services.optimizer.analysis.verification import HistoryCheck
 
 SHOWN: Final = 100
 """Differences that are listed."""
@@ -62,7 +62,7 @@ def run_verification(
         EvaluatorUnavailable: Walks cannot be run here.
     """
     # It brings in the database.
-    from services.optimizer.analysis.verification import check_history
+    from gaitswarm.services.optimizer.analysis.verification import check_history
 
     job = service.job(job_id)
     seed = secrets.randbelow(1 << 32) if request.seed is None else request.seed

@@ -10,11 +10,11 @@ from typing import Any, Final
 from gaitswarm.evidence.archive import FORMAT, MANIFEST, VERSION
 from gaitswarm.evidence.certificates import Certified, how_to_make_one
 from gaitswarm.places import place_of
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.sim.robot import load_robot
 from gaitswarm.views import BestView
 from gaitswarm.views.certificate import CertificateView, ProportionView, SpreadView, WorldView
-from services.optimizer.jobs.job import Job
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from sim.robot import load_robot
 
 _STYLE: Final = """
 :root { color-scheme: light dark; }

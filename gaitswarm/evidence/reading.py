@@ -20,17 +20,17 @@ from gaitswarm.evidence.contents import (
     REEVALUATIONS,
     SPEC,
 )
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.documents import SPECS, AnySpec
+from gaitswarm.services.optimizer.jobs.fork import Lineage
+from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, ProvenanceRecord
+from gaitswarm.sim.errors import RobotFileError
+from gaitswarm.sim.identification.recorded_walk import RecordedWalk, Recordings
+from gaitswarm.sim.input.wording import message_of
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.robot.check import MOST_ROBOTS, check_files, files_of, objects_in
 from gaitswarm.tables import EvaluationTable
 from gaitswarm.zip_archive import BadArchive
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.documents import SPECS, AnySpec
-from services.optimizer.jobs.fork import Lineage
-from services.optimizer.jobs.provenance import JobProvenance, ProvenanceRecord
-from sim.errors import RobotFileError
-from sim.identification.recorded_walk import RecordedWalk, Recordings
-from sim.input.wording import message_of
-from sim.outcome import Status
-from sim.robot.check import MOST_ROBOTS, check_files, files_of, objects_in
 
 if TYPE_CHECKING:
     import pyarrow as pa

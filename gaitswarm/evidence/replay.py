@@ -8,16 +8,16 @@ from contextlib import closing
 import numpy as np
 from numpy.typing import NDArray
 
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.documents import AnySpec
+from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
+from gaitswarm.sim.identification.recorded_walk import Recordings
+from gaitswarm.sim.mujoco.engines import ENGINE
+from gaitswarm.sim.outcome import Outcome, Status
+from gaitswarm.sim.provenance import provenance_of
 from gaitswarm.views.verification import DifferenceView
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.documents import AnySpec
-from services.optimizer.jobs.kinds.certificate import CertificateSpec
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.run.evaluator import EvaluationRequest
-from sim.identification.recorded_walk import Recordings
-from sim.mujoco.engines import ENGINE
-from sim.outcome import Outcome, Status
-from sim.provenance import provenance_of
 
 Table = tuple[AnySpec, EvaluationColumns]
 """Evaluations, with a spec that says in which cases and precision they were made."""
@@ -80,7 +80,7 @@ def simulated_differences(
     """
     found: list[DifferenceView] = []
     # What only reads need not wait for a database's packages.
-    from services.runtime import open_evaluator
+    from gaitswarm.services.runtime import open_evaluator
 
     with closing(open_evaluator("in-process")) as evaluator:
         for spec, columns in tables:

@@ -37,9 +37,9 @@ from gaitswarm.evidence.replay import (
     why_no_replay,
 )
 from gaitswarm.places import place_of
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.views.verification import DIGEST, CheckView, DifferenceView, VerificationView
 from gaitswarm.zip_archive import LARGEST_ARCHIVE, BadArchive, unzipped
-from services.optimizer.jobs.kinds.tuning import JobSpec
 
 _SHOWN: Final = 100
 """Differences that are listed."""

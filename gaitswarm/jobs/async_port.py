@@ -9,15 +9,17 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self, Unpack
 
 from gaitswarm.jobs.port import JobEvent
-from services.optimizer.jobs.job import Command, JobOrder, JobState
-from services.optimizer.jobs.labels import ANY_JOB, JobFilter
-from sim.controllers import ControllerName
-from sim.kernel.walk import Precision
-from sim.robot import DEFAULT_ROBOT
+from gaitswarm.services.optimizer.jobs.job import Command, JobOrder, JobState
+from gaitswarm.services.optimizer.jobs.labels import ANY_JOB, JobFilter
+from gaitswarm.sim.controllers import ControllerName
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.robot import DEFAULT_ROBOT
 
 if TYPE_CHECKING:
     from gaitswarm.requests.firmware import FirmwareOptions
     from gaitswarm.requests.robustness import RobustnessOptions
+    from gaitswarm.services.optimizer.analysis.fits.targets import LeaveOut
+    from gaitswarm.sim.identification.recorded_walk import RecordedWalk
     from gaitswarm.simulation_result import SimulationResult
     from gaitswarm.specs import (
         ForkOptions,
@@ -59,8 +61,6 @@ if TYPE_CHECKING:
     )
     from gaitswarm.views.trade_offs import FrontView, PreferenceForView
     from gaitswarm.views.verification import HistoryVerificationView
-    from services.optimizer.analysis.fits.targets import LeaveOut
-    from sim.identification.recorded_walk import RecordedWalk
 
 
 class AsyncJobs(ABC):

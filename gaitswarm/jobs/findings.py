@@ -7,6 +7,8 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from gaitswarm.services.optimizer.analysis.fits.targets import LeaveOut
+    from gaitswarm.sim.kernel.walk import Precision
     from gaitswarm.specs import PreferenceInput
     from gaitswarm.tables import EvaluationTable, TableFormat
     from gaitswarm.views import BestView, HistoryIterationView, IterationView, RankingView
@@ -19,8 +21,6 @@ if TYPE_CHECKING:
     from gaitswarm.views.preferences import RobustPreferencesView
     from gaitswarm.views.trade_offs import FrontView, PreferenceForView
     from gaitswarm.views.verification import HistoryVerificationView
-    from services.optimizer.analysis.fits.targets import LeaveOut
-    from sim.kernel.walk import Precision
 
 
 class Findings(ABC):

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gaitswarm.errors import InvalidRequest, NotFound, StoreUnavailable
-from services.optimizer.run.outage import Backoff
+from gaitswarm.services.optimizer.run.outage import Backoff
 
 if TYPE_CHECKING:
     from gaitswarm.jobs.database.async_jobs import AsyncDatabaseJobs
@@ -37,9 +37,9 @@ def open(  # noqa: A001 - `gaitswarm.open`, as `gzip.open`
         StoreUnavailable: The database cannot be opened, or is of a later version.
     """
     from gaitswarm.jobs.database.jobs import DatabaseJobs
+    from gaitswarm.services.optimizer.service import JobService
+    from gaitswarm.services.runtime import open_store
     from gaitswarm.settings import read_settings
-    from services.optimizer.service import JobService
-    from services.runtime import open_store
 
     settings = read_settings(db=None if db is None else os.fspath(db))
     url = database_to_write(settings) if create else database_to_read(settings)

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Self, TypeAlias, Unpack
 from gaitswarm.jobs.findings import Findings
 from gaitswarm.jobs.tournaments import Tournaments
 from gaitswarm.jobs.walks import Walks
+from gaitswarm.services.optimizer.jobs.job import Command, JobOrder, JobState
+from gaitswarm.services.optimizer.jobs.labels import ANY_JOB, JobFilter
 from gaitswarm.views import IterationView, StateView
-from services.optimizer.jobs.job import Command, JobOrder, JobState
-from services.optimizer.jobs.labels import ANY_JOB, JobFilter
 
 if TYPE_CHECKING:
+    from gaitswarm.sim.identification.recorded_walk import RecordedWalk
     from gaitswarm.specs import ForkOptions, SpecInput, SpecOptions
     from gaitswarm.views import (
         EstimateView,
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
         JobView,
     )
     from gaitswarm.views.identification import RecordingEntryView, RecordingView
-    from sim.identification.recorded_walk import RecordedWalk
 
 JobEvent: TypeAlias = IterationView | StateView
 """What happens to a job: an iteration was committed, or its state is another."""

@@ -7,9 +7,9 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Unpack
 
-from sim.controllers import ControllerName
-from sim.kernel.walk import Precision
-from sim.robot import DEFAULT_ROBOT
+from gaitswarm.sim.controllers import ControllerName
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.robot import DEFAULT_ROBOT
 
 if TYPE_CHECKING:
     from gaitswarm.requests.firmware import FirmwareOptions

@@ -14,6 +14,15 @@ from pydantic import BaseModel, ValidationError
 
 from gaitswarm.errors import InvalidRequest, NotFound, invalid_request
 from gaitswarm.requests.preferences import PreferencesRequest
+from gaitswarm.services.optimizer.analysis.fits.targets import LeaveOut
+from gaitswarm.services.optimizer.analysis.robustness.certificate import MOST_WORST
+from gaitswarm.services.optimizer.jobs.fork import ForkRequest
+from gaitswarm.services.optimizer.jobs.job import Command, JobOrder, JobState
+from gaitswarm.services.optimizer.jobs.labels import LabelsChange
+from gaitswarm.services.optimizer.jobs.notification import unusable_url
+from gaitswarm.services.optimizer.jobs.priority import check_priority
+from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
+from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.specs import (
     ForkOptions,
     PreferenceInput,
@@ -22,15 +31,6 @@ from gaitswarm.specs import (
 from gaitswarm.tables import TableFormat
 from gaitswarm.views import RankingRequest
 from gaitswarm.views.verification import VerificationRequest
-from services.optimizer.analysis.fits.targets import LeaveOut
-from services.optimizer.analysis.robustness.certificate import MOST_WORST
-from services.optimizer.jobs.fork import ForkRequest
-from services.optimizer.jobs.job import Command, JobOrder, JobState
-from services.optimizer.jobs.labels import LabelsChange
-from services.optimizer.jobs.notification import unusable_url
-from services.optimizer.jobs.priority import check_priority
-from sim.controllers import CONTROLLERS, ControllerName
-from sim.kernel.walk import Precision
 
 E = TypeVar("E", bound=StrEnum)
 M = TypeVar("M", bound=BaseModel)

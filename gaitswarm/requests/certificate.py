@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from gaitswarm.requests.targets import Histories
+from gaitswarm.services.optimizer.analysis.robustness.certificate import certificate
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 from gaitswarm.views.certificate import CertificateView
-from services.optimizer.analysis.robustness.certificate import certificate
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.kinds.certificate import CertificateSpec
 
 
 def run_certificate(

@@ -8,6 +8,12 @@ from typing import Any, Final
 
 import numpy as np
 
+from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
+from gaitswarm.services.optimizer.jobs.iteration import Iteration
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.sim.scenario import Scenario
+from gaitswarm.sim.variables import Variable
 from gaitswarm.views.base import finite
 from gaitswarm.views.comparison import (
     ComparedJobView,
@@ -17,12 +23,6 @@ from gaitswarm.views.comparison import (
     SpecDifferenceView,
 )
 from gaitswarm.views.reference import ReferenceView
-from services.optimizer.errors import InvalidRequest, NotFound
-from services.optimizer.jobs.iteration import Iteration
-from services.optimizer.jobs.job import Job
-from services.optimizer.service import JobService
-from sim.scenario import Scenario
-from sim.variables import Variable
 
 MOST_JOBS: Final = 12
 """Jobs that are compared at once."""

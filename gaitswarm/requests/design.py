@@ -9,15 +9,15 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from gaitswarm.errors import simulation_errors
 from gaitswarm.robot_defaults import DEFAULT_CONTROLLER
-from services.optimizer.errors import InvalidRequest
-from sim.catalogue import check_design, design_numbers
-from sim.controllers import CONTROLLERS, ControllerName
-from sim.errors import SimulationInputError
-from sim.gait_variables import GAIT_CATALOGUE, with_gait
-from sim.robot import DEFAULT_ROBOT, RobotSource
-from sim.scenario import SCENARIOS, Scenario, ScenarioChoice, find_scenario
-from sim.simulate import check_drives, check_reach
-from sim.variables import VariableName, VariableValue
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.sim.catalogue import check_design, design_numbers
+from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
+from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotSource
+from gaitswarm.sim.scenario import SCENARIOS, Scenario, ScenarioChoice, find_scenario
+from gaitswarm.sim.simulate import check_drives, check_reach
+from gaitswarm.sim.variables import VariableName, VariableValue
 
 PUBLISHED_DESIGN = dict(CONTROLLERS["fuzzy-pi"].published["A"])
 

@@ -19,6 +19,9 @@ from gaitswarm.requests.replay import ReplayRequest
 from gaitswarm.requests.robustness import RobustnessOptions, RobustnessRequest
 from gaitswarm.requests.surface import SurfaceRequest
 from gaitswarm.requests.walk import SimulationRequest
+from gaitswarm.services.optimizer.jobs.documents import AnySpec
+from gaitswarm.sim.controllers import ControllerName
+from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.specs import (
     PreferenceInput,
     RobotInput,
@@ -27,9 +30,6 @@ from gaitswarm.specs import (
     scenario_entries,
 )
 from gaitswarm.views import BestView
-from services.optimizer.jobs.documents import AnySpec
-from sim.controllers import ControllerName
-from sim.kernel.walk import Precision
 
 
 def simulation(

@@ -7,11 +7,11 @@ from typing import Final
 import numpy as np
 
 from gaitswarm.requests.targets import Histories
+from gaitswarm.services.optimizer.analysis.robustness.scenario_families import scenario_families
+from gaitswarm.services.optimizer.analysis.utilities import log_utilities
+from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.views.families import ScenarioFamiliesView
-from services.optimizer.analysis.robustness.scenario_families import scenario_families
-from services.optimizer.analysis.utilities import log_utilities
-from services.optimizer.errors import Conflict, InvalidRequest
-from services.optimizer.jobs.kinds.tuning import JobSpec
 
 TOLERANCE: Final = 0.01
 """Regret of the smallest family, by default [1]."""

@@ -9,15 +9,15 @@ from pydantic import Field, ValidationError
 
 from gaitswarm.errors import invalid_request, simulation_errors
 from gaitswarm.requests.design import ScenariosRequest
+from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
+from gaitswarm.services.optimizer.jobs.documents import AnySpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.sim.catalogue import design_numbers
+from gaitswarm.sim.controllers import ControllerName
+from gaitswarm.sim.firmware import Firmware, check_drives_by_pwm, check_table_bits, firmware_of
 from gaitswarm.specs import RobotInput, ScenarioInput
 from gaitswarm.views import BestView
 from gaitswarm.views.firmware import FirmwareView
-from services.optimizer.errors import InvalidRequest, NotFound
-from services.optimizer.jobs.documents import AnySpec
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from sim.catalogue import design_numbers
-from sim.controllers import ControllerName
-from sim.firmware import Firmware, check_drives_by_pwm, check_table_bits, firmware_of
 
 
 class FirmwareOptions(TypedDict, total=False):

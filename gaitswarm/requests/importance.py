@@ -9,22 +9,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaitswarm.requests.targets import Histories
+from gaitswarm.services.optimizer.analysis.distribution import thinned
+from gaitswarm.services.optimizer.analysis.importance import (
+    MOST_DESIGNS,
+    companions,
+    first_order_indices,
+)
+from gaitswarm.services.optimizer.analysis.interval import Interval
+from gaitswarm.services.optimizer.analysis.robustness.index import NORMALISED_OBJECTIVES
+from gaitswarm.services.optimizer.analysis.utilities import objective_vectors
+from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.sim.variables import Variable
 from gaitswarm.views.importance import (
     ImportanceView,
     IndexIntervalView,
     VariableImportanceView,
     WidenedView,
 )
-from services.optimizer.analysis.distribution import thinned
-from services.optimizer.analysis.importance import MOST_DESIGNS, companions, first_order_indices
-from services.optimizer.analysis.interval import Interval
-from services.optimizer.analysis.robustness.index import NORMALISED_OBJECTIVES
-from services.optimizer.analysis.utilities import objective_vectors
-from services.optimizer.errors import Conflict, InvalidRequest
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.spec import Spec
-from sim.variables import Variable
 
 NEAR: Final = 0.01
 """Share of a variable's range within which a winner lies at the bound [1]."""

@@ -8,15 +8,15 @@ from pydantic import Field
 
 from gaitswarm.errors import simulation_errors
 from gaitswarm.requests.design import DesignRequest, resolved
-from services.optimizer.errors import InvalidRequest
-from sim.errors import MeasuredLogError
-from sim.identification.recorded_walk import RecordedWalk, record
-from sim.measurement.measured_csv import parse_measured_log
-from sim.measurement.measured_log import MeasuredLog
-from sim.measurement.synchronise import Synchronised, synchronise
-from sim.measurement.walk import MeasuredWalk
-from sim.robot import load_robot
-from sim.scenario import Scenario, ScenarioChoice
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.sim.errors import MeasuredLogError
+from gaitswarm.sim.identification.recorded_walk import RecordedWalk, record
+from gaitswarm.sim.measurement.measured_csv import parse_measured_log
+from gaitswarm.sim.measurement.measured_log import MeasuredLog
+from gaitswarm.sim.measurement.synchronise import Synchronised, synchronise
+from gaitswarm.sim.measurement.walk import MeasuredWalk
+from gaitswarm.sim.robot import load_robot
+from gaitswarm.sim.scenario import Scenario, ScenarioChoice
 
 
 class MeasuredWalkRequest(DesignRequest):

@@ -15,19 +15,19 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from gaitswarm.errors import invalid_request, simulation_errors
 from gaitswarm.requests.robustness import RobustnessRequest, run_robustness
 from gaitswarm.requests.targets import Histories
-from gaitswarm.views.base import finite
-from gaitswarm.views.preferences import PreferenceWinnerView, RobustPreferencesView
-from gaitswarm.views.robustness import IndexView
-from services.optimizer.analysis.robustness.preference_winners import (
+from gaitswarm.services.optimizer.analysis.robustness.preference_winners import (
     Winner,
     drawn_preferences,
     winners,
 )
-from services.optimizer.errors import Conflict, InvalidRequest
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.documents import AnySpec
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from sim.kernel.walk import Precision
+from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.documents import AnySpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.views.base import finite
+from gaitswarm.views.preferences import PreferenceWinnerView, RobustPreferencesView
+from gaitswarm.views.robustness import IndexView
 
 MOST: Final = 100_000
 """Preferences and candidates of a request."""

@@ -9,12 +9,12 @@ from pydantic import Field
 from gaitswarm.mesh_library import urdf_digest
 from gaitswarm.requests.design import resolved
 from gaitswarm.requests.walk import WorldRequest
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.replay import CONTROL_RATE, replay
+from gaitswarm.sim.robot import RobotFiles, load_robot
+from gaitswarm.sim.scenario import ScenarioChoice
 from gaitswarm.views.replay import encoded_replay
-from services.optimizer.errors import InvalidRequest
-from sim.outcome import Status
-from sim.replay import CONTROL_RATE, replay
-from sim.robot import RobotFiles, load_robot
-from sim.scenario import ScenarioChoice
 
 MOST_POSES: Final = 1_000_000
 """Poses of links in a replay; one of 40 s at 500 Hz has half as many of a shipped robot."""

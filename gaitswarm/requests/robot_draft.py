@@ -6,11 +6,11 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from gaitswarm.errors import simulation_errors
 from gaitswarm.robots import check_name, frame_of, own_name
+from gaitswarm.sim.proposal.apart import propose_apart
+from gaitswarm.sim.proposal.drive import ActuatorChoice
+from gaitswarm.sim.proposal.frame import Axis
+from gaitswarm.sim.robot.bounds import LONGEST_NAME, LONGEST_URDF, MOST_ELEMENTS, MOST_LINKS
 from gaitswarm.views.robot_draft import RobotDraftView
-from sim.proposal.apart import propose_apart
-from sim.proposal.drive import ActuatorChoice
-from sim.proposal.frame import Axis
-from sim.robot.bounds import LONGEST_NAME, LONGEST_URDF, MOST_ELEMENTS, MOST_LINKS
 
 
 class RobotDraftRequest(BaseModel):

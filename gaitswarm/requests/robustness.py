@@ -10,19 +10,23 @@ import numpy as np
 from pydantic import Field
 
 from gaitswarm.requests.walk import WalksRequest
+from gaitswarm.services.optimizer.analysis.robustness.index import (
+    LocalSample,
+    local_sample,
+    robustness,
+)
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
+from gaitswarm.sim.case import Walk
+from gaitswarm.sim.catalogue import design_catalogue
+from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
+from gaitswarm.sim.input.near_names import instead_of
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.outcome import Outcome, Status
+from gaitswarm.sim.provenance import provenance_of
+from gaitswarm.sim.variables import Variable, VariableChoice
 from gaitswarm.specs import RobotInput, ScenarioInput
 from gaitswarm.views.robustness import RobustnessView
-from services.optimizer.analysis.robustness.index import LocalSample, local_sample, robustness
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.run.evaluator import EvaluationRequest
-from sim.case import Walk
-from sim.catalogue import design_catalogue
-from sim.controllers import CONTROLLERS, ControllerName
-from sim.input.near_names import instead_of
-from sim.kernel.walk import Precision
-from sim.outcome import Outcome, Status
-from sim.provenance import provenance_of
-from sim.variables import Variable, VariableChoice
 
 _BLOCK: Final = 64
 """Designs between two reports of progress; a multiple of every kernel's lanes."""
@@ -156,7 +160,7 @@ def _walked(
     request: RobustnessRequest, sample: LocalSample, cpus: int | None, progress: Progress | None
 ) -> list[Outcome]:
     """One outcome a scenario."""
-    from services.runtime import open_evaluator
+    from gaitswarm.services.runtime import open_evaluator
 
     cases = tuple(
         Walk(request.robot, request.controller, scenario, sample.names, request.precision)

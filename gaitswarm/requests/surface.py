@@ -7,12 +7,12 @@ from collections.abc import Mapping
 from pydantic import BaseModel, ConfigDict, Field
 
 from gaitswarm.requests.design import PUBLISHED_DESIGN
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.sim.catalogue import check_design, design_numbers
+from gaitswarm.sim.controllers import CONTROLLERS, ControllerName, Inference
+from gaitswarm.sim.controllers.surface import surface
+from gaitswarm.sim.variables import VariableName, VariableValue
 from gaitswarm.views.surface import SurfaceView
-from services.optimizer.errors import InvalidRequest
-from sim.catalogue import check_design, design_numbers
-from sim.controllers import CONTROLLERS, ControllerName, Inference
-from sim.controllers.surface import surface
-from sim.variables import VariableName, VariableValue
 
 
 class SurfaceRequest(BaseModel):

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
+from gaitswarm.services.optimizer.analysis.fits.identifiability import check_comparable
+from gaitswarm.services.optimizer.analysis.fits.targets import LeaveOut, target_results
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.iteration import Evaluation
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from gaitswarm.views.calibration import TargetsView
-from services.optimizer.analysis.fits.identifiability import check_comparable
-from services.optimizer.analysis.fits.targets import LeaveOut, target_results
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.iteration import Evaluation
-from services.optimizer.jobs.job import Job
-from services.optimizer.jobs.kinds.calibration import CalibrationSpec
 
 
 class Histories(Protocol):

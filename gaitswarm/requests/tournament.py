@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from typing import Final, Protocol
 
+from gaitswarm.services.optimizer.analysis.tournaments.entrants import Tournament, tournaments_of
+from gaitswarm.services.optimizer.analysis.tournaments.standings import (
+    looked_at,
+    profiles_of,
+    standings_of,
+)
+from gaitswarm.services.optimizer.analysis.tournaments.tournament import Results
+from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, NotFound
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.kinds.tournament import TournamentSpec
+from gaitswarm.services.optimizer.store.port.reading import Page
 from gaitswarm.views.tournament import ProblemRunsView, TournamentStandingsView, TournamentView
-from services.optimizer.analysis.tournaments.entrants import Tournament, tournaments_of
-from services.optimizer.analysis.tournaments.standings import looked_at, profiles_of, standings_of
-from services.optimizer.analysis.tournaments.tournament import Results
-from services.optimizer.errors import Conflict, InvalidRequest, NotFound
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.job import Job
-from services.optimizer.jobs.kinds.tournament import TournamentSpec
-from services.optimizer.store.port.reading import Page
 
 _PAGE: Final = 200
 

@@ -8,13 +8,13 @@ import numpy as np
 
 from gaitswarm.places import place_of
 from gaitswarm.requests.targets import Histories
+from gaitswarm.services.optimizer.analysis.trade_offs.front import pareto_front
+from gaitswarm.services.optimizer.analysis.trade_offs.winning_preference import preference_fits
+from gaitswarm.services.optimizer.analysis.utilities import objective_vectors
+from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, NotFound
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.views.trade_offs import FrontView, PreferenceForView
-from services.optimizer.analysis.trade_offs.front import pareto_front
-from services.optimizer.analysis.trade_offs.winning_preference import preference_fits
-from services.optimizer.analysis.utilities import objective_vectors
-from services.optimizer.errors import Conflict, InvalidRequest, NotFound
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.kinds.tuning import JobSpec
 
 DESIGNS: Final = 1000
 """Designs of a front that are listed, by default."""

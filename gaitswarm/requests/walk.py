@@ -10,18 +10,18 @@ from pydantic import Field, FiniteFloat, model_validator
 
 from gaitswarm.requests.design import DesignRequest, ScenariosRequest
 from gaitswarm.robot_defaults import DEFAULT_PREFERENCE
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice
+from gaitswarm.sim.assembly import Backend, check_precision
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.gait.stability import static_stability
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.robot import load_robot
+from gaitswarm.sim.scenario import Scenario
+from gaitswarm.sim.simulate import Simulation, simulate
+from gaitswarm.sim.variables import VariableName
+from gaitswarm.sim.worlds import WorldWalk, check_worlds
 from gaitswarm.views import SimulationView
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice
-from sim.assembly import Backend, check_precision
-from sim.errors import SimulationInputError
-from sim.gait.stability import static_stability
-from sim.kernel.walk import Precision
-from sim.robot import load_robot
-from sim.scenario import Scenario
-from sim.simulate import Simulation, simulate
-from sim.variables import VariableName
-from sim.worlds import WorldWalk, check_worlds
 
 
 class WorldRequest(DesignRequest):

@@ -11,15 +11,15 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from gaitswarm.sim.case import Case, LongCase, Walk, run_together
+from gaitswarm.sim.case_registry import CASES, CaseSettings, create_case
+from gaitswarm.sim.controllers import CONTROLLERS
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.gait_variables import with_gait
+from gaitswarm.sim.outcome import Outcome, Status
+from gaitswarm.sim.robot import DEFAULT_ROBOT
+from gaitswarm.sim.scenario import find_scenario
 from gaitswarm.testing.refusals import refused
-from sim.case import Case, LongCase, Walk, run_together
-from sim.case_registry import CASES, CaseSettings, create_case
-from sim.controllers import CONTROLLERS
-from sim.errors import SimulationInputError
-from sim.gait_variables import with_gait
-from sim.outcome import Outcome, Status
-from sim.robot import DEFAULT_ROBOT
-from sim.scenario import find_scenario
 
 
 class CaseContract:

@@ -8,16 +8,16 @@ from types import MappingProxyType
 
 import numpy as np
 
+from gaitswarm.sim.catalogue import check_design
+from gaitswarm.sim.controllers import CONTROLLERS, ControlLaw, Controller, LookupTable, names_of
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.gait_variables import GAIT_CATALOGUE
+from gaitswarm.sim.kernel.gains import check_gains
+from gaitswarm.sim.robot import RobotSource, load_robot
+from gaitswarm.sim.robot.shipped import DEFAULT_ROBOT
+from gaitswarm.sim.scenario import find_scenario
+from gaitswarm.sim.simulate import simulate
 from gaitswarm.testing.refusals import refused
-from sim.catalogue import check_design
-from sim.controllers import CONTROLLERS, ControlLaw, Controller, LookupTable, names_of
-from sim.errors import SimulationInputError
-from sim.gait_variables import GAIT_CATALOGUE
-from sim.kernel.gains import check_gains
-from sim.robot import RobotSource, load_robot
-from sim.robot.shipped import DEFAULT_ROBOT
-from sim.scenario import find_scenario
-from sim.simulate import simulate
 
 
 class ControllerContract:

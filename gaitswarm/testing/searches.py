@@ -15,9 +15,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.search.optimizer import Optimizer
-from services.optimizer.search.registry import METHODS
-from services.optimizer.search.space import Axis, Space
+from gaitswarm.services.optimizer.search.optimizer import Optimizer
+from gaitswarm.services.optimizer.search.registry import METHODS
+from gaitswarm.services.optimizer.search.space import Axis, Space
 
 Floats = NDArray[np.float64]
 

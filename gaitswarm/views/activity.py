@@ -7,14 +7,14 @@ from typing import Literal
 
 from pydantic import Field
 
-from gaitswarm.views.base import View
-from services.monitoring.activity import (
+from gaitswarm.services.monitoring.activity import (
     IterationSpan,
     JobActivity,
     Message,
     TaskSpan,
     WorkerHealth,
 )
+from gaitswarm.views.base import View
 
 Level = Literal["DEBUG", "INFO", "WARNING", "ERROR", "CRITICAL"]
 

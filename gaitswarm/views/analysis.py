@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from gaitswarm.services.optimizer.analysis.distribution import QUANTILES, Distribution
+from gaitswarm.services.optimizer.analysis.ranking import RankedDesign, RankedJob
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.iteration import Evaluation
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice
 from gaitswarm.views.base import View, finite
 from gaitswarm.views.evaluation import ScenarioResultView, evaluation_views
-from services.optimizer.analysis.distribution import QUANTILES, Distribution
-from services.optimizer.analysis.ranking import RankedDesign, RankedJob
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.iteration import Evaluation
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice
 
 
 class DistributionItemView(View):

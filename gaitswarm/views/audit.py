@@ -7,8 +7,8 @@ from typing import Any
 
 from pydantic import Field
 
+from gaitswarm.services.optimizer.jobs.audit import AuditAction, AuditEntry
 from gaitswarm.views.base import View
-from services.optimizer.jobs.audit import AuditAction, AuditEntry
 
 
 class AuditEntryView(View):

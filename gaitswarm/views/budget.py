@@ -7,8 +7,8 @@ from typing import Literal
 
 from pydantic import Field
 
+from gaitswarm.services.optimizer.jobs.estimate import Estimate
 from gaitswarm.views.base import View
-from services.optimizer.jobs.estimate import Estimate
 
 
 @dataclass(frozen=True, slots=True)

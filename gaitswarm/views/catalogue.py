@@ -6,24 +6,24 @@ from typing import Any, Generic, Literal, TypeVar
 
 from pydantic import ConfigDict, Field
 
-from gaitswarm.views.base import View, listing_name
-from services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceName
-from services.optimizer.search.automatic import (
+from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceName
+from gaitswarm.services.optimizer.search.automatic import (
     AUTO_SUMMARY,
     CHOICES,
     ChoiceName,
     ChosenSettings,
 )
-from services.optimizer.search.registry import METHODS
-from sim.case_registry import CASES
-from sim.catalogue import design_shown
-from sim.controllers import CONTROLLERS
-from sim.gait_variables import GAIT_VARIABLES
-from sim.plugins import Kind, Registry
-from sim.robot import DEFAULT_ROBOT, SHIPPED, RobotName, load_robot
-from sim.robot.identifiable import CONVENTIONAL_VARIABLES, identifiable_variables
-from sim.scenario import PRESETS, Scenario
-from sim.variables import Variable
+from gaitswarm.services.optimizer.search.registry import METHODS
+from gaitswarm.sim.case_registry import CASES
+from gaitswarm.sim.catalogue import design_shown
+from gaitswarm.sim.controllers import CONTROLLERS
+from gaitswarm.sim.gait_variables import GAIT_VARIABLES
+from gaitswarm.sim.plugins import Kind, Registry
+from gaitswarm.sim.robot import DEFAULT_ROBOT, SHIPPED, RobotName, load_robot
+from gaitswarm.sim.robot.identifiable import CONVENTIONAL_VARIABLES, identifiable_variables
+from gaitswarm.sim.scenario import PRESETS, Scenario
+from gaitswarm.sim.variables import Variable
+from gaitswarm.views.base import View, listing_name
 
 T = TypeVar("T")
 

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from gaitswarm.views.base import View, finite
-from gaitswarm.views.evaluation import StatusName
-from services.optimizer.analysis.robustness.certificate import (
+from gaitswarm.services.optimizer.analysis.robustness.certificate import (
     LEVEL,
     QUANTILES,
     CaseResult,
@@ -16,15 +14,17 @@ from services.optimizer.analysis.robustness.certificate import (
     Spread,
     WorldOutcome,
 )
-from services.optimizer.analysis.robustness.engines import (
+from gaitswarm.services.optimizer.analysis.robustness.engines import (
     Compared,
     ComparedCase,
     ComparedEngine,
 )
-from services.optimizer.jobs.kinds.certificate import CertificateSpec
-from services.optimizer.jobs.preference import Preference
-from sim.mujoco.engines import ENGINES
-from sim.robot import RobotSource
+from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
+from gaitswarm.services.optimizer.jobs.preference import Preference
+from gaitswarm.sim.mujoco.engines import ENGINES
+from gaitswarm.sim.robot import RobotSource
+from gaitswarm.views.base import View, finite
+from gaitswarm.views.evaluation import StatusName
 
 
 class ProportionView(View):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from services.optimizer.jobs.job import LARGEST_BUDGET
-from services.optimizer.jobs.priority import HIGHEST, LOWEST
+from gaitswarm.services.optimizer.jobs.job import LARGEST_BUDGET
+from gaitswarm.services.optimizer.jobs.priority import HIGHEST, LOWEST
 
 
 class ExtensionRequest(BaseModel):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pydantic import Field
 
+from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.views.base import View
 from gaitswarm.views.reference import ReferenceView
-from services.optimizer.jobs.job import JobState
 
 
 class ConvergenceView(View):

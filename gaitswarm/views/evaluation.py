@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from pydantic import Field, TypeAdapter
 from pydantic_core import to_json
 
+from gaitswarm.services.optimizer.jobs.iteration import Evaluation
+from gaitswarm.services.optimizer.jobs.judgement import exponential
+from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.outcome import OBJECTIVES, Objective, Status
 from gaitswarm.views.base import View, finite
-from services.optimizer.jobs.iteration import Evaluation
-from services.optimizer.jobs.judgement import exponential
-from services.optimizer.jobs.spec import Spec
-from sim.kernel.walk import Precision
-from sim.outcome import OBJECTIVES, Objective, Status
 
 StatusName = Literal["ok", "diverged", "fell", "unreachable", "stalled"]
 _EXAMPLE: Final = {
@@ -221,7 +221,7 @@ def case_results(
     Args:
         names: K names of the cases.
         objectives: m, columns of `values`.
-        statuses: (K,) values of `sim.outcome.Status`.
+        statuses: (K,) values of `gaitswarm.sim.outcome.Status`.
         values: (K, m) raw objectives, in their units, NaN where there is none.
         log_utilities: (K,) logarithms of the utilities, +inf for a failed case.
 

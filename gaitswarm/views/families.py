@@ -8,14 +8,14 @@ from collections.abc import Sequence
 import numpy as np
 from pydantic import Field
 
-from gaitswarm.views.base import View, finite
-from services.optimizer.analysis.interval import Interval
-from services.optimizer.analysis.robustness.scenario_families import (
+from gaitswarm.services.optimizer.analysis.interval import Interval
+from gaitswarm.services.optimizer.analysis.robustness.scenario_families import (
     Family,
     LeftOut,
     ScenarioFamilies,
 )
-from services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.views.base import View, finite
 
 
 class LossView(View):

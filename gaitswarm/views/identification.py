@@ -6,20 +6,20 @@ from datetime import datetime
 
 from pydantic import Field
 
-from gaitswarm.views.base import View, finite
-from services.optimizer.analysis.fits.identifiability import (
+from gaitswarm.services.optimizer.analysis.fits.identifiability import (
     THRESHOLDS,
     ChoiceEvidence,
     Identifiability,
     ParameterIdentifiability,
     Trust,
 )
-from services.optimizer.store.port.recordings import RecordingEntry
-from sim.controllers.fixed_point import CONTROL_PERIOD
-from sim.identification.recorded_walk import RecordedWalk
-from sim.measurement.measured_log import MeasuredLog, Quantity
-from sim.measurement.synchronise import Synchronised
-from sim.scenario import Scenario
+from gaitswarm.services.optimizer.store.port.recordings import RecordingEntry
+from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
+from gaitswarm.sim.identification.recorded_walk import RecordedWalk
+from gaitswarm.sim.measurement.measured_log import MeasuredLog, Quantity
+from gaitswarm.sim.measurement.synchronise import Synchronised
+from gaitswarm.sim.scenario import Scenario
+from gaitswarm.views.base import View, finite
 
 
 class IntervalView(View):

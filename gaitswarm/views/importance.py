@@ -6,8 +6,8 @@ from typing import Literal
 
 from pydantic import Field
 
+from gaitswarm.services.optimizer.analysis.interval import Interval
 from gaitswarm.views.base import View
-from services.optimizer.analysis.interval import Interval
 
 
 class IndexIntervalView(View):

@@ -8,10 +8,10 @@ from datetime import datetime
 from pydantic import Field
 from pydantic_core import to_json
 
+from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Iteration
+from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.views.base import View, finite
 from gaitswarm.views.evaluation import EvaluationView, evaluation_views
-from services.optimizer.jobs.iteration import Evaluation, Iteration
-from services.optimizer.jobs.spec import Spec
 
 
 class IterationView(View):

@@ -7,25 +7,25 @@ from typing import Literal
 
 from pydantic import ConfigDict, Field
 
+from gaitswarm.services.optimizer.errors import Unreadable
+from gaitswarm.services.optimizer.jobs.documents import AnySpec
+from gaitswarm.services.optimizer.jobs.fork import Lineage
+from gaitswarm.services.optimizer.jobs.iteration import Evaluation
+from gaitswarm.services.optimizer.jobs.job import (
+    Job,
+    JobState,
+    UnreadableSpec,
+)
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.labels import preference_name, robot_name
+from gaitswarm.services.optimizer.jobs.provenance import ProvenanceRecord, as_stored
+from gaitswarm.services.optimizer.jobs.time_left import time_left
+from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.views.base import View, finite
 from gaitswarm.views.budget import Spent, budget_spent
 from gaitswarm.views.evaluation import BestView, ObjectiveView
 from gaitswarm.views.links import job_links
 from gaitswarm.views.reference import ReferenceView
-from services.optimizer.errors import Unreadable
-from services.optimizer.jobs.documents import AnySpec
-from services.optimizer.jobs.fork import Lineage
-from services.optimizer.jobs.iteration import Evaluation
-from services.optimizer.jobs.job import (
-    Job,
-    JobState,
-    UnreadableSpec,
-)
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.labels import preference_name, robot_name
-from services.optimizer.jobs.provenance import ProvenanceRecord, as_stored
-from services.optimizer.jobs.time_left import time_left
-from sim.kernel.walk import Precision
 
 JobKind = Literal["tuning", "identification", "calibration", "tournament", "certificate"]
 

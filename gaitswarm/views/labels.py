@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pydantic import Field
 
+from gaitswarm.services.optimizer.jobs.labels import FacetCounts
 from gaitswarm.views.base import View
-from services.optimizer.jobs.labels import FacetCounts
 
 
 class JobFacetsView(View):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from services.optimizer.jobs.job import DELETABLE, TRANSITIONS, Job, JobState
-from services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.job import DELETABLE, TRANSITIONS, Job, JobState
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 
 PREFIX: Final = "/v1"
 """Version of the HTTP API, in every path."""

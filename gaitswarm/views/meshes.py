@@ -5,9 +5,9 @@ from __future__ import annotations
 from pydantic import Field
 
 from gaitswarm.mesh_library import FoundMesh, MeshFormat
+from gaitswarm.sim.robot.visual_meshes import VisualMesh
 from gaitswarm.views.base import View
 from gaitswarm.views.links import PREFIX
-from sim.robot.visual_meshes import VisualMesh
 
 
 class LinkMeshView(View):

@@ -8,8 +8,8 @@ from urllib.parse import urlsplit
 
 from pydantic import Field
 
+from gaitswarm.services.optimizer.jobs.notification import Notification
 from gaitswarm.views.base import View
-from services.optimizer.jobs.notification import Notification
 
 
 class NotificationView(View):

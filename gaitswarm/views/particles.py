@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from gaitswarm.services.optimizer.analysis.distribution import thinned
+from gaitswarm.services.optimizer.analysis.robustness.index import NORMALISED_OBJECTIVES
+from gaitswarm.services.optimizer.analysis.utilities import objective_vectors, utilities
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.views.base import View, framed
-from services.optimizer.analysis.distribution import thinned
-from services.optimizer.analysis.robustness.index import NORMALISED_OBJECTIVES
-from services.optimizer.analysis.utilities import objective_vectors, utilities
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.job import Job
-from services.optimizer.jobs.kinds.tuning import JobSpec
 
 
 class ParticleColumnView(View):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pydantic import Field
 
+from gaitswarm.services.optimizer.jobs.preference import Preference
 from gaitswarm.views.base import View
 from gaitswarm.views.robustness import IndexView
-from services.optimizer.jobs.preference import Preference
 
 
 class PreferenceWinnerView(View):

@@ -8,10 +8,10 @@ from typing import Any, Final
 
 from pydantic import Field
 
+from gaitswarm.sim.input.choice import without_tags
+from gaitswarm.sim.input.former_names import as_written
+from gaitswarm.sim.input.wording import message_of
 from gaitswarm.views.base import View
-from sim.input.choice import without_tags
-from sim.input.former_names import as_written
-from sim.input.wording import message_of
 
 _LEADING_FIELD: Final = re.compile(r"^([a-z_]+(?:\.\w+)*): (.*)$", re.DOTALL)
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pydantic import Field
 
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.reference import Reference, ReferenceKind
 from gaitswarm.views.base import View, finite
-from services.optimizer.jobs.job import Job
-from services.optimizer.jobs.reference import Reference, ReferenceKind
 
 
 class ReferenceView(View):

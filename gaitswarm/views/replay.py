@@ -11,17 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from gaitswarm.sim.kernel.parameters import gravity_on
+from gaitswarm.sim.outcome import OBJECTIVE_NAMES, OBJECTIVES, Status
+from gaitswarm.sim.replay import Replay
+from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.shapes import Role, Shape, VisibleLink
+from gaitswarm.sim.robot.urdf import SolidKind
+from gaitswarm.sim.scenario import Scenario
 from gaitswarm.views.base import View, finite, framed, unframed
 from gaitswarm.views.evaluation import StatusName
 from gaitswarm.views.meshes import LinkMeshView
 from gaitswarm.views.simulation import QUANTITIES
-from sim.kernel.parameters import gravity_on
-from sim.outcome import OBJECTIVE_NAMES, OBJECTIVES, Status
-from sim.replay import Replay
-from sim.robot import Robot
-from sim.robot.shapes import Role, Shape, VisibleLink
-from sim.robot.urdf import SolidKind
-from sim.scenario import Scenario
 
 VERSION: Final = 1
 

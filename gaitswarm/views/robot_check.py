@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pydantic import Field
 
+from gaitswarm.sim.variables import Variable
 from gaitswarm.views.base import View
-from sim.variables import Variable
 
 
 class CheckedLegView(View):

@@ -8,19 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gaitswarm.views.base import View, finite
-from gaitswarm.views.evaluation import ObjectiveView
-from services.optimizer.analysis.interval import Interval
-from services.optimizer.analysis.robustness.index import (
+from gaitswarm.services.optimizer.analysis.interval import Interval
+from gaitswarm.services.optimizer.analysis.robustness.index import (
     NORMALISED_OBJECTIVES,
     LocalSample,
     Robustness,
     Sensitivity,
 )
-from sim.catalogue import design_shown
-from sim.kernel.walk import Precision
-from sim.robot import RobotSource
-from sim.variables import Variable
+from gaitswarm.sim.catalogue import design_shown
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.robot import RobotSource
+from gaitswarm.sim.variables import Variable
+from gaitswarm.views.base import View, finite
+from gaitswarm.views.evaluation import ObjectiveView
 
 _NAMES = tuple(objective.name for objective in NORMALISED_OBJECTIVES)
 

@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, WithJsonSchema
 
+from gaitswarm.services.optimizer.jobs.preference import Preference, figure_of_merit, judge
+from gaitswarm.sim.catalogue import design_shown
+from gaitswarm.sim.gait.stability import Stability
+from gaitswarm.sim.kernel.observation import WalkLog
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.outcome import MEASUREMENT_NAMES, OBJECTIVES, Status
+from gaitswarm.sim.robot import RobotSource
 from gaitswarm.views.base import View, finite
 from gaitswarm.views.evaluation import ScenarioResultView, case_results
-from services.optimizer.jobs.preference import Preference, figure_of_merit, judge
-from sim.catalogue import design_shown
-from sim.gait.stability import Stability
-from sim.kernel.observation import WalkLog
-from sim.kernel.walk import Precision
-from sim.outcome import MEASUREMENT_NAMES, OBJECTIVES, Status
-from sim.robot import RobotSource
 
 LOG_RATE: Final = 500
 """Rows of a log per second of simulated time [Hz]."""
@@ -115,7 +115,7 @@ class MeasurementsView(View):
         """Make a view of one walk's measurements.
 
         Args:
-            row: (5,) in the order of `sim.outcome.MEASUREMENTS`, NaN where there is none.
+            row: (5,) in the order of `gaitswarm.sim.outcome.MEASUREMENTS`, NaN where there is none.
         """
         return cls(**dict(zip(MEASUREMENT_NAMES, map(finite, row.tolist()), strict=True)))
 
@@ -219,9 +219,9 @@ class SimulationView(View):
             preference: by which to judge.
             precision: of the physics' numbers.
             names: K names of the scenarios.
-            statuses: (K,) values of `sim.outcome.Status`.
+            statuses: (K,) values of `gaitswarm.sim.outcome.Status`.
             objectives: (K, 6) raw objectives f1..f6, in their units, NaN where there is none.
-            measurements: (K, 5) as in `sim.outcome.MEASUREMENTS`, NaN where there is none.
+            measurements: (K, 5) as in `MEASUREMENTS`, NaN where there is none.
             logs: K, or none if they were not asked for; None for a robot that never moved.
             gaits: K planned gaits, or none to leave them out.
         """

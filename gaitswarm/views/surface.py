@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from pydantic import ConfigDict, Field
 
+from gaitswarm.sim.controllers import ControllerName
+from gaitswarm.sim.controllers.mamdani import Rule
+from gaitswarm.sim.controllers.quantisation import OUTPUT_BITS
+from gaitswarm.sim.controllers.surface import Memberships, Surface
 from gaitswarm.views.base import View
-from sim.controllers import ControllerName
-from sim.controllers.mamdani import Rule
-from sim.controllers.quantisation import OUTPUT_BITS
-from sim.controllers.surface import Memberships, Surface
 
 
 class MembershipView(View):

@@ -7,13 +7,13 @@ from datetime import datetime
 
 from pydantic import Field
 
+from gaitswarm.services.optimizer.analysis.interval import Interval
+from gaitswarm.services.optimizer.analysis.tournaments.entrants import Entrant, Tournament
+from gaitswarm.services.optimizer.analysis.tournaments.standings import Profile, Standing, Standings
+from gaitswarm.services.optimizer.analysis.tournaments.tournament import Runs
+from gaitswarm.services.optimizer.jobs.job import JobState
+from gaitswarm.services.optimizer.jobs.kinds.race_case import SEED
 from gaitswarm.views.base import View, finite
-from services.optimizer.analysis.interval import Interval
-from services.optimizer.analysis.tournaments.entrants import Entrant, Tournament
-from services.optimizer.analysis.tournaments.standings import Profile, Standing, Standings
-from services.optimizer.analysis.tournaments.tournament import Runs
-from services.optimizer.jobs.job import JobState
-from services.optimizer.jobs.kinds.race_case import SEED
 
 
 class EntrantView(View):

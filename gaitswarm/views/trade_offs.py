@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from gaitswarm.services.optimizer.analysis.robustness.index import NORMALISED_OBJECTIVES
+from gaitswarm.services.optimizer.analysis.trade_offs.front import Front
+from gaitswarm.services.optimizer.analysis.trade_offs.winning_preference import PreferenceFit
+from gaitswarm.services.optimizer.analysis.utilities import objective_vectors
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.preference import Preference
 from gaitswarm.views.base import View, finite
 from gaitswarm.views.evaluation import ObjectiveView
-from services.optimizer.analysis.robustness.index import NORMALISED_OBJECTIVES
-from services.optimizer.analysis.trade_offs.front import Front
-from services.optimizer.analysis.trade_offs.winning_preference import PreferenceFit
-from services.optimizer.analysis.utilities import objective_vectors
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.preference import Preference
 
 OBJECTIVE_NAMES: Final = tuple(objective.name for objective in NORMALISED_OBJECTIVES)
 

@@ -21,7 +21,7 @@ from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 from sphinx.util.typing import ExtensionMetadata
 
-from cli.main import app as command_line
+from gaitswarm.cli.main import app as command_line
 from scripts.manual.fields import models, settings
 from scripts.manual.rest import routes, schemas
 

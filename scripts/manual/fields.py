@@ -54,7 +54,7 @@ def _row(name: str, field: FieldInfo) -> str:
     value = None if field.is_required() else field.get_default(call_default_factory=True)
     kind = getattr(field.annotation, "__name__", None) if not get_args(field.annotation) else None
     shown = kind or str(field.annotation).replace("typing.", "")
-    for module in ("sim.robot.description.", "collections.abc."):
+    for module in ("gaitswarm.sim.robot.description.", "collections.abc."):
         shown = shown.replace(module, "")
     default = code("" if value is None else value)
     return row([code(name), code(shown), default, field.description or ""])

@@ -6,8 +6,8 @@ import json
 from collections.abc import Iterator
 from functools import cache
 
-from api.document import document
-from api.problems import PROBLEMS
+from gaitswarm.api.document import document
+from gaitswarm.api.problems import PROBLEMS
 from scripts.manual.tables import Json, code, default_of, head, kind_of, row
 
 

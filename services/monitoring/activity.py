@@ -15,9 +15,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Final, cast
 
-from services.optimizer.log_context import log_fields
-from services.optimizer.run.evaluator import EvaluationRequest, Evaluator, TaskReport
-from sim.outcome import Outcome
+from gaitswarm.services.optimizer.log_context import log_fields
+from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, Evaluator, TaskReport
+from gaitswarm.sim.outcome import Outcome
 
 _JOBS: Final = 32
 """Jobs of which anything is known: those that were heard of last."""

@@ -9,9 +9,9 @@ from typing import Protocol
 from prometheus_client.metrics_core import GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
-from services.monitoring.metrics import FAILURE_CAUSES, failure_cause
-from services.optimizer.errors import StoreUnavailable
-from services.optimizer.store.port.base import Store
+from gaitswarm.services.monitoring.metrics import FAILURE_CAUSES, failure_cause
+from gaitswarm.services.optimizer.errors import StoreUnavailable
+from gaitswarm.services.optimizer.store.port.base import Store
 
 
 class QueueCollector(Collector):

@@ -13,10 +13,10 @@ from threading import Thread
 from typing import Any, Final
 from wsgiref.simple_server import WSGIRequestHandler, WSGIServer, make_server
 
-from services.monitoring.hosts import HostNames
-from services.monitoring.metrics import Metrics
-from services.optimizer.access import Tokens, secret_digest
-from services.optimizer.errors import EvaluatorUnavailable, StoreUnavailable
+from gaitswarm.services.monitoring.hosts import HostNames
+from gaitswarm.services.monitoring.metrics import Metrics
+from gaitswarm.services.optimizer.access import Tokens, secret_digest
+from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, StoreUnavailable
 
 _log = logging.getLogger(__name__)
 

@@ -10,13 +10,13 @@ from typing import Any, Final, cast
 
 import numpy as np
 
-from services.monitoring.metrics import Metrics, failure_cause
-from services.optimizer.errors import LeaseLost, StoreUnavailable
-from services.optimizer.jobs.estimate import duration
-from services.optimizer.jobs.iteration import CompletedIteration
-from services.optimizer.jobs.job import Claim, Command, Job, JobState
-from services.optimizer.store.port.base import Store
-from sim.outcome import Status
+from gaitswarm.services.monitoring.metrics import Metrics, failure_cause
+from gaitswarm.services.optimizer.errors import LeaseLost, StoreUnavailable
+from gaitswarm.services.optimizer.jobs.estimate import duration
+from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
+from gaitswarm.services.optimizer.jobs.job import Claim, Command, Job, JobState
+from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.sim.outcome import Status
 
 _LOSSES_KEPT: Final = 256
 """Leases whose loss is remembered, so that it is counted once."""

@@ -17,7 +17,7 @@ from prometheus_client.exposition import choose_encoder
 from prometheus_client.metrics_core import Metric
 from prometheus_client.registry import Collector
 
-from sim.outcome import Status
+from gaitswarm.sim.outcome import Status
 
 _OTHER: Final = "other"
 

@@ -16,12 +16,12 @@ from opentelemetry.sdk.resources import Resource
 from opentelemetry.sdk.trace import SpanProcessor, TracerProvider
 from opentelemetry.trace import Span, Status, StatusCode, set_span_in_context
 
-from services.optimizer.errors import LeaseLost
-from services.optimizer.jobs.iteration import CompletedIteration
-from services.optimizer.jobs.job import Claim, JobState, Renewal
-from services.optimizer.run.evaluator import EvaluationRequest, Evaluator, TaskReport
-from services.optimizer.store.port.base import Store
-from sim.outcome import Outcome
+from gaitswarm.services.optimizer.errors import LeaseLost
+from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
+from gaitswarm.services.optimizer.jobs.job import Claim, JobState, Renewal
+from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, Evaluator, TaskReport
+from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.sim.outcome import Outcome
 
 
 def exporting_tracing() -> Tracing:

@@ -18,9 +18,9 @@ from typing import Final
 
 import httpx2
 
-from services.optimizer.errors import StoreUnavailable
-from services.optimizer.jobs.notification import Notification, refused_url
-from services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.errors import StoreUnavailable
+from gaitswarm.services.optimizer.jobs.notification import Notification, refused_url
+from gaitswarm.services.optimizer.store.port.base import Store
 
 _TIMEOUT: Final = 10.0
 """Longest silence of a receiver [s]."""

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from services.optimizer.jobs.audit import LOCAL
-from services.optimizer.jobs.job import Command, Job
-from services.optimizer.jobs.priority import check_priority
-from services.optimizer.jobs.quota import Quota
-from services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.jobs.audit import LOCAL
+from gaitswarm.services.optimizer.jobs.job import Command, Job
+from gaitswarm.services.optimizer.jobs.priority import check_priority
+from gaitswarm.services.optimizer.jobs.quota import Quota
+from gaitswarm.services.optimizer.store.port.base import Store
 
 
 class Commands:

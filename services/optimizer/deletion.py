@@ -7,10 +7,10 @@ import threading
 from datetime import UTC, datetime, timedelta
 from typing import Final
 
-from services.optimizer.errors import StoreUnavailable
-from services.optimizer.jobs.audit import LOCAL
-from services.optimizer.jobs.job import Job
-from services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.errors import StoreUnavailable
+from gaitswarm.services.optimizer.jobs.audit import LOCAL
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.store.port.base import Store
 
 _SECONDS_PER_ROUND: Final = 10.0
 _ROUNDS_PER_RETENTION: Final = 360

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from services.optimizer.jobs.audit import LOCAL
-from services.optimizer.jobs.job import Job, JobOrder, JobState
-from services.optimizer.jobs.labels import ANY_JOB, FacetCounts, JobFilter, LabelsChange
-from services.optimizer.store.port.base import Store
-from services.optimizer.store.port.reading import Page
+from gaitswarm.services.optimizer.jobs.audit import LOCAL
+from gaitswarm.services.optimizer.jobs.job import Job, JobOrder, JobState
+from gaitswarm.services.optimizer.jobs.labels import ANY_JOB, FacetCounts, JobFilter, LabelsChange
+from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.store.port.reading import Page
 
 
 class Labelling:

@@ -9,27 +9,32 @@ from typing import Any, Final
 
 import numpy as np
 
-from services.optimizer.analysis.fork import Parent, check_begun, forked
-from services.optimizer.analysis.questions import Questions
-from services.optimizer.analysis.start import started
-from services.optimizer.commands import Commands
-from services.optimizer.deletion import Deletion
-from services.optimizer.errors import ProvenanceChanged
-from services.optimizer.jobs.audit import LOCAL
-from services.optimizer.jobs.estimate import Estimate, MeasuredRates, checked_length, estimate
-from services.optimizer.jobs.fork import ForkRequest
-from services.optimizer.jobs.iteration import Evaluation, Iteration
-from services.optimizer.jobs.job import Claim, Job, refusal
-from services.optimizer.jobs.priority import check_priority
-from services.optimizer.jobs.provenance import JobProvenance, job_provenance
-from services.optimizer.jobs.quota import Quota
-from services.optimizer.jobs.spec import Spec
-from services.optimizer.labelling import Labelling
-from services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS
-from services.optimizer.run.runner import runner_name
-from services.optimizer.store.port.reading import Page
-from services.optimizer.store.port.recordings import RecordingEntry
-from sim.identification.recorded_walk import RecordedWalk
+from gaitswarm.services.optimizer.analysis.fork import Parent, check_begun, forked
+from gaitswarm.services.optimizer.analysis.questions import Questions
+from gaitswarm.services.optimizer.analysis.start import started
+from gaitswarm.services.optimizer.commands import Commands
+from gaitswarm.services.optimizer.deletion import Deletion
+from gaitswarm.services.optimizer.errors import ProvenanceChanged
+from gaitswarm.services.optimizer.jobs.audit import LOCAL
+from gaitswarm.services.optimizer.jobs.estimate import (
+    Estimate,
+    MeasuredRates,
+    checked_length,
+    estimate,
+)
+from gaitswarm.services.optimizer.jobs.fork import ForkRequest
+from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Iteration
+from gaitswarm.services.optimizer.jobs.job import Claim, Job, refusal
+from gaitswarm.services.optimizer.jobs.priority import check_priority
+from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
+from gaitswarm.services.optimizer.jobs.quota import Quota
+from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.services.optimizer.labelling import Labelling
+from gaitswarm.services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS
+from gaitswarm.services.optimizer.run.runner import runner_name
+from gaitswarm.services.optimizer.store.port.reading import Page
+from gaitswarm.services.optimizer.store.port.recordings import RecordingEntry
+from gaitswarm.sim.identification.recorded_walk import RecordedWalk
 
 _EARLIER: Final = 50
 """Newest jobs among which one like a new job is looked for."""

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final
 
-from services.worker.pace import LONGEST_UNMEASURED, Pace
-from sim.kernel.compiled.lanes import plan_lanes
+from gaitswarm.services.worker.pace import LONGEST_UNMEASURED, Pace
+from gaitswarm.sim.kernel.compiled.lanes import plan_lanes
 
 _TASKS_PER_SLOT: Final = 3
 """Of chunks of one case: enough for the last ones to end at about the same time."""

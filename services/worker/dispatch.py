@@ -10,18 +10,22 @@ from typing import Final
 
 import numpy as np
 
-from services.optimizer.errors import EvaluatorUnavailable
-from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped, TaskReport
-from services.worker.cutting import Chunk, cut
-from services.worker.durations import CaseTime, Durations, costs_of
-from services.worker.failures import killed_workers, misshapen, unlike
-from services.worker.fair_queue import FairQueue
-from services.worker.pace import Pace, TaskTime
-from services.worker.tasks import Answer, Load, Task, TaskTotals
-from services.worker.tries import Running, Tries, Verdict, straggler
-from sim.case import LongCase, WalkingCase
-from sim.kernel.walk import Precision
-from sim.outcome import Outcome
+from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
+from gaitswarm.services.optimizer.run.evaluator import (
+    EvaluationRequest,
+    EvaluationStopped,
+    TaskReport,
+)
+from gaitswarm.services.worker.cutting import Chunk, cut
+from gaitswarm.services.worker.durations import CaseTime, Durations, costs_of
+from gaitswarm.services.worker.failures import killed_workers, misshapen, unlike
+from gaitswarm.services.worker.fair_queue import FairQueue
+from gaitswarm.services.worker.pace import Pace, TaskTime
+from gaitswarm.services.worker.tasks import Answer, Load, Task, TaskTotals
+from gaitswarm.services.worker.tries import Running, Tries, Verdict, straggler
+from gaitswarm.sim.case import LongCase, WalkingCase
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.outcome import Outcome
 
 _GLANCE: Final = 0.1
 """Seconds between looks at `should_stop`."""

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
-from services.worker.cutting import Chunk
-from sim.case import Case
+from gaitswarm.services.worker.cutting import Chunk
+from gaitswarm.sim.case import Case
 
 _WEIGHT: Final = 0.5
 """Of the last iteration, against all before."""

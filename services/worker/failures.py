@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from services.optimizer.errors import KilledWorker, ProvenanceChanged
-from services.optimizer.run.evaluator import EvaluationRequest
-from services.worker.cutting import Chunk
-from services.worker.tasks import Answer
-from sim.outcome import Outcome
-from sim.provenance import Provenance
+from gaitswarm.services.optimizer.errors import KilledWorker, ProvenanceChanged
+from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
+from gaitswarm.services.worker.cutting import Chunk
+from gaitswarm.services.worker.tasks import Answer
+from gaitswarm.sim.outcome import Outcome
+from gaitswarm.sim.provenance import Provenance
 
 
 def killed_workers(request: EvaluationRequest, chunk: Chunk, times: int) -> KilledWorker:

@@ -8,13 +8,13 @@ import time
 from collections.abc import Callable
 from typing import Final
 
-from services.optimizer.errors import EvaluatorUnavailable, ProvenanceChanged
-from services.optimizer.run.evaluator import EvaluationRequest
-from services.worker.in_process import InProcessEvaluator
-from services.worker.preparation import KernelBuilder
-from services.worker.ray_evaluator import RayEvaluator
-from services.worker.tasks import Load
-from sim.outcome import Outcome
+from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, ProvenanceChanged
+from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
+from gaitswarm.services.worker.in_process import InProcessEvaluator
+from gaitswarm.services.worker.preparation import KernelBuilder
+from gaitswarm.services.worker.ray_evaluator import RayEvaluator
+from gaitswarm.services.worker.tasks import Load
+from gaitswarm.sim.outcome import Outcome
 
 LONG_JOB_SECONDS: Final = 60.0
 """Ray is started for a job that is expected to take longer yet [s]: its processes take some six

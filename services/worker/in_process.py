@@ -8,12 +8,12 @@ import threading
 from collections.abc import Callable
 from functools import partial
 
-from services.optimizer.run.evaluator import EvaluationRequest
-from services.worker.dispatch import Dispatcher, Work
-from services.worker.preparation import KernelBuilder
-from services.worker.tasks import Load, TaskTotals
-from sim import simulate
-from sim.outcome import Outcome
+from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
+from gaitswarm.services.worker.dispatch import Dispatcher, Work
+from gaitswarm.services.worker.preparation import KernelBuilder
+from gaitswarm.services.worker.tasks import Load, TaskTotals
+from gaitswarm.sim import simulate
+from gaitswarm.sim.outcome import Outcome
 
 
 def available_cpus() -> int:

@@ -1,6 +1,6 @@
 """A node without CPUs, for a process that uses a cluster which has no node on its machine.
 
-    python -m services.worker.joining 6379
+    python -m gaitswarm.services.worker.joining 6379
 
 ends with 0 if a node runs here of a cluster whose head listens at that port, else with 1.
 """
@@ -15,7 +15,7 @@ import time
 from pathlib import Path
 from typing import IO, Final
 
-from services.optimizer.errors import EvaluatorUnavailable
+from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
 
 _STORE_BYTES: Final = 80 * 1024 * 1024
 """Of the node's object store, in which cases are put."""

@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import Future, wait
 from typing import Final, TypeVar
 
-from services.optimizer.run.evaluator import EvaluationStopped
-from sim import simulate
-from sim.case import Case
-from sim.kernel.walk import Precision
-from sim.robot import RobotSource
+from gaitswarm.services.optimizer.run.evaluator import EvaluationStopped
+from gaitswarm.sim import simulate
+from gaitswarm.sim.case import Case
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.robot import RobotSource
 
 T = TypeVar("T")
 

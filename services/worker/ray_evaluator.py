@@ -9,17 +9,17 @@ from concurrent.futures import Future
 from contextlib import suppress
 from typing import Final
 
-from services.optimizer.errors import EvaluatorUnavailable
-from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped
-from services.worker.cluster.nodes import Nodes, OwnNode
-from services.worker.cluster.pump import Pump
-from services.worker.cluster.ray_nodes import ClusterNodes
-from services.worker.dispatch import Dispatcher
-from services.worker.preparation import KernelBuilder, awaited
-from services.worker.ray_session import open_ray
-from services.worker.tasks import Load, TaskTotals
-from sim import simulate
-from sim.outcome import Outcome
+from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
+from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped
+from gaitswarm.services.worker.cluster.nodes import Nodes, OwnNode
+from gaitswarm.services.worker.cluster.pump import Pump
+from gaitswarm.services.worker.cluster.ray_nodes import ClusterNodes
+from gaitswarm.services.worker.dispatch import Dispatcher
+from gaitswarm.services.worker.preparation import KernelBuilder, awaited
+from gaitswarm.services.worker.ray_session import open_ray
+from gaitswarm.services.worker.tasks import Load, TaskTotals
+from gaitswarm.sim import simulate
+from gaitswarm.sim.outcome import Outcome
 
 _PATIENCE: Final = 10.0
 """Seconds to wait for a connection that is to be closed, and may be busy being opened."""

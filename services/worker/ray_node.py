@@ -1,6 +1,6 @@
 """A node of a Ray cluster: `ray start --block`, which ends when the node's raylet has ended.
 
-    python -m services.worker.ray_node --head --port=6379
+    python -m gaitswarm.services.worker.ray_node --head --port=6379
 
 Ray's own goes on without a raylet that has ended by itself, as one does when an agent of it is
 killed: the node is gone then, and whatever starts nodes again does not know.

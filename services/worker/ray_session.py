@@ -18,9 +18,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, Final
 
-from services.optimizer.errors import EvaluatorUnavailable
-from services.worker.in_process import available_cpus
-from services.worker.joining import JoinedNode, comes_here
+from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
+from gaitswarm.services.worker.in_process import available_cpus
+from gaitswarm.services.worker.joining import JoinedNode, comes_here
 
 _log = logging.getLogger(__name__)
 
@@ -274,7 +274,7 @@ def listens(host: str, port: int, *, timeout: float = 2.0) -> bool:
 
 def _import_path() -> dict[str, str]:
     """Lets workers find our packages, installed or not."""
-    root = str(Path(__file__).resolve().parents[2])
+    root = str(Path(__file__).parents[3])
     given = os.environ.get("PYTHONPATH", "")
     return {"PYTHONPATH": os.pathsep.join([root, *filter(None, [given])])}
 

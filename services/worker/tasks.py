@@ -11,16 +11,16 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.errors import EvaluatorUnavailable
-from services.optimizer.run.outage import is_infrastructure
-from services.worker.cutting import Part
-from sim.case import Case, run_together
-from sim.controllers.quantisation import timing_tables
-from sim.errors import SimulationError
-from sim.kernel.batch import KernelTime
-from sim.kernel.walk import LaneUse
-from sim.outcome import Outcome
-from sim.provenance import Provenance, provenance_of, simulator_digest
+from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
+from gaitswarm.services.optimizer.run.outage import is_infrastructure
+from gaitswarm.services.worker.cutting import Part
+from gaitswarm.sim.case import Case, run_together
+from gaitswarm.sim.controllers.quantisation import timing_tables
+from gaitswarm.sim.errors import SimulationError
+from gaitswarm.sim.kernel.batch import KernelTime
+from gaitswarm.sim.kernel.walk import LaneUse
+from gaitswarm.sim.outcome import Outcome
+from gaitswarm.sim.provenance import Provenance, provenance_of, simulator_digest
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,16 +6,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Final
 
-from sim.catalogue import design_catalogue
-from sim.controllers import CONTROLLERS, ControllerName
-from sim.errors import SimulationInputError
-from sim.robot import Robot, RobotSource, load_robot
-from sim.robot.identifiable import (
+from gaitswarm.sim.catalogue import design_catalogue
+from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.robot import Robot, RobotSource, load_robot
+from gaitswarm.sim.robot.identifiable import (
     CONVENTIONAL_VARIABLES,
     identifiable_variables,
     with_parameters,
 )
-from sim.variables import Variable
+from gaitswarm.sim.variables import Variable
 
 ROBOT: Final = "robot"
 """The variable that chooses between robots."""

@@ -7,10 +7,10 @@ from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
-from sim.catalogue import check_design, design_numbers
-from sim.controllers import ControllerName
-from sim.scenario import Scenario, ScenarioChoice, find_scenario
-from sim.variables import VariableName, VariableValue
+from gaitswarm.sim.catalogue import check_design, design_numbers
+from gaitswarm.sim.controllers import ControllerName
+from gaitswarm.sim.scenario import Scenario, ScenarioChoice, find_scenario
+from gaitswarm.sim.variables import VariableName, VariableValue
 
 WalkName = Annotated[
     str,

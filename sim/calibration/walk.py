@@ -9,17 +9,17 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.assembly import control_steps, judge, kernel_of, measure, plan_walk
-from sim.calibration.catalogue import robot_variables, varied_robot
-from sim.catalogue import design_catalogue
-from sim.controllers import ControllerName, control_law
-from sim.gait.trajectory import desired_angles
-from sim.gait_variables import GAIT_CATALOGUE, with_gait
-from sim.kernel.batch import Walking, WantedWalk, walk_together
-from sim.kernel.walk import Precision, WalkSetup
-from sim.outcome import MEASUREMENTS, N_OBJECTIVES, OBJECTIVES, Objective, Outcome, Status
-from sim.robot import Robot, RobotSource
-from sim.scenario import Scenario
+from gaitswarm.sim.assembly import control_steps, judge, kernel_of, measure, plan_walk
+from gaitswarm.sim.calibration.catalogue import robot_variables, varied_robot
+from gaitswarm.sim.catalogue import design_catalogue
+from gaitswarm.sim.controllers import ControllerName, control_law
+from gaitswarm.sim.gait.trajectory import desired_angles
+from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
+from gaitswarm.sim.kernel.batch import Walking, WantedWalk, walk_together
+from gaitswarm.sim.kernel.walk import Precision, WalkSetup
+from gaitswarm.sim.outcome import MEASUREMENTS, N_OBJECTIVES, OBJECTIVES, Objective, Outcome, Status
+from gaitswarm.sim.robot import Robot, RobotSource
+from gaitswarm.sim.scenario import Scenario
 
 Floats = NDArray[np.float64]
 

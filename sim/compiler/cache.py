@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Final
 
-from sim.errors import KernelBuildError
+from gaitswarm.sim.errors import KernelBuildError
 
 KEPT_UNUSED_DAYS: Final = 90
 """A library that was not loaded for so long is removed when another one is built."""

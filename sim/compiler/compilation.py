@@ -1,7 +1,7 @@
 """C source -> shared library, compiled once and kept in the user's cache directory.
 
 A library is named by a hash of all that went into it, so a stale one is never loaded; see
-`sim.compiler.cache` on damaged ones. One that was built beforehand and installed with the package
+`gaitswarm.sim.compiler.cache` on damaged ones. One that was built beforehand and installed with the package
 saves the compilation, or the compiler.
 """
 
@@ -17,9 +17,9 @@ from importlib import resources
 from pathlib import Path
 from typing import Final
 
-from sim.compiler import cache
-from sim.compiler.target import Target, target
-from sim.compiler.toolchain import (
+from gaitswarm.sim.compiler import cache
+from gaitswarm.sim.compiler.target import Target, target
+from gaitswarm.sim.compiler.toolchain import (
     FLAGS,
     SCHEDULING,
     Compiler,
@@ -27,7 +27,7 @@ from sim.compiler.toolchain import (
     run_compiler,
     without_compiler,
 )
-from sim.errors import KernelBuildError
+from gaitswarm.sim.errors import KernelBuildError
 
 TIME_LIMIT: Final = 300.0
 """Seconds that a compiler may take; a kernel takes one some five."""
@@ -45,7 +45,7 @@ def vector_header() -> str:
     Returns:
         C text that defines `vec` of as many reals as a register holds, and its operations.
     """
-    folder = resources.files("sim.compiler")
+    folder = resources.files("gaitswarm.sim.compiler")
     vectors = (folder / "vec.h").read_text(encoding="utf-8")
     for name in ("instructions.h", "fma.h"):
         included = (folder / name).read_text(encoding="utf-8")

@@ -18,8 +18,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
-from sim.compiler.target import Target, host_architecture
-from sim.errors import KernelBuildError
+from gaitswarm.sim.compiler.target import Target, host_architecture
+from gaitswarm.sim.errors import KernelBuildError
 
 # No contraction into fused multiply-adds and no fast-math: a lane's bits must not depend on
 # compiler or machine. Integers wrap: a lane that has diverged computes on. Zig's compiler adds what

@@ -5,12 +5,12 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Annotated, Final, TypeAlias
 
-from sim.controllers.base import ControlLaw, Controller, Inference, LookupTable, names_of
-from sim.controllers.fuzzy_pi import FuzzyPi
-from sim.controllers.fuzzy_pi_3 import FuzzyPi3
-from sim.controllers.joint_pd import JointPdController
-from sim.controllers.linear import PI, PID, P
-from sim.plugins import KnownName, Plugin, Registry, check_is, check_name
+from gaitswarm.sim.controllers.base import ControlLaw, Controller, Inference, LookupTable, names_of
+from gaitswarm.sim.controllers.fuzzy_pi import FuzzyPi
+from gaitswarm.sim.controllers.fuzzy_pi_3 import FuzzyPi3
+from gaitswarm.sim.controllers.joint_pd import JointPdController
+from gaitswarm.sim.controllers.linear import PI, PID, P
+from gaitswarm.sim.plugins import KnownName, Plugin, Registry, check_is, check_name
 
 
 def _accepted(plugin: Plugin, brought: object) -> Controller:

@@ -9,11 +9,11 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers.fixed_point import FRACTION_BITS, descale
-from sim.controllers.mamdani import Mamdani
-from sim.controllers.quantisation import Axis
-from sim.errors import SimulationInputError
-from sim.variables import Variable
+from gaitswarm.sim.controllers.fixed_point import FRACTION_BITS, descale
+from gaitswarm.sim.controllers.mamdani import Mamdani
+from gaitswarm.sim.controllers.quantisation import Axis
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.variables import Variable
 
 Ints = NDArray[np.int64]
 

@@ -11,8 +11,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.errors import SimulationInputError
-from sim.variables import Variable
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.variables import Variable
 
 FRACTION_BITS: Final = 16
 """Fractional bits of proportional gains and table index scales."""

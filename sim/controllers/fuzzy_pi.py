@@ -15,8 +15,8 @@ from typing import Final
 
 import numpy as np
 
-from sim.controllers.base import ControlLaw, Inference, LookupTable, Universe
-from sim.controllers.fixed_point import (
+from gaitswarm.sim.controllers.base import ControlLaw, Inference, LookupTable, Universe
+from gaitswarm.sim.controllers.fixed_point import (
     FRACTION_BITS,
     INTEGRATOR_UNIT,
     integral_gain,
@@ -24,7 +24,7 @@ from sim.controllers.fixed_point import (
     required_integer,
     to_fixed,
 )
-from sim.controllers.fuzzy_sets import (
+from gaitswarm.sim.controllers.fuzzy_sets import (
     EXTREME_PEAK,
     LARGE_BEGINS,
     POSITIVE_PEAK,
@@ -33,9 +33,9 @@ from sim.controllers.fuzzy_sets import (
     UNIVERSE,
     MembershipSets,
 )
-from sim.controllers.mamdani import Mamdani, Rule, Shape
-from sim.controllers.quantisation import Axis, ExactInference, Quantised, quantised
-from sim.variables import Variable
+from gaitswarm.sim.controllers.mamdani import Mamdani, Rule, Shape
+from gaitswarm.sim.controllers.quantisation import Axis, ExactInference, Quantised, quantised
+from gaitswarm.sim.variables import Variable
 
 ERROR: Final = Axis(bits=10, centred=True)
 CURRENT: Final = Axis(bits=6, centred=False)

@@ -13,8 +13,8 @@ from typing import Final
 
 import numpy as np
 
-from sim.controllers.base import ControlLaw, Inference, LookupTable, Universe
-from sim.controllers.fixed_point import (
+from gaitswarm.sim.controllers.base import ControlLaw, Inference, LookupTable, Universe
+from gaitswarm.sim.controllers.fixed_point import (
     CONTROL_PERIOD,
     CURRENT_COUNTS,
     FRACTION_BITS,
@@ -23,7 +23,7 @@ from sim.controllers.fixed_point import (
     required_integer,
     to_fixed,
 )
-from sim.controllers.fuzzy_sets import (
+from gaitswarm.sim.controllers.fuzzy_sets import (
     LARGE_BEGINS,
     POSITIVE_PEAK,
     SIGNED,
@@ -31,9 +31,9 @@ from sim.controllers.fuzzy_sets import (
     UNIVERSE,
     MembershipSets,
 )
-from sim.controllers.mamdani import Mamdani, Rule, Shape
-from sim.controllers.quantisation import Axis, Quantised, quantised
-from sim.variables import Variable
+from gaitswarm.sim.controllers.mamdani import Mamdani, Rule, Shape
+from gaitswarm.sim.controllers.quantisation import Axis, Quantised, quantised
+from gaitswarm.sim.variables import Variable
 
 ERROR: Final = Axis(bits=10, centred=True)
 CURRENT: Final = Axis(bits=6, centred=False)

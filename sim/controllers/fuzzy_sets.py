@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from sim.controllers.fixed_point import given_or_default
-from sim.controllers.mamdani import FuzzySet
-from sim.variables import Variable
+from gaitswarm.sim.controllers.fixed_point import given_or_default
+from gaitswarm.sim.controllers.mamdani import FuzzySet
+from gaitswarm.sim.variables import Variable
 
 SIGNED: Final[Mapping[str, FuzzySet]] = MappingProxyType(
     {

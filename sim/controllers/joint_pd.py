@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
-from sim.controllers.base import ControlLaw, Inference, JointPd
-from sim.controllers.fixed_point import required
-from sim.variables import Variable
+from gaitswarm.sim.controllers.base import ControlLaw, Inference, JointPd
+from gaitswarm.sim.controllers.fixed_point import required
+from gaitswarm.sim.variables import Variable
 
 LARGEST_GAIN: Final = 1e5
 """Of a gain that can be simulated [N m/rad], [N m s/rad]."""

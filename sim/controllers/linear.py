@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from sim.controllers.base import ControlLaw, Inference
-from sim.controllers.fixed_point import (
+from gaitswarm.sim.controllers.base import ControlLaw, Inference
+from gaitswarm.sim.controllers.fixed_point import (
     CONTROL_PERIOD,
     FRACTION_BITS,
     INTEGRATOR_UNIT,
@@ -16,7 +16,7 @@ from sim.controllers.fixed_point import (
     required,
     to_fixed,
 )
-from sim.variables import Variable
+from gaitswarm.sim.variables import Variable
 
 _P: Final = Variable(
     name="P",

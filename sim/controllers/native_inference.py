@@ -10,8 +10,8 @@ from importlib import resources
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.compiler.compilation import load_library, vector_header
-from sim.controllers.mamdani import Mamdani
+from gaitswarm.sim.compiler.compilation import load_library, vector_header
+from gaitswarm.sim.controllers.mamdani import Mamdani
 
 
 def compiled_table(
@@ -85,7 +85,7 @@ def inference_source() -> str:
     Returns:
         C text that lacks the definition of DOUBLES only.
     """
-    here = resources.files("sim.controllers")
+    here = resources.files("gaitswarm.sim.controllers")
     parts = [(here / name).read_text(encoding="utf-8") for name in ("estimate.c", "inference.c")]
     return "\n".join([vector_header(), *parts])
 

@@ -12,9 +12,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers.fixed_point import FRACTION_BITS, to_fixed
-from sim.controllers.mamdani import Mamdani
-from sim.controllers.native_inference import compiled_table
+from gaitswarm.sim.controllers.fixed_point import FRACTION_BITS, to_fixed
+from gaitswarm.sim.controllers.mamdani import Mamdani
+from gaitswarm.sim.controllers.native_inference import compiled_table
 
 OUTPUT_BITS: Final = 8
 OUTPUT_SCALE: Final = 127

@@ -9,9 +9,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers.base import Inference, Universe
-from sim.controllers.mamdani import FuzzySet
-from sim.controllers.quantisation import OUTPUT_BITS, Axis, table_bytes
+from gaitswarm.sim.controllers.base import Inference, Universe
+from gaitswarm.sim.controllers.mamdani import FuzzySet
+from gaitswarm.sim.controllers.quantisation import OUTPUT_BITS, Axis, table_bytes
 
 Floats = NDArray[np.float64]
 

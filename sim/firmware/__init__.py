@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sim.firmware.folder import (
+from gaitswarm.sim.firmware.folder import (
     FORMAT,
     MANIFEST,
     Firmware,
@@ -11,7 +11,7 @@ from sim.firmware.folder import (
     firmware_of,
     parsed_table_bits,
 )
-from sim.firmware.memory import BUDGET, Memory
+from gaitswarm.sim.firmware.memory import BUDGET, Memory
 
 __all__ = [
     "BUDGET",

@@ -10,12 +10,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers.base import LookupTable
-from sim.controllers.fixed_point import CONTROL_PERIOD
-from sim.firmware.control_log import ControlLog
-from sim.firmware.integers import LawIntegers
-from sim.firmware.trajectory_table import TrajectoryTable
-from sim.robot import Robot
+from gaitswarm.sim.controllers.base import LookupTable
+from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
+from gaitswarm.sim.firmware.control_log import ControlLog
+from gaitswarm.sim.firmware.integers import LawIntegers
+from gaitswarm.sim.firmware.trajectory_table import TrajectoryTable
+from gaitswarm.sim.robot import Robot
 
 _WIDTH: Final = 24
 """Numbers on a line."""
@@ -30,7 +30,7 @@ def own_file(path: str) -> str:
     Returns:
         Its text.
     """
-    return (resources.files("sim.firmware") / "code" / path).read_text(encoding="utf-8")
+    return (resources.files("gaitswarm.sim.firmware") / "code" / path).read_text(encoding="utf-8")
 
 
 def filled(path: str, **values: object) -> str:

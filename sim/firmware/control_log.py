@@ -8,16 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.assembly import control_steps, judge, kernel_of, plan_walk
-from sim.controllers import ControlLaw
-from sim.firmware.integers import in_16_bits
-from sim.gait.trajectory import require_reachable
-from sim.gait_variables import with_gait
-from sim.kernel.observation import encoder_angles, split_states
-from sim.kernel.walk import Coding, WalkResult, WalkSetup
-from sim.outcome import Status
-from sim.robot import Robot
-from sim.scenario import Scenario
+from gaitswarm.sim.assembly import control_steps, judge, kernel_of, plan_walk
+from gaitswarm.sim.controllers import ControlLaw
+from gaitswarm.sim.firmware.integers import in_16_bits
+from gaitswarm.sim.gait.trajectory import require_reachable
+from gaitswarm.sim.gait_variables import with_gait
+from gaitswarm.sim.kernel.observation import encoder_angles, split_states
+from gaitswarm.sim.kernel.walk import Coding, WalkResult, WalkSetup
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.scenario import Scenario
 
 Codes = NDArray[np.int16]
 

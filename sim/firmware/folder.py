@@ -11,11 +11,11 @@ from typing import Final, Protocol, runtime_checkable
 
 import numpy as np
 
-from sim.assembly import control_steps
-from sim.controllers import CONTROLLERS, ControlLaw, ControllerName, control_law
-from sim.controllers.quantisation import Axis
-from sim.errors import SimulationInputError
-from sim.firmware.c_text import (
+from gaitswarm.sim.assembly import control_steps
+from gaitswarm.sim.controllers import CONTROLLERS, ControlLaw, ControllerName, control_law
+from gaitswarm.sim.controllers.quantisation import Axis
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.firmware.c_text import (
     controller_header,
     expected_header,
     expected_source,
@@ -24,17 +24,17 @@ from sim.firmware.c_text import (
     tables_source,
     trajectories_source,
 )
-from sim.firmware.control_log import ControlLog, control_logs
-from sim.firmware.integers import LawIntegers, law_integers
-from sim.firmware.memory import Memory
-from sim.firmware.readme import readme
-from sim.firmware.trajectory_table import TrajectoryTable, trajectory_table
-from sim.gait_variables import GAIT_CATALOGUE
-from sim.kernel.emitted.source import control_tick
-from sim.outcome import OBJECTIVE_NAMES
-from sim.robot import DEFAULT_ROBOT, RobotChoice, RobotFiles, RobotVariant, load_robot
-from sim.robot.description import JOINTS_PER_LEG
-from sim.scenario import PRESETS, Scenario
+from gaitswarm.sim.firmware.control_log import ControlLog, control_logs
+from gaitswarm.sim.firmware.integers import LawIntegers, law_integers
+from gaitswarm.sim.firmware.memory import Memory
+from gaitswarm.sim.firmware.readme import readme
+from gaitswarm.sim.firmware.trajectory_table import TrajectoryTable, trajectory_table
+from gaitswarm.sim.gait_variables import GAIT_CATALOGUE
+from gaitswarm.sim.kernel.emitted.source import control_tick
+from gaitswarm.sim.outcome import OBJECTIVE_NAMES
+from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotChoice, RobotFiles, RobotVariant, load_robot
+from gaitswarm.sim.robot.description import JOINTS_PER_LEG
+from gaitswarm.sim.scenario import PRESETS, Scenario
 
 MANIFEST: Final = "firmware.json"
 """File that says what the others are, by which a folder is known as firmware."""

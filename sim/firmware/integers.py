@@ -9,11 +9,11 @@ from typing import Final, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers.base import ControlLaw, LookupTable, Response
-from sim.controllers.fixed_point import FRACTION_BITS, INTEGRAL_BITS
-from sim.errors import SimulationInputError
-from sim.kernel.gains import check_gains
-from sim.kernel.walk import CODE_LIMIT, Coding
+from gaitswarm.sim.controllers.base import ControlLaw, LookupTable, Response
+from gaitswarm.sim.controllers.fixed_point import FRACTION_BITS, INTEGRAL_BITS
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.kernel.gains import check_gains
+from gaitswarm.sim.kernel.walk import CODE_LIMIT, Coding
 
 _INT32: Final = (1 << 31) - 1
 

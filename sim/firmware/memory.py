@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from sim.firmware.integers import LawIntegers
-from sim.firmware.trajectory_table import TrajectoryTable
-from sim.robot.description import JOINTS_PER_LEG
+from gaitswarm.sim.firmware.integers import LawIntegers
+from gaitswarm.sim.firmware.trajectory_table import TrajectoryTable
+from gaitswarm.sim.robot.description import JOINTS_PER_LEG
 
 
 @dataclass(frozen=True, slots=True)

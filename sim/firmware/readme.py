@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from sim.controllers.fixed_point import CONTROL_PERIOD
-from sim.firmware.c_text import filled
-from sim.firmware.memory import BUDGET, Memory
-from sim.firmware.trajectory_table import TrajectoryTable
+from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
+from gaitswarm.sim.firmware.c_text import filled
+from gaitswarm.sim.firmware.memory import BUDGET, Memory
+from gaitswarm.sim.firmware.trajectory_table import TrajectoryTable
 
 
 def readme(

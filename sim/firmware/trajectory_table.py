@@ -8,12 +8,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers.fixed_point import CONTROL_PERIOD
-from sim.firmware.integers import in_16_bits
-from sim.gait.trajectory import desired_angles
-from sim.robot import Robot
-from sim.robot.description import JOINTS_PER_LEG
-from sim.scenario import Scenario
+from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
+from gaitswarm.sim.firmware.integers import in_16_bits
+from gaitswarm.sim.gait.trajectory import desired_angles
+from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.description import JOINTS_PER_LEG
+from gaitswarm.sim.scenario import Scenario
 
 _MOST_CYCLES: Final = 4
 """A cycle that is no whole number of ticks may repeat after some."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from sim.errors import SimulationInputError
-from sim.scenario import Scenario
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.scenario import Scenario
 
 UPDATES_PER_CYCLE: Final = 42
 """New targets a cycle: 20 points of support, 20 of swing, and the two ends of the stride."""

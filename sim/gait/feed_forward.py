@@ -7,10 +7,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.gait.trajectory import Trajectory
-from sim.robot import Robot
-from sim.robot.description import JOINTS_PER_LEG
-from sim.robot.legs import ChainLeg, KneeUpLeg, LegKinematics
+from gaitswarm.sim.gait.trajectory import Trajectory
+from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.description import JOINTS_PER_LEG
+from gaitswarm.sim.robot.legs import ChainLeg, KneeUpLeg, LegKinematics
 
 Floats = NDArray[np.float64]
 

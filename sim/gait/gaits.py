@@ -13,12 +13,12 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from sim.errors import SimulationInputError
-from sim.input.near_names import instead_of
-from sim.robot import Robot
-from sim.robot.leg_groups import rows_of
-from sim.robot.legs import LegKinematics
-from sim.scenario import GaitName, Scenario
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.input.near_names import instead_of
+from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.leg_groups import rows_of
+from gaitswarm.sim.robot.legs import LegKinematics
+from gaitswarm.sim.scenario import GaitName, Scenario
 
 Rows = tuple[Sequence[int], Sequence[int]]
 """Indices of the legs on the left and on the right, from the front."""

@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.robot.legs import ChainLeg
+from gaitswarm.sim.robot.legs import ChainLeg
 
 Floats = NDArray[np.float64]
 

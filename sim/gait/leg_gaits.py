@@ -9,11 +9,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.gait.gaits import phases_of
-from sim.robot import Robot
-from sim.robot.leg_groups import values_by_leg
-from sim.scenario import BY_LEG_GROUP, Scenario
-from sim.variables import split_name
+from gaitswarm.sim.gait.gaits import phases_of
+from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.leg_groups import values_by_leg
+from gaitswarm.sim.scenario import BY_LEG_GROUP, Scenario
+from gaitswarm.sim.variables import split_name
 
 Floats = NDArray[np.float64]
 

@@ -1,6 +1,6 @@
 """The foot's curve of 2011: a straight support and a swing by a quadratic spline.
 
-Appendix .2.1, eq. 1-3, with the weights (1-a)^2, 2a(1-a), a^2. `sim.gait.driving_2011`
+Appendix .2.1, eq. 1-3, with the weights (1-a)^2, 2a(1-a), a^2. `gaitswarm.sim.gait.driving_2011`
 says when its points were sent.
 """
 

@@ -10,12 +10,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers.fixed_point import CONTROL_PERIOD
-from sim.gait.leg_gaits import leg_gaits, supporting
-from sim.gait.trajectory import desired_angles, require_reachable
-from sim.robot import Robot
-from sim.robot.posture import feet_and_centre_of_mass
-from sim.scenario import Scenario
+from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
+from gaitswarm.sim.gait.leg_gaits import leg_gaits, supporting
+from gaitswarm.sim.gait.trajectory import desired_angles, require_reachable
+from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.posture import feet_and_centre_of_mass
+from gaitswarm.sim.scenario import Scenario
 
 Floats = NDArray[np.float64]
 

@@ -9,18 +9,18 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers.fixed_point import CONTROL_PERIOD
-from sim.errors import BeyondJointLimit, UnreachablePose
-from sim.gait.cycloid import cycloid
-from sim.gait.half_ellipse import half_ellipse
-from sim.gait.inverse_kinematics import chain_angles, leg_angles
-from sim.gait.leg_gaits import LegGait, Sway, leg_gaits
-from sim.gait.low_pass import FirWindow, low_pass
-from sim.gait.quadratic_spline import quadratic_spline
-from sim.robot import Robot
-from sim.robot.description import JOINTS_PER_LEG
-from sim.robot.legs import ChainLeg, LegKinematics
-from sim.scenario import Scenario
+from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
+from gaitswarm.sim.errors import BeyondJointLimit, UnreachablePose
+from gaitswarm.sim.gait.cycloid import cycloid
+from gaitswarm.sim.gait.half_ellipse import half_ellipse
+from gaitswarm.sim.gait.inverse_kinematics import chain_angles, leg_angles
+from gaitswarm.sim.gait.leg_gaits import LegGait, Sway, leg_gaits
+from gaitswarm.sim.gait.low_pass import FirWindow, low_pass
+from gaitswarm.sim.gait.quadratic_spline import quadratic_spline
+from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.description import JOINTS_PER_LEG
+from gaitswarm.sim.robot.legs import ChainLeg, LegKinematics
+from gaitswarm.sim.scenario import Scenario
 
 Floats = NDArray[np.float64]
 

@@ -8,19 +8,19 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.assembly import control_steps, kernel_of, plan_walk
-from sim.controllers import CONTROLLERS
-from sim.errors import SimulationInputError
-from sim.gait.trajectory import desired_angles
-from sim.gait_variables import with_gait
-from sim.identification.recorded_walk import RecordedWalk
-from sim.kernel.dynamics.electrical import supply_voltage
-from sim.kernel.observation import sensed_currents, split_states
-from sim.kernel.walk import Precision
-from sim.outcome import Objective, Outcome, Status
-from sim.robot import Robot, RobotSource, load_robot
-from sim.robot.description import JOINTS_PER_LEG
-from sim.robot.identifiable import with_parameters
+from gaitswarm.sim.assembly import control_steps, kernel_of, plan_walk
+from gaitswarm.sim.controllers import CONTROLLERS
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.gait.trajectory import desired_angles
+from gaitswarm.sim.gait_variables import with_gait
+from gaitswarm.sim.identification.recorded_walk import RecordedWalk
+from gaitswarm.sim.kernel.dynamics.electrical import supply_voltage
+from gaitswarm.sim.kernel.observation import sensed_currents, split_states
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.outcome import Objective, Outcome, Status
+from gaitswarm.sim.robot import Robot, RobotSource, load_robot
+from gaitswarm.sim.robot.description import JOINTS_PER_LEG
+from gaitswarm.sim.robot.identifiable import with_parameters
 
 Floats = NDArray[np.float64]
 

@@ -17,18 +17,18 @@ from pydantic import (
     model_validator,
 )
 
-from sim.controllers import CONTROLLERS, ControllerName, names_of
-from sim.controllers.fixed_point import CONTROL_PERIOD
-from sim.errors import MeasuredLogError, SimulationInputError
-from sim.gait_variables import GAIT_CATALOGUE
-from sim.input.wording import message_of
-from sim.robot import RobotSource, load_robot
-from sim.scenario import Scenario
-from sim.simulate import check_reach
-from sim.variables import VariableName
+from gaitswarm.sim.controllers import CONTROLLERS, ControllerName, names_of
+from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
+from gaitswarm.sim.errors import MeasuredLogError, SimulationInputError
+from gaitswarm.sim.gait_variables import GAIT_CATALOGUE
+from gaitswarm.sim.input.wording import message_of
+from gaitswarm.sim.robot import RobotSource, load_robot
+from gaitswarm.sim.scenario import Scenario
+from gaitswarm.sim.simulate import check_reach
+from gaitswarm.sim.variables import VariableName
 
 if TYPE_CHECKING:
-    from sim.measurement.synchronise import Synchronised
+    from gaitswarm.sim.measurement.synchronise import Synchronised
 
 _DECIMALS: Final = 5
 """Of a stored current [A]: far below the converter's step, and a third of the text."""

@@ -9,8 +9,8 @@ from typing import Annotated, Any, Final, Union, get_args, get_origin
 
 from pydantic import BaseModel, Tag
 
-from sim.input.choice import is_tag
-from sim.input.near_names import instead_of, nearest
+from gaitswarm.sim.input.choice import is_tag
+from gaitswarm.sim.input.near_names import instead_of, nearest
 
 _PLAIN: Final = {
     "missing": "is missing",

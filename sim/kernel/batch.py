@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from itertools import islice
 from typing import TypeVar
 
-from sim.kernel.walk import Coding, Kernel, LaneUse, WalkResult, WalkSetup
+from gaitswarm.sim.kernel.walk import Coding, Kernel, LaneUse, WalkResult, WalkSetup
 
 T = TypeVar("T")
 

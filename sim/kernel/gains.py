@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Final
 
-from sim.controllers.base import ControlLaw, LookupTable
-from sim.errors import SimulationInputError
-from sim.kernel.walk import CODE_LIMIT
+from gaitswarm.sim.controllers.base import ControlLaw, LookupTable
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.kernel.walk import CODE_LIMIT
 
 NO_JOINT_PD: Final = (
     "a joint PD commands torques, and this robot has DC motors; choose another controller, or give"

@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers.fixed_point import CONTROL_PERIOD
-from sim.kernel.parameters import Layout, internal_state_size
-from sim.kernel.walk import WalkSetup, current_smoothing
-from sim.robot import Robot
+from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
+from gaitswarm.sim.kernel.parameters import Layout, internal_state_size
+from gaitswarm.sim.kernel.walk import WalkSetup, current_smoothing
+from gaitswarm.sim.robot import Robot
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -170,7 +170,7 @@ def walk_log(robot: Robot, setup: WalkSetup, states: NDArray[np.float64]) -> Wal
 def _observing(robot: Robot, instants: int) -> Any:
     """What is observed at so many instants; many walks are as long as others."""
     # Logs are rare: they alone need CasADi in a process that has a compiled kernel.
-    from sim.kernel.dynamics.physics_step import physics_model  # noqa: PLC0415
+    from gaitswarm.sim.kernel.dynamics.physics_step import physics_model  # noqa: PLC0415
 
     return physics_model(robot).observe.map(instants)
 

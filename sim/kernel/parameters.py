@@ -11,11 +11,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.errors import SimulationInputError
-from sim.robot import Robot
-from sim.robot.description import JOINTS_PER_LEG, ContactLaw
-from sim.robot.inertia import parallel_axis
-from sim.scenario import Scenario
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.description import JOINTS_PER_LEG, ContactLaw
+from gaitswarm.sim.robot.inertia import parallel_axis
+from gaitswarm.sim.scenario import Scenario
 
 GRAVITY = 9.81
 """[m/s2], table 5."""
@@ -40,7 +40,7 @@ class ContactData:
     """What a law of contact needs of the kernel's inputs.
 
     Attributes:
-        parameters: that it reads by foot, fields of `sim.robot.description.Contact`.
+        parameters: that it reads by foot, fields of `gaitswarm.sim.robot.description.Contact`.
         internal_state_size: numbers that it carries by foot from step to step.
     """
 
@@ -58,7 +58,7 @@ CONTACT_LAWS: Final[Mapping[ContactLaw, ContactData]] = MappingProxyType(
         "dead_zone": ContactData((*_NORMAL, "slip_velocity", "stick_velocity")),
     }
 )
-"""By name; their formulas are in `sim.kernel.dynamics.contact`."""
+"""By name; their formulas are in `gaitswarm.sim.kernel.dynamics.contact`."""
 
 
 def internal_state_size(robot: Robot) -> int:

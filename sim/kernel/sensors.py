@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.errors import SimulationInputError
+from gaitswarm.sim.errors import SimulationInputError
 
 Floats = NDArray[np.float64]
 Words = NDArray[np.uint64]

@@ -10,13 +10,13 @@ from typing import Any, Final, Literal, Protocol, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers.base import ControlLaw
-from sim.errors import SimulationInputError
-from sim.kernel.sensors import NO_ERRORS, SensorErrors
-from sim.outcome import Status
-from sim.robot import Robot
-from sim.robot.actuators import CONTROL_RATE, LARGEST_OUTPUT
-from sim.robot.description import EnergyConvention
+from gaitswarm.sim.controllers.base import ControlLaw
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.kernel.sensors import NO_ERRORS, SensorErrors
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.actuators import CONTROL_RATE, LARGEST_OUTPUT
+from gaitswarm.sim.robot.description import EnergyConvention
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

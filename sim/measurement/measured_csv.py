@@ -22,10 +22,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers.fixed_point import CONTROL_PERIOD
-from sim.errors import MeasuredLogError
-from sim.measurement.measured_log import AXES, MeasuredLog, Quantity
-from sim.robot import Robot
+from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
+from gaitswarm.sim.errors import MeasuredLogError
+from gaitswarm.sim.measurement.measured_log import AXES, MeasuredLog, Quantity
+from gaitswarm.sim.robot import Robot
 
 Floats = NDArray[np.float64]
 

@@ -10,11 +10,11 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.errors import SimulationInputError
-from sim.kernel.observation import WalkLog, sensed_currents
-from sim.kernel.parameters import GRAVITY
-from sim.robot import Robot
-from sim.robot.description import JOINTS_PER_LEG
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.kernel.observation import WalkLog, sensed_currents
+from gaitswarm.sim.kernel.parameters import GRAVITY
+from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.description import JOINTS_PER_LEG
 
 Floats = NDArray[np.float64]
 

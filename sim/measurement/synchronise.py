@@ -8,10 +8,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers.fixed_point import CONTROL_PERIOD
-from sim.errors import MeasuredLogError
-from sim.measurement.measured_log import MeasuredLog
-from sim.memory import require_room_for_scipy
+from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
+from gaitswarm.sim.errors import MeasuredLogError
+from gaitswarm.sim.measurement.measured_log import MeasuredLog
+from gaitswarm.sim.memory import require_room_for_scipy
 
 Floats = NDArray[np.float64]
 

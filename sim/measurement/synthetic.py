@@ -14,17 +14,23 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
-from sim.controllers.fixed_point import CONTROL_PERIOD
-from sim.errors import SimulationInputError
-from sim.measurement.measured_log import ORIGIN, SYNTHETIC, MeasuredLog, Quantity, simulated_log
-from sim.outcome import Status
-from sim.robot import Robot
-from sim.robot.actuators import AnyActuator, TorqueActuator
-from sim.robot.description import Contact
-from sim.robot.identifiable import with_parameters
-from sim.scenario import Scenario
-from sim.simulate import simulate
-from sim.variables import VariableName
+from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.measurement.measured_log import (
+    ORIGIN,
+    SYNTHETIC,
+    MeasuredLog,
+    Quantity,
+    simulated_log,
+)
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.actuators import AnyActuator, TorqueActuator
+from gaitswarm.sim.robot.description import Contact
+from gaitswarm.sim.robot.identifiable import with_parameters
+from gaitswarm.sim.scenario import Scenario
+from gaitswarm.sim.simulate import simulate
+from gaitswarm.sim.variables import VariableName
 
 Floats = NDArray[np.float64]
 

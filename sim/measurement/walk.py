@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.errors import SimulationInputError
-from sim.gait_variables import GAIT_CATALOGUE, with_gait
-from sim.measurement.measured_log import MeasuredLog, simulated_log
-from sim.outcome import Status
-from sim.robot import Robot
-from sim.scenario import Scenario
-from sim.simulate import check_reach, simulate
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
+from gaitswarm.sim.measurement.measured_log import MeasuredLog, simulated_log
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.scenario import Scenario
+from gaitswarm.sim.simulate import check_reach, simulate
 
 
 @dataclass(frozen=True, slots=True)

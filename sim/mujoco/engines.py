@@ -7,8 +7,8 @@ from importlib.util import find_spec
 from types import MappingProxyType
 from typing import Final, Literal
 
-from sim.errors import SimulationInputError
-from sim.variables import Variable
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.variables import Variable
 
 EngineName = Literal["mujoco", "mujoco-contacts"]
 

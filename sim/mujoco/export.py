@@ -5,14 +5,14 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from sim.gait.leg_gaits import leg_gaits
-from sim.gait.trajectory import desired_angles, require_reachable
-from sim.mujoco.mjcf import Rig, Surroundings, mjcf
-from sim.mujoco.model import Feet, even_drags, with_contacts
-from sim.robot import Robot
-from sim.robot.posture import resting_height
-from sim.robot.shapes import visible_links
-from sim.scenario import Scenario
+from gaitswarm.sim.gait.leg_gaits import leg_gaits
+from gaitswarm.sim.gait.trajectory import desired_angles, require_reachable
+from gaitswarm.sim.mujoco.mjcf import Rig, Surroundings, mjcf
+from gaitswarm.sim.mujoco.model import Feet, even_drags, with_contacts
+from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.posture import resting_height
+from gaitswarm.sim.robot.shapes import visible_links
+from gaitswarm.sim.scenario import Scenario
 
 
 def exported(robot: Robot, scenario: Scenario, *, contacts: bool = True) -> str:

@@ -10,9 +10,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.kernel.parameters import STATIC_FRICTION_RATE
-from sim.robot import Robot
-from sim.robot.robot import JointActuators
+from gaitswarm.sim.kernel.parameters import STATIC_FRICTION_RATE
+from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.robot import JointActuators
 
 Floats = NDArray[np.float64]
 
@@ -117,7 +117,7 @@ class DcMotors:
     Args:
         actuators: Of the robot.
         numbers: `viscous` and, of a robot that has it, `static_friction` (J,), and the battery's
-            `supply_voltage` and `supply_resistance` (1,), as `sim.kernel.parameters.Layout` has
+            `supply_voltage` and `supply_resistance` (1,), as `gaitswarm.sim.kernel.parameters.Layout` has
             them.
     """
 

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.robot.description import ContactLaw
+from gaitswarm.sim.robot.description import ContactLaw
 
 Floats = NDArray[np.float64]
 
@@ -19,8 +19,8 @@ class Ground(ABC):
     """A clamped spring and damper along the ground's normal, and a law of friction.
 
     Args:
-        numbers: (L,) each, by the names of `sim.robot.description.Contact`: those of
-            `sim.kernel.parameters.CONTACT_LAWS`.
+        numbers: (L,) each, by the names of `gaitswarm.sim.robot.description.Contact`: those of
+            `gaitswarm.sim.kernel.parameters.CONTACT_LAWS`.
 
     Attributes:
         numbers: these.

@@ -16,10 +16,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers.fixed_point import CONTROL_PERIOD
-from sim.kernel.gains import check_gains
-from sim.kernel.parameters import CONTACT_LAWS, Layout, internal_state_size
-from sim.kernel.readable.control_tick import (
+from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
+from gaitswarm.sim.kernel.gains import check_gains
+from gaitswarm.sim.kernel.parameters import CONTACT_LAWS, Layout, internal_state_size
+from gaitswarm.sim.kernel.readable.control_tick import (
     Past,
     coded,
     control,
@@ -27,9 +27,9 @@ from sim.kernel.readable.control_tick import (
     padded_states,
     status_of,
 )
-from sim.kernel.readable.joint_pd import InnerLoop
-from sim.kernel.sensors import Sensors
-from sim.kernel.walk import (
+from gaitswarm.sim.kernel.readable.joint_pd import InnerLoop
+from gaitswarm.sim.kernel.sensors import Sensors
+from gaitswarm.sim.kernel.walk import (
     INTEGRANDS,
     Coding,
     LaneUse,
@@ -37,13 +37,13 @@ from sim.kernel.walk import (
     WalkResults,
     WalkSetup,
 )
-from sim.mujoco.gears import gears_of
-from sim.mujoco.ground import GROUNDS
-from sim.mujoco.mjcf import Rig, Soles, Surroundings, mjcf
-from sim.mujoco.model import Feet, even_drags, with_contacts
-from sim.outcome import Status
-from sim.robot import Robot
-from sim.robot.inertia import BodyInertia, parallel_axis
+from gaitswarm.sim.mujoco.gears import gears_of
+from gaitswarm.sim.mujoco.ground import GROUNDS
+from gaitswarm.sim.mujoco.mjcf import Rig, Soles, Surroundings, mjcf
+from gaitswarm.sim.mujoco.model import Feet, even_drags, with_contacts
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.inertia import BodyInertia, parallel_axis
 
 Floats = NDArray[np.float64]
 

@@ -14,15 +14,15 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.kernel.parameters import gravity_on
-from sim.robot import Robot
-from sim.robot.description import Contact
-from sim.robot.inertia import BodyInertia
-from sim.robot.limbs import limbs_of
-from sim.scenario import Scenario
+from gaitswarm.sim.kernel.parameters import gravity_on
+from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.description import Contact
+from gaitswarm.sim.robot.inertia import BodyInertia
+from gaitswarm.sim.robot.limbs import limbs_of
+from gaitswarm.sim.scenario import Scenario
 
 if TYPE_CHECKING:
-    from sim.robot.shapes import Shape, VisibleLink
+    from gaitswarm.sim.robot.shapes import Shape, VisibleLink
 
 Floats = NDArray[np.float64]
 

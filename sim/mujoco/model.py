@@ -14,10 +14,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.mujoco.mjcf import TIMESTEP, Rig, Surroundings, mjcf
-from sim.robot import Robot
-from sim.robot.description import Contact
-from sim.scenario import Scenario
+from gaitswarm.sim.mujoco.mjcf import TIMESTEP, Rig, Surroundings, mjcf
+from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.description import Contact
+from gaitswarm.sim.scenario import Scenario
 
 Floats = NDArray[np.float64]
 

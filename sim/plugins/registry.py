@@ -10,8 +10,8 @@ from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from sim.input.near_names import instead_of, nearest
-from sim.plugins.entry_points import Kind, Plugin, PluginError, find_plugins
+from gaitswarm.sim.input.near_names import instead_of, nearest
+from gaitswarm.sim.plugins.entry_points import Kind, Plugin, PluginError, find_plugins
 
 T = TypeVar("T")
 

@@ -9,7 +9,7 @@ from pydantic import BaseModel, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
-from sim.plugins.registry import Registry
+from gaitswarm.sim.plugins.registry import Registry
 
 T = TypeVar("T")
 

@@ -9,7 +9,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from sim.plugins.entry_points import Plugin, find_plugins
+from gaitswarm.sim.plugins.entry_points import Plugin, find_plugins
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -9,8 +9,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from sim.proposal.drive import DriveNumbers
-from sim.robot.actuators import ActuatorKind
+from gaitswarm.sim.proposal.drive import DriveNumbers
+from gaitswarm.sim.robot.actuators import ActuatorKind
 
 _VOLTAGE: Final = 24.0
 """Of a battery that is unknown [V]."""

@@ -5,16 +5,16 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Final
 
-from sim.errors import ProcessEnded, RobotFileError, SimulationInputError
-from sim.limited_process import Document, LimitedProcesses, serve
-from sim.proposal.document import Proposal, propose_robot
-from sim.proposal.drive import ActuatorChoice
-from sim.proposal.feet import MeshBounds, no_meshes
-from sim.proposal.frame import AS_IT_IS, Frame
-from sim.proposal.gait import walk_within_reach
-from sim.robot import bounds
-from sim.robot.robot import parse_robot
-from sim.robot.urdf_errors import by_line
+from gaitswarm.sim.errors import ProcessEnded, RobotFileError, SimulationInputError
+from gaitswarm.sim.limited_process import Document, LimitedProcesses, serve
+from gaitswarm.sim.proposal.document import Proposal, propose_robot
+from gaitswarm.sim.proposal.drive import ActuatorChoice
+from gaitswarm.sim.proposal.feet import MeshBounds, no_meshes
+from gaitswarm.sim.proposal.frame import AS_IT_IS, Frame
+from gaitswarm.sim.proposal.gait import walk_within_reach
+from gaitswarm.sim.robot import bounds
+from gaitswarm.sim.robot.robot import parse_robot
+from gaitswarm.sim.robot.urdf_errors import by_line
 
 SECONDS: Final = 40.0
 """That a proposal may take; it takes some tenths of a second, the first a second more."""
@@ -25,7 +25,7 @@ MEMORY: Final = 2 << 30
 """Address space of a process that proposes [B]; it takes a tenth of that."""
 
 PROCESSES: Final = LimitedProcesses(
-    "sim.proposal.apart", count=1, seconds=SECONDS, cpu_seconds=CPU_SECONDS, memory=MEMORY
+    "gaitswarm.sim.proposal.apart", count=1, seconds=SECONDS, cpu_seconds=CPU_SECONDS, memory=MEMORY
 )
 
 

@@ -10,14 +10,14 @@ from typing import Any, Final
 
 import numpy as np
 
-from sim.proposal.actuators import (
+from gaitswarm.sim.proposal.actuators import (
     ACTUATOR_NOTES,
     actuator_tables,
     drive_names,
     proposed_control,
     quoted,
 )
-from sim.proposal.drive import (
+from gaitswarm.sim.proposal.drive import (
     ActuatorChoice,
     DriveNumbers,
     SoleNumbers,
@@ -25,15 +25,15 @@ from sim.proposal.drive import (
     propose_drives,
     propose_sole,
 )
-from sim.proposal.feet import MeshBounds, no_meshes
-from sim.proposal.frame import AS_IT_IS, Frame, sideways
-from sim.proposal.gait import alternating_phases, propose_scenarios
-from sim.proposal.legs import FoundLeg, FoundLegs, chain_leg
-from sim.proposal.prepared import stood_up, with_feet
-from sim.proposal.stance import Stance, choose_stance
-from sim.robot.unphysical import unphysical
-from sim.robot.urdf import parse_urdf
-from sim.robot.urdf_errors import by_line
+from gaitswarm.sim.proposal.feet import MeshBounds, no_meshes
+from gaitswarm.sim.proposal.frame import AS_IT_IS, Frame, sideways
+from gaitswarm.sim.proposal.gait import alternating_phases, propose_scenarios
+from gaitswarm.sim.proposal.legs import FoundLeg, FoundLegs, chain_leg
+from gaitswarm.sim.proposal.prepared import stood_up, with_feet
+from gaitswarm.sim.proposal.stance import Stance, choose_stance
+from gaitswarm.sim.robot.unphysical import unphysical
+from gaitswarm.sim.robot.urdf import parse_urdf
+from gaitswarm.sim.robot.urdf_errors import by_line
 
 _PREFERENCE: Final = "C"
 """The one without biases, whose size is that of one hexapod's objectives: it ranks walks of robots

@@ -9,11 +9,11 @@ from typing import Final, Literal, get_args
 
 import numpy as np
 
-from sim.proposal.stance import Stance
-from sim.robot.actuators import ActuatorKind
-from sim.robot.joints import Joint
-from sim.robot.legs import ChainLeg
-from sim.robot.urdf import Urdf
+from gaitswarm.sim.proposal.stance import Stance
+from gaitswarm.sim.robot.actuators import ActuatorKind
+from gaitswarm.sim.robot.joints import Joint
+from gaitswarm.sim.robot.legs import ChainLeg
+from gaitswarm.sim.robot.urdf import Urdf
 
 GRAVITY: Final = 9.81
 """[m/s2]"""

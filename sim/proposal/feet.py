@@ -11,10 +11,10 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.errors import RobotFileError
-from sim.proposal.xml_text import fixed_joint
-from sim.robot.urdf import Solid, Urdf
-from sim.robot.visual_meshes import visual_meshes
+from gaitswarm.sim.errors import RobotFileError
+from gaitswarm.sim.proposal.xml_text import fixed_joint
+from gaitswarm.sim.robot.urdf import Solid, Urdf
+from gaitswarm.sim.robot.visual_meshes import visual_meshes
 
 Floats = NDArray[np.float64]
 

@@ -10,10 +10,10 @@ from typing import Final, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.errors import RobotFileError
-from sim.proposal.xml_text import fixed_joint, with_elements
-from sim.robot.legs import ChainLeg
-from sim.robot.urdf import Urdf
+from gaitswarm.sim.errors import RobotFileError
+from gaitswarm.sim.proposal.xml_text import fixed_joint, with_elements
+from gaitswarm.sim.robot.legs import ChainLeg
+from gaitswarm.sim.robot.urdf import Urdf
 
 Floats = NDArray[np.float64]
 

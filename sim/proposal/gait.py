@@ -8,15 +8,15 @@ from typing import Any, Final
 
 from pydantic import ValidationError
 
-from sim.errors import BeyondJointLimit, RobotFileError, UnreachablePose
-from sim.gait.gaits import GAITS, lags_of
-from sim.gait.trajectory import require_reachable
-from sim.input.wording import message_of
-from sim.proposal.drive import GRAVITY
-from sim.proposal.stance import Stance
-from sim.robot import Robot
-from sim.robot.legs import ChainLeg
-from sim.scenario import Scenario
+from gaitswarm.sim.errors import BeyondJointLimit, RobotFileError, UnreachablePose
+from gaitswarm.sim.gait.gaits import GAITS, lags_of
+from gaitswarm.sim.gait.trajectory import require_reachable
+from gaitswarm.sim.input.wording import message_of
+from gaitswarm.sim.proposal.drive import GRAVITY
+from gaitswarm.sim.proposal.stance import Stance
+from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.legs import ChainLeg
+from gaitswarm.sim.scenario import Scenario
 
 _WALKS: Final = {"slow": (0.9, 0.25), "fast": (0.6, 0.35)}
 """Cycle time in units of a pendulum's of the hips' height, stride in units of the height; of robots

@@ -9,16 +9,16 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.errors import RobotFileError
-from sim.proposal.feet import MeshBounds, end_of, no_meshes
-from sim.proposal.frame import check_upright
-from sim.proposal.look_alikes import check_look_alikes
-from sim.robot.chain import Chain, chain_of
-from sim.robot.description import JOINTS_PER_LEG, Leg
-from sim.robot.joints import TURNS, Joint
-from sim.robot.legs import ChainLeg
-from sim.robot.robot import Robot
-from sim.robot.urdf import Urdf
+from gaitswarm.sim.errors import RobotFileError
+from gaitswarm.sim.proposal.feet import MeshBounds, end_of, no_meshes
+from gaitswarm.sim.proposal.frame import check_upright
+from gaitswarm.sim.proposal.look_alikes import check_look_alikes
+from gaitswarm.sim.robot.chain import Chain, chain_of
+from gaitswarm.sim.robot.description import JOINTS_PER_LEG, Leg
+from gaitswarm.sim.robot.joints import TURNS, Joint
+from gaitswarm.sim.robot.legs import ChainLeg
+from gaitswarm.sim.robot.robot import Robot
+from gaitswarm.sim.robot.urdf import Urdf
 
 Floats = NDArray[np.float64]
 

@@ -8,9 +8,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.errors import RobotFileError
-from sim.robot.joints import TURNS, Joint
-from sim.robot.urdf import Urdf
+from gaitswarm.sim.errors import RobotFileError
+from gaitswarm.sim.robot.joints import TURNS, Joint
+from gaitswarm.sim.robot.urdf import Urdf
 
 Floats = NDArray[np.float64]
 

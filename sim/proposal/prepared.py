@@ -9,12 +9,12 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from sim.proposal.feet import MeshBounds
-from sim.proposal.frame import AS_IT_IS, Frame, turned
-from sim.proposal.legs import FoundLeg, FoundLegs, chain_leg, find_legs
-from sim.proposal.stance import choose_stance
-from sim.proposal.xml_text import fixed_joint, with_elements
-from sim.robot.urdf import parse_urdf
+from gaitswarm.sim.proposal.feet import MeshBounds
+from gaitswarm.sim.proposal.frame import AS_IT_IS, Frame, turned
+from gaitswarm.sim.proposal.legs import FoundLeg, FoundLegs, chain_leg, find_legs
+from gaitswarm.sim.proposal.stance import choose_stance
+from gaitswarm.sim.proposal.xml_text import fixed_joint, with_elements
+from gaitswarm.sim.robot.urdf import parse_urdf
 
 _LEVEL: Final = 0.2
 """How far hips may be above or below the body's origin, as a share of the legs' length."""

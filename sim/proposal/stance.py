@@ -9,10 +9,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.errors import RobotFileError
-from sim.gait.inverse_kinematics import chain_angles
-from sim.proposal.legs import tried_angles
-from sim.robot.legs import ChainLeg
+from gaitswarm.sim.errors import RobotFileError
+from gaitswarm.sim.gait.inverse_kinematics import chain_angles
+from gaitswarm.sim.proposal.legs import tried_angles
+from gaitswarm.sim.robot.legs import ChainLeg
 
 Floats = NDArray[np.float64]
 

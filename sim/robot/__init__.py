@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from sim.robot.robot import Robot, parse_robot
-from sim.robot.shipped import DEFAULT_ROBOT, SHIPPED, RobotName
-from sim.robot.variant import (
+from gaitswarm.sim.robot.robot import Robot, parse_robot
+from gaitswarm.sim.robot.shipped import DEFAULT_ROBOT, SHIPPED, RobotName
+from gaitswarm.sim.robot.variant import (
     RobotChoice,
     RobotFiles,
     RobotSource,

@@ -10,9 +10,9 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 
-from sim.input import former_names
-from sim.input.former_names import current_names
-from sim.robot.bounds import Number, PartName
+from gaitswarm.sim.input import former_names
+from gaitswarm.sim.input.former_names import current_names
+from gaitswarm.sim.robot.bounds import Number, PartName
 
 ActuatorKind = Literal["dc", "torque"]
 """What a controller commands: a DC motor's voltage, or an actuator's torque."""

@@ -12,7 +12,7 @@ from xml.parsers import expat
 
 from pydantic import AfterValidator, Field
 
-from sim.errors import RobotFileError
+from gaitswarm.sim.errors import RobotFileError
 
 LONGEST_TOML: Final = 200_000
 """Characters of a robot.toml."""

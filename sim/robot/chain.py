@@ -9,13 +9,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.errors import RobotFileError
-from sim.input.near_names import nearest
-from sim.robot.description import Leg
-from sim.robot.elements import MOST_TURNED
-from sim.robot.inertia import BodyInertia, product
-from sim.robot.joints import Joint
-from sim.robot.urdf import Place, Urdf
+from gaitswarm.sim.errors import RobotFileError
+from gaitswarm.sim.input.near_names import nearest
+from gaitswarm.sim.robot.description import Leg
+from gaitswarm.sim.robot.elements import MOST_TURNED
+from gaitswarm.sim.robot.inertia import BodyInertia, product
+from gaitswarm.sim.robot.joints import Joint
+from gaitswarm.sim.robot.urdf import Place, Urdf
 
 Floats = NDArray[np.float64]
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, Final
 
-from sim.errors import ProcessEnded, RobotFileError, SimulationInputError
-from sim.limited_process import Document, LimitedProcesses, serve
-from sim.robot import bounds
-from sim.robot.digests import PASSED, digest_of
-from sim.robot.limbs import limbs_of
-from sim.robot.robot import parse_robot
-from sim.robot.shapes import visible_links
+from gaitswarm.sim.errors import ProcessEnded, RobotFileError, SimulationInputError
+from gaitswarm.sim.limited_process import Document, LimitedProcesses, serve
+from gaitswarm.sim.robot import bounds
+from gaitswarm.sim.robot.digests import PASSED, digest_of
+from gaitswarm.sim.robot.limbs import limbs_of
+from gaitswarm.sim.robot.robot import parse_robot
+from gaitswarm.sim.robot.shapes import visible_links
 
 SECONDS: Final = 20.0
 """That a check may take; it takes some hundredths of a second, the first a second."""
@@ -27,7 +27,7 @@ MOST_ROBOTS: Final = 16
 Location = tuple[str | int, ...]
 
 PROCESSES: Final = LimitedProcesses(
-    "sim.robot.check", count=2, seconds=SECONDS, cpu_seconds=CPU_SECONDS, memory=MEMORY
+    "gaitswarm.sim.robot.check", count=2, seconds=SECONDS, cpu_seconds=CPU_SECONDS, memory=MEMORY
 )
 
 

@@ -11,9 +11,9 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import ConfigDict, Field, model_validator
 
-from sim.input import former_names
-from sim.input.former_names import current_names
-from sim.robot.actuators import (
+from gaitswarm.sim.input import former_names
+from gaitswarm.sim.input.former_names import current_names
+from gaitswarm.sim.robot.actuators import (
     CONTROL_RATE,
     LARGEST_OUTPUT,
     Actuator,
@@ -24,7 +24,7 @@ from sim.robot.actuators import (
     Motor,
     TorqueCommand,
 )
-from sim.robot.bounds import LONGEST_LEG_NAME, MOST_LEGS, Number, PartName, Sentence
+from gaitswarm.sim.robot.bounds import LONGEST_LEG_NAME, MOST_LEGS, Number, PartName, Sentence
 
 JOINTS_PER_LEG = 3
 """Coxa, femur, tibia."""
@@ -93,7 +93,7 @@ class Sensors(Data):
 
 
 ContactLaw = Literal["linear_zone", "karnopp", "stick", "dead_zone"]
-"""How a sole rubs on the ground; see `sim.kernel.dynamics.contact`."""
+"""How a sole rubs on the ground; see `gaitswarm.sim.kernel.dynamics.contact`."""
 
 
 PlannedSoles = Literal["nominal", "own"]

@@ -47,7 +47,7 @@ class _Digests:
 
 
 PASSED: Final = _Digests()
-"""Files that passed `sim.robot.check.check_files`, in this process."""
+"""Files that passed `gaitswarm.sim.robot.check.check_files`, in this process."""
 
 READ: Final = _Digests()
 """Files that this process has made a robot of."""

@@ -13,18 +13,18 @@ from typing import Final, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from sim.errors import SimulationInputError
-from sim.input.wording import message_of
-from sim.robot.actuators import Actuator, TorqueActuator
-from sim.robot.description import (
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.input.wording import message_of
+from gaitswarm.sim.robot.actuators import Actuator, TorqueActuator
+from gaitswarm.sim.robot.description import (
     ContactLaw,
     EnergyConvention,
     Leg,
     PlannedSoles,
     RobotDescription,
 )
-from sim.robot.robot import Robot
-from sim.variables import Variable
+from gaitswarm.sim.robot.robot import Robot
+from gaitswarm.sim.variables import Variable
 
 _WHOLE: Final = (
     Variable(

@@ -11,10 +11,10 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.errors import RobotFileError
-from sim.memory import require_room_for_scipy
-from sim.robot.bounds import LARGEST, shortened
-from sim.robot.elements import Origin, numbers_of, origin_of
+from gaitswarm.sim.errors import RobotFileError
+from gaitswarm.sim.memory import require_room_for_scipy
+from gaitswarm.sim.robot.bounds import LARGEST, shortened
+from gaitswarm.sim.robot.elements import Origin, numbers_of, origin_of
 
 Floats = NDArray[np.float64]
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from sim.errors import SimulationInputError
-from sim.robot.legs import LegKinematics
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.robot.legs import LegKinematics
 
 if TYPE_CHECKING:
-    from sim.robot.robot import Robot
+    from gaitswarm.sim.robot.robot import Robot
 
 
 def rows_of(legs: Sequence[LegKinematics]) -> tuple[tuple[int, ...], tuple[int, ...]]:

@@ -12,10 +12,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.robot.chain import Placement, chain_of, check_joints
-from sim.robot.description import JOINTS_PER_LEG
-from sim.robot.inertia import parallel_axis
-from sim.robot.robot import Robot
+from gaitswarm.sim.robot.chain import Placement, chain_of, check_joints
+from gaitswarm.sim.robot.description import JOINTS_PER_LEG
+from gaitswarm.sim.robot.inertia import parallel_axis
+from gaitswarm.sim.robot.robot import Robot
 
 _NOISE: Final = 1e-14
 

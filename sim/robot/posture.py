@@ -7,10 +7,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.robot.chain import chain_of
-from sim.robot.legs import turned
-from sim.robot.limbs import limbs_of
-from sim.robot.robot import Robot
+from gaitswarm.sim.robot.chain import chain_of
+from gaitswarm.sim.robot.legs import turned
+from gaitswarm.sim.robot.limbs import limbs_of
+from gaitswarm.sim.robot.robot import Robot
 
 Floats = NDArray[np.float64]
 

@@ -12,17 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from sim.errors import RobotFileError
-from sim.robot.actuators import Actuator, TorqueActuator
-from sim.robot.bounds import check_toml
-from sim.robot.chain import chain_of, check_joints, check_owners
-from sim.robot.description import JOINTS_PER_LEG, Contact, Leg, RobotDescription
-from sim.robot.elements import MOST_TURNED
-from sim.robot.inertia import BodyInertia
-from sim.robot.legs import ChainLeg, KneeUpLeg, LegKinematics
-from sim.robot.toml_errors import by_leg, first_problem
-from sim.robot.urdf import Urdf, parse_urdf
-from sim.robot.urdf_errors import by_line
+from gaitswarm.sim.errors import RobotFileError
+from gaitswarm.sim.robot.actuators import Actuator, TorqueActuator
+from gaitswarm.sim.robot.bounds import check_toml
+from gaitswarm.sim.robot.chain import chain_of, check_joints, check_owners
+from gaitswarm.sim.robot.description import JOINTS_PER_LEG, Contact, Leg, RobotDescription
+from gaitswarm.sim.robot.elements import MOST_TURNED
+from gaitswarm.sim.robot.inertia import BodyInertia
+from gaitswarm.sim.robot.legs import ChainLeg, KneeUpLeg, LegKinematics
+from gaitswarm.sim.robot.toml_errors import by_leg, first_problem
+from gaitswarm.sim.robot.urdf import Urdf, parse_urdf
+from gaitswarm.sim.robot.urdf_errors import by_line
 
 Floats = NDArray[np.float64]
 
@@ -239,7 +239,7 @@ def parse_robot(toml: str, urdf: str) -> Robot:
         The robot.
 
     Raises:
-        RobotFileError: A file breaks a bound of `sim.robot.bounds` or cannot be used; names file
+        RobotFileError: A file breaks a bound of `gaitswarm.sim.robot.bounds` or cannot be used; names file
             and field.
     """
     check_toml(toml)

@@ -9,13 +9,13 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.memory import require_room_for_scipy
-from sim.robot.chain import chain_of
-from sim.robot.description import Leg
-from sim.robot.legs import LegKinematics
-from sim.robot.robot import Robot
-from sim.robot.urdf import SolidKind
-from sim.robot.visual_meshes import VisualMesh, material_colours, visual_meshes
+from gaitswarm.sim.memory import require_room_for_scipy
+from gaitswarm.sim.robot.chain import chain_of
+from gaitswarm.sim.robot.description import Leg
+from gaitswarm.sim.robot.legs import LegKinematics
+from gaitswarm.sim.robot.robot import Robot
+from gaitswarm.sim.robot.urdf import SolidKind
+from gaitswarm.sim.robot.visual_meshes import VisualMesh, material_colours, visual_meshes
 
 Floats = NDArray[np.float64]
 

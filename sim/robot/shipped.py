@@ -8,9 +8,9 @@ from functools import lru_cache
 from importlib import resources
 from typing import Final, Literal, get_args
 
-from sim.errors import SimulationInputError
-from sim.robot.identifiable import with_parameters
-from sim.robot.robot import Robot, parse_robot
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.robot.identifiable import with_parameters
+from gaitswarm.sim.robot.robot import Robot, parse_robot
 
 RobotName = Literal["szabadka2", "szabadka2-identified", "szabadka2-reconstructed"]
 """Robots that ship with gaitswarm."""
@@ -39,7 +39,7 @@ def shipped_robot(name: str) -> Robot:
     """
     if name not in SHIPPED:
         raise SimulationInputError(f"robot: unknown {name!r}; known are {', '.join(SHIPPED)}")
-    folder = resources.files("sim.robot") / name
+    folder = resources.files("gaitswarm.sim.robot") / name
     parameters = folder / "parameters.toml"
     if not parameters.is_file():
         robot = parse_robot(

@@ -9,12 +9,12 @@ from typing import Any, Final
 
 from pydantic import BaseModel, ValidationError
 
-from sim.errors import RobotFileError
-from sim.input.former_names import as_written
-from sim.input.wording import message_of, with_known_keys
-from sim.robot.actuators import Actuator, Gearhead, Motor, TorqueActuator, TorqueCommand
-from sim.robot.bounds import shortened
-from sim.robot.description import (
+from gaitswarm.sim.errors import RobotFileError
+from gaitswarm.sim.input.former_names import as_written
+from gaitswarm.sim.input.wording import message_of, with_known_keys
+from gaitswarm.sim.robot.actuators import Actuator, Gearhead, Motor, TorqueActuator, TorqueCommand
+from gaitswarm.sim.robot.bounds import shortened
+from gaitswarm.sim.robot.description import (
     Contact,
     Leg,
     Pwm,

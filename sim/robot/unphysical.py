@@ -8,9 +8,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.robot.inertia import BodyInertia
-from sim.robot.urdf import Urdf
-from sim.robot.urdf_errors import with_line
+from gaitswarm.sim.robot.inertia import BodyInertia
+from gaitswarm.sim.robot.urdf import Urdf
+from gaitswarm.sim.robot.urdf_errors import with_line
 
 Floats = NDArray[np.float64]
 

@@ -12,12 +12,12 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.errors import RobotFileError
-from sim.robot.bounds import check_urdf, shortened
-from sim.robot.elements import Origin, numbers_of, origin_of
-from sim.robot.inertia import NO_INERTIA, BodyInertia, product
-from sim.robot.joints import Joint, joint_of, standardise
-from sim.robot.urdf_errors import by_line
+from gaitswarm.sim.errors import RobotFileError
+from gaitswarm.sim.robot.bounds import check_urdf, shortened
+from gaitswarm.sim.robot.elements import Origin, numbers_of, origin_of
+from gaitswarm.sim.robot.inertia import NO_INERTIA, BodyInertia, product
+from gaitswarm.sim.robot.joints import Joint, joint_of, standardise
+from gaitswarm.sim.robot.urdf_errors import by_line
 
 Floats = NDArray[np.float64]
 
@@ -169,7 +169,7 @@ def parse_urdf(text: str, held: Mapping[str, float] = _NONE_HELD) -> Urdf:
         What it says.
 
     Raises:
-        RobotFileError: It breaks a bound of `sim.robot.bounds`, is no XML, a number cannot be
+        RobotFileError: It breaks a bound of `gaitswarm.sim.robot.bounds`, is no XML, a number cannot be
             read, its links are not one tree, or a held joint is not there or does not turn.
     """
     return _read(text, tuple(held.items()))

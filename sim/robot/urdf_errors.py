@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import Final
 from xml.parsers import expat
 
-from sim.errors import RobotFileError
+from gaitswarm.sim.errors import RobotFileError
 
 _PART: Final = re.compile(
     r"""robot\.urdf: (?P<part>(?P<tag>link|joint)\ (?P<name>'(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*"))"""
@@ -21,7 +21,7 @@ def by_line(text: str) -> Iterator[None]:
     """Add the line to errors that name a link or a joint of a URDF.
 
     Args:
-        text: Of the file, which keeps the bounds of `sim.robot.bounds`.
+        text: Of the file, which keeps the bounds of `gaitswarm.sim.robot.bounds`.
 
     Yields:
         Nothing.
@@ -42,7 +42,7 @@ def with_line(text: str, said: str) -> str:
     """Add the line to a sentence that begins with a link or a joint of a URDF.
 
     Args:
-        text: Of the file, which keeps the bounds of `sim.robot.bounds`.
+        text: Of the file, which keeps the bounds of `gaitswarm.sim.robot.bounds`.
         said: The sentence.
 
     Returns:

@@ -9,11 +9,11 @@ from typing import Annotated, Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field, Tag, model_validator
 
-from sim.input import former_names
-from sim.input.choice import NAME, alternatives
-from sim.input.former_names import current_names
-from sim.robot.actuators import AnyActuator
-from sim.robot.bounds import (
+from gaitswarm.sim.input import former_names
+from gaitswarm.sim.input.choice import NAME, alternatives
+from gaitswarm.sim.input.former_names import current_names
+from gaitswarm.sim.robot.actuators import AnyActuator
+from gaitswarm.sim.robot.bounds import (
     DEEPEST,
     LONGEST_TOML,
     LONGEST_URDF,
@@ -22,10 +22,10 @@ from sim.robot.bounds import (
     MOST_LINKS,
     MOST_VALUES,
 )
-from sim.robot.description import ContactLaw, Leg, PlannedSoles
-from sim.robot.digests import PASSED, READ, digest_of
-from sim.robot.robot import Robot, parse_robot
-from sim.robot.shipped import DEFAULT_ROBOT, RobotName, shipped_robot
+from gaitswarm.sim.robot.description import ContactLaw, Leg, PlannedSoles
+from gaitswarm.sim.robot.digests import PASSED, READ, digest_of
+from gaitswarm.sim.robot.robot import Robot, parse_robot
+from gaitswarm.sim.robot.shipped import DEFAULT_ROBOT, RobotName, shipped_robot
 
 Degrees = tuple[float, float, float]
 

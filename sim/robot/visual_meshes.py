@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Final
 from xml.etree import ElementTree as ET
 
-from sim.errors import RobotFileError
-from sim.robot.elements import origin_of
-from sim.robot.urdf import Link
+from gaitswarm.sim.errors import RobotFileError
+from gaitswarm.sim.robot.elements import origin_of
+from gaitswarm.sim.robot.urdf import Link
 
 Colour = tuple[float, float, float, float]
 """Red, green, blue and opacity, 0 to 1."""

@@ -2,8 +2,20 @@
 
 from __future__ import annotations
 
-from sim.scenario.description import BY_LEG_GROUP, GAIT_NAMES, GaitName, Scenario, ScenarioName
-from sim.scenario.presets import HELD_OUT, PRESETS, SCENARIOS, ScenarioChoice, find_scenario
+from gaitswarm.sim.scenario.description import (
+    BY_LEG_GROUP,
+    GAIT_NAMES,
+    GaitName,
+    Scenario,
+    ScenarioName,
+)
+from gaitswarm.sim.scenario.presets import (
+    HELD_OUT,
+    PRESETS,
+    SCENARIOS,
+    ScenarioChoice,
+    find_scenario,
+)
 
 __all__ = [
     "BY_LEG_GROUP",

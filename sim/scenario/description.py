@@ -15,11 +15,11 @@ from pydantic import (
     model_validator,
 )
 
-from sim.input import former_names
-from sim.input.former_names import current_names
-from sim.input.wording import message_of
-from sim.scenario.usual_duty import USUAL_SUPPORT, with_duty_factor
-from sim.variables import VariableName, split_name
+from gaitswarm.sim.input import former_names
+from gaitswarm.sim.input.former_names import current_names
+from gaitswarm.sim.input.wording import message_of
+from gaitswarm.sim.scenario.usual_duty import USUAL_SUPPORT, with_duty_factor
+from gaitswarm.sim.variables import VariableName, split_name
 
 ScenarioName = Annotated[
     str,
@@ -35,12 +35,12 @@ ScenarioName = Annotated[
 GaitName = Literal[
     "own", "alternating", "tripod", "wave", "ripple", "trot", "pace", "bound", "crawl"
 ]
-"""Order of the legs' steps; `own` is that of the robot's description. See `sim.gait.gaits`."""
+"""Order of the legs' steps; `own` is that of the robot's description. See `gaitswarm.sim.gait.gaits`."""
 
 GAIT_NAMES: Final[tuple[GaitName, ...]] = get_args(GaitName)
 
 CurveName = Literal["quadratic_spline", "half_ellipse", "cycloid"]
-"""Shape of the swing; each is a module of `sim.gait`."""
+"""Shape of the swing; each is a module of `gaitswarm.sim.gait`."""
 
 BY_LEG_GROUP: Final = ("stride", "height", "duty_factor", "start_phase", "radius")
 """Fields of which groups of legs may have values of their own."""

@@ -6,10 +6,10 @@ from typing import Annotated, Final
 
 from pydantic import AfterValidator, BeforeValidator, Tag
 
-from sim.errors import SimulationInputError
-from sim.input.choice import NAME, OWN, alternatives
-from sim.input.near_names import instead_of
-from sim.scenario.description import Scenario, ScenarioName
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.input.choice import NAME, OWN, alternatives
+from gaitswarm.sim.input.near_names import instead_of
+from gaitswarm.sim.scenario.description import Scenario, ScenarioName
 
 SCENARIOS: Final[tuple[Scenario, ...]] = (
     Scenario(name="normal-fast", cycle_time=1.5, radius=0.16, hip_height=0.15),

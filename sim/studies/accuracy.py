@@ -11,19 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from sim.assembly import PHYSICS_RATE, control_steps, judge, plan_walk
-from sim.controllers.base import ControlLaw
-from sim.controllers.fuzzy_pi import FuzzyPi
-from sim.controllers.quantisation import Axis
-from sim.errors import SimulationInputError
-from sim.input.wording import message_of
-from sim.kernel.readable.reference import reference_kernel
-from sim.noise import LinkNoise
-from sim.outcome import Status
-from sim.robot import DEFAULT_ROBOT, RobotChoice, load_robot
-from sim.robot.robot import with_shafts
-from sim.scenario import SCENARIOS, Scenario
-from sim.simulate import simulate
+from gaitswarm.sim.assembly import PHYSICS_RATE, control_steps, judge, plan_walk
+from gaitswarm.sim.controllers.base import ControlLaw
+from gaitswarm.sim.controllers.fuzzy_pi import FuzzyPi
+from gaitswarm.sim.controllers.quantisation import Axis
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.input.wording import message_of
+from gaitswarm.sim.kernel.readable.reference import reference_kernel
+from gaitswarm.sim.noise import LinkNoise
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotChoice, load_robot
+from gaitswarm.sim.robot.robot import with_shafts
+from gaitswarm.sim.scenario import SCENARIOS, Scenario
+from gaitswarm.sim.simulate import simulate
 
 RESOLUTIONS: Final = ((6, 6), (8, 8), (10, 6))
 """Bits of error and current in the tables that are compared."""

@@ -9,15 +9,15 @@ from typing import Final
 
 import numpy as np
 
-from sim.controllers import CONTROLLERS, ControllerName
-from sim.errors import SimulationInputError
-from sim.gait.driving_2011 import driven_as_in_2011
-from sim.gait_variables import GAIT_CATALOGUE, with_gait
-from sim.input.near_names import instead_of
-from sim.outcome import Status
-from sim.robot import DEFAULT_ROBOT, RobotChoice
-from sim.scenario import Scenario
-from sim.simulate import simulate
+from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.gait.driving_2011 import driven_as_in_2011
+from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
+from gaitswarm.sim.input.near_names import instead_of
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotChoice
+from gaitswarm.sim.scenario import Scenario
+from gaitswarm.sim.simulate import simulate
 
 
 def _in_the_scenarios_own_gait(scenario: Scenario) -> Scenario:

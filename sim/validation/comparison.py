@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from sim.controllers.fixed_point import CONTROL_PERIOD
-from sim.measurement.measured_log import MeasuredLog, Quantity
-from sim.measurement.synchronise import Synchronised, synchronise
-from sim.robot.description import JOINTS_PER_LEG
-from sim.validation import measures
-from sim.validation.measures import Tolerance
+from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
+from gaitswarm.sim.measurement.measured_log import MeasuredLog, Quantity
+from gaitswarm.sim.measurement.synchronise import Synchronised, synchronise
+from gaitswarm.sim.robot.description import JOINTS_PER_LEG
+from gaitswarm.sim.validation import measures
+from gaitswarm.sim.validation.measures import Tolerance
 
 Floats = NDArray[np.float64]
 

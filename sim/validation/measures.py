@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.errors import SimulationInputError
+from gaitswarm.sim.errors import SimulationInputError
 
 Floats = NDArray[np.float64]
 

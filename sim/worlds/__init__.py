@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from sim.scenario import HELD_OUT
-from sim.worlds.engine_walk import EngineWalk
-from sim.worlds.perturbations import PERTURBATIONS, check_worlds, sample_worlds
-from sim.worlds.perturbed_walk import MeasuredPerturbedWalk, PerturbedWalk
-from sim.worlds.world_walk import WorldWalk
+from gaitswarm.sim.scenario import HELD_OUT
+from gaitswarm.sim.worlds.engine_walk import EngineWalk
+from gaitswarm.sim.worlds.perturbations import PERTURBATIONS, check_worlds, sample_worlds
+from gaitswarm.sim.worlds.perturbed_walk import MeasuredPerturbedWalk, PerturbedWalk
+from gaitswarm.sim.worlds.world_walk import WorldWalk
 
 __all__ = [
     "HELD_OUT",

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.kernel.walk import Kernel, Precision
-from sim.mujoco.engines import ENGINES, check_installed
-from sim.mujoco.mjcf import Soles
-from sim.outcome import N_OBJECTIVES, Objective, Outcome
-from sim.robot import RobotSource, load_robot
-from sim.worlds.world_walk import WorldWalk
+from gaitswarm.sim.kernel.walk import Kernel, Precision
+from gaitswarm.sim.mujoco.engines import ENGINES, check_installed
+from gaitswarm.sim.mujoco.mjcf import Soles
+from gaitswarm.sim.outcome import N_OBJECTIVES, Objective, Outcome
+from gaitswarm.sim.robot import RobotSource, load_robot
+from gaitswarm.sim.worlds.world_walk import WorldWalk
 
 Floats = NDArray[np.float64]
 
@@ -89,7 +89,7 @@ class EngineWalk:
     def _kernel(self, engine: int, should_stop: Callable[[], bool]) -> Kernel:
         check_installed()
         # Whoever has none of these walks need not have MuJoCo.
-        from sim.mujoco.kernel import MujocoKernel  # noqa: PLC0415
+        from gaitswarm.sim.mujoco.kernel import MujocoKernel  # noqa: PLC0415
 
         robot = load_robot(self.walk.robot)
         own_contacts = tuple(ENGINES)[engine - 1] == "mujoco-contacts"

@@ -10,10 +10,10 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.errors import SimulationInputError
-from sim.input.near_names import instead_of
-from sim.kernel.sensors import LARGEST_DELAY
-from sim.variables import Variable
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.input.near_names import instead_of
+from gaitswarm.sim.kernel.sensors import LARGEST_DELAY
+from gaitswarm.sim.variables import Variable
 
 Floats = NDArray[np.float64]
 

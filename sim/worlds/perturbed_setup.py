@@ -10,13 +10,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.kernel.parameters import Layout, gravity_on
-from sim.kernel.sensors import DEVIATION, SensorErrors, byte_sums
-from sim.kernel.walk import WalkSetup
-from sim.robot import Robot
-from sim.robot.posture import feet_in_body, height_on_soles
-from sim.scenario import Scenario
-from sim.worlds.perturbations import NOMINAL
+from gaitswarm.sim.kernel.parameters import Layout, gravity_on
+from gaitswarm.sim.kernel.sensors import DEVIATION, SensorErrors, byte_sums
+from gaitswarm.sim.kernel.walk import WalkSetup
+from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.posture import feet_in_body, height_on_soles
+from gaitswarm.sim.scenario import Scenario
+from gaitswarm.sim.worlds.perturbations import NOMINAL
 
 Floats = NDArray[np.float64]
 

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.assembly import control_steps, judge, kernel_of, measure, plan_walk
-from sim.controllers import ControllerName, control_law
-from sim.gait_variables import GAIT_CATALOGUE, with_gait
-from sim.kernel.batch import Walking, WantedWalk, walk_together
-from sim.kernel.observation import WalkLog, walk_log
-from sim.kernel.walk import Kernel, Precision, WalkSetup
-from sim.outcome import (
+from gaitswarm.sim.assembly import control_steps, judge, kernel_of, measure, plan_walk
+from gaitswarm.sim.controllers import ControllerName, control_law
+from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
+from gaitswarm.sim.kernel.batch import Walking, WantedWalk, walk_together
+from gaitswarm.sim.kernel.observation import WalkLog, walk_log
+from gaitswarm.sim.kernel.walk import Kernel, Precision, WalkSetup
+from gaitswarm.sim.outcome import (
     N_MEASUREMENTS,
     N_OBJECTIVES,
     OBJECTIVES,
@@ -22,11 +22,11 @@ from sim.outcome import (
     Outcome,
     Status,
 )
-from sim.robot import RobotSource, load_robot
-from sim.scenario import Scenario
-from sim.simulate import Simulation
-from sim.worlds.perturbations import check_worlds
-from sim.worlds.perturbed_setup import perturbed_setups
+from gaitswarm.sim.robot import RobotSource, load_robot
+from gaitswarm.sim.scenario import Scenario
+from gaitswarm.sim.simulate import Simulation
+from gaitswarm.sim.worlds.perturbations import check_worlds
+from gaitswarm.sim.worlds.perturbed_setup import perturbed_setups
 
 Floats = NDArray[np.float64]
 

@@ -35,12 +35,12 @@ from schemathesis.specs.openapi.checks import (
     unsupported_method,
 )
 
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.search.swarm.pso import PsoSettings
-from services.optimizer.service import JobService
-from services.optimizer.store.sql_store import SqlStore, open_store
-from services.runtime import open_evaluator, run_embedded
-from sim.scenario import Scenario
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.search.swarm.pso import PsoSettings
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.runtime import open_evaluator, run_embedded
+from gaitswarm.sim.scenario import Scenario
 from tests.certificate.examples import small
 from tests.examples.servers import Server
 from tests.examples.walks import SHORT_WALK

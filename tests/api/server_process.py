@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import sys
 
-from api.app import create_app
-from api.server import ApiServer
+from gaitswarm.api.app import create_app
+from gaitswarm.api.server import ApiServer
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.sql_store import open_store
 from gaitswarm.settings import Settings
-from services.optimizer.service import JobService
-from services.optimizer.store.sql_store import open_store
 
 
 def main() -> None:

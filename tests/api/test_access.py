@@ -9,13 +9,13 @@ import httpx2
 import pytest
 
 import gaitswarm
-from api.access import COOKIE, may_command, may_submit
+from gaitswarm.api.access import COOKIE, may_command, may_submit
+from gaitswarm.services.optimizer.access import Scope
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from gaitswarm.settings import Settings
-from services.optimizer.access import Scope
-from services.optimizer.jobs.job import Job
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.service import JobService
-from services.optimizer.store.sql_store import SqlStore
 from tests.api.conftest import Serve
 from tests.examples.servers import Server, operations
 
@@ -209,7 +209,7 @@ def test_the_audit_log_names_tokens_and_is_for_administrators(
 def test_a_revoked_token_is_refused_within_seconds(
     guarded: httpx2.Client, bearer: Bearer, store: SqlStore, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("api.known_tokens.REMEMBERED_SECONDS", 0.0)
+    monkeypatch.setattr("gaitswarm.api.known_tokens.REMEMBERED_SECONDS", 0.0)
     headers = bearer(Scope.READ)
     assert guarded.get("/v1/jobs", headers=headers).status_code == 200
     store.tokens.revoke("read")

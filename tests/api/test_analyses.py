@@ -8,10 +8,10 @@ from concurrent.futures import ThreadPoolExecutor
 import httpx2
 import pytest
 
-from api.dependencies import Analysing
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.job import Job
-from services.optimizer.service import JobService
+from gaitswarm.api.dependencies import Analysing
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.service import JobService
 from tests.api.conftest import Commit, Serve
 from tests.examples.servers import operations
 

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from services.optimizer.jobs.job import Job
-from services.optimizer.jobs.kinds.identification import IdentificationSpec
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.preference import PREFERENCES
-from services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from tests.api.conftest import PARTICLES, Commit
 from tests.examples.servers import unframed
 

@@ -8,7 +8,13 @@ from typing import Any
 import httpx2
 import pytest
 
-from api.answers import Answers
+from gaitswarm.api.answers import Answers
+from gaitswarm.services.monitoring.metrics import Metrics
+from gaitswarm.services.optimizer.access import Scope
+from gaitswarm.services.optimizer.jobs.job import Command, Job
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.labels import LabelsChange
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from gaitswarm.views import (
     BestView,
     CatalogueView,
@@ -19,12 +25,6 @@ from gaitswarm.views import (
     PageView,
     evaluation_views,
 )
-from services.monitoring.metrics import Metrics
-from services.optimizer.access import Scope
-from services.optimizer.jobs.job import Command, Job
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.labels import LabelsChange
-from services.optimizer.store.sql_store import SqlStore
 from tests.api.conftest import Commit, Serve
 from tests.store.test_job_reading import statements
 

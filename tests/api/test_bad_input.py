@@ -9,7 +9,7 @@ from typing import Any
 import httpx2
 import pytest
 
-from services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 
 pytestmark = pytest.mark.slow
 

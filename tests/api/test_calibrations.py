@@ -8,8 +8,8 @@ from typing import Any
 
 import httpx2
 
-from services.optimizer.store.sql_store import SqlStore
-from services.runtime import open_evaluator, run_embedded
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.runtime import open_evaluator, run_embedded
 from tests.calibration.conftest import WALKS
 
 SPEC: dict[str, Any] = {

@@ -9,13 +9,13 @@ import httpx2
 import jsonschema
 import pytest
 
-from services.optimizer.jobs.preference import PREFERENCES
-from services.optimizer.search.automatic import CHOICES
-from services.optimizer.search.registry import METHODS
-from sim.controllers import CONTROLLERS
-from sim.gait_variables import GAIT_VARIABLES
-from sim.robot import DEFAULT_ROBOT, SHIPPED, load_robot
-from sim.scenario import PRESETS, SCENARIOS
+from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
+from gaitswarm.services.optimizer.search.automatic import CHOICES
+from gaitswarm.services.optimizer.search.registry import METHODS
+from gaitswarm.sim.controllers import CONTROLLERS
+from gaitswarm.sim.gait_variables import GAIT_VARIABLES
+from gaitswarm.sim.robot import DEFAULT_ROBOT, SHIPPED, load_robot
+from gaitswarm.sim.scenario import PRESETS, SCENARIOS
 
 
 def items(client: httpx2.Client, what: str) -> list[dict[str, Any]]:

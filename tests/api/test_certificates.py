@@ -7,8 +7,8 @@ from typing import Any
 import httpx2
 import pytest
 
-from services.optimizer.store.sql_store import SqlStore
-from services.runtime import open_evaluator, run_embedded
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.runtime import open_evaluator, run_embedded
 from tests.certificate.examples import DOCUMENT, PI
 from tests.examples.walks import SHORT_WALK
 

@@ -8,11 +8,11 @@ from typing import Any
 import httpx2
 import pytest
 
-from services.optimizer.jobs.job import Job
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.reference import Reference
-from services.optimizer.search.swarm.pso import PsoSettings
-from services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.reference import Reference
+from gaitswarm.services.optimizer.search.swarm.pso import PsoSettings
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from tests.api.conftest import PARTICLES, Commit
 
 pytestmark = pytest.mark.slow

@@ -19,10 +19,10 @@ from schemathesis.generation.meta import CoveragePhaseData
 from schemathesis.pytest.lazy import get_all_tests
 from schemathesis.schemas import APIOperation, BaseSchema
 
-from api.app import create_app
+from gaitswarm.api.app import create_app
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.sql_store import open_store
 from gaitswarm.settings import Settings
-from services.optimizer.service import JobService
-from services.optimizer.store.sql_store import open_store
 from tests.api.conformance import CHECKS, Found, schema_of, sequences, served
 from tests.examples.api_document import api_document
 from tests.examples.servers import Server

@@ -10,8 +10,8 @@ from contextlib import ExitStack
 
 import pytest
 
-from api.connections import ConnectionLimits
-from services.optimizer.jobs.job import Job
+from gaitswarm.api.connections import ConnectionLimits
+from gaitswarm.services.optimizer.jobs.job import Job
 from tests.api.conftest import Serve
 from tests.examples.servers import Server
 

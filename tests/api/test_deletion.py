@@ -10,11 +10,11 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from services.optimizer.deletion import Housekeeping
-from services.optimizer.errors import NotFound
-from services.optimizer.jobs.job import Command, Job
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.deletion import Housekeeping
+from gaitswarm.services.optimizer.errors import NotFound
+from gaitswarm.services.optimizer.jobs.job import Command, Job
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from tests.api.conftest import Commit
 from tests.examples.processes import eventually
 from tests.examples.servers import ServerProcess

@@ -8,7 +8,7 @@ from typing import Any
 import httpx2
 import pytest
 
-from api.documentation import TAGS
+from gaitswarm.api.documentation import TAGS
 from tests.examples.servers import Server
 
 Document = dict[str, Any]

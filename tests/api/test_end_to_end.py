@@ -9,9 +9,9 @@ from typing import Any
 import httpx2
 import pytest
 
-from services.optimizer.run.runner import Runner
-from services.optimizer.store.sql_store import SqlStore
-from services.worker.in_process import InProcessEvaluator
+from gaitswarm.services.optimizer.run.runner import Runner
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.worker.in_process import InProcessEvaluator
 from tests.examples.jobs import SMALL_SPEC
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import httpx2
 import pytest
 
-from services.optimizer.jobs.job import Job
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from tests.api.conftest import Commit
 from tests.examples.jobs import SMALL_SPEC
 from tests.examples.walks import SHORT_WALK

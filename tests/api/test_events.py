@@ -14,9 +14,9 @@ from typing import Any
 import httpx2
 import pytest
 
-from services.optimizer.jobs.job import Command, Job
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.jobs.job import Command, Job
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from tests.api.conftest import PARTICLES, Commit, Serve
 
 pytestmark = pytest.mark.slow
@@ -192,7 +192,7 @@ def test_a_last_event_id_that_is_none_of_ours_is_refused(client: httpx2.Client, 
 def test_an_idle_stream_is_kept_alive_by_comments(
     client: httpx2.Client, job: Job, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("api.event_stream.KEEP_ALIVE_SECONDS", 0.05)
+    monkeypatch.setattr("gaitswarm.api.event_stream.KEEP_ALIVE_SECONDS", 0.05)
 
     with client.stream("GET", f"/v1/jobs/{job.id}/events") as answer:
         assert any(line.startswith(":") for line in answer.iter_lines())

@@ -10,11 +10,11 @@ import httpx2
 import pyarrow.parquet as pq
 import pytest
 
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.sim.outcome import OBJECTIVE_NAMES
 from gaitswarm.tables import encoded_table
-from services.optimizer.jobs.job import Job
-from services.optimizer.service import JobService
-from services.optimizer.store.sql_store import SqlStore
-from sim.outcome import OBJECTIVE_NAMES
 from tests.api.conftest import PARTICLES, Commit
 
 pytestmark = pytest.mark.slow

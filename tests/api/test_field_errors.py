@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
+from gaitswarm.services.optimizer.jobs.documents import SPECS
 from gaitswarm.views import field_errors
-from services.optimizer.jobs.documents import SPECS
 
 
 def told(document: dict[str, Any]) -> dict[str, str]:

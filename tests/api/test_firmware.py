@@ -12,8 +12,8 @@ import httpx2
 import pytest
 
 from gaitswarm.firmware import write_firmware
-from services.optimizer.jobs.job import Job
-from services.optimizer.service import JobService
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.service import JobService
 from tests.api.conftest import Commit, Serve
 from tests.examples.walks import SHORT_WALK
 

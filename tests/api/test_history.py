@@ -7,9 +7,9 @@ import math
 import httpx2
 import pytest
 
-from services.optimizer.jobs.job import Job
-from services.optimizer.store.sql_store import SqlStore
-from sim.outcome import OBJECTIVE_NAMES
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.sim.outcome import OBJECTIVE_NAMES
 from tests.api.conftest import Commit
 
 pytestmark = pytest.mark.slow

@@ -8,13 +8,13 @@ import httpx2
 import numpy as np
 import pytest
 
-from services.optimizer.jobs.iteration import Ask, CompletedIteration
-from services.optimizer.jobs.job import Job
-from services.optimizer.jobs.kinds.certificate import CertificateSpec
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.search.swarm.pso import PsoSettings
-from services.optimizer.store.sql_store import SqlStore
-from sim.outcome import N_OBJECTIVES, Outcome, Status
+from gaitswarm.services.optimizer.jobs.iteration import Ask, CompletedIteration
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.search.swarm.pso import PsoSettings
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.sim.outcome import N_OBJECTIVES, Outcome, Status
 
 pytestmark = pytest.mark.slow
 

@@ -8,11 +8,11 @@ import httpx2
 import pytest
 from sqlalchemy import Engine, event
 
-from services.optimizer.jobs.job import Job, JobState
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.preference import PREFERENCES
-from services.optimizer.jobs.provenance import job_provenance
-from services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.jobs.job import Job, JobState
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
+from gaitswarm.services.optimizer.jobs.provenance import job_provenance
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from tests.api.conftest import Commit
 
 pytestmark = pytest.mark.slow

@@ -9,10 +9,10 @@ from urllib.parse import urlsplit
 import httpx2
 import pytest
 
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.settings import read_settings
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.job import Job
-from services.optimizer.service import JobService
 from tests.examples.servers import Server
 
 ELSEWHERE = {"Sec-Fetch-Site": "cross-site", "Origin": "https://elsewhere.example"}

@@ -12,8 +12,8 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from api.page import is_built
-from services.optimizer.jobs.job import Job
+from gaitswarm.api.page import is_built
+from gaitswarm.services.optimizer.jobs.job import Job
 from tests.api.conftest import Commit, Serve
 from tests.examples.processes import python
 from tests.examples.servers import Server
@@ -184,7 +184,9 @@ def test_long_json_is_compressed(page: httpx2.Client) -> None:
 def test_the_document_of_the_api_is_printed_without_server_database_or_settings(
     client: httpx2.Client,
 ) -> None:
-    done = python("-m", "api.document", environment={"GAITSWARM_API_PORT": "none", "PATH": ""})
+    done = python(
+        "-m", "gaitswarm.api.document", environment={"GAITSWARM_API_PORT": "none", "PATH": ""}
+    )
 
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout) == client.get("/openapi.json").json()

@@ -7,10 +7,10 @@ from contextlib import ExitStack
 import httpx2
 import pytest
 
-from api.rates import RequestRate, address_of
-from services.optimizer.access import Scope
-from services.optimizer.jobs.job import Job
-from services.optimizer.store.sql_store import SqlStore
+from gaitswarm.api.rates import RequestRate, address_of
+from gaitswarm.services.optimizer.access import Scope
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from tests.api.conftest import Serve
 
 SELDOM = {"api_request_rate": 0.001, "api_request_burst": 3}

@@ -8,16 +8,20 @@ from unittest.mock import patch
 import httpx2
 import pytest
 
-from cli.tables.views import jobs_table
+from gaitswarm.cli.tables.views import jobs_table
+from gaitswarm.services.optimizer.analysis import reference as references
+from gaitswarm.services.optimizer.analysis.reference import (
+    note_reference,
+    walked_reference,
+    with_reference,
+)
+from gaitswarm.services.optimizer.errors import StoreUnavailable
+from gaitswarm.services.optimizer.jobs.job import Job, JobOrder
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.provenance import job_provenance
+from gaitswarm.services.optimizer.jobs.reference import Reference
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from gaitswarm.views import JobSummaryView
-from services.optimizer.analysis import reference as references
-from services.optimizer.analysis.reference import note_reference, walked_reference, with_reference
-from services.optimizer.errors import StoreUnavailable
-from services.optimizer.jobs.job import Job, JobOrder
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.provenance import job_provenance
-from services.optimizer.jobs.reference import Reference
-from services.optimizer.store.sql_store import SqlStore
 from tests.api.conftest import Commit
 from tests.examples.walks import quadruped_files
 

@@ -10,9 +10,9 @@ import jsonschema
 import numpy as np
 import pytest
 
-from sim.outcome import OBJECTIVE_NAMES
-from sim.robot import load_robot
-from sim.scenario import SCENARIOS
+from gaitswarm.sim.outcome import OBJECTIVE_NAMES
+from gaitswarm.sim.robot import load_robot
+from gaitswarm.sim.scenario import SCENARIOS
 from tests.examples.hostile import TOML, chain
 from tests.examples.paths import QUADRUPED
 from tests.examples.servers import unframed

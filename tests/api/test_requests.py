@@ -8,12 +8,12 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from api.dependencies import Component
-from services.optimizer.errors import EvaluatorUnavailable, LeaseLost, StoreUnavailable
-from services.optimizer.jobs.job import Job
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.store.sql_store import SqlStore
-from sim.errors import KernelBuildError
+from gaitswarm.api.dependencies import Component
+from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, LeaseLost, StoreUnavailable
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.sim.errors import KernelBuildError
 from tests.api.conftest import Commit, Serve
 
 pytestmark = pytest.mark.slow

@@ -12,12 +12,12 @@ from typing import cast
 
 import pytest
 
-from api import known_tokens
-from api.known_tokens import KnownTokens
-from services.optimizer.access import Scope, Token, Tokens
-from services.optimizer.errors import StoreUnavailable
-from services.optimizer.jobs.job import Command, Job
-from services.optimizer.store.sql_store import SqlStore
+from gaitswarm.api import known_tokens
+from gaitswarm.api.known_tokens import KnownTokens
+from gaitswarm.services.optimizer.access import Scope, Token, Tokens
+from gaitswarm.services.optimizer.errors import StoreUnavailable
+from gaitswarm.services.optimizer.jobs.job import Command, Job
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from tests.api.conftest import Serve
 
 STREAMS = 40

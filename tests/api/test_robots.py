@@ -8,10 +8,10 @@ from typing import Any
 import httpx2
 import pytest
 
-from sim.errors import ProcessEnded
-from sim.limited_process import LimitedProcesses
-from sim.proposal import apart
-from sim.proposal.document import propose_robot
+from gaitswarm.sim.errors import ProcessEnded
+from gaitswarm.sim.limited_process import LimitedProcesses
+from gaitswarm.sim.proposal import apart
+from gaitswarm.sim.proposal.document import propose_robot
 from tests.examples.hostile import chain
 from tests.robots.test_proposal import STATUE, dog
 
@@ -117,7 +117,7 @@ def test_a_proposal_that_takes_too_much_is_ended(
     client: httpx2.Client, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     processes = LimitedProcesses(
-        "sim.proposal.apart", count=1, seconds=0.01, cpu_seconds=1, memory=2 << 30
+        "gaitswarm.sim.proposal.apart", count=1, seconds=0.01, cpu_seconds=1, memory=2 << 30
     )
     monkeypatch.setattr(apart, "PROCESSES", processes)
     with pytest.raises(ProcessEnded):

@@ -12,12 +12,12 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from api.app import create_app
-from api.server import ApiServer
+from gaitswarm.api.app import create_app
+from gaitswarm.api.server import ApiServer
+from gaitswarm.services.optimizer.jobs.job import Job, JobState
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from gaitswarm.settings import Settings
-from services.optimizer.jobs.job import Job, JobState
-from services.optimizer.service import JobService
-from services.optimizer.store.sql_store import SqlStore
 from tests.api import server_process
 from tests.api.conftest import Serve
 from tests.examples.forked import ForkedCommand
@@ -121,5 +121,5 @@ def test_a_taken_port_is_an_error_at_once(service: JobService) -> None:
 
 @pytest.mark.slow
 def test_the_api_brings_in_neither_ray_nor_a_database_nor_scipy() -> None:
-    statements = "import api.app, api.server, gaitswarm.requests.walk"
+    statements = "import gaitswarm.api.app, gaitswarm.api.server, gaitswarm.requests.walk"
     assert loaded_by(statements, ["ray", "sqlalchemy", "alembic", "scipy"]) == set()

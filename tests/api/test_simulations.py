@@ -13,13 +13,13 @@ import httpx2
 import numpy as np
 import pytest
 
-from api.dependencies import check_length
+from gaitswarm.api.dependencies import check_length
 from gaitswarm.requests.walk import SimulationRequest, run_simulation
+from gaitswarm.services.optimizer.access import Scope as TokenScope
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.sim.outcome import OBJECTIVE_NAMES, Status
+from gaitswarm.sim.scenario import find_scenario
 from gaitswarm.views import SimulationView
-from services.optimizer.access import Scope as TokenScope
-from services.optimizer.store.sql_store import SqlStore
-from sim.outcome import OBJECTIVE_NAMES, Status
-from sim.scenario import find_scenario
 from tests.api.conftest import Serve
 from tests.examples.processes import eventually
 from tests.examples.walks import PUBLISHED_A, SHORT_WALK, short_walk, walk
@@ -166,8 +166,8 @@ def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[Gate]:
         check_length(*arguments, **options)
         gate.arrived.release()
 
-    monkeypatch.setattr("api.routes.simulations.check_length", arriving)
-    monkeypatch.setattr("api.routes.simulations.run_simulation", held)
+    monkeypatch.setattr("gaitswarm.api.routes.simulations.check_length", arriving)
+    monkeypatch.setattr("gaitswarm.api.routes.simulations.run_simulation", held)
     yield gate
     gate.opened.set()
 

@@ -6,8 +6,8 @@ import asyncio
 from collections.abc import Callable, Coroutine, Sequence
 from typing import Any
 
-from api.slots import ComputingSlots
-from services.optimizer.errors import EvaluatorUnavailable, TooManyRequests
+from gaitswarm.api.slots import ComputingSlots
+from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, TooManyRequests
 
 
 class Askers:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import httpx2
 import pytest
 
-from services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.job import Job
 from tests.api.conftest import Commit
 
 pytestmark = pytest.mark.slow

@@ -8,7 +8,7 @@ import httpx2
 import numpy as np
 import pytest
 
-from sim.controllers import CONTROLLERS
+from gaitswarm.sim.controllers import CONTROLLERS
 from tests.examples.walks import PUBLISHED_A
 
 CHAPTER_3 = dict(CONTROLLERS["fuzzy-pi-3"].published["fuzzy-pso-ps"])

@@ -8,11 +8,11 @@ from collections.abc import Awaitable, Callable
 
 import pytest
 
-from api.topics import News, Topic, Topics
-from services.optimizer.errors import StoreUnavailable
-from services.optimizer.jobs.job import Command, Job
-from services.optimizer.service import JobService
-from services.optimizer.store.sql_store import SqlStore
+from gaitswarm.api.topics import News, Topic, Topics
+from gaitswarm.services.optimizer.errors import StoreUnavailable
+from gaitswarm.services.optimizer.jobs.job import Command, Job
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from tests.api.conftest import Commit
 
 

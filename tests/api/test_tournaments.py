@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import httpx2
 
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.service import JobService
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.service import JobService
 from tests.tournament.examples import entrant, submitted
 
 

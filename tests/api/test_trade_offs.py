@@ -7,9 +7,9 @@ from typing import Any
 import httpx2
 import pytest
 
-from services.optimizer.jobs.job import Job
-from services.optimizer.jobs.kinds.identification import IdentificationSpec
-from services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from tests.api.conftest import Commit
 
 pytestmark = pytest.mark.slow

@@ -11,8 +11,8 @@ import httpx2
 import numpy as np
 import pytest
 
-from services.optimizer.service import JobService
-from services.runtime import open_store
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.runtime import open_store
 from tests.examples.servers import Server, unframed
 from tests.examples.uneven import SIZES, run_uneven
 

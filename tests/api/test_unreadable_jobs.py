@@ -9,11 +9,11 @@ from pathlib import Path
 import httpx2
 import pytest
 
+from gaitswarm.services.optimizer.errors import Unreadable
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from gaitswarm.views import JobView
-from services.optimizer.errors import Unreadable
-from services.optimizer.jobs.job import Job
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.store.sql_store import SqlStore
 from tests.api.conftest import Commit
 
 pytestmark = pytest.mark.slow

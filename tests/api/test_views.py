@@ -9,6 +9,12 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
+from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Reevaluation
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.sim.kernel.observation import WalkLog
+from gaitswarm.sim.outcome import N_MEASUREMENTS, N_OBJECTIVES, OBJECTIVES, Status
 from gaitswarm.views import (
     BestView,
     HistoryIterationView,
@@ -18,12 +24,6 @@ from gaitswarm.views import (
     evaluation_views,
 )
 from gaitswarm.views.evaluation import StatusName
-from services.optimizer.jobs.iteration import Evaluation, Reevaluation
-from services.optimizer.jobs.job import Job
-from services.optimizer.jobs.preference import PREFERENCES
-from services.optimizer.store.sql_store import SqlStore
-from sim.kernel.observation import WalkLog
-from sim.outcome import N_MEASUREMENTS, N_OBJECTIVES, OBJECTIVES, Status
 from tests.api.conftest import Commit
 from tests.examples.processes import loaded_by
 

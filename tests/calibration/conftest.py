@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from services.optimizer.jobs.kinds.calibration import CalibrationSpec
-from sim.robot import RobotVariant, load_robot
-from sim.robot.identifiable import with_parameters
+from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
+from gaitswarm.sim.robot import RobotVariant, load_robot
+from gaitswarm.sim.robot.identifiable import with_parameters
 from tests.examples.walks import PUBLISHED_A, SHORT_WALK, short_walk, walk
 
 PI: Final = {"P": 0.45, "I": 0.1}

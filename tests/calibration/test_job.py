@@ -6,12 +6,12 @@ import threading
 
 import pytest
 
-from services.optimizer.jobs.job import JobState
-from services.optimizer.jobs.kinds.calibration import CalibrationSpec
-from services.optimizer.service import JobService
-from services.optimizer.store.sql_store import SqlStore
-from services.runtime import open_evaluator, run_embedded
-from sim.robot import RobotVariant, load_robot
+from gaitswarm.services.optimizer.jobs.job import JobState
+from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.runtime import open_evaluator, run_embedded
+from gaitswarm.sim.robot import RobotVariant, load_robot
 from tests.calibration.conftest import PI, TRUE_LAW, TRUTH, WALKS, spec, true_targets
 from tests.examples.jobs import history
 from tests.examples.walks import short_walk, walk

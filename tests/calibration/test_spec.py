@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.documents import SPECS
-from sim.calibration.walk import RESULTS
-from sim.outcome import N_OBJECTIVES
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.documents import SPECS
+from gaitswarm.sim.calibration.walk import RESULTS
+from gaitswarm.sim.outcome import N_OBJECTIVES
 from tests.calibration.conftest import PI, WALKS, spec
 from tests.examples.walks import SHORT_WALK, UPHILL_WALK
 

@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from services.optimizer.analysis.fits.identifiability import Trust, identifiability
-from services.optimizer.analysis.fits.targets import target_results
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.iteration import Evaluation, Reevaluation
-from services.optimizer.jobs.kinds.calibration import CalibrationSpec
-from sim.calibration.walk import RESULTS
-from sim.variables import Variable
+from gaitswarm.services.optimizer.analysis.fits.identifiability import Trust, identifiability
+from gaitswarm.services.optimizer.analysis.fits.targets import target_results
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Reevaluation
+from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
+from gaitswarm.sim.calibration.walk import RESULTS
+from gaitswarm.sim.variables import Variable
 from tests.calibration.conftest import spec
 from tests.optimizer.columns import columns_of
 

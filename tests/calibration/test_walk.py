@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sim.calibration.catalogue import robot_variables
-from sim.calibration.walk import CalibrationWalk
-from sim.outcome import Status
-from sim.robot import RobotVariant, load_robot
-from sim.robot.identifiable import with_parameters
-from sim.scenario import Scenario
+from gaitswarm.sim.calibration.catalogue import robot_variables
+from gaitswarm.sim.calibration.walk import CalibrationWalk
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.robot import RobotVariant, load_robot
+from gaitswarm.sim.robot.identifiable import with_parameters
+from gaitswarm.sim.scenario import Scenario
 from tests.calibration.conftest import PI
 from tests.examples.walks import short_walk, walk
 

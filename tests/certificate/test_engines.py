@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 
 import gaitswarm
-from services.optimizer.analysis.robustness.certificate import certificate
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.documents import SPECS
-from services.optimizer.jobs.job import JobState
-from services.optimizer.jobs.kinds.certificate import CertificateSpec
-from services.optimizer.jobs.provenance import job_provenance
-from services.optimizer.run.evaluator import Evaluator
-from services.optimizer.service import JobService
-from services.optimizer.store.port.base import Store
-from services.runtime import open_evaluator, run_embedded
-from sim.outcome import Status
+from gaitswarm.services.optimizer.analysis.robustness.certificate import certificate
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.documents import SPECS
+from gaitswarm.services.optimizer.jobs.job import JobState
+from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
+from gaitswarm.services.optimizer.jobs.provenance import job_provenance
+from gaitswarm.services.optimizer.run.evaluator import Evaluator
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.runtime import open_evaluator, run_embedded
+from gaitswarm.sim.outcome import Status
 from tests.certificate.examples import DOCUMENT, columns, small
 from tests.examples.commands import run_command
 from tests.examples.jobs import history
@@ -162,7 +162,7 @@ def test_evidence_of_it_is_verified_where_there_is_no_such_engine(
     with gaitswarm.open(tmp_path / "jobs.db") as jobs:
         spec = small(engines=["mujoco"], scenarios=[SHORT_WALK], worlds=4)
         content = jobs.evidence(jobs.run(jobs.submit(spec).id).id)
-    monkeypatch.setattr("sim.mujoco.engines.find_spec", lambda name: None)
+    monkeypatch.setattr("gaitswarm.sim.mujoco.engines.find_spec", lambda name: None)
     found = gaitswarm.verify(content, replay=50)
     assert found.verified, found
     # The nominal world and the drawn ones; that of MuJoCo has its bits on one machine alone.
@@ -172,7 +172,7 @@ def test_evidence_of_it_is_verified_where_there_is_no_such_engine(
 @pytest.fixture
 def without_mujoco(monkeypatch: pytest.MonkeyPatch) -> None:
     """As on a machine without the extra."""
-    monkeypatch.setattr("sim.mujoco.engines.find_spec", lambda name: None)
+    monkeypatch.setattr("gaitswarm.sim.mujoco.engines.find_spec", lambda name: None)
 
 
 @pytest.mark.usefixtures("without_mujoco")
@@ -192,9 +192,9 @@ def test_without_the_library_the_error_names_the_extra_and_how_to_install_it(
 
 PROGRAM = """
 import sys
-from services.optimizer.jobs.documents import SPECS
+from gaitswarm.services.optimizer.jobs.documents import SPECS
 from tests.certificate.examples import DOCUMENT
-import cli.main, gaitswarm.views.certificate, sim.worlds
+import gaitswarm.cli.main, gaitswarm.views.certificate, gaitswarm.sim.worlds
 spec = SPECS.validate_python(DOCUMENT | {"engines": ["mujoco"]})
 case = spec.cases({})[0]
 designs = spec.design_space().designs(spec.create_search().ask())[:1]

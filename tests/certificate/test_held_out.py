@@ -8,15 +8,15 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from services.optimizer.jobs.kinds.held_out import (
+from gaitswarm.services.optimizer.jobs.kinds.held_out import (
     CASES,
     LEAST,
     certificate_scenarios,
     certificate_walks,
 )
-from services.optimizer.jobs.preference import PREFERENCES
-from sim.robot import load_robot
-from sim.scenario import HELD_OUT, SCENARIOS, Scenario
+from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
+from gaitswarm.sim.robot import load_robot
+from gaitswarm.sim.scenario import HELD_OUT, SCENARIOS, Scenario
 from tests.certificate.examples import PI, small
 from tests.examples.commands import run_command
 from tests.examples.robots import FAST, SLOW, robot_folder

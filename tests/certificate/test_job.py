@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.fork import ForkRequest
-from services.optimizer.jobs.job import JobState
-from services.optimizer.jobs.kinds.certificate import CertificateSpec
-from services.optimizer.run.evaluator import Evaluator
-from services.optimizer.service import JobService
-from services.optimizer.store.port.base import Store
-from services.runtime import open_evaluator, run_embedded
-from sim.simulate import simulate
-from sim.worlds import WorldWalk
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.fork import ForkRequest
+from gaitswarm.services.optimizer.jobs.job import JobState
+from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
+from gaitswarm.services.optimizer.run.evaluator import Evaluator
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.runtime import open_evaluator, run_embedded
+from gaitswarm.sim.simulate import simulate
+from gaitswarm.sim.worlds import WorldWalk
 from tests.certificate.examples import PI, small
 from tests.examples.jobs import history
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.documents import SPECS
-from services.optimizer.jobs.kinds.certificate import CertificateSpec
-from services.optimizer.jobs.kinds.held_out import CASES, certificate_scenarios
-from sim.scenario import HELD_OUT, SCENARIOS
-from sim.worlds import PERTURBATIONS, sample_worlds
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.documents import SPECS
+from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
+from gaitswarm.services.optimizer.jobs.kinds.held_out import CASES, certificate_scenarios
+from gaitswarm.sim.scenario import HELD_OUT, SCENARIOS
+from gaitswarm.sim.worlds import PERTURBATIONS, sample_worlds
 from tests.certificate.examples import DOCUMENT, PI, small
 
 

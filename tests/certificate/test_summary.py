@@ -7,15 +7,15 @@ import math
 import numpy as np
 import pytest
 
-from services.optimizer.analysis.robustness.certificate import (
+from gaitswarm.services.optimizer.analysis.robustness.certificate import (
     Certificate,
     certificate,
     conditional_value_at_risk,
     proportion,
 )
-from services.optimizer.errors import Conflict
-from services.optimizer.jobs.kinds.certificate import CertificateSpec
-from sim.outcome import Status
+from gaitswarm.services.optimizer.errors import Conflict
+from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
+from gaitswarm.sim.outcome import Status
 from tests.certificate.examples import columns, small
 
 PRODUCT = {"bias": [0.0] * 5, "exponent": [0.2] * 5}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from cli.exit_codes import ExitCode
+from gaitswarm.cli.exit_codes import ExitCode
 from tests.cli.conftest import Gaitswarm
 
 

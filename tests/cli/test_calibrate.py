@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from cli.inputs.target_file import read_targets
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.kinds.calibration import CalibrationSpec
+from gaitswarm.cli.inputs.target_file import read_targets
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from tests.cli.conftest import Gaitswarm
 from tests.examples.paths import ROOT
 

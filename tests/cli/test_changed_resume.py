@@ -12,10 +12,10 @@ from typing import Any
 
 import pytest
 
-from services.runtime import open_store
-from sim.robot import DEFAULT_ROBOT
+from gaitswarm.services.runtime import open_store
+from gaitswarm.sim.robot import DEFAULT_ROBOT
 from tests.cli.conftest import Finished, Gaitswarm
-from tests.examples.paths import ROOT
+from tests.examples.paths import ROOT, copy_package
 from tests.examples.processes import COMMAND_LINE, python
 
 pytestmark = pytest.mark.slow
@@ -38,8 +38,7 @@ def resume(job: Finished, *options: str, **environment: str) -> subprocess.Compl
 
 def changed_simulator(folder: Path, file: str, old: str, new: str) -> str:
     """PYTHONPATH of a gaitswarm whose simulator differs in one place."""
-    shutil.copytree(ROOT / "sim", folder / "sim", ignore=shutil.ignore_patterns("__pycache__"))
-    changed = folder / "sim" / file
+    changed = copy_package(folder) / "sim" / file
     text = changed.read_text(encoding="utf-8")
     assert old in text
     changed.write_text(text.replace(old, new), encoding="utf-8")

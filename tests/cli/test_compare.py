@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from cli.main import run
-from sim.scenario import find_scenario
+from gaitswarm.cli.main import run
+from gaitswarm.sim.scenario import find_scenario
 
 pytestmark = pytest.mark.slow
 

@@ -10,12 +10,12 @@ from typing import Any
 
 import pytest
 
-from cli.studies.controllers import Budget, comparisons, study_document, study_table
+from gaitswarm.cli.studies.controllers import Budget, comparisons, study_document, study_table
 from gaitswarm.jobs.database.embedded import earlier_job
-from services.optimizer.jobs.job import Command, Job
-from services.optimizer.search.registry import OPTIMIZERS
-from services.optimizer.service import JobService
-from services.runtime import open_store
+from gaitswarm.services.optimizer.jobs.job import Command, Job
+from gaitswarm.services.optimizer.search.registry import OPTIMIZERS
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.runtime import open_store
 from tests.cli.conftest import Gaitswarm
 
 pytestmark = pytest.mark.slow

@@ -6,10 +6,10 @@ import sqlite3
 from contextlib import closing
 from pathlib import Path
 
-from cli.exit_codes import ExitCode
-from services.optimizer.jobs.job import Command
-from services.optimizer.store.schema.revisions import head
-from services.optimizer.store.sql_store import open_store
+from gaitswarm.cli.exit_codes import ExitCode
+from gaitswarm.services.optimizer.jobs.job import Command
+from gaitswarm.services.optimizer.store.schema.revisions import head
+from gaitswarm.services.optimizer.store.sql_store import open_store
 from tests.cli.conftest import Finished, Gaitswarm
 from tests.store.examples import spec
 from tests.store.test_opening import edit

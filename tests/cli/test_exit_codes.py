@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 
-import cli.embedded
 import gaitswarm.jobs.open as gaitswarm_open
-from cli.exit_codes import ExitCode
+from gaitswarm.cli import embedded
+from gaitswarm.cli.exit_codes import ExitCode
 from gaitswarm.errors import EvaluatorUnavailable, StoreUnavailable
 from tests.cli.conftest import Finished, Gaitswarm
 from tests.examples.forked import run_forked
@@ -174,7 +174,7 @@ def test_an_optimization_without_workers_says_how_to_go_on_with_its_job(
         raise EvaluatorUnavailable("no Ray cluster listens there")
 
     with monkeypatch.context() as without_workers:
-        without_workers.setattr(cli.embedded, "open_evaluator", no_cluster)
+        without_workers.setattr(embedded, "open_evaluator", no_cluster)
         stopped = gaitswarm("optimize", "--spec", small_spec, "--db", db)
     assert stopped.code == ExitCode.UNAVAILABLE
     said = re.search(

@@ -10,7 +10,7 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 
-from sim.outcome import OBJECTIVE_NAMES
+from gaitswarm.sim.outcome import OBJECTIVE_NAMES
 from tests.cli.conftest import Finished, Gaitswarm
 from tests.examples.commands import run_command
 

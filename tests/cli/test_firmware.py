@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from sim.firmware import MANIFEST
-from sim.scenario import SCENARIOS
+from gaitswarm.sim.firmware import MANIFEST
+from gaitswarm.sim.scenario import SCENARIOS
 from tests.cli.conftest import Finished, Gaitswarm, WriteJson
 from tests.examples.walks import PUBLISHED_A, SHORT_WALK
 from tests.firmware.conftest import make

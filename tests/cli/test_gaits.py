@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from sim.gait.gaits import GAITS
+from gaitswarm.sim.gait.gaits import GAITS
 from tests.cli.conftest import Gaitswarm, WriteJson
 from tests.examples.paths import QUADRUPED, ROOT
 

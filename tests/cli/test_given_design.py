@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from cli.inputs.design_file import GivenDesign, given_design
-from services.optimizer.errors import InvalidRequest, NotFound
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.store.sql_store import SqlStore
-from sim.robot import DEFAULT_ROBOT
+from gaitswarm.cli.inputs.design_file import GivenDesign, given_design
+from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.sim.robot import DEFAULT_ROBOT
 from tests.calibration.conftest import spec as calibration
 from tests.cli.conftest import Finished, WriteJson
 from tests.examples.walks import PUBLISHED_A

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from cli.inputs.job_ids import full_id
+from gaitswarm.cli.inputs.job_ids import full_id
 from gaitswarm.jobs.open import open_jobs
-from services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.errors import InvalidRequest
 from tests.cli.conftest import Finished, Gaitswarm
 from tests.examples.commands import run_command
 from tests.setup import command_line

@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
-from cli.exit_codes import ExitCode
-from cli.inputs.spec_file import LARGEST_FILE
-from services.runtime import open_store
+from gaitswarm.cli.exit_codes import ExitCode
+from gaitswarm.cli.inputs.spec_file import LARGEST_FILE
+from gaitswarm.services.runtime import open_store
 from tests.cli.conftest import Finished, Gaitswarm, WriteJson
 from tests.examples.jobs import SMALL_SPEC
 from tests.examples.paths import CHAPTER_3

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.main import run
+from gaitswarm.cli.main import run
 from tests.examples.paths import QUADRUPED
 
 pytestmark = pytest.mark.slow

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cli.studies.precision import (
+from gaitswarm.cli.studies.precision import (
     LAWS,
     Variant,
     agreement,
@@ -14,13 +14,13 @@ from cli.studies.precision import (
     study_tables,
     variants,
 )
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.outcome import N_MEASUREMENTS, Status
+from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotVariant
+from gaitswarm.sim.scenario import SCENARIOS
 from gaitswarm.simulation_result import SimulationResult
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.preference import PREFERENCES
-from sim.kernel.walk import Precision
-from sim.outcome import N_MEASUREMENTS, Status
-from sim.robot import DEFAULT_ROBOT, RobotVariant
-from sim.scenario import SCENARIOS
 from tests.cli.conftest import Gaitswarm
 
 SCENARIO = SCENARIOS[0].model_copy(update={"cycles": 1.0})

@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from services.runtime import open_store
+from gaitswarm.services.runtime import open_store
 from tests.cli.conftest import Gaitswarm, WriteJson
 from tests.examples.forked import ForkedCommand
 from tests.examples.jobs import SMALL_SPEC

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from cli.comparison import published_beside
-from cli.inputs.design_file import read_design
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.reference import on_the_jobs_terms
-from services.optimizer.search.swarm.pso import PsoSettings
-from sim.controllers import CONTROLLERS, ControllerName
-from sim.gait_variables import GAIT_CATALOGUE
+from gaitswarm.cli.comparison import published_beside
+from gaitswarm.cli.inputs.design_file import read_design
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.reference import on_the_jobs_terms
+from gaitswarm.services.optimizer.search.swarm.pso import PsoSettings
+from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
+from gaitswarm.sim.gait_variables import GAIT_CATALOGUE
 from tests.cli.conftest import Gaitswarm, WriteJson
 
 GAIT = {"cycle_time", "stride", "height", "duty_factor", "fir_ms"}

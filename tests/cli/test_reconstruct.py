@@ -10,16 +10,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cli.inputs.target_file import read_targets
-from cli.reconstruction.alternatives import alternatives, default_choice, simulated_targets
-from cli.reconstruction.bound import greatest_product
-from cli.reconstruction.optimality import OPTIMA, optimality, random_designs
-from cli.reconstruction.plan import TARGETS, Size, calibrations
-from services.optimizer.jobs.preference import PREFERENCES, judge
-from sim.controllers import CONTROLLERS
-from sim.gait.driving_2011 import driven_as_in_2011
-from sim.gait_variables import with_gait
-from sim.scenario import SCENARIOS
+from gaitswarm.cli.inputs.target_file import read_targets
+from gaitswarm.cli.reconstruction.alternatives import (
+    alternatives,
+    default_choice,
+    simulated_targets,
+)
+from gaitswarm.cli.reconstruction.bound import greatest_product
+from gaitswarm.cli.reconstruction.optimality import OPTIMA, optimality, random_designs
+from gaitswarm.cli.reconstruction.plan import TARGETS, Size, calibrations
+from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, judge
+from gaitswarm.sim.controllers import CONTROLLERS
+from gaitswarm.sim.gait.driving_2011 import driven_as_in_2011
+from gaitswarm.sim.gait_variables import with_gait
+from gaitswarm.sim.scenario import SCENARIOS
 from tests.cli.conftest import Gaitswarm
 
 TINY = (

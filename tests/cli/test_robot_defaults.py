@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from services.optimizer.jobs.preference import PREFERENCES
-from sim.controllers import CONTROLLERS
+from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
+from gaitswarm.sim.controllers import CONTROLLERS
 from tests.examples.commands import Result, run_command
 from tests.examples.paths import ROOT
 from tests.examples.robots import SLOW, robot_folder

@@ -9,7 +9,7 @@ from typing import Any
 import jsonschema
 import pytest
 
-from services.optimizer.search.automatic import CHOICES
+from gaitswarm.services.optimizer.search.automatic import CHOICES
 from tests.cli.conftest import Gaitswarm, WriteJson
 from tests.examples.uneven import UNEVEN_SPEC, uneven_iterations
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sim.outcome import MEASUREMENT_NAMES, OBJECTIVE_NAMES
-from sim.scenario import SCENARIOS
+from gaitswarm.sim.outcome import MEASUREMENT_NAMES, OBJECTIVE_NAMES
+from gaitswarm.sim.scenario import SCENARIOS
 from tests.cli.conftest import Finished, Gaitswarm, WriteJson
 from tests.examples.walks import PUBLISHED_A
 

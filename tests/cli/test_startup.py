@@ -9,14 +9,14 @@ from typing import Any
 import pytest
 from typer import Context
 
-from cli.exit_codes import ExitCode
-from cli.main import commands
-from services.profile import profile_job
-from sim.assembly import PHYSICS_RATE
-from sim.kernel.compiled.native import native_kernel
-from sim.kernel.walk import Precision
-from sim.robot import DEFAULT_ROBOT, load_robot
-from sim.simulate import lanes, prepare
+from gaitswarm.cli.exit_codes import ExitCode
+from gaitswarm.cli.main import commands
+from gaitswarm.services.profile import profile_job
+from gaitswarm.sim.assembly import PHYSICS_RATE
+from gaitswarm.sim.kernel.compiled.native import native_kernel
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.robot import DEFAULT_ROBOT, load_robot
+from gaitswarm.sim.simulate import lanes, prepare
 from tests.cli.conftest import Finished, Gaitswarm
 from tests.examples.processes import COMMAND_LINE, loaded_by, output, start_python
 
@@ -29,7 +29,7 @@ HEAVY = (
 @pytest.mark.slow
 @pytest.mark.parametrize("of", [[], ["optimize"], ["serve"], ["study", "noise"]])
 def test_help_imports_none_of_the_heavy_packages(of: list[str]) -> None:
-    statements = f"from cli.main import run; assert run({[*of, '--help']}) == 0"
+    statements = f"from gaitswarm.cli.main import run; assert run({[*of, '--help']}) == 0"
     assert loaded_by(statements, HEAVY) == set()
 
 
@@ -129,7 +129,7 @@ def test_a_profile_says_what_each_part_takes_of_the_slots_time(
     gaitswarm: Gaitswarm, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     brief = cache(partial(profile_job, particles=2, iterations=2, cpus=1))
-    monkeypatch.setattr("services.profile.profile_job", brief)
+    monkeypatch.setattr("gaitswarm.services.profile.profile_job", brief)
     result = gaitswarm("bench", "--profile", "--evaluator", "in-process", "--json")
     assert result.code == 0, result.err
     found = result.json

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.exit_codes import ExitCode
+from gaitswarm.cli.exit_codes import ExitCode
 from tests.cli.conftest import Gaitswarm
 from tests.examples.forked import ForkedCommand
 from tests.examples.processes import line_with

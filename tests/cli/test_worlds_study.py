@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from cli.studies.worlds import (
+from gaitswarm.cli.studies.worlds import (
     Contestant,
     HeldOut,
     Run,
@@ -16,9 +16,13 @@ from cli.studies.worlds import (
     study_document,
     study_table,
 )
+from gaitswarm.services.optimizer.analysis.robustness.certificate import (
+    QUANTILES,
+    Proportion,
+    Spread,
+)
+from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
 from gaitswarm.views.certificate import CertificateView, ProportionView, SpreadView
-from services.optimizer.analysis.robustness.certificate import QUANTILES, Proportion, Spread
-from services.optimizer.jobs.preference import PREFERENCES
 from tests.cli.conftest import Gaitswarm
 
 TINY = ("--particles", "4", "--iterations", "1", "--worlds", "2", "--held-out", "3")

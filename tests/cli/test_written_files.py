@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.atomic_file import replacing
+from gaitswarm.cli.atomic_file import replacing
 from gaitswarm.errors import InvalidRequest
 
 

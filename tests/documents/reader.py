@@ -25,7 +25,7 @@ from typing import Any, Final
 
 import httpx2
 
-from cli.main import run
+from gaitswarm.cli.main import run
 from tests.examples.commands import run_command
 from tests.examples.paths import ROOT
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import gaitswarm
-from services.runtime import open_runtime
+from gaitswarm.services.runtime import open_runtime
 from tests.documents.reader import Reader
 from tests.examples.commands import run_command
 from tests.examples.paths import ROOT

@@ -18,11 +18,11 @@ import pytest
 
 import gaitswarm
 from gaitswarm.evidence.contents import evidence
+from gaitswarm.services.optimizer.jobs.job import Job, JobState
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.sql_store import open_store
+from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.zip_archive import unzipped
-from services.optimizer.jobs.job import Job, JobState
-from services.optimizer.service import JobService
-from services.optimizer.store.sql_store import open_store
-from sim.kernel.walk import Precision
 from tests.evidence.conftest import JOB, Proved
 from tests.examples.servers import Server
 
@@ -115,8 +115,8 @@ def test_a_job_that_has_committed_nothing_has_no_evidence(tmp_path: Path) -> Non
 
 
 def test_a_server_sends_it_as_an_archive(proved: Proved, lasting_server: Server) -> None:
-    from services.optimizer.service import JobService
-    from services.runtime import open_store
+    from gaitswarm.services.optimizer.service import JobService
+    from gaitswarm.services.runtime import open_store
 
     store = open_store(str(proved.db))
     lasting_server.serve(JobService(store))

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import gaitswarm
-from cli.exit_codes import ExitCode
+from gaitswarm.cli.exit_codes import ExitCode
 from gaitswarm.views.verification import CheckView, HistoryVerificationView
 from gaitswarm.zip_archive import unzipped
 from tests.evidence.conftest import CHAIN, EVALUATIONS, JOB, Proved, tampered, with_cells
@@ -110,10 +110,10 @@ def test_a_number_that_was_changed_with_its_digests_is_found_by_the_replay(
     copy: Path, proved: Proved
 ) -> None:
     """Whoever can write to the database can chain it anew; walks cannot be made up."""
-    from services.optimizer.store.connections.engine import connect, parse_url
-    from services.optimizer.store.rows.job_rows import chain_documents
-    from services.optimizer.store.statements.chain import chain_taken
-    from services.optimizer.store.statements.records import job_row
+    from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
+    from gaitswarm.services.optimizer.store.rows.job_rows import chain_documents
+    from gaitswarm.services.optimizer.store.statements.chain import chain_taken
+    from gaitswarm.services.optimizer.store.statements.records import job_row
 
     with closing(sqlite3.connect(copy)) as connection:
         (text,) = connection.execute(

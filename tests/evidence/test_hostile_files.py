@@ -17,9 +17,9 @@ import pytest
 
 import gaitswarm
 from gaitswarm.evidence.archive import MANIFEST, archived, parsed_json
+from gaitswarm.sim.errors import ProcessEnded
+from gaitswarm.sim.robot import check, variant
 from gaitswarm.zip_archive import unzipped
-from sim.errors import ProcessEnded
-from sim.robot import check, variant
 from tests.evidence.conftest import CHAIN, EVALUATIONS, Change, Proved, tampered, with_manifest
 from tests.examples.hostile import TOML, URDF, chain
 

@@ -13,8 +13,8 @@ import pytest
 import gaitswarm
 from gaitswarm import VerificationView
 from gaitswarm.evidence.archive import MANIFEST
+from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.zip_archive import unzipped
-from sim.controllers import CONTROLLERS
 from tests.evidence.conftest import (
     ASKS,
     CHAIN,

@@ -6,9 +6,9 @@ import copy
 from functools import cache
 from typing import Any, cast
 
-from api.app import create_app
+from gaitswarm.api.app import create_app
+from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.settings import Settings
-from services.optimizer.service import JobService
 
 
 def api_document() -> dict[str, Any]:

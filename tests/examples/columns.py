@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from services.optimizer.analysis.ranking import fitness_by
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
-from services.optimizer.jobs.preference import PREFERENCES, Preference
-from sim.outcome import Status
+from gaitswarm.services.optimizer.analysis.ranking import fitness_by
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
+from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference
+from gaitswarm.sim.outcome import Status
 
 
 def columns_of(

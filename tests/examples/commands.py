@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from io import StringIO
 from typing import Any
 
-from cli.main import run
+from gaitswarm.cli.main import run
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import IO, Any, Self
 
-from cli.main import main
+from gaitswarm.cli.main import main
 from tests.examples import command_process
 from tests.examples.processes import environment_of_process
 

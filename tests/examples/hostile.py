@@ -15,7 +15,7 @@ from typing import Any, Final
 TAKEN: Final = (200, 202)
 REFUSED: Final = (422,)
 
-_FOLDER = resources.files("sim.robot") / "szabadka2"
+_FOLDER = resources.files("gaitswarm.sim.robot") / "szabadka2"
 TOML: Final = (_FOLDER / "robot.toml").read_text(encoding="utf-8")
 URDF: Final = (_FOLDER / "robot.urdf").read_text(encoding="utf-8")
 END: Final = "</robot>"

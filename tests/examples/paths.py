@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 from typing import Final
 
@@ -12,3 +13,9 @@ CHAPTER_3: Final = ROOT / "examples" / "chapter-3"
 
 QUADRUPED: Final = ROOT / "examples" / "quadruped"
 """Folder of a robot that is not shipped, and of the walk `crawl.json`."""
+
+
+def copy_package(folder: Path) -> Path:
+    """Copy the package into a folder, its symbolic links followed, and return its new path."""
+    ignored = shutil.ignore_patterns("__pycache__", "page", "manual", "prebuilt")
+    return shutil.copytree(ROOT / "gaitswarm", folder / "gaitswarm", ignore=ignored)

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-from sim.plugins import find_plugins, plugin_versions
+from gaitswarm.sim.plugins import find_plugins, plugin_versions
 
 
 def install(

@@ -13,7 +13,7 @@ from typing import IO, Any
 
 from tests.examples.paths import ROOT
 
-COMMAND_LINE = ("-u", "-c", "from cli.main import main; main()")
+COMMAND_LINE = ("-u", "-c", "from gaitswarm.cli.main import main; main()")
 """Arguments of Python that make it `gaitswarm`."""
 
 

@@ -17,14 +17,14 @@ from fastapi import FastAPI
 from fastapi.routing import APIRoute
 from numpy.typing import NDArray
 
-from api import dependencies
-from api.app import create_app
-from api.connections import ConnectionLimits
-from api.server import ApiServer
+from gaitswarm.api import dependencies
+from gaitswarm.api.app import create_app
+from gaitswarm.api.connections import ConnectionLimits
+from gaitswarm.api.server import ApiServer
+from gaitswarm.services.monitoring.activity import Activity
+from gaitswarm.services.monitoring.metrics import Metrics
+from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.settings import Settings
-from services.monitoring.activity import Activity
-from services.monitoring.metrics import Metrics
-from services.optimizer.service import JobService
 from tests.examples.api_document import api_document
 from tests.examples.forked import ForkedCommand
 from tests.examples.processes import line_with, output

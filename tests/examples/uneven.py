@@ -11,10 +11,10 @@ from typing import Any, Final
 import pytest
 
 import gaitswarm
-from services.optimizer.search.random_stream import RandomNumbers
-from services.optimizer.search.registry import METHODS
-from services.optimizer.search.replayed import Proposals, Replayed
-from services.optimizer.search.space import Space
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.registry import METHODS
+from gaitswarm.services.optimizer.search.replayed import Proposals, Replayed
+from gaitswarm.services.optimizer.search.space import Space
 from tests.examples.walks import SHORT_WALK
 
 UNEVEN_SPEC: Final[dict[str, Any]] = {

@@ -8,11 +8,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers import CONTROLLERS
-from sim.kernel.observation import WalkLog
-from sim.robot import RobotFiles
-from sim.scenario import Scenario
-from sim.simulate import Simulation, simulate
+from gaitswarm.sim.controllers import CONTROLLERS
+from gaitswarm.sim.kernel.observation import WalkLog
+from gaitswarm.sim.robot import RobotFiles
+from gaitswarm.sim.scenario import Scenario
+from gaitswarm.sim.simulate import Simulation, simulate
 from tests.examples.paths import QUADRUPED
 
 Floats = NDArray[np.float64]

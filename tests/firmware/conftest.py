@@ -15,7 +15,7 @@ from typing import Final
 import pytest
 
 from gaitswarm.firmware import write_firmware
-from sim.controllers import CONTROLLERS, ControllerName
+from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
 from tests.examples.walks import short_walk
 
 TOOLS: Final = Path(sys.prefix) / "cross"

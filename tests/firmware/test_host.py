@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from gaitswarm.firmware import write_firmware
-from sim.controllers import ControllerName
-from sim.kernel.emitted.source import kernel_source
-from sim.robot import RobotVariant, load_robot
-from sim.scenario import SCENARIOS
+from gaitswarm.sim.controllers import ControllerName
+from gaitswarm.sim.kernel.emitted.source import kernel_source
+from gaitswarm.sim.robot import RobotVariant, load_robot
+from gaitswarm.sim.scenario import SCENARIOS
 from tests.examples.paths import QUADRUPED, ROOT
 from tests.examples.walks import short_walk
 from tests.firmware.conftest import make, published, replaced, with_changed_cell

@@ -7,14 +7,14 @@ import dataclasses
 import numpy as np
 import pytest
 
-from sim.assembly import control_steps
-from sim.controllers import CONTROLLERS, ControlLaw, ControllerName, LookupTable
-from sim.errors import SimulationInputError
-from sim.firmware.integers import LawIntegers, in_16_bits, law_integers
-from sim.firmware.trajectory_table import TrajectoryTable, trajectory_table
-from sim.gait.trajectory import desired_angles
-from sim.robot import load_robot
-from sim.scenario import SCENARIOS, Scenario
+from gaitswarm.sim.assembly import control_steps
+from gaitswarm.sim.controllers import CONTROLLERS, ControlLaw, ControllerName, LookupTable
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.firmware.integers import LawIntegers, in_16_bits, law_integers
+from gaitswarm.sim.firmware.trajectory_table import TrajectoryTable, trajectory_table
+from gaitswarm.sim.gait.trajectory import desired_angles
+from gaitswarm.sim.robot import load_robot
+from gaitswarm.sim.scenario import SCENARIOS, Scenario
 from tests.examples.walks import short_walk
 
 ROBOT = load_robot("szabadka2-reconstructed")

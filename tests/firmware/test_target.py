@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 
 from gaitswarm.firmware import write_firmware
-from sim.controllers import ControllerName
-from sim.firmware import BUDGET
-from sim.firmware.memory import CODE_BYTES
-from sim.gait_variables import GAIT_CATALOGUE
+from gaitswarm.sim.controllers import ControllerName
+from gaitswarm.sim.firmware import BUDGET
+from gaitswarm.sim.firmware.memory import CODE_BYTES
+from gaitswarm.sim.gait_variables import GAIT_CATALOGUE
 from tests.examples.walks import short_walk
 from tests.firmware.conftest import TOOLS, make, published, with_changed_cell
 

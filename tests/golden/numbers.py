@@ -13,14 +13,14 @@ from typing import Any, Final
 
 import numpy as np
 
-from services.optimizer.jobs.iteration import Evaluation
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.spec import judge_outcomes
-from services.runtime import open_evaluator, open_store, run_embedded
-from sim.assembly import Backend
-from sim.outcome import OBJECTIVE_NAMES, Status
-from sim.robot import load_robot
-from sim.scenario import SCENARIOS, Scenario
+from gaitswarm.services.optimizer.jobs.iteration import Evaluation
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.spec import judge_outcomes
+from gaitswarm.services.runtime import open_evaluator, open_store, run_embedded
+from gaitswarm.sim.assembly import Backend
+from gaitswarm.sim.outcome import OBJECTIVE_NAMES, Status
+from gaitswarm.sim.robot import load_robot
+from gaitswarm.sim.scenario import SCENARIOS, Scenario
 from tests.examples.walks import short_walk, torque_quadruped_files, walk
 
 FILE: Final = Path(__file__).with_name("numbers.json")

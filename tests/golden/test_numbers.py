@@ -11,11 +11,11 @@ from typing import Any
 
 import pytest
 
-from sim.assembly import Backend
-from sim.compiler.target import Target, target
-from sim.errors import SimulationInputError
-from sim.scenario import SCENARIOS
-from sim.simulate import prepare
+from gaitswarm.sim.assembly import Backend
+from gaitswarm.sim.compiler.target import Target, target
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.scenario import SCENARIOS
+from gaitswarm.sim.simulate import prepare
 from tests.examples.processes import python
 from tests.golden.numbers import (
     ITERATIONS,
@@ -32,12 +32,12 @@ GOLDEN = read()
 # its environment to leave the wider instructions alone.
 NARROW_MACHINE = """
 import json, sys
-from sim.compiler import compilation, target
+from gaitswarm.sim.compiler import compilation, target
 narrow = target.Target(int(sys.argv[1]), sys.argv[2])
 compilation.target = lambda: narrow
-from sim.robot import DEFAULT_ROBOT, load_robot
-from sim.assembly import kernel_of
-from sim.scenario import SCENARIOS
+from gaitswarm.sim.robot import DEFAULT_ROBOT, load_robot
+from gaitswarm.sim.assembly import kernel_of
+from gaitswarm.sim.scenario import SCENARIOS
 from tests.golden.numbers import objectives_of_the_optimum
 found = objectives_of_the_optimum(tuple(s for s in SCENARIOS if s.name in sys.argv[3:]))
 print(json.dumps([kernel_of(load_robot(DEFAULT_ROBOT)).lanes, found]))

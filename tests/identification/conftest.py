@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import pytest
 
-from sim.identification.recorded_walk import RecordedWalk, record
-from sim.measurement.measured_log import simulated_log
-from sim.measurement.synchronise import synchronise
-from sim.measurement.synthetic import Perturbation, synthetic_log
-from sim.robot import Robot, load_robot
+from gaitswarm.sim.identification.recorded_walk import RecordedWalk, record
+from gaitswarm.sim.measurement.measured_log import simulated_log
+from gaitswarm.sim.measurement.synchronise import synchronise
+from gaitswarm.sim.measurement.synthetic import Perturbation, synthetic_log
+from gaitswarm.sim.robot import Robot, load_robot
 from tests.examples.walks import PUBLISHED_A, logged_walk, short_walk
 
 SCENARIO = short_walk(name="brief", cycles=2, stride=0.16, height=0.03, curve="half_ellipse")

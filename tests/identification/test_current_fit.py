@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from sim.assembly import control_steps, kernel_of, plan_walk
-from sim.controllers import CONTROLLERS
-from sim.errors import SimulationInputError
-from sim.identification.current_fit import CurrentFit, recorded_currents
-from sim.identification.recorded_walk import RecordedWalk
-from sim.measurement.measured_log import simulated_log
-from sim.outcome import Status
-from sim.robot import RobotVariant, load_robot
-from sim.robot.identifiable import with_parameters
+from gaitswarm.sim.assembly import control_steps, kernel_of, plan_walk
+from gaitswarm.sim.controllers import CONTROLLERS
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.identification.current_fit import CurrentFit, recorded_currents
+from gaitswarm.sim.identification.recorded_walk import RecordedWalk
+from gaitswarm.sim.measurement.measured_log import simulated_log
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.robot import RobotVariant, load_robot
+from gaitswarm.sim.robot.identifiable import with_parameters
 from tests.examples.walks import PUBLISHED_A, logged_walk
 from tests.identification.conftest import SCENARIO, TRUTH, Twin
 from tests.sim.test_identifiable import described_values

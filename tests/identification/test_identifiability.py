@@ -7,9 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from services.optimizer.analysis.fits.identifiability import THRESHOLDS, Trust, identifiability
-from services.optimizer.jobs.columns import EvaluationColumns
-from sim.variables import Variable
+from gaitswarm.services.optimizer.analysis.fits.identifiability import (
+    THRESHOLDS,
+    Trust,
+    identifiability,
+)
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.sim.variables import Variable
 
 VARIABLES = (
     Variable(name="told", low=0.0, high=10.0, unit="V"),

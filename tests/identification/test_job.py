@@ -7,15 +7,15 @@ import threading
 import numpy as np
 import pytest
 
-from services.optimizer.analysis.fits.identifiability import Trust
-from services.optimizer.errors import Conflict, InvalidRequest
-from services.optimizer.jobs.job import JobState
-from services.optimizer.jobs.judgement import Judgement
-from services.optimizer.jobs.kinds.identification import IdentificationSpec
-from services.optimizer.search.swarm.pso import PsoSettings
-from services.optimizer.service import JobService
-from services.optimizer.store.sql_store import SqlStore
-from services.runtime import open_evaluator, run_embedded
+from gaitswarm.services.optimizer.analysis.fits.identifiability import Trust
+from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest
+from gaitswarm.services.optimizer.jobs.job import JobState
+from gaitswarm.services.optimizer.jobs.judgement import Judgement
+from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
+from gaitswarm.services.optimizer.search.swarm.pso import PsoSettings
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.runtime import open_evaluator, run_embedded
 from tests.examples.jobs import history
 from tests.identification.conftest import TRUTH, Twin
 

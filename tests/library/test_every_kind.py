@@ -14,11 +14,11 @@ import pytest
 import gaitswarm
 from gaitswarm import JobView
 from gaitswarm.jobs.database.jobs import DatabaseJobs
-from sim.identification.recorded_walk import record
-from sim.measurement.measured_log import simulated_log
-from sim.measurement.synchronise import synchronise
-from sim.measurement.synthetic import Perturbation, synthetic_log
-from sim.robot import load_robot
+from gaitswarm.sim.identification.recorded_walk import record
+from gaitswarm.sim.measurement.measured_log import simulated_log
+from gaitswarm.sim.measurement.synchronise import synchronise
+from gaitswarm.sim.measurement.synthetic import Perturbation, synthetic_log
+from gaitswarm.sim.robot import load_robot
 from tests.calibration.conftest import WALKS
 from tests.certificate.examples import DOCUMENT as CERTIFICATE
 from tests.examples.walks import PUBLISHED_A, SHORT_WALK, UPHILL_WALK, logged_walk, short_walk

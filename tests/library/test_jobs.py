@@ -18,8 +18,8 @@ import pyarrow.parquet as pq
 import pytest
 
 import gaitswarm
-from services.runtime import open_store
-from sim.robot import load_robot
+from gaitswarm.services.runtime import open_store
+from gaitswarm.sim.robot import load_robot
 from tests.examples.walks import SHORT_WALK
 from tests.library.conftest import SMALL, Finished, Reach
 

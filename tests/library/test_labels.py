@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import gaitswarm
-from services.optimizer.jobs.labels import JobFilter
+from gaitswarm.services.optimizer.jobs.labels import JobFilter
 from tests.examples.commands import run_command
 from tests.library.conftest import Finished, Reach
 

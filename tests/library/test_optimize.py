@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 
 import gaitswarm
-from services.optimizer.jobs.provenance import JobProvenance, job_provenance
-from services.optimizer.jobs.spec import Spec
-from services.optimizer.run.evaluator import EvaluationRequest, Evaluator
-from services.optimizer.run.runner import Runner
-from services.optimizer.service import JobService
-from services.runtime import open_evaluator, open_store
+from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
+from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, Evaluator
+from gaitswarm.services.optimizer.run.runner import Runner
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.runtime import open_evaluator, open_store
 from tests.library.conftest import SMALL, Finished
 
 pytestmark = pytest.mark.slow

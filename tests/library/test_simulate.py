@@ -11,7 +11,7 @@ import pytest
 
 import gaitswarm
 from gaitswarm.requests.walk import SimulationRequest, run_simulation
-from sim.outcome import MEASUREMENT_NAMES, OBJECTIVE_NAMES
+from gaitswarm.sim.outcome import MEASUREMENT_NAMES, OBJECTIVE_NAMES
 from tests.examples.paths import QUADRUPED
 
 pytestmark = pytest.mark.slow

@@ -10,10 +10,10 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.sim.outcome import Status
 from gaitswarm.tables import EvaluationTable, Table, encoded_table
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from sim.outcome import Status
 
 SPEC = JobSpec(controller="pi", scenarios=("normal-fast", "2"), preference="C")
 CASES = ("normal-fast", "normal-slow")

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 import gaitswarm
-from services.optimizer.service import JobService
-from services.optimizer.store.sql_store import open_store
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.sql_store import open_store
 from tests.library.conftest import Reach
 from tests.tournament.examples import entrant, submitted
 

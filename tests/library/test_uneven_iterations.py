@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import gaitswarm
+from gaitswarm.services.runtime import open_store
 from gaitswarm.views import IterationView
 from gaitswarm.views.budget import Spent, budget_spent
-from services.runtime import open_store
 from tests.examples.jobs import history
 from tests.examples.uneven import SIZES, run_uneven, uneven_iterations
 from tests.library.conftest import Reach

@@ -12,8 +12,8 @@ import httpx2
 from prometheus_client.metrics_core import Metric
 from prometheus_client.parser import text_string_to_metric_families
 
-from services.monitoring.metrics import Metrics
-from services.runtime import open_runtime
+from gaitswarm.services.monitoring.metrics import Metrics
+from gaitswarm.services.runtime import open_runtime
 from tests.examples.servers import Server
 
 

@@ -9,15 +9,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from services.monitoring import activity as kept
-from services.monitoring.activity import Activity
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.provenance import job_provenance
-from services.optimizer.log_context import log_context
-from services.optimizer.run.evaluator import EvaluationRequest, TaskReport
-from services.optimizer.service import JobService
-from services.optimizer.store.sql_store import SqlStore
-from sim.outcome import Outcome
+from gaitswarm.services.monitoring import activity as kept
+from gaitswarm.services.monitoring.activity import Activity
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.provenance import job_provenance
+from gaitswarm.services.optimizer.log_context import log_context
+from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, TaskReport
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.sim.outcome import Outcome
 from tests.examples.servers import Server
 
 

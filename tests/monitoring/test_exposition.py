@@ -9,14 +9,14 @@ from unittest.mock import Mock
 import httpx2
 import pytest
 
+from gaitswarm.services.monitoring.exposition import MetricsAccess, metrics_server
+from gaitswarm.services.monitoring.hosts import HostNames
+from gaitswarm.services.monitoring.metrics import Metrics
+from gaitswarm.services.optimizer.access import Scope, Token
+from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, StoreUnavailable
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from gaitswarm.settings import Settings
-from services.monitoring.exposition import MetricsAccess, metrics_server
-from services.monitoring.hosts import HostNames
-from services.monitoring.metrics import Metrics
-from services.optimizer.access import Scope, Token
-from services.optimizer.errors import EvaluatorUnavailable, StoreUnavailable
-from services.optimizer.service import JobService
-from services.optimizer.store.sql_store import SqlStore
 from tests.examples.forked import ForkedCommand
 from tests.examples.processes import eventually, line_with
 from tests.examples.servers import Server
@@ -156,7 +156,7 @@ def test_a_site_whose_name_is_made_to_resolve_to_a_port_of_its_own_sees_nothing(
 def test_a_known_token_reads_metrics_of_a_server_while_its_database_is_away(
     store: SqlStore, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("api.known_tokens.REMEMBERED_SECONDS", 0.0)
+    monkeypatch.setattr("gaitswarm.api.known_tokens.REMEMBERED_SECONDS", 0.0)
     headers = {"Authorization": f"Bearer {store.tokens.create('prometheus', Scope.READ)[1]}"}
     server = Server(JobService(store), api_access="token")
     try:

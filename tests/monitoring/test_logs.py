@@ -18,12 +18,12 @@ import pytest
 from starlette.requests import Request
 from starlette.responses import StreamingResponse
 
-from cli.logs import JsonFormatter
-from services.optimizer.errors import StoreUnavailable
-from services.optimizer.log_context import log_context, log_fields
-from services.optimizer.run.execution import Surroundings, run_claim
-from services.optimizer.service import JobService
-from services.optimizer.store.sql_store import SqlStore
+from gaitswarm.cli.logs import JsonFormatter
+from gaitswarm.services.optimizer.errors import StoreUnavailable
+from gaitswarm.services.optimizer.log_context import log_context, log_fields
+from gaitswarm.services.optimizer.run.execution import Surroundings, run_claim
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from tests.examples.forked import ForkedCommand
 from tests.examples.jobs import SMALL_SPEC
 from tests.examples.processes import eventually

@@ -7,18 +7,18 @@ from pathlib import Path
 
 import pytest
 
-from services.monitoring.collectors import QueueCollector
-from services.monitoring.measured_store import measured
-from services.monitoring.metrics import Metrics
-from services.optimizer.errors import LeaseLost, StoreUnavailable
-from services.optimizer.jobs.job import Command, JobState
-from services.optimizer.jobs.provenance import JobProvenance
-from services.optimizer.run.execution import Surroundings, run_claim
-from services.optimizer.service import JobService
-from services.optimizer.store.sql_store import SqlStore, open_store
-from services.worker.cutting import Chunk, Part
-from services.worker.failures import killed_workers
-from sim.outcome import Status
+from gaitswarm.services.monitoring.collectors import QueueCollector
+from gaitswarm.services.monitoring.measured_store import measured
+from gaitswarm.services.monitoring.metrics import Metrics
+from gaitswarm.services.optimizer.errors import LeaseLost, StoreUnavailable
+from gaitswarm.services.optimizer.jobs.job import Command, JobState
+from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
+from gaitswarm.services.optimizer.run.execution import Surroundings, run_claim
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.worker.cutting import Chunk, Part
+from gaitswarm.services.worker.failures import killed_workers
+from gaitswarm.sim.outcome import Status
 from tests.examples.processes import eventually
 from tests.examples.servers import Server
 from tests.monitoring.scraped import Scrape, of, scraped

@@ -12,15 +12,15 @@ from opentelemetry.sdk.trace.export import SimpleSpanProcessor
 from opentelemetry.sdk.trace.export.in_memory_span_exporter import InMemorySpanExporter
 from opentelemetry.trace import StatusCode
 
-from services.monitoring.tracing import Tracing
-from services.optimizer.errors import LeaseLost
-from services.optimizer.jobs.documents import SPECS
-from services.optimizer.jobs.job import Command, JobState
-from services.optimizer.run.evaluator import TaskReport
-from services.optimizer.run.execution import Surroundings, run_claim
-from services.optimizer.store.sql_store import SqlStore
-from services.runtime import open_runtime
-from services.worker.dispatch import Dispatcher
+from gaitswarm.services.monitoring.tracing import Tracing
+from gaitswarm.services.optimizer.errors import LeaseLost
+from gaitswarm.services.optimizer.jobs.documents import SPECS
+from gaitswarm.services.optimizer.jobs.job import Command, JobState
+from gaitswarm.services.optimizer.run.evaluator import TaskReport
+from gaitswarm.services.optimizer.run.execution import Surroundings, run_claim
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.runtime import open_runtime
+from gaitswarm.services.worker.dispatch import Dispatcher
 from tests.examples.jobs import SMALL_SPEC
 from tests.examples.processes import eventually, loaded_by
 from tests.optimizer.formula import HERE, SPEC, FormulaEvaluator
@@ -138,8 +138,10 @@ def test_nothing_is_imported_unless_a_collector_is_named(tmp_path: Path) -> None
     options = ["serve", "--db", database, "--port", "0", "--evaluator", "in-process"]
     served = (
         "from unittest.mock import patch\n"
-        "from cli.main import run\n"
-        f"with patch('api.server.ApiServer.run'): assert run({options!r}) == 0"
+        "from gaitswarm.cli.main import run\n"
+        f"with patch('gaitswarm.api.server.ApiServer.run'): assert run({options!r}) == 0"
     )
-    found = loaded_by(served, ["opentelemetry.sdk", "services.monitoring.tracing", "sqlalchemy"])
+    found = loaded_by(
+        served, ["opentelemetry.sdk", "gaitswarm.services.monitoring.tracing", "sqlalchemy"]
+    )
     assert found == {"sqlalchemy"}

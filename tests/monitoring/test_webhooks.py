@@ -13,13 +13,13 @@ from typing import Any
 
 import pytest
 
+from gaitswarm.services.monitoring.webhooks import Notifier
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.job import Command, JobState
+from gaitswarm.services.optimizer.jobs.notification import MOST_ATTEMPTS, check_url, pause_after
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
 from gaitswarm.settings import Settings
-from services.monitoring.webhooks import Notifier
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.job import Command, JobState
-from services.optimizer.jobs.notification import MOST_ATTEMPTS, check_url, pause_after
-from services.optimizer.service import JobService
-from services.optimizer.store.sql_store import SqlStore, open_store
 from tests.examples.forked import ForkedCommand
 from tests.examples.jobs import SMALL_SPEC
 from tests.examples.processes import eventually

@@ -8,10 +8,10 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers.fuzzy_pi import quantised_table
-from sim.controllers.mamdani import Shape
-from sim.kernel.observation import WalkLog
-from sim.robot import Robot
+from gaitswarm.sim.controllers.fuzzy_pi import quantised_table
+from gaitswarm.sim.controllers.mamdani import Shape
+from gaitswarm.sim.kernel.observation import WalkLog
+from gaitswarm.sim.robot import Robot
 from tests.mujoco.walker import CONTROL_PERIOD, Floats
 
 Ints = NDArray[np.int64]

@@ -7,15 +7,15 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.assembly import control_steps, judge, plan_walk
-from sim.controllers import control_law
-from sim.kernel.observation import WalkLog, walk_log
-from sim.kernel.walk import WalkResult
-from sim.mujoco.kernel import MujocoKernel
-from sim.mujoco.mjcf import Soles
-from sim.outcome import Status
-from sim.robot import RobotChoice, load_robot
-from sim.scenario import Scenario
+from gaitswarm.sim.assembly import control_steps, judge, plan_walk
+from gaitswarm.sim.controllers import control_law
+from gaitswarm.sim.kernel.observation import WalkLog, walk_log
+from gaitswarm.sim.kernel.walk import WalkResult
+from gaitswarm.sim.mujoco.kernel import MujocoKernel
+from gaitswarm.sim.mujoco.mjcf import Soles
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.robot import RobotChoice, load_robot
+from gaitswarm.sim.scenario import Scenario
 
 
 def walk_in_mujoco(

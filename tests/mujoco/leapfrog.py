@@ -13,9 +13,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.mujoco.gears import Actuation, Gears
-from sim.mujoco.ground import Ground
-from sim.robot import Robot
+from gaitswarm.sim.mujoco.gears import Actuation, Gears
+from gaitswarm.sim.mujoco.ground import Ground
+from gaitswarm.sim.robot import Robot
 from tests.mujoco.resistance import Resistance, apply_forces, feet_of
 
 Floats = NDArray[np.float64]

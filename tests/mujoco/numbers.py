@@ -7,13 +7,13 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.mujoco.gears import Gears, gears_of
-from sim.mujoco.ground import GROUNDS, Ground
-from sim.mujoco.mjcf import Surroundings
-from sim.mujoco.model import Feet, even_drags
-from sim.robot import Robot
-from sim.robot.description import Contact
-from sim.scenario import Scenario
+from gaitswarm.sim.mujoco.gears import Gears, gears_of
+from gaitswarm.sim.mujoco.ground import GROUNDS, Ground
+from gaitswarm.sim.mujoco.mjcf import Surroundings
+from gaitswarm.sim.mujoco.model import Feet, even_drags
+from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.description import Contact
+from gaitswarm.sim.scenario import Scenario
 
 Floats = NDArray[np.float64]
 

@@ -12,9 +12,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.mujoco.ground import DeadZone, Ground, Karnopp, LinearZone, Stick
-from sim.mujoco.model import model
-from sim.robot import Robot
+from gaitswarm.sim.mujoco.ground import DeadZone, Ground, Karnopp, LinearZone, Stick
+from gaitswarm.sim.mujoco.model import model
+from gaitswarm.sim.robot import Robot
 
 Floats = NDArray[np.float64]
 Drag = tuple[Floats, Floats]

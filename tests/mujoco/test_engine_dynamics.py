@@ -7,13 +7,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sim.kernel.dynamics.physics_step import physics_model
-from sim.kernel.parameters import pack_parameters
-from sim.mujoco.gears import Gears, LooseGears
-from sim.mujoco.ground import Ground, Stick
-from sim.mujoco.model import model
-from sim.robot import Robot, RobotChoice, RobotFiles, RobotVariant, load_robot
-from sim.scenario import SCENARIOS, Scenario
+from gaitswarm.sim.kernel.dynamics.physics_step import physics_model
+from gaitswarm.sim.kernel.parameters import pack_parameters
+from gaitswarm.sim.mujoco.gears import Gears, LooseGears
+from gaitswarm.sim.mujoco.ground import Ground, Stick
+from gaitswarm.sim.mujoco.model import model
+from gaitswarm.sim.robot import Robot, RobotChoice, RobotFiles, RobotVariant, load_robot
+from gaitswarm.sim.scenario import SCENARIOS, Scenario
 from tests.examples.walks import STEEP, random_state, torque_quadruped_files
 from tests.mujoco.leapfrog import Leapfrog
 from tests.mujoco.numbers import even_feet, own_gears, own_ground

@@ -9,10 +9,10 @@ from itertools import cycle
 import numpy as np
 import pytest
 
-from sim.kernel.observation import WalkLog
-from sim.outcome import Status
-from sim.robot import RobotVariant, load_robot
-from sim.scenario import SCENARIOS, Scenario
+from gaitswarm.sim.kernel.observation import WalkLog
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.robot import RobotVariant, load_robot
+from gaitswarm.sim.scenario import SCENARIOS, Scenario
 from tests.examples import walks
 from tests.mujoco.controllers import Coded, FuzzyPi, Pi
 from tests.mujoco.engine import walk_in_mujoco

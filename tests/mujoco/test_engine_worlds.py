@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sim.assembly import control_steps, plan_walk
-from sim.controllers import ControllerName, control_law
-from sim.kernel.parameters import Layout
-from sim.kernel.walk import WalkSetup
-from sim.mujoco.kernel import MujocoKernel, WalkStopped
-from sim.outcome import Status
-from sim.robot import load_robot
-from sim.scenario import Scenario
-from sim.worlds import PERTURBATIONS, EngineWalk, WorldWalk, sample_worlds
+from gaitswarm.sim.assembly import control_steps, plan_walk
+from gaitswarm.sim.controllers import ControllerName, control_law
+from gaitswarm.sim.kernel.parameters import Layout
+from gaitswarm.sim.kernel.walk import WalkSetup
+from gaitswarm.sim.mujoco.kernel import MujocoKernel, WalkStopped
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.robot import load_robot
+from gaitswarm.sim.scenario import Scenario
+from gaitswarm.sim.worlds import PERTURBATIONS, EngineWalk, WorldWalk, sample_worlds
 from tests.examples.walks import UPHILL_WALK
 
 pytestmark = pytest.mark.slow

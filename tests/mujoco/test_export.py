@@ -8,11 +8,11 @@ import mujoco
 import numpy as np
 import pytest
 
-from sim.assembly import plan_walk
-from sim.controllers import control_law
-from sim.mujoco.export import exported
-from sim.robot import RobotFiles, RobotVariant, load_robot
-from sim.scenario import SCENARIOS, Scenario
+from gaitswarm.sim.assembly import plan_walk
+from gaitswarm.sim.controllers import control_law
+from gaitswarm.sim.mujoco.export import exported
+from gaitswarm.sim.robot import RobotFiles, RobotVariant, load_robot
+from gaitswarm.sim.scenario import SCENARIOS, Scenario
 from tests.examples.commands import run_command
 from tests.examples.paths import ROOT
 from tests.examples.robots import SLOW, robot_folder

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sim.outcome import Status
-from sim.proposal.document import propose_robot
-from sim.robot import Robot, RobotFiles, load_robot
-from sim.scenario import Scenario
-from sim.simulate import simulate
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.proposal.document import propose_robot
+from gaitswarm.sim.robot import Robot, RobotFiles, load_robot
+from gaitswarm.sim.scenario import Scenario
+from gaitswarm.sim.simulate import simulate
 from tests.mujoco.controllers import Pi
 from tests.mujoco.engine import walk_in_mujoco
 from tests.mujoco.walker import walk

@@ -6,9 +6,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from sim.mujoco.export import exported
-from sim.robot import load_robot
-from sim.scenario import SCENARIOS
+from gaitswarm.sim.mujoco.export import exported
+from gaitswarm.sim.robot import load_robot
+from gaitswarm.sim.scenario import SCENARIOS
 from tests.examples.walks import short_walk, torque_quadruped_files, walk
 from tests.mujoco.engine import walk_in_mujoco
 

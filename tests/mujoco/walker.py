@@ -15,11 +15,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.kernel.observation import WalkLog
-from sim.mujoco.gears import Gears
-from sim.mujoco.model import model
-from sim.robot import Robot
-from sim.scenario import Scenario
+from gaitswarm.sim.kernel.observation import WalkLog
+from gaitswarm.sim.mujoco.gears import Gears
+from gaitswarm.sim.mujoco.model import model
+from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.scenario import Scenario
 from tests.mujoco.leapfrog import Leapfrog, Middle
 from tests.mujoco.numbers import own_gears, own_ground
 

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.preference import Preference, judge
-from sim.outcome import Status
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.preference import Preference, judge
+from gaitswarm.sim.outcome import Status
 
 
 def columns_of(

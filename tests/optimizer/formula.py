@@ -9,16 +9,16 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from services.optimizer.jobs.documents import AnySpec
-from services.optimizer.jobs.job import Job, JobState
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.provenance import JobProvenance, with_record
-from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped
-from services.optimizer.run.execution import Surroundings, run_claim
-from services.optimizer.store.port.base import Store
-from sim.case import Walk
-from sim.outcome import Outcome, Status
-from sim.provenance import Provenance
+from gaitswarm.services.optimizer.jobs.documents import AnySpec
+from gaitswarm.services.optimizer.jobs.job import Job, JobState
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, with_record
+from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped
+from gaitswarm.services.optimizer.run.execution import Surroundings, run_claim
+from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.sim.case import Walk
+from gaitswarm.sim.outcome import Outcome, Status
+from gaitswarm.sim.provenance import Provenance
 
 SPEC = JobSpec.model_validate(
     {

@@ -7,10 +7,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.search.local.walk import Point, Walk
-from services.optimizer.search.optimizer import SearchSettings
-from services.optimizer.search.registry import METHODS, create_search
-from services.optimizer.search.space import Axis, Space
+from gaitswarm.services.optimizer.search.local.walk import Point, Walk
+from gaitswarm.services.optimizer.search.optimizer import SearchSettings
+from gaitswarm.services.optimizer.search.registry import METHODS, create_search
+from gaitswarm.services.optimizer.search.space import Axis, Space
 
 Floats = NDArray[np.float64]
 

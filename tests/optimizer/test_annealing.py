@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from services.optimizer.search.local.annealing import Chain, initial_temperature
-from services.optimizer.search.local.walk import Axes, Floats, Point
-from services.optimizer.search.random_stream import RandomNumbers
-from services.optimizer.search.space import Axis, Space
+from gaitswarm.services.optimizer.search.local.annealing import Chain, initial_temperature
+from gaitswarm.services.optimizer.search.local.walk import Axes, Floats, Point
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.space import Axis, Space
 from tests.optimizer.searched import MIXED, calls_to, designs_asked, mixed_bowl
 
 SQUARE = Space.continuous([0.0, 0.0], [1.0, 1.0])

@@ -7,22 +7,22 @@ from dataclasses import replace
 import pytest
 from pydantic import ValidationError
 
-from services.optimizer.jobs.documents import SPECS
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.spec import create_optimizer
-from services.optimizer.search.automatic import RULES, AutoSettings, Rule, chosen_method
-from services.optimizer.search.random_search import RandomSearchSettings
-from services.optimizer.search.registry import (
+from gaitswarm.services.optimizer.jobs.documents import SPECS
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.spec import create_optimizer
+from gaitswarm.services.optimizer.search.automatic import RULES, AutoSettings, Rule, chosen_method
+from gaitswarm.services.optimizer.search.random_search import RandomSearchSettings
+from gaitswarm.services.optimizer.search.registry import (
     DEFAULT_METHOD,
     LONGEST_REPLAY,
     METHODS,
     OPTIMIZERS,
     OptimizerSettings,
 )
-from services.optimizer.search.space import Axis, Space
-from services.optimizer.search.swarm.pso import PsoSettings
-from services.optimizer.service import JobService
-from services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.search.space import Axis, Space
+from gaitswarm.services.optimizer.search.swarm.pso import PsoSettings
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from tests.calibration.conftest import spec as calibration
 
 LINE = Space([Axis(0.0, 1.0)])

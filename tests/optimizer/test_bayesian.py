@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from services.optimizer.search.model.gaussian_process import GaussianProcess
-from services.optimizer.search.space import Axis, Space
+from gaitswarm.services.optimizer.search.model.gaussian_process import GaussianProcess
+from gaitswarm.services.optimizer.search.space import Axis, Space
 from tests.optimizer.searched import MIXED, designs_asked, mixed_bowl
 
 pytestmark = pytest.mark.skipif(find_spec("sklearn") is None, reason="scikit-learn is missing")

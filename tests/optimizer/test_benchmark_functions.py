@@ -11,7 +11,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from services.optimizer.tournament.functions import ACCEPTANCE, FUNCTIONS, BenchmarkFunction, draw
+from gaitswarm.services.optimizer.tournament.functions import (
+    ACCEPTANCE,
+    FUNCTIONS,
+    BenchmarkFunction,
+    draw,
+)
 from tests.examples.paths import ROOT
 
 Numbers = NDArray[np.float64]

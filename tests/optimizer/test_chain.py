@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from services.optimizer.jobs.chain import (
+from gaitswarm.services.optimizer.jobs.chain import (
     ChainDocuments,
     Link,
     Outcomes,
@@ -19,8 +19,8 @@ from services.optimizer.jobs.chain import (
     encoded,
     iteration_digest,
 )
-from services.optimizer.jobs.iteration import Reevaluation
-from sim.outcome import Status
+from gaitswarm.services.optimizer.jobs.iteration import Reevaluation
+from gaitswarm.sim.outcome import Status
 
 # RFC 8949, appendix A; floats always in 64 bits.
 PUBLISHED: list[tuple[Any, str]] = [

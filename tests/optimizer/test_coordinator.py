@@ -7,11 +7,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from services.optimizer.jobs.iteration import Ask, CompletedIteration
-from services.optimizer.jobs.job import Claim, JobState, Progress
-from services.optimizer.jobs.spec import judge_outcomes
-from services.optimizer.run.coordinator import Coordination, Phase, handle
-from services.optimizer.run.events import (
+from gaitswarm.services.optimizer.jobs.iteration import Ask, CompletedIteration
+from gaitswarm.services.optimizer.jobs.job import Claim, JobState, Progress
+from gaitswarm.services.optimizer.jobs.spec import judge_outcomes
+from gaitswarm.services.optimizer.run.coordinator import Coordination, Phase, handle
+from gaitswarm.services.optimizer.run.events import (
     Action,
     Begin,
     Claimed,
@@ -29,7 +29,7 @@ from services.optimizer.run.events import (
     Wait,
     Waited,
 )
-from services.optimizer.run.outage import Backoff
+from gaitswarm.services.optimizer.run.outage import Backoff
 from tests.optimizer.formula import HERE, SPEC, job, walk
 
 

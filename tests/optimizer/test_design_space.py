@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from services.optimizer.jobs.design_space import DesignSpace
-from sim.variables import Variable
+from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
+from gaitswarm.sim.variables import Variable
 
 GAIN = Variable(name="gain", low=0.0, high=2.0, unit="1")
 SHAPE = Variable(name="shape", low=1, high=3, kind="integer", unit="index")

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from services.optimizer.search.local.directed_tabu import (
+from gaitswarm.services.optimizer.search.local.directed_tabu import (
     DirectedTabuSettings,
     TabuList,
     VisitedRegions,
@@ -15,9 +15,9 @@ from services.optimizer.search.local.directed_tabu import (
     explore,
     neighbours,
 )
-from services.optimizer.search.local.walk import Axes, Floats, Point
-from services.optimizer.search.random_stream import RandomNumbers
-from services.optimizer.search.space import Axis, Space
+from gaitswarm.services.optimizer.search.local.walk import Axes, Floats, Point
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.space import Axis, Space
 from tests.optimizer.searched import MIXED, Formula, calls_to, designs_asked, mixed_bowl, walked
 
 SQUARE = Axes(Space.continuous([0.0, 0.0], [1.0, 1.0]))

@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.optimizer.analysis.distribution import (
+from gaitswarm.services.optimizer.analysis.distribution import (
     QUANTILES,
     distribution,
     finite_quantiles,
     thinned,
 )
-from services.optimizer.jobs.design_space import DesignSpace
-from sim.variables import Variable
+from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
+from gaitswarm.sim.variables import Variable
 from tests.optimizer.columns import columns_of, fitness_only
 
 INF = math.inf

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from services.optimizer.analysis.trade_offs import dominance
-from services.optimizer.analysis.trade_offs.dominance import non_dominated
+from gaitswarm.services.optimizer.analysis.trade_offs import dominance
+from gaitswarm.services.optimizer.analysis.trade_offs.dominance import non_dominated
 
 
 def by_definition(points: np.ndarray) -> np.ndarray:

@@ -8,19 +8,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from services.optimizer.errors import StoreUnavailable
-from services.optimizer.jobs.iteration import Known
-from services.optimizer.jobs.job import Job, JobState
-from services.optimizer.jobs.kinds.tournament import TournamentSpec
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.provenance import JobProvenance
-from services.optimizer.jobs.walk_keys import walk_keys
-from services.optimizer.run.economy import evaluate_unknown
-from services.optimizer.run.evaluator import EvaluationRequest
-from services.optimizer.run.execution import Surroundings, run_claim
-from services.optimizer.store.port.base import Store
-from services.optimizer.store.sql_store import SqlStore
-from sim.outcome import Outcome
+from gaitswarm.services.optimizer.errors import StoreUnavailable
+from gaitswarm.services.optimizer.jobs.iteration import Known
+from gaitswarm.services.optimizer.jobs.job import Job, JobState
+from gaitswarm.services.optimizer.jobs.kinds.tournament import TournamentSpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
+from gaitswarm.services.optimizer.jobs.walk_keys import walk_keys
+from gaitswarm.services.optimizer.run.economy import evaluate_unknown
+from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
+from gaitswarm.services.optimizer.run.execution import Surroundings, run_claim
+from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.sim.outcome import Outcome
 from tests.examples.jobs import history
 from tests.optimizer.formula import HERE, SPEC, FormulaEvaluator, walk
 

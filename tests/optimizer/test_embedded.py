@@ -11,16 +11,20 @@ from typing import Any
 
 import pytest
 
-from services.optimizer.errors import EvaluatorUnavailable, StoreReplaced
-from services.optimizer.jobs.iteration import CompletedIteration
-from services.optimizer.jobs.job import Claim, Command, JobState, Renewal
-from services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS, run_embedded
-from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped, Evaluator
-from services.optimizer.run.execution import Surroundings, run_claim
-from services.optimizer.service import JobService
-from services.optimizer.store.port.base import Store
-from services.optimizer.store.sql_store import open_store
-from sim.outcome import Outcome
+from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, StoreReplaced
+from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
+from gaitswarm.services.optimizer.jobs.job import Claim, Command, JobState, Renewal
+from gaitswarm.services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS, run_embedded
+from gaitswarm.services.optimizer.run.evaluator import (
+    EvaluationRequest,
+    EvaluationStopped,
+    Evaluator,
+)
+from gaitswarm.services.optimizer.run.execution import Surroundings, run_claim
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.store.sql_store import open_store
+from gaitswarm.sim.outcome import Outcome
 from tests.optimizer.formula import SPEC, FormulaEvaluator
 
 ALL = list(range(SPEC.iterations))

@@ -8,20 +8,20 @@ from typing import Any
 
 import pytest
 
-from services.optimizer.jobs.documents import AnySpec
-from services.optimizer.jobs.estimate import MeasuredRates, estimate
-from services.optimizer.jobs.job import Job, Progress
-from services.optimizer.jobs.kinds.identification import IdentificationSpec
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.spec import Spec
-from services.optimizer.search.random_search import RandomSearchSettings
-from services.optimizer.search.swarm.pso import PsoSettings
-from sim.identification.recorded_walk import RecordedWalk
-from sim.kernel.batch import Walking
-from sim.robot import RobotVariant
-from sim.scenario import Scenario
-from sim.simulate import Simulation, simulating
-from sim.variables import Variable
+from gaitswarm.services.optimizer.jobs.documents import AnySpec
+from gaitswarm.services.optimizer.jobs.estimate import MeasuredRates, estimate
+from gaitswarm.services.optimizer.jobs.job import Job, Progress
+from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.services.optimizer.search.random_search import RandomSearchSettings
+from gaitswarm.services.optimizer.search.swarm.pso import PsoSettings
+from gaitswarm.sim.identification.recorded_walk import RecordedWalk
+from gaitswarm.sim.kernel.batch import Walking
+from gaitswarm.sim.robot import RobotVariant
+from gaitswarm.sim.scenario import Scenario
+from gaitswarm.sim.simulate import Simulation, simulating
+from gaitswarm.sim.variables import Variable
 from tests.examples.walks import SHORT_WALK
 from tests.optimizer.formula import job
 
@@ -100,7 +100,7 @@ def test_without_a_job_alike_a_walk_is_measured_once(monkeypatch: pytest.MonkeyP
     first = estimate(SPEC, SPEC.cases({}), (), rates)
     assert first.seconds is not None and 0.0 < first.seconds < 60.0
     assert "measured on this machine" in first.basis
-    monkeypatch.setattr("sim.case.simulating", None)
+    monkeypatch.setattr("gaitswarm.sim.case.simulating", None)
     assert estimate(SPEC, SPEC.cases({}), (), rates) == first
 
 
@@ -122,7 +122,7 @@ def test_a_method_that_asks_for_one_design_at_a_time_is_measured_so(
         walked.append(len(designs))
         return simulating(*arguments, **options)
 
-    monkeypatch.setattr("sim.case.simulating", noted)
+    monkeypatch.setattr("gaitswarm.sim.case.simulating", noted)
     single = SPEC.model_copy(update={"optimizer": RandomSearchSettings(particles=1)})
     found = estimate(single, single.cases({}), (), MeasuredRates())
     assert found.seconds is not None
@@ -152,7 +152,7 @@ def test_a_measured_walk_is_short_however_long_the_jobs_walks_are(
         walked.append(scenario.cycles)
         return simulating(scenario, *arguments, **options)
 
-    monkeypatch.setattr("sim.case.simulating", noted)
+    monkeypatch.setattr("gaitswarm.sim.case.simulating", noted)
     found = estimate(long, long.cases({}), (), MeasuredRates())
     assert found.seconds is not None
     assert max(walked) * scenario.cycle_time == pytest.approx(5.0)

@@ -6,13 +6,20 @@ import threading
 
 import pytest
 
-from services.optimizer.errors import Conflict, InvalidRequest
-from services.optimizer.jobs.iteration import CompletedIteration
-from services.optimizer.jobs.job import LARGEST_BUDGET, Claim, Command, Job, JobState, extended
-from services.optimizer.run.coordinator import Coordination, handle
-from services.optimizer.run.events import Claimed, Commit, Evaluate, Evaluated, Extended
-from services.optimizer.run.execution import OnCommit, Surroundings, run_claim
-from services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest
+from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
+from gaitswarm.services.optimizer.jobs.job import (
+    LARGEST_BUDGET,
+    Claim,
+    Command,
+    Job,
+    JobState,
+    extended,
+)
+from gaitswarm.services.optimizer.run.coordinator import Coordination, handle
+from gaitswarm.services.optimizer.run.events import Claimed, Commit, Evaluate, Evaluated, Extended
+from gaitswarm.services.optimizer.run.execution import OnCommit, Surroundings, run_claim
+from gaitswarm.services.optimizer.store.port.base import Store
 from tests.examples.jobs import Bits, history
 from tests.optimizer.formula import HERE, SPEC, FormulaEvaluator, job, walk
 

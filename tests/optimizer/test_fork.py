@@ -10,15 +10,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from services.optimizer.errors import Conflict, InvalidRequest, NotFound, ProvenanceChanged
-from services.optimizer.jobs.fork import Fork, ForkRequest, Lineage, TakenHistory
-from services.optimizer.jobs.job import Job, JobState
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.time_left import time_left
-from services.optimizer.run.embedded import run_embedded
-from services.optimizer.service import JobService
-from services.optimizer.store.sql_store import SqlStore
-from sim.outcome import Status
+from gaitswarm.services.optimizer.errors import (
+    Conflict,
+    InvalidRequest,
+    NotFound,
+    ProvenanceChanged,
+)
+from gaitswarm.services.optimizer.jobs.fork import Fork, ForkRequest, Lineage, TakenHistory
+from gaitswarm.services.optimizer.jobs.job import Job, JobState
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.time_left import time_left
+from gaitswarm.services.optimizer.run.embedded import run_embedded
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.sim.outcome import Status
 from tests.examples.jobs import history
 from tests.optimizer.formula import HERE, SINGLE, SPEC, TradeOff
 

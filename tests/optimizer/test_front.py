@@ -8,13 +8,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from services.optimizer.analysis.ranking import rank
-from services.optimizer.analysis.trade_offs.front import Front, knees, pareto_front
-from services.optimizer.analysis.utilities import objective_vectors
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
-from services.optimizer.jobs.preference import PREFERENCES
-from services.optimizer.jobs.preference import objective_vectors as stored_vectors
+from gaitswarm.services.optimizer.analysis.ranking import rank
+from gaitswarm.services.optimizer.analysis.trade_offs.front import Front, knees, pareto_front
+from gaitswarm.services.optimizer.analysis.utilities import objective_vectors
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
+from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
+from gaitswarm.services.optimizer.jobs.preference import objective_vectors as stored_vectors
 from tests.examples.columns import columns_of
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from services.optimizer.search.space import Axis, Space
+from gaitswarm.services.optimizer.search.space import Axis, Space
 from tests.optimizer.searched import MIXED, calls_to, designs_asked, mixed_bowl
 
 pytest.importorskip("pymoo")

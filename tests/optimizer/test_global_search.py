@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from services.optimizer.search.local.walk import Axes, Floats, Point
-from services.optimizer.search.multistart.global_search import Clusters, critical_distance
-from services.optimizer.search.registry import MethodName
-from services.optimizer.search.space import Axis, Space
+from gaitswarm.services.optimizer.search.local.walk import Axes, Floats, Point
+from gaitswarm.services.optimizer.search.multistart.global_search import Clusters, critical_distance
+from gaitswarm.services.optimizer.search.registry import MethodName
+from gaitswarm.services.optimizer.search.space import Axis, Space
 from tests.optimizer.searched import MIXED, calls_to, designs_asked, mixed_bowl
 
 SQUARE = Space.continuous([0.0, 0.0], [1.0, 1.0])

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from services.optimizer.search.random_stream import RandomNumbers
-from services.optimizer.search.registry import create_search
-from services.optimizer.search.space import Axis, Space
-from services.optimizer.search.swarm.gsa import GsaSettings, accelerations, gsa, masses
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.registry import create_search
+from gaitswarm.services.optimizer.search.space import Axis, Space
+from gaitswarm.services.optimizer.search.swarm.gsa import GsaSettings, accelerations, gsa, masses
 
 Floats = NDArray[np.float64]
 

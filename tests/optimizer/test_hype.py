@@ -11,10 +11,10 @@ import pytest
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from services.optimizer.search.evolution.hype import Hype, HypeSettings
-from services.optimizer.search.evolution.pareto import SampledHypervolume, pareto_ranks
-from services.optimizer.search.random_stream import RandomNumbers
-from services.optimizer.search.space import Axis, Space
+from gaitswarm.services.optimizer.search.evolution.hype import Hype, HypeSettings
+from gaitswarm.services.optimizer.search.evolution.pareto import SampledHypervolume, pareto_ranks
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.space import Axis, Space
 
 Floats = NDArray[np.float64]
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from services.optimizer.analysis.importance import (
+from gaitswarm.services.optimizer.analysis.importance import (
     LEAST_DESIGNS,
     companions,
     first_order_indices,
 )
-from services.optimizer.analysis.interval import Interval
-from sim.variables import Variable
+from gaitswarm.services.optimizer.analysis.interval import Interval
+from gaitswarm.sim.variables import Variable
 
 
 def variables(*names: str) -> tuple[Variable, ...]:

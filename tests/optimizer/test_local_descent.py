@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from services.optimizer.search.local.bfgs import bfgs
-from services.optimizer.search.local.unirandi import unirandi
-from services.optimizer.search.local.walk import Axes, Floats, Point, Walk
-from services.optimizer.search.random_stream import RandomNumbers
-from services.optimizer.search.space import Axis, Space
+from gaitswarm.services.optimizer.search.local.bfgs import bfgs
+from gaitswarm.services.optimizer.search.local.unirandi import unirandi
+from gaitswarm.services.optimizer.search.local.walk import Axes, Floats, Point, Walk
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.space import Axis, Space
 from tests.optimizer.searched import Formula, walked
 
 CUBE = Axes(Space.continuous([0.0] * 4, [1.0] * 4))

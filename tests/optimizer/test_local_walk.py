@@ -8,7 +8,7 @@ from collections.abc import Generator
 import numpy as np
 import pytest
 
-from services.optimizer.search.local.walk import (
+from gaitswarm.services.optimizer.search.local.walk import (
     Axes,
     Endless,
     Floats,
@@ -19,8 +19,8 @@ from services.optimizer.search.local.walk import (
     mixed,
     poll,
 )
-from services.optimizer.search.registry import MethodName, create_search
-from services.optimizer.search.space import Axis, Space
+from gaitswarm.services.optimizer.search.registry import MethodName, create_search
+from gaitswarm.services.optimizer.search.space import Axis, Space
 from tests.optimizer.searched import MIXED, mixed_bowl, settings_of, walked
 
 AXES = Axes(MIXED)

@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from services.optimizer.search.local.mads import MadsSettings, mads
-from services.optimizer.search.local.nomad_client import MOST_PROCESSES
-from services.optimizer.search.random_stream import RandomNumbers
-from services.optimizer.search.replayed import Proposals, Start
-from services.optimizer.search.space import Axis, Space
+from gaitswarm.services.optimizer.search.local.mads import MadsSettings, mads
+from gaitswarm.services.optimizer.search.local.nomad_client import MOST_PROCESSES
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.replayed import Proposals, Start
+from gaitswarm.services.optimizer.search.space import Axis, Space
 from tests.optimizer.searched import MIXED, calls_to, designs_asked, mixed_bowl
 
 pytest.importorskip("PyNomad")
@@ -141,7 +141,7 @@ def test_a_killed_search_leaves_no_process() -> None:
 
 LEFT_OPEN = """
 import sys
-from services.optimizer.search.local import nomad_client
+from gaitswarm.services.optimizer.search.local import nomad_client
 from tests.optimizer.test_mads import begun
 # What a module holds is collected when the names of others are gone.
 nomad_client.left_open = begun(), list(sys.modules.values())

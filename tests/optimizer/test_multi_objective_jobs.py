@@ -11,19 +11,19 @@ import pytest
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from services.optimizer.analysis.search_path import retraced
-from services.optimizer.jobs.documents import SPECS
-from services.optimizer.jobs.fork import ForkRequest
-from services.optimizer.jobs.iteration import CompletedIteration
-from services.optimizer.jobs.job import Job, JobState
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.kinds.tuning_worlds import Aggregate
-from services.optimizer.jobs.preference import PREFERENCES, judge
-from services.optimizer.run.embedded import run_embedded
-from services.optimizer.run.execution import Surroundings, run_claim
-from services.optimizer.service import JobService
-from services.optimizer.store.port.base import Store
-from services.optimizer.tournament.methods import method_names
+from gaitswarm.services.optimizer.analysis.search_path import retraced
+from gaitswarm.services.optimizer.jobs.documents import SPECS
+from gaitswarm.services.optimizer.jobs.fork import ForkRequest
+from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
+from gaitswarm.services.optimizer.jobs.job import Job, JobState
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import Aggregate
+from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, judge
+from gaitswarm.services.optimizer.run.embedded import run_embedded
+from gaitswarm.services.optimizer.run.execution import Surroundings, run_claim
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.tournament.methods import method_names
 from tests.calibration.conftest import spec as calibration
 from tests.examples.jobs import history
 from tests.optimizer.formula import HERE, SPEC, TradeOff

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from services.optimizer.search.local.nelder_mead import simplex_search
-from services.optimizer.search.local.walk import Axes, Floats, Point
-from services.optimizer.search.space import Axis, Space
+from gaitswarm.services.optimizer.search.local.nelder_mead import simplex_search
+from gaitswarm.services.optimizer.search.local.walk import Axes, Floats, Point
+from gaitswarm.services.optimizer.search.space import Axis, Space
 from tests.optimizer.searched import MIXED, calls_to, designs_asked, mixed_bowl, walked
 
 CUBE = Space.continuous([0.0] * 4, [1.0] * 4)

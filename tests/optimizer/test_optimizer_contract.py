@@ -6,6 +6,7 @@ import platform
 
 import pytest
 
+from gaitswarm.services.optimizer.search.registry import METHODS
 from gaitswarm.testing.optimizers import SearchContract
 from gaitswarm.testing.searches import (
     BUDGET,
@@ -15,7 +16,6 @@ from gaitswarm.testing.searches import (
     search,
     whole_path,
 )
-from services.optimizer.search.registry import METHODS
 
 INSTALLED = [name for name, method in METHODS.built_in.items() if not method.missing]
 """Methods whose libraries are here; with the development lock, all that this machine can have."""

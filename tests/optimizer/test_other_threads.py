@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from services.optimizer.analysis.robustness.certificate import certificate
-from services.optimizer.jobs.judgement import Judgement
-from services.optimizer.jobs.preference import PREFERENCES, geometric_mean, judge
+from gaitswarm.services.optimizer.analysis.robustness.certificate import certificate
+from gaitswarm.services.optimizer.jobs.judgement import Judgement
+from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, geometric_mean, judge
 from tests.certificate.examples import columns, small
 
 DESIGNS = 20_000

@@ -12,12 +12,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from services.optimizer.jobs.design_space import DesignSpace
-from services.optimizer.search.random_stream import uniform
-from services.optimizer.search.registry import OPTIMIZERS
-from services.optimizer.search.space import Space
-from services.optimizer.search.swarm.pso import ParticleSwarm, PsoSettings, absorb, reflect
-from sim.variables import Variable
+from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
+from gaitswarm.services.optimizer.search.random_stream import uniform
+from gaitswarm.services.optimizer.search.registry import OPTIMIZERS
+from gaitswarm.services.optimizer.search.space import Space
+from gaitswarm.services.optimizer.search.swarm.pso import (
+    ParticleSwarm,
+    PsoSettings,
+    absorb,
+    reflect,
+)
+from gaitswarm.sim.variables import Variable
 
 Function = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from services.optimizer.search.local.pattern_search import PatternSearchSettings
-from services.optimizer.search.optimizer import Optimizer
-from services.optimizer.search.registry import create_search
-from services.optimizer.search.space import Axis, Space
+from gaitswarm.services.optimizer.search.local.pattern_search import PatternSearchSettings
+from gaitswarm.services.optimizer.search.optimizer import Optimizer
+from gaitswarm.services.optimizer.search.registry import create_search
+from gaitswarm.services.optimizer.search.space import Axis, Space
 
 Floats = NDArray[np.float64]
 Function = Callable[[Floats], Floats]

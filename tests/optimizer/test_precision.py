@@ -8,14 +8,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from services.optimizer.jobs.documents import SPECS
-from services.optimizer.jobs.iteration import Ask, CompletedIteration
-from services.optimizer.jobs.job import Claim, JobState, Progress
-from services.optimizer.jobs.provenance import with_record
-from services.optimizer.jobs.spec import judge_outcomes
-from services.optimizer.run.coordinator import Coordination, Phase, handle
-from services.optimizer.run.evaluator import EvaluationRequest
-from services.optimizer.run.events import (
+from gaitswarm.services.optimizer.jobs.documents import SPECS
+from gaitswarm.services.optimizer.jobs.iteration import Ask, CompletedIteration
+from gaitswarm.services.optimizer.jobs.job import Claim, JobState, Progress
+from gaitswarm.services.optimizer.jobs.provenance import with_record
+from gaitswarm.services.optimizer.jobs.spec import judge_outcomes
+from gaitswarm.services.optimizer.run.coordinator import Coordination, Phase, handle
+from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
+from gaitswarm.services.optimizer.run.events import (
     Begin,
     Claimed,
     Commit,
@@ -27,8 +27,8 @@ from services.optimizer.run.events import (
     Wait,
     Waited,
 )
-from services.optimizer.store.port.base import Store
-from sim.outcome import Outcome, Status
+from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.sim.outcome import Outcome, Status
 from tests.optimizer.formula import HERE, SINGLE, SPEC, FormulaEvaluator, job, queue, walk
 from tests.optimizer.formula import run as run_job
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from services.optimizer.jobs.preference import (
+from gaitswarm.services.optimizer.jobs.preference import (
     PREFERENCES,
     Preference,
     PreferenceName,
@@ -20,7 +20,7 @@ from services.optimizer.jobs.preference import (
     log_utilities,
     objective_vectors,
 )
-from sim.outcome import Outcome, Status
+from gaitswarm.sim.outcome import Outcome, Status
 
 TABLE_3_6 = (8.71, 1.77, 16.09, 41.96)
 SPEED = 0.156

@@ -7,8 +7,11 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from services.optimizer.analysis.robustness.preference_winners import drawn_preferences, winners
-from services.optimizer.analysis.utilities import fitness_of, log_utilities
+from gaitswarm.services.optimizer.analysis.robustness.preference_winners import (
+    drawn_preferences,
+    winners,
+)
+from gaitswarm.services.optimizer.analysis.utilities import fitness_of, log_utilities
 from tests.examples.columns import columns_of
 
 TRADE_OFF = np.array(

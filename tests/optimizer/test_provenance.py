@@ -11,40 +11,40 @@ from typing import Any
 
 import pytest
 
-from services.optimizer.errors import ProvenanceChanged
-from services.optimizer.jobs import case_choice
-from services.optimizer.jobs.design_space import DesignSpace
-from services.optimizer.jobs.iteration import CompletedIteration
-from services.optimizer.jobs.job import Claim, Command, Job, JobState
-from services.optimizer.jobs.kinds.calibration import CalibrationSpec
-from services.optimizer.jobs.kinds.certificate import CertificateSpec
-from services.optimizer.jobs.kinds.identification import IdentificationSpec
-from services.optimizer.jobs.kinds.misfit import root_mean_square
-from services.optimizer.jobs.kinds.problem import FunctionProblem
-from services.optimizer.jobs.kinds.race_case import RaceCase
-from services.optimizer.jobs.kinds.tournament import TournamentSpec
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
-from services.optimizer.jobs.optimizer_choice import optimizer_settings
-from services.optimizer.jobs.preference import Preference
-from services.optimizer.jobs.provenance import (
+from gaitswarm.services.optimizer.errors import ProvenanceChanged
+from gaitswarm.services.optimizer.jobs import case_choice
+from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
+from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
+from gaitswarm.services.optimizer.jobs.job import Claim, Command, Job, JobState
+from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
+from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
+from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
+from gaitswarm.services.optimizer.jobs.kinds.misfit import root_mean_square
+from gaitswarm.services.optimizer.jobs.kinds.problem import FunctionProblem
+from gaitswarm.services.optimizer.jobs.kinds.race_case import RaceCase
+from gaitswarm.services.optimizer.jobs.kinds.tournament import TournamentSpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
+from gaitswarm.services.optimizer.jobs.optimizer_choice import optimizer_settings
+from gaitswarm.services.optimizer.jobs.preference import Preference
+from gaitswarm.services.optimizer.jobs.provenance import (
     JobProvenance,
     ProvenanceRecord,
     as_stored,
     job_provenance,
     optimizer_files,
 )
-from services.optimizer.jobs.spec import Spec
-from services.optimizer.jobs.start import EarlierJobs
-from services.optimizer.run.coordinator import Coordination, handle
-from services.optimizer.run.events import Begin, Claimed, Evaluate, Record, Release
-from services.optimizer.run.execution import OnCommit, Surroundings, run_claim
-from services.optimizer.search.registry import create_search
-from services.optimizer.service import JobService
-from services.optimizer.store.port.base import Store
-from services.optimizer.tournament.race import race
-from sim.errors import RobotFileError
-from sim.outcome import OBJECTIVES
+from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.services.optimizer.jobs.start import EarlierJobs
+from gaitswarm.services.optimizer.run.coordinator import Coordination, handle
+from gaitswarm.services.optimizer.run.events import Begin, Claimed, Evaluate, Record, Release
+from gaitswarm.services.optimizer.run.execution import OnCommit, Surroundings, run_claim
+from gaitswarm.services.optimizer.search.registry import create_search
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.tournament.race import race
+from gaitswarm.sim.errors import RobotFileError
+from gaitswarm.sim.outcome import OBJECTIVES
 from tests.optimizer.formula import HERE, SPEC, FormulaEvaluator, job
 
 

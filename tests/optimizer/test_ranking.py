@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.optimizer.analysis.ranking import best_so_far, rank
-from services.optimizer.analysis.utilities import fitness_of, log_utilities, utilities
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.preference import PREFERENCES, Preference, judge
-from sim.outcome import Status
+from gaitswarm.services.optimizer.analysis.ranking import best_so_far, rank
+from gaitswarm.services.optimizer.analysis.utilities import fitness_of, log_utilities, utilities
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference, judge
+from gaitswarm.sim.outcome import Status
 from tests.optimizer.columns import columns_of, fitness_only
 
 objective = st.one_of(

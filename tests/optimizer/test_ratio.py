@@ -5,7 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from services.optimizer.analysis.ratio import MedianInterval, median_interval, median_ratio
+from gaitswarm.services.optimizer.analysis.ratio import (
+    MedianInterval,
+    median_interval,
+    median_ratio,
+)
 
 
 def test_the_interval_of_ten_runs_lies_between_the_second_and_the_ninth() -> None:

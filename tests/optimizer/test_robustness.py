@@ -7,8 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from services.optimizer.analysis.robustness.index import LocalSample, local_sample, robustness
-from sim.variables import Variable
+from gaitswarm.services.optimizer.analysis.robustness.index import (
+    LocalSample,
+    local_sample,
+    robustness,
+)
+from gaitswarm.sim.variables import Variable
 
 X = Variable(name="x", low=0.0, high=10.0)
 Y = Variable(name="y", low=-1.0, high=1.0)

@@ -15,20 +15,20 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from services.optimizer.errors import EvaluatorUnavailable, KilledWorker, StoreUnavailable
-from services.optimizer.jobs.iteration import CompletedIteration
-from services.optimizer.jobs.job import Claim, Command, Job, JobState
-from services.optimizer.jobs.provenance import JobProvenance, job_provenance
-from services.optimizer.jobs.spec import Spec
-from services.optimizer.jobs.time_left import time_left
-from services.optimizer.run.evaluator import EvaluationRequest
-from services.optimizer.run.execution import Surroundings, run_claim
-from services.optimizer.run.outage import Backoff
-from services.optimizer.run.runner import Runner
-from services.optimizer.store.port.base import Store
-from services.optimizer.store.sql_store import open_store
-from sim.errors import KernelBuildError, SimulationInputError
-from sim.outcome import Outcome
+from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, KilledWorker, StoreUnavailable
+from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
+from gaitswarm.services.optimizer.jobs.job import Claim, Command, Job, JobState
+from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
+from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.services.optimizer.jobs.time_left import time_left
+from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
+from gaitswarm.services.optimizer.run.execution import Surroundings, run_claim
+from gaitswarm.services.optimizer.run.outage import Backoff
+from gaitswarm.services.optimizer.run.runner import Runner
+from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.store.sql_store import open_store
+from gaitswarm.sim.errors import KernelBuildError, SimulationInputError
+from gaitswarm.sim.outcome import Outcome
 from tests.examples.jobs import history
 from tests.examples.processes import eventually
 from tests.optimizer.formula import BRISK, SINGLE, SPEC, FormulaEvaluator, queue, run

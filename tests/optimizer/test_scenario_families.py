@@ -8,7 +8,10 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from services.optimizer.analysis.robustness.scenario_families import Family, scenario_families
+from gaitswarm.services.optimizer.analysis.robustness.scenario_families import (
+    Family,
+    scenario_families,
+)
 
 
 def utilities(*rows: tuple[float, ...]) -> np.ndarray:

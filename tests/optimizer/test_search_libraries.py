@@ -9,11 +9,11 @@ from importlib import metadata
 
 import pytest
 
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.provenance import JobProvenance, job_provenance
-from services.optimizer.search.registry import METHODS, OPTIMIZERS
-from services.optimizer.service import JobService
-from services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
+from gaitswarm.services.optimizer.search.registry import METHODS, OPTIMIZERS
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.port.base import Store
 from tests.optimizer.formula import HERE, SPEC
 
 OPTIONAL = ("pymoo", "PyNomad", "scipy.stats", "sklearn")
@@ -54,7 +54,7 @@ def test_methods_that_need_an_extra_say_which_libraries_it_brings() -> None:
 
 def test_no_method_imports_its_library_before_it_runs() -> None:
     code = (
-        "import sys, services.optimizer.search.registry;"
+        "import sys, gaitswarm.services.optimizer.search.registry;"
         f"print([name for name in {OPTIONAL} if name in sys.modules])"
     )
     printed = subprocess.run(

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from services.optimizer.search.multi_objective import MultiObjective
-from services.optimizer.search.optimizer import Optimizer
-from services.optimizer.search.random_search import RandomSearchSettings
-from services.optimizer.search.random_stream import RandomNumbers
-from services.optimizer.search.registry import METHODS, MethodName, create_search
-from services.optimizer.search.replayed import Proposals, Replayed, Start
-from services.optimizer.search.space import Axis, Space
-from services.optimizer.search.swarm.pso import PsoSettings
+from gaitswarm.services.optimizer.search.multi_objective import MultiObjective
+from gaitswarm.services.optimizer.search.optimizer import Optimizer
+from gaitswarm.services.optimizer.search.random_search import RandomSearchSettings
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.registry import METHODS, MethodName, create_search
+from gaitswarm.services.optimizer.search.replayed import Proposals, Replayed, Start
+from gaitswarm.services.optimizer.search.space import Axis, Space
+from gaitswarm.services.optimizer.search.swarm.pso import PsoSettings
 
 Floats = NDArray[np.float64]
 

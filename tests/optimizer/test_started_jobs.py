@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from gaitswarm.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.job import Job, JobState
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.run.embedded import run_embedded
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.port.base import Store
 from gaitswarm.specs import chosen_spec
 from gaitswarm.tables import encoded_table
-from services.optimizer.jobs.job import Job, JobState
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.run.embedded import run_embedded
-from services.optimizer.service import JobService
-from services.optimizer.store.port.base import Store
 from tests.examples.jobs import history
 from tests.optimizer.formula import HERE, SPEC, FormulaEvaluator
 

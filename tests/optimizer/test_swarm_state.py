@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.spec import create_optimizer
-from services.optimizer.search.optimizer import Optimizer
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.spec import create_optimizer
+from gaitswarm.services.optimizer.search.optimizer import Optimizer
 
 
 def job(optimizer: dict[str, object], seed: int = 3) -> JobSpec:

@@ -7,11 +7,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.search.random_stream import RandomNumbers
-from services.optimizer.search.registry import create_search
-from services.optimizer.search.replayed import Proposals, Start
-from services.optimizer.search.space import Axis, Space
-from services.optimizer.search.swarm.tlbo import TlboSettings, tlbo
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.registry import create_search
+from gaitswarm.services.optimizer.search.replayed import Proposals, Start
+from gaitswarm.services.optimizer.search.space import Axis, Space
+from gaitswarm.services.optimizer.search.swarm.tlbo import TlboSettings, tlbo
 
 Floats = NDArray[np.float64]
 

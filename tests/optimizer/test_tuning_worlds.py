@@ -10,18 +10,18 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from services.optimizer.analysis.robustness.certificate import conditional_value_at_risk
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.documents import SPECS
-from services.optimizer.jobs.job import JobState
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
-from services.optimizer.jobs.preference import PREFERENCES, log_utilities
-from services.optimizer.run.evaluator import Evaluator
-from services.optimizer.service import JobService
-from services.optimizer.store.port.base import Store
-from services.runtime import open_evaluator, run_embedded
-from sim.worlds import PERTURBATIONS, WorldWalk, sample_worlds
+from gaitswarm.services.optimizer.analysis.robustness.certificate import conditional_value_at_risk
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.documents import SPECS
+from gaitswarm.services.optimizer.jobs.job import JobState
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
+from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, log_utilities
+from gaitswarm.services.optimizer.run.evaluator import Evaluator
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.runtime import open_evaluator, run_embedded
+from gaitswarm.sim.worlds import PERTURBATIONS, WorldWalk, sample_worlds
 from tests.examples.jobs import history
 from tests.examples.walks import SHORT_WALK, UPHILL_WALK
 

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from services.optimizer.analysis.ranking import fitness_by
-from services.optimizer.analysis.trade_offs.winning_preference import preference_fits
-from services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
-from services.optimizer.jobs.preference import PREFERENCES, Preference
+from gaitswarm.services.optimizer.analysis.ranking import fitness_by
+from gaitswarm.services.optimizer.analysis.trade_offs.winning_preference import preference_fits
+from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
+from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference
 from tests.examples.columns import columns_of
 
 A, C = PREFERENCES["A"], PREFERENCES["C"]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.testing import ControllerContract
-from sim.controllers import CONTROLLERS
 from tests.examples.walks import torque_quadruped_files
 
 

@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.search.registry import METHODS, OPTIMIZERS
+from gaitswarm.services.worker.cluster.handshake import Introduction, fingerprint
+from gaitswarm.sim.controllers import CONTROLLERS
+from gaitswarm.sim.plugins import find_plugins, version_of
 from gaitswarm.views import plugin_views
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.search.registry import METHODS, OPTIMIZERS
-from services.worker.cluster.handshake import Introduction, fingerprint
-from sim.controllers import CONTROLLERS
-from sim.plugins import find_plugins, version_of
 from tests.examples.plugins import install, installed
 from tests.examples.processes import loaded_by, python
 
@@ -154,5 +154,5 @@ def test_the_suites_are_imported_without_a_test_runner() -> None:
 @pytest.mark.slow
 def test_help_does_not_look_for_plug_ins() -> None:
     looked = "import importlib.metadata as m; m.entry_points = None"
-    statements = f"{looked}; from cli.main import run; raise SystemExit(run(['--help']))"
+    statements = f"{looked}; from gaitswarm.cli.main import run; raise SystemExit(run(['--help']))"
     assert python("-c", statements).returncode == 0

@@ -6,12 +6,12 @@ import threading
 from collections.abc import Callable, Mapping
 from multiprocessing.connection import Connection
 
-from services.optimizer.run.evaluator import EvaluationRequest
-from services.optimizer.run.runner import Runner
-from services.runtime import open_evaluator, open_store, run_embedded
-from services.worker.in_process import InProcessEvaluator
-from services.worker.ray_evaluator import RayEvaluator
-from sim.outcome import Outcome
+from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
+from gaitswarm.services.optimizer.run.runner import Runner
+from gaitswarm.services.runtime import open_evaluator, open_store, run_embedded
+from gaitswarm.services.worker.in_process import InProcessEvaluator
+from gaitswarm.services.worker.ray_evaluator import RayEvaluator
+from gaitswarm.sim.outcome import Outcome
 
 
 def main(url: str, job_id: str, kind: str, told: Connection) -> None:

@@ -14,9 +14,9 @@ from benchmarks.faults.campaign import remembered, run, specs, undisturbed
 from benchmarks.faults.deployment import DatabaseKind, Deployment
 from benchmarks.faults.kinds import KINDS
 from benchmarks.faults.plan import plan
-from services.optimizer.store.sql_store import open_store
-from services.runtime import run_embedded
-from services.worker.in_process import InProcessEvaluator
+from gaitswarm.services.optimizer.store.sql_store import open_store
+from gaitswarm.services.runtime import run_embedded
+from gaitswarm.services.worker.in_process import InProcessEvaluator
 from tests.store.postgres_server import server_binaries
 
 

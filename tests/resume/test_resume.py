@@ -12,15 +12,15 @@ from typing import Any
 
 import pytest
 
-from services.optimizer.analysis.verification import check_history
-from services.optimizer.jobs.job import JobState
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.run.evaluator import Evaluator
-from services.optimizer.run.runner import Runner
-from services.optimizer.search.evolution.hype import HypeSettings
-from services.optimizer.search.registry import METHODS
-from services.optimizer.store.port.base import Store
-from services.runtime import open_evaluator, open_store, run_embedded
+from gaitswarm.services.optimizer.analysis.verification import check_history
+from gaitswarm.services.optimizer.jobs.job import JobState
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.run.evaluator import Evaluator
+from gaitswarm.services.optimizer.run.runner import Runner
+from gaitswarm.services.optimizer.search.evolution.hype import HypeSettings
+from gaitswarm.services.optimizer.search.registry import METHODS
+from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.runtime import open_evaluator, open_store, run_embedded
 from tests.examples.forked import PROCESSES
 from tests.examples.jobs import history
 from tests.examples.walks import SHORT_WALK, UPHILL_WALK

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from cli.exit_codes import ExitCode
+from gaitswarm.cli.exit_codes import ExitCode
 from gaitswarm.jobs.open import open_jobs
-from services.optimizer.jobs.job import JobState
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.jobs.job import JobState
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from tests.examples.forked import ForkedCommand
 from tests.examples.jobs import LONG_SPEC, SMALL_SPEC
 from tests.examples.processes import eventually, line_with

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from services.runtime import stop_on_signals
+from gaitswarm.services.runtime import stop_on_signals
 from tests.examples.forked import ForkedCommand
 
 pytestmark = pytest.mark.slow

@@ -6,9 +6,9 @@ import pinocchio as pin
 import pytest
 
 from gaitswarm.robot_checks import check_robot
-from sim.errors import RobotFileError
-from sim.proposal.document import Proposal, propose_robot
-from sim.robot import RobotFiles, parse_robot
+from gaitswarm.sim.errors import RobotFileError
+from gaitswarm.sim.proposal.document import Proposal, propose_robot
+from gaitswarm.sim.robot import RobotFiles, parse_robot
 from tests.robots.radial import radial_robot
 from tests.robots.test_proposal import QUADRUPED, dog
 

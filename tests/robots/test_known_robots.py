@@ -11,18 +11,18 @@ import pinocchio as pin
 import pytest
 from numpy.typing import NDArray
 
-from cli.main import run
+from gaitswarm.cli.main import run
 from gaitswarm.robot_checks import standing_drive, standing_scenario
 from gaitswarm.robots import init_robot
-from sim.errors import RobotFileError
-from sim.gait.trajectory import require_reachable
-from sim.kernel.dynamics.physics_step import PhysicsModel, physics_model
-from sim.kernel.parameters import pack_parameters
-from sim.outcome import Status
-from sim.proposal.document import propose_robot
-from sim.robot import Robot, parse_robot
-from sim.scenario import Scenario
-from sim.simulate import simulate
+from gaitswarm.sim.errors import RobotFileError
+from gaitswarm.sim.gait.trajectory import require_reachable
+from gaitswarm.sim.kernel.dynamics.physics_step import PhysicsModel, physics_model
+from gaitswarm.sim.kernel.parameters import pack_parameters
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.proposal.document import propose_robot
+from gaitswarm.sim.robot import Robot, parse_robot
+from gaitswarm.sim.scenario import Scenario
+from gaitswarm.sim.simulate import simulate
 from tests.examples.walks import random_state, short_walk
 from tests.robots.known import BIPED, FOLDER, QUADRUPEDS, urdf_of
 from tests.sim.pinocchio_oracle import Oracle

@@ -6,10 +6,10 @@ import math
 
 import pytest
 
-from sim.errors import RobotFileError
-from sim.proposal.document import propose_robot
-from sim.proposal.legs import find_legs
-from sim.robot.urdf import parse_urdf
+from gaitswarm.sim.errors import RobotFileError
+from gaitswarm.sim.proposal.document import propose_robot
+from gaitswarm.sim.proposal.legs import find_legs
+from gaitswarm.sim.robot.urdf import parse_urdf
 from tests.robots.radial import radial_robot
 from tests.robots.test_proposal import ARM, QUADRUPED, dog
 from tests.robots.wrong_files import SOURCE

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from cli.main import run
 from gaitswarm import mesh_copies, mesh_library
+from gaitswarm.cli.main import run
 from gaitswarm.mesh_copies import copy_meshes
 from gaitswarm.mesh_library import MeshLibrary, urdf_digest
 from gaitswarm.meshes import own_place

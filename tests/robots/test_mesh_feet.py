@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cli.main import run
-from sim.errors import RobotFileError
-from sim.proposal.apart import walking_proposal
-from sim.proposal.document import propose_robot
-from sim.robot import Robot, parse_robot
-from sim.robot.legs import ChainLeg
+from gaitswarm.cli.main import run
+from gaitswarm.sim.errors import RobotFileError
+from gaitswarm.sim.proposal.apart import walking_proposal
+from gaitswarm.sim.proposal.document import propose_robot
+from gaitswarm.sim.robot import Robot, parse_robot
+from gaitswarm.sim.robot.legs import ChainLeg
 from tests.robots.test_proposal import dog
 
 NAME = "package://dog_description/meshes/calf.obj"

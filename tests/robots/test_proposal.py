@@ -9,18 +9,20 @@ from importlib import resources
 import numpy as np
 import pytest
 
-from sim.errors import RobotFileError
-from sim.gait.trajectory import desired_angles, require_reachable
-from sim.proposal.document import propose_robot
-from sim.proposal.drive import ActuatorChoice
-from sim.proposal.legs import find_legs
-from sim.robot import Robot, parse_robot
-from sim.robot.legs import ChainLeg
-from sim.robot.urdf import parse_urdf
-from sim.scenario import Scenario
+from gaitswarm.sim.errors import RobotFileError
+from gaitswarm.sim.gait.trajectory import desired_angles, require_reachable
+from gaitswarm.sim.proposal.document import propose_robot
+from gaitswarm.sim.proposal.drive import ActuatorChoice
+from gaitswarm.sim.proposal.legs import find_legs
+from gaitswarm.sim.robot import Robot, parse_robot
+from gaitswarm.sim.robot.legs import ChainLeg
+from gaitswarm.sim.robot.urdf import parse_urdf
+from gaitswarm.sim.scenario import Scenario
 from tests.examples.walks import quadruped_files
 
-HEXAPOD = (resources.files("sim.robot") / "szabadka2" / "robot.urdf").read_text(encoding="utf-8")
+HEXAPOD = (resources.files("gaitswarm.sim.robot") / "szabadka2" / "robot.urdf").read_text(
+    encoding="utf-8"
+)
 QUADRUPED = quadruped_files().urdf
 INERTIAL = """<inertial><origin xyz="0 0 -0.1"/><mass value="0.3"/>
   <inertia ixx="1e-3" iyy="1e-3" izz="1e-4" ixy="0" iyz="0" ixz="0"/></inertial>"""

@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 from gaitswarm.robot_checks import check_robot
-from sim.errors import RobotFileError
-from sim.gait.trajectory import require_reachable
-from sim.outcome import Status
-from sim.proposal.apart import walking_proposal
-from sim.proposal.document import Proposal
-from sim.robot import Robot, RobotFiles, parse_robot
-from sim.robot.legs import ChainLeg
-from sim.scenario import Scenario
-from sim.simulate import simulate
+from gaitswarm.sim.errors import RobotFileError
+from gaitswarm.sim.gait.trajectory import require_reachable
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.proposal.apart import walking_proposal
+from gaitswarm.sim.proposal.document import Proposal
+from gaitswarm.sim.robot import Robot, RobotFiles, parse_robot
+from gaitswarm.sim.robot.legs import ChainLeg
+from gaitswarm.sim.scenario import Scenario
+from gaitswarm.sim.simulate import simulate
 from tests.robots.radial import radial_robot
 
 LAYOUTS = {

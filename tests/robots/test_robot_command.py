@@ -10,9 +10,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from cli.main import run
-from sim.proposal.apart import walking_proposal
-from sim.robot import parse_robot
+from gaitswarm.cli.main import run
+from gaitswarm.sim.proposal.apart import walking_proposal
+from gaitswarm.sim.robot import parse_robot
 from tests.robots.radial import radial_robot
 from tests.robots.test_proposal import ARM, dog
 

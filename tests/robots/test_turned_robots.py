@@ -8,12 +8,12 @@ import math
 import numpy as np
 import pytest
 
-from sim.errors import RobotFileError
-from sim.proposal.document import propose_robot
-from sim.proposal.frame import AXES, Axis, Frame, turned
-from sim.robot import parse_robot
-from sim.robot.legs import ChainLeg
-from sim.robot.urdf import parse_urdf
+from gaitswarm.sim.errors import RobotFileError
+from gaitswarm.sim.proposal.document import propose_robot
+from gaitswarm.sim.proposal.frame import AXES, Axis, Frame, turned
+from gaitswarm.sim.robot import parse_robot
+from gaitswarm.sim.robot.legs import ChainLeg
+from gaitswarm.sim.robot.urdf import parse_urdf
 from tests.robots.radial import radial_robot
 from tests.robots.test_proposal import HEXAPOD, QUADRUPED, dog
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.main import run
+from gaitswarm.cli.main import run
 from tests.robots.wrong_files import SOURCE
 
 MOMENTS = '<inertia ixx="1e-3" iyy="1e-3" izz="1e-4" ixy="0" iyz="0" ixz="0"/>'

@@ -9,7 +9,7 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from cli.main import run
+from gaitswarm.cli.main import run
 from tests.robots.wrong_files import SOURCE, TOML, URDF, WRONG_TOMLS, WRONG_URDFS, Wrong
 
 Told = Callable[..., str]

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-from sim.proposal.document import propose_robot
+from gaitswarm.sim.proposal.document import propose_robot
 from tests.examples.hostile import chain
 from tests.robots.test_proposal import dog
 

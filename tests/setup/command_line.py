@@ -11,7 +11,7 @@ from typing import Any
 
 import typer
 
-from cli.main import app
+from gaitswarm.cli.main import app
 
 
 @cache

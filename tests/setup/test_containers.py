@@ -70,7 +70,11 @@ def options_of_ray(words: list[str], command: str) -> list[str]:
     """What is given to a command of Ray's, by itself or as a node of ours."""
     if words[:2] == ["ray", command]:
         return words[2:]
-    is_node = command == "start" and words[:3] == ["python", "-m", "services.worker.ray_node"]
+    is_node = command == "start" and words[:3] == [
+        "python",
+        "-m",
+        "gaitswarm.services.worker.ray_node",
+    ]
     return words[3:] if is_node else []
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from services.optimizer.jobs.documents import SPECS
-from sim.scenario import PRESETS, Scenario
+from gaitswarm.services.optimizer.jobs.documents import SPECS
+from gaitswarm.sim.scenario import PRESETS, Scenario
 from tests.examples.api_document import api_document
 from tests.examples.paths import ROOT
 from tests.setup import command_line, settings_classes

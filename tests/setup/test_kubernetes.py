@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 import yaml
 
+from gaitswarm.services.worker import joining
 from gaitswarm.settings import Settings, is_loopback
-from services.worker import joining
 from tests.examples.api_document import api_document
 from tests.examples.paths import ROOT
 from tests.setup import command_line, settings_classes

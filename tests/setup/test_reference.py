@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from api.problems import PROBLEMS
+from gaitswarm.api.problems import PROBLEMS
 from scripts.manual.fields import settings
 from scripts.manual.rest import routes, schemas
 from tests.examples.api_document import api_document

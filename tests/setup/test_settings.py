@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from gaitswarm.services.optimizer.errors import InvalidRequest, StoreUnavailable
 from gaitswarm.settings import read_settings
-from services.optimizer.errors import InvalidRequest, StoreUnavailable
 
 
 def test_an_option_goes_before_its_variable(monkeypatch: pytest.MonkeyPatch) -> None:

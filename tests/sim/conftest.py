@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from sim.robot import Robot, load_robot
+from gaitswarm.sim.robot import Robot, load_robot
 
 
 @pytest.fixture(scope="session")

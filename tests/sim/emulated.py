@@ -20,9 +20,9 @@ from typing import Any, Final
 import numpy as np
 import pytest
 
-from sim.compiler.target import ARM, ARM_TARGET, Target, host_architecture
-from sim.compiler.toolchain import find_compiler
-from sim.kernel.compiled.structures import Walker
+from gaitswarm.sim.compiler.target import ARM, ARM_TARGET, Target, host_architecture
+from gaitswarm.sim.compiler.toolchain import find_compiler
+from gaitswarm.sim.kernel.compiled.structures import Walker
 from tests.examples.paths import ROOT
 
 TOOLS: Final = Path(sys.prefix) / "cross"

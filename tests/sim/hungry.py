@@ -6,8 +6,8 @@ import os
 import signal
 import time
 
-from sim.errors import SimulationInputError
-from sim.limited_process import Document, serve
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.limited_process import Document, serve
 
 
 def answer(request: Document) -> Document:

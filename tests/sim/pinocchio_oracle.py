@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from sim.robot import Robot, load_robot
-from sim.robot.urdf import parse_urdf
+from gaitswarm.sim.robot import Robot, load_robot
+from gaitswarm.sim.robot.urdf import parse_urdf
 from tests.examples.walks import quadruped_files
 
 ROBOTS = ("szabadka2", "quadruped", "turned quadruped")

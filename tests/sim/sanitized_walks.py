@@ -13,17 +13,17 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from sim.assembly import control_steps, plan_walk
-from sim.controllers import CONTROLLERS
-from sim.controllers.base import JointPd
-from sim.controllers.fuzzy_pi import CURRENT, ERROR, inference_system
-from sim.controllers.mamdani import Shape
-from sim.controllers.native_inference import compiled_table
-from sim.kernel.compiled.native import NativeKernel
-from sim.kernel.walk import Precision
-from sim.outcome import Status
-from sim.robot import Robot, RobotVariant, load_robot
-from sim.scenario import SCENARIOS, Scenario
+from gaitswarm.sim.assembly import control_steps, plan_walk
+from gaitswarm.sim.controllers import CONTROLLERS
+from gaitswarm.sim.controllers.base import JointPd
+from gaitswarm.sim.controllers.fuzzy_pi import CURRENT, ERROR, inference_system
+from gaitswarm.sim.controllers.mamdani import Shape
+from gaitswarm.sim.controllers.native_inference import compiled_table
+from gaitswarm.sim.kernel.compiled.native import NativeKernel
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.robot import Robot, RobotVariant, load_robot
+from gaitswarm.sim.scenario import SCENARIOS, Scenario
 from tests.examples.walks import torque_quadruped_files
 
 ROBOTS = {

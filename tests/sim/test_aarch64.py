@@ -10,11 +10,11 @@ from typing import cast
 import numpy as np
 import pytest
 
-from sim.compiler.target import target
-from sim.kernel.compiled.native import NativeKernel, native_kernel
-from sim.kernel.emitted.source import kernel_source
-from sim.kernel.walk import Precision
-from sim.scenario import SCENARIOS
+from gaitswarm.sim.compiler.target import target
+from gaitswarm.sim.kernel.compiled.native import NativeKernel, native_kernel
+from gaitswarm.sim.kernel.emitted.source import kernel_source
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.scenario import SCENARIOS
 from tests.sim.emulated import EmulatedLibrary, tools_for_arm
 from tests.sim.sanitized_walks import ROBOTS, digest_of_walks
 from tests.sim.test_vectors import PRECISIONS, bits, call, source, triples

@@ -8,12 +8,12 @@ import pytest
 
 from gaitswarm.errors import InvalidRequest
 from gaitswarm.requests.firmware import FirmwareRequest
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.kinds.walks import WalksSpec
-from sim.errors import RobotFileError, SimulationInputError
-from sim.robot import RobotFiles, load_robot, parse_robot
-from sim.robot.actuators import TorqueActuator
-from sim.robot.identifiable import identifiable_variables, with_parameters
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.kinds.walks import WalksSpec
+from gaitswarm.sim.errors import RobotFileError, SimulationInputError
+from gaitswarm.sim.robot import RobotFiles, load_robot, parse_robot
+from gaitswarm.sim.robot.actuators import TorqueActuator
+from gaitswarm.sim.robot.identifiable import identifiable_variables, with_parameters
 from tests.examples.walks import quadruped_files, short_walk, torque_quadruped_files
 
 DC, TORQUE = quadruped_files(), torque_quadruped_files()

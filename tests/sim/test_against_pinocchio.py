@@ -9,12 +9,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sim.kernel.dynamics.articulated_body import LinkState
-from sim.kernel.dynamics.body import body_of, body_state
-from sim.kernel.dynamics.limb import links_at
-from sim.kernel.dynamics.physics_step import physics_model
-from sim.kernel.dynamics.rotation import Rotation
-from sim.kernel.dynamics.spatial import (
+from gaitswarm.sim.kernel.dynamics.articulated_body import LinkState
+from gaitswarm.sim.kernel.dynamics.body import body_of, body_state
+from gaitswarm.sim.kernel.dynamics.limb import links_at
+from gaitswarm.sim.kernel.dynamics.physics_step import physics_model
+from gaitswarm.sim.kernel.dynamics.rotation import Rotation
+from gaitswarm.sim.kernel.dynamics.spatial import (
     Matrix,
     add,
     apply,
@@ -25,9 +25,9 @@ from sim.kernel.dynamics.spatial import (
     scale,
     vector,
 )
-from sim.kernel.parameters import Floats, gravity_on, pack_parameters
-from sim.robot import Robot
-from sim.robot.limbs import limbs_of
+from gaitswarm.sim.kernel.parameters import Floats, gravity_on, pack_parameters
+from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.limbs import limbs_of
 from tests.examples.walks import STEEP, random_state
 from tests.sim.pinocchio_oracle import ROBOTS, Oracle, robot_named
 

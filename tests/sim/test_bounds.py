@@ -6,9 +6,9 @@ import time
 
 import pytest
 
-from sim.errors import RobotFileError
-from sim.robot import RobotFiles, variant
-from sim.robot.bounds import (
+from gaitswarm.sim.errors import RobotFileError
+from gaitswarm.sim.robot import RobotFiles, variant
+from gaitswarm.sim.robot.bounds import (
     DEEPEST,
     LONGEST_NAME,
     LONGEST_TOML,
@@ -19,8 +19,8 @@ from sim.robot.bounds import (
     MOST_LINKS,
     MOST_VALUES,
 )
-from sim.robot.limbs import limbs_of
-from sim.robot.robot import parse_robot
+from gaitswarm.sim.robot.limbs import limbs_of
+from gaitswarm.sim.robot.robot import parse_robot
 from tests.examples.paths import QUADRUPED
 
 TOML, URDF = (

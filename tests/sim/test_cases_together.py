@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sim.calibration.walk import CalibrationWalk
-from sim.case import Case, MeasuredWalk, Walk, run_together
-from sim.kernel.batch import Walking, walk_together
-from sim.kernel.compiled.native import NativeKernel
-from sim.kernel.walk import Coding, Precision, WalkResult, WalkSetup
-from sim.outcome import Objective, Outcome
-from sim.robot import RobotSource
-from sim.scenario import Scenario
+from gaitswarm.sim.calibration.walk import CalibrationWalk
+from gaitswarm.sim.case import Case, MeasuredWalk, Walk, run_together
+from gaitswarm.sim.kernel.batch import Walking, walk_together
+from gaitswarm.sim.kernel.compiled.native import NativeKernel
+from gaitswarm.sim.kernel.walk import Coding, Precision, WalkResult, WalkSetup
+from gaitswarm.sim.outcome import Objective, Outcome
+from gaitswarm.sim.robot import RobotSource
+from gaitswarm.sim.scenario import Scenario
 from tests.examples.walks import SHORT_WALK, UPHILL_WALK
 
 SHORT, UPHILL = (Scenario.model_validate(walk) for walk in (SHORT_WALK, UPHILL_WALK))

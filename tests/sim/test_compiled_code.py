@@ -9,15 +9,15 @@ from pathlib import Path
 
 import pytest
 
-from sim.compiler.compilation import build_library
-from sim.compiler.target import X86, X86_TARGETS, Target, host_architecture
-from sim.compiler.toolchain import find_compiler
-from sim.controllers.native_inference import inference_source
-from sim.errors import KernelBuildError
-from sim.kernel.compiled.native import load_kernel, native_kernel
-from sim.kernel.emitted.source import kernel_identity, kernel_source
-from sim.kernel.walk import Precision
-from sim.robot import Robot, RobotFiles, RobotVariant, load_robot
+from gaitswarm.sim.compiler.compilation import build_library
+from gaitswarm.sim.compiler.target import X86, X86_TARGETS, Target, host_architecture
+from gaitswarm.sim.compiler.toolchain import find_compiler
+from gaitswarm.sim.controllers.native_inference import inference_source
+from gaitswarm.sim.errors import KernelBuildError
+from gaitswarm.sim.kernel.compiled.native import load_kernel, native_kernel
+from gaitswarm.sim.kernel.emitted.source import kernel_identity, kernel_source
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.robot import Robot, RobotFiles, RobotVariant, load_robot
 from tests.examples.walks import torque_quadruped_files
 from tests.sim.processes import ROOT, run_python
 from tests.sim.sanitized_walks import (

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sim.kernel.dynamics.articulated_body import LinkState
-from sim.kernel.dynamics.contact import FRICTION, foot_on_ground
-from sim.kernel.dynamics.inertia import Motion
-from sim.kernel.parameters import CONTACT_LAWS
-from sim.robot.description import ContactLaw
+from gaitswarm.sim.kernel.dynamics.articulated_body import LinkState
+from gaitswarm.sim.kernel.dynamics.contact import FRICTION, foot_on_ground
+from gaitswarm.sim.kernel.dynamics.inertia import Motion
+from gaitswarm.sim.kernel.parameters import CONTACT_LAWS
+from gaitswarm.sim.robot.description import ContactLaw
 
 Floats = NDArray[np.float64]
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.search.swarm.pso import PsoSettings
-from sim.controllers import CONTROLLERS, ControllerName
-from sim.controllers.base import LookupTable
-from sim.controllers.mamdani import Shape
-from sim.errors import SimulationInputError
-from sim.outcome import Status
-from sim.scenario import SCENARIOS
-from sim.simulate import simulate
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.search.swarm.pso import PsoSettings
+from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
+from gaitswarm.sim.controllers.base import LookupTable
+from gaitswarm.sim.controllers.mamdani import Shape
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.scenario import SCENARIOS
+from gaitswarm.sim.simulate import simulate
 from tests.examples.walks import PUBLISHED_A
 
 FUZZY = CONTROLLERS["fuzzy-pi"]

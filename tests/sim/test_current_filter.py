@@ -8,14 +8,14 @@ import math
 import numpy as np
 import pytest
 
-from sim.assembly import control_steps, plan_walk
-from sim.controllers import CONTROLLERS
-from sim.controllers.base import ControlLaw, LookupTable
-from sim.kernel.compiled.native import native_kernel
-from sim.kernel.observation import sensed_currents, walk_log
-from sim.kernel.readable.reference import reference_kernel
-from sim.kernel.walk import Coding, current_smoothing
-from sim.robot import Robot, load_robot
+from gaitswarm.sim.assembly import control_steps, plan_walk
+from gaitswarm.sim.controllers import CONTROLLERS
+from gaitswarm.sim.controllers.base import ControlLaw, LookupTable
+from gaitswarm.sim.kernel.compiled.native import native_kernel
+from gaitswarm.sim.kernel.observation import sensed_currents, walk_log
+from gaitswarm.sim.kernel.readable.reference import reference_kernel
+from gaitswarm.sim.kernel.walk import Coding, current_smoothing
+from gaitswarm.sim.robot import Robot, load_robot
 from tests.examples.robots import changed
 from tests.examples.walks import PUBLISHED_A, short_walk, walk
 

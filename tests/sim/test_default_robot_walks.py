@@ -7,10 +7,10 @@ from typing import Final
 import numpy as np
 import pytest
 
-from sim.kernel.observation import WalkLog
-from sim.replay import replay
-from sim.robot import DEFAULT_ROBOT, Robot, RobotVariant, load_robot
-from sim.scenario import SCENARIOS, Scenario
+from gaitswarm.sim.kernel.observation import WalkLog
+from gaitswarm.sim.replay import replay
+from gaitswarm.sim.robot import DEFAULT_ROBOT, Robot, RobotVariant, load_robot
+from gaitswarm.sim.scenario import SCENARIOS, Scenario
 from tests.examples.robots import with_feet
 from tests.examples.walks import Floats, heading, logged_walk, share_of_the_intended_speed, walk
 

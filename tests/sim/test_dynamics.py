@@ -8,10 +8,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sim.kernel.dynamics.physics_step import PhysicsModel, physics_model
-from sim.kernel.parameters import gravity_on, pack_parameters
-from sim.robot import Robot, parse_robot
-from sim.scenario import SCENARIOS
+from gaitswarm.sim.kernel.dynamics.physics_step import PhysicsModel, physics_model
+from gaitswarm.sim.kernel.parameters import gravity_on, pack_parameters
+from gaitswarm.sim.robot import Robot, parse_robot
+from gaitswarm.sim.scenario import SCENARIOS
 from tests.examples.walks import random_state, short_walk
 from tests.sim.pinocchio_oracle import ROBOTS, Oracle, robot_named
 
@@ -90,7 +90,7 @@ def test_a_load_is_a_rigid_mass_on_the_body(robot: Robot, model: PhysicsModel) -
 
 def lossless() -> Robot:
     """The robot without friction, and with motors that neither drive nor brake."""
-    folder = resources.files("sim.robot") / "szabadka2"
+    folder = resources.files("gaitswarm.sim.robot") / "szabadka2"
     toml = (folder / "robot.toml").read_text(encoding="utf-8")
     for line, replacement in (
         ("efficiency = 0.6", "efficiency = 1.0"),

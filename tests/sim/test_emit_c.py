@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sim.compiler.compilation import load_library, vector_header
-from sim.compiler.target import Target, target
-from sim.errors import SimulationError
-from sim.kernel.emitted.emit_c import emit_c
+from gaitswarm.sim.compiler.compilation import load_library, vector_header
+from gaitswarm.sim.compiler.target import Target, target
+from gaitswarm.sim.errors import SimulationError
+from gaitswarm.sim.kernel.emitted.emit_c import emit_c
 
 Floats = NDArray[np.float64]
 

@@ -7,10 +7,10 @@ from typing import Any
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from sim.errors import RobotFileError
-from sim.input.former_names import as_written
-from sim.robot import RobotFiles, RobotSource, RobotVariant, load_robot, parse_robot
-from sim.scenario import Scenario
+from gaitswarm.sim.errors import RobotFileError
+from gaitswarm.sim.input.former_names import as_written
+from gaitswarm.sim.robot import RobotFiles, RobotSource, RobotVariant, load_robot, parse_robot
+from gaitswarm.sim.scenario import Scenario
 from tests.examples.walks import quadruped_files
 
 TOML, URDF = quadruped_files().toml, quadruped_files().urdf

@@ -10,16 +10,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim.compiler.compilation import load_library
-from sim.compiler.target import Target, target
-from sim.controllers import CONTROLLERS, control_law
-from sim.controllers.base import LookupTable
-from sim.controllers.fuzzy_pi import CURRENT, ERROR, inference_system, quantised_table
-from sim.controllers.fuzzy_pi_3 import integral_system, voltage_system
-from sim.controllers.fuzzy_sets import MembershipSets
-from sim.controllers.mamdani import FuzzySet, Mamdani, Rule, Shape
-from sim.controllers.native_inference import compiled_table, inference_source
-from sim.controllers.quantisation import (
+from gaitswarm.sim.compiler.compilation import load_library
+from gaitswarm.sim.compiler.target import Target, target
+from gaitswarm.sim.controllers import CONTROLLERS, control_law
+from gaitswarm.sim.controllers.base import LookupTable
+from gaitswarm.sim.controllers.fuzzy_pi import CURRENT, ERROR, inference_system, quantised_table
+from gaitswarm.sim.controllers.fuzzy_pi_3 import integral_system, voltage_system
+from gaitswarm.sim.controllers.fuzzy_sets import MembershipSets
+from gaitswarm.sim.controllers.mamdani import FuzzySet, Mamdani, Rule, Shape
+from gaitswarm.sim.controllers.native_inference import compiled_table, inference_source
+from gaitswarm.sim.controllers.quantisation import (
     Axis,
     quantised,
     reference_table,

@@ -11,16 +11,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim.controllers.fixed_point import CONTROL_PERIOD
-from sim.errors import SimulationInputError, UnreachablePose
-from sim.gait.driving_2011 import SPEEDS, driven_as_in_2011, scenario_2011
-from sim.gait.half_ellipse import half_ellipse
-from sim.gait.inverse_kinematics import leg_angles
-from sim.gait.quadratic_spline import quadratic_spline
-from sim.gait.trajectory import desired_angles, n_ticks, require_reachable
-from sim.robot import Robot, load_robot
-from sim.robot.posture import feet_below_body, resting_height
-from sim.scenario import SCENARIOS, Scenario
+from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
+from gaitswarm.sim.errors import SimulationInputError, UnreachablePose
+from gaitswarm.sim.gait.driving_2011 import SPEEDS, driven_as_in_2011, scenario_2011
+from gaitswarm.sim.gait.half_ellipse import half_ellipse
+from gaitswarm.sim.gait.inverse_kinematics import leg_angles
+from gaitswarm.sim.gait.quadratic_spline import quadratic_spline
+from gaitswarm.sim.gait.trajectory import desired_angles, n_ticks, require_reachable
+from gaitswarm.sim.robot import Robot, load_robot
+from gaitswarm.sim.robot.posture import feet_below_body, resting_height
+from gaitswarm.sim.scenario import SCENARIOS, Scenario
 
 
 def test_support_is_a_straight_line_at_constant_speed_and_swing_a_half_ellipse() -> None:

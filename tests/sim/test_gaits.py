@@ -7,16 +7,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sim.errors import RobotFileError, SimulationInputError
-from sim.gait.cycloid import cycloid
-from sim.gait.gaits import GAITS, find_gait, lags_of
-from sim.gait.leg_gaits import leg_gaits, supporting
-from sim.gait.trajectory import desired_angles, require_reachable
-from sim.gait_variables import GAIT_CATALOGUE, with_gait
-from sim.robot import Robot, load_robot, parse_robot
-from sim.robot.leg_groups import leg_groups
-from sim.robot.posture import feet_in_body
-from sim.scenario import GAIT_NAMES, GaitName, Scenario, find_scenario
+from gaitswarm.sim.errors import RobotFileError, SimulationInputError
+from gaitswarm.sim.gait.cycloid import cycloid
+from gaitswarm.sim.gait.gaits import GAITS, find_gait, lags_of
+from gaitswarm.sim.gait.leg_gaits import leg_gaits, supporting
+from gaitswarm.sim.gait.trajectory import desired_angles, require_reachable
+from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
+from gaitswarm.sim.robot import Robot, load_robot, parse_robot
+from gaitswarm.sim.robot.leg_groups import leg_groups
+from gaitswarm.sim.robot.posture import feet_in_body
+from gaitswarm.sim.scenario import GAIT_NAMES, GaitName, Scenario, find_scenario
 from tests.examples.walks import logged_walk, quadruped_files, short_walk
 
 CYCLE = np.arange(1000) / 1000 + 0.0005

@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.errors import SimulationInputError
-from sim.kernel.parameters import Layout, pack_parameters
-from sim.robot import load_robot
-from sim.robot.identifiable import (
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.kernel.parameters import Layout, pack_parameters
+from gaitswarm.sim.robot import load_robot
+from gaitswarm.sim.robot.identifiable import (
     CONVENTIONAL_VARIABLES,
     identifiable_variables,
     with_parameters,
 )
-from sim.robot.robot import Robot
-from sim.scenario import SCENARIOS
+from gaitswarm.sim.robot.robot import Robot
+from gaitswarm.sim.scenario import SCENARIOS
 from tests.examples.walks import quadruped_files
 
 

@@ -7,12 +7,12 @@ import dataclasses
 import numpy as np
 import pytest
 
-from sim.gait.trajectory import desired_angles
-from sim.outcome import Status
-from sim.robot import SHIPPED, Robot, RobotVariant, load_robot
-from sim.robot.identifiable import identifiable_variables
-from sim.scenario import SCENARIOS
-from sim.simulate import simulate
+from gaitswarm.sim.gait.trajectory import desired_angles
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.robot import SHIPPED, Robot, RobotVariant, load_robot
+from gaitswarm.sim.robot.identifiable import identifiable_variables
+from gaitswarm.sim.scenario import SCENARIOS
+from gaitswarm.sim.simulate import simulate
 
 LEGS = ("right_front", "left_front", "right_middle", "left_middle", "right_rear", "left_rear")
 """Legs 1 to 6 of the thesis."""

@@ -9,19 +9,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sim.assembly import control_steps, plan_walk
-from sim.compiler.target import X86, Target, host_architecture, target
-from sim.controllers import CONTROLLERS
-from sim.controllers.base import ControlLaw, LookupTable
-from sim.controllers.fixed_point import CONTROL_PERIOD
-from sim.kernel.compiled.native import NativeKernel, load_kernel, native_kernel
-from sim.kernel.observation import walk_log
-from sim.kernel.readable.reference import ReferenceKernel, reference_kernel
-from sim.kernel.walk import Coding, Kernel, WalkSetup
-from sim.outcome import Status
-from sim.robot import Robot, RobotVariant, load_robot
-from sim.scenario import SCENARIOS, Scenario
-from sim.simulate import lanes, simulate
+from gaitswarm.sim.assembly import control_steps, plan_walk
+from gaitswarm.sim.compiler.target import X86, Target, host_architecture, target
+from gaitswarm.sim.controllers import CONTROLLERS
+from gaitswarm.sim.controllers.base import ControlLaw, LookupTable
+from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
+from gaitswarm.sim.kernel.compiled.native import NativeKernel, load_kernel, native_kernel
+from gaitswarm.sim.kernel.observation import walk_log
+from gaitswarm.sim.kernel.readable.reference import ReferenceKernel, reference_kernel
+from gaitswarm.sim.kernel.walk import Coding, Kernel, WalkSetup
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.robot import Robot, RobotVariant, load_robot
+from gaitswarm.sim.scenario import SCENARIOS, Scenario
+from gaitswarm.sim.simulate import lanes, simulate
 from tests.examples import walks
 from tests.examples.walks import PUBLISHED_A
 

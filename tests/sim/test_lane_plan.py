@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim.kernel.compiled.lanes import plan_lanes
-from sim.scenario import SCENARIOS
+from gaitswarm.sim.kernel.compiled.lanes import plan_lanes
+from gaitswarm.sim.scenario import SCENARIOS
 
 SWARM = [scenario.duration for scenario in SCENARIOS for _ in range(25)]
 

@@ -13,16 +13,16 @@ from typing import Final, cast
 import numpy as np
 import pytest
 
-from sim.assembly import control_steps, plan_walk
-from sim.controllers import CONTROLLERS
-from sim.kernel.compiled.native import NativeKernel, native_kernel
-from sim.kernel.compiled.sharing import LaneCounts, Pool
-from sim.kernel.readable.reference import reference_kernel
-from sim.kernel.walk import Coding, LaneUse, Precision, WalkResult, WalkSetup
-from sim.outcome import Status
-from sim.robot import RobotVariant, load_robot
-from sim.robot.description import ContactLaw
-from sim.scenario import SCENARIOS
+from gaitswarm.sim.assembly import control_steps, plan_walk
+from gaitswarm.sim.controllers import CONTROLLERS
+from gaitswarm.sim.kernel.compiled.native import NativeKernel, native_kernel
+from gaitswarm.sim.kernel.compiled.sharing import LaneCounts, Pool
+from gaitswarm.sim.kernel.readable.reference import reference_kernel
+from gaitswarm.sim.kernel.walk import Coding, LaneUse, Precision, WalkResult, WalkSetup
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.robot import RobotVariant, load_robot
+from gaitswarm.sim.robot.description import ContactLaw
+from gaitswarm.sim.scenario import SCENARIOS
 
 LAWS: Final[tuple[ContactLaw, ...]] = ("linear_zone", "dead_zone", "karnopp", "stick")
 VARIANTS: Final[dict[str, RobotVariant]] = {

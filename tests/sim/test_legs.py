@@ -9,14 +9,14 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sim.errors import BeyondJointLimit, RobotFileError
-from sim.gait.inverse_kinematics import chain_angles, leg_angles
-from sim.gait.trajectory import desired_angles, require_reachable
-from sim.robot import Robot, RobotFiles, load_robot, parse_robot
-from sim.robot.legs import ChainLeg
-from sim.robot.legs import turned as turned_about
-from sim.robot.robot import assembled
-from sim.scenario import SCENARIOS, Scenario
+from gaitswarm.sim.errors import BeyondJointLimit, RobotFileError
+from gaitswarm.sim.gait.inverse_kinematics import chain_angles, leg_angles
+from gaitswarm.sim.gait.trajectory import desired_angles, require_reachable
+from gaitswarm.sim.robot import Robot, RobotFiles, load_robot, parse_robot
+from gaitswarm.sim.robot.legs import ChainLeg
+from gaitswarm.sim.robot.legs import turned as turned_about
+from gaitswarm.sim.robot.robot import assembled
+from gaitswarm.sim.scenario import SCENARIOS, Scenario
 from tests.examples.walks import quadruped_files, short_walk, walk
 
 STANCE = "[0.0, 0.5, -1.2]"

@@ -15,9 +15,9 @@ from pathlib import Path
 
 import pytest
 
-from sim.compiler.cache import KEPT_UNUSED_DAYS, SIZE_VARIABLE
-from sim.compiler.compilation import load_library
-from sim.errors import KernelBuildError
+from gaitswarm.sim.compiler.cache import KEPT_UNUSED_DAYS, SIZE_VARIABLE
+from gaitswarm.sim.compiler.compilation import load_library
+from gaitswarm.sim.errors import KernelBuildError
 from tests.sim.processes import run_python
 
 pytestmark = pytest.mark.slow
@@ -25,7 +25,7 @@ pytestmark = pytest.mark.slow
 SOURCE = 'const char *answer(void) { return "the right answer"; }'
 ASK = f"""
 import ctypes
-from sim.compiler.compilation import load_library
+from gaitswarm.sim.compiler.compilation import load_library
 library = load_library("answer", b"", lambda: {SOURCE!r})
 library.answer.restype = ctypes.c_char_p
 print(library.answer().decode())

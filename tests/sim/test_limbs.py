@@ -10,20 +10,20 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from sim.errors import RobotFileError
-from sim.kernel.compiled.native import native_kernel
-from sim.kernel.dynamics.kinds import robot_constants
-from sim.kernel.dynamics.spatial import Scalar
-from sim.kernel.dynamics.traced import Traced
-from sim.kernel.dynamics.tree import leaves
-from sim.kernel.emitted.source import kernel_identity, kernel_source
-from sim.outcome import Status
-from sim.robot import SHIPPED, Robot, RobotFiles, load_robot
-from sim.robot.chain import Placement
-from sim.robot.inertia import BodyInertia
-from sim.robot.limbs import limb_of, limbs_of
-from sim.robot.robot import parse_robot
-from sim.robot.urdf import parse_urdf
+from gaitswarm.sim.errors import RobotFileError
+from gaitswarm.sim.kernel.compiled.native import native_kernel
+from gaitswarm.sim.kernel.dynamics.kinds import robot_constants
+from gaitswarm.sim.kernel.dynamics.spatial import Scalar
+from gaitswarm.sim.kernel.dynamics.traced import Traced
+from gaitswarm.sim.kernel.dynamics.tree import leaves
+from gaitswarm.sim.kernel.emitted.source import kernel_identity, kernel_source
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.robot import SHIPPED, Robot, RobotFiles, load_robot
+from gaitswarm.sim.robot.chain import Placement
+from gaitswarm.sim.robot.inertia import BodyInertia
+from gaitswarm.sim.robot.limbs import limb_of, limbs_of
+from gaitswarm.sim.robot.robot import parse_robot
+from gaitswarm.sim.robot.urdf import parse_urdf
 from tests.examples.paths import QUADRUPED
 from tests.examples.walks import short_walk, walk
 from tests.sim.pinocchio_oracle import Oracle, robot_named
@@ -78,7 +78,7 @@ def test_limbs_are_as_pinocchio_reads_the_urdf(name: str) -> None:
 
 
 def files_of(folder: str) -> RobotFiles:
-    kept = resources.files("sim.robot") / folder
+    kept = resources.files("gaitswarm.sim.robot") / folder
     toml, urdf = ((kept / f"robot.{kind}").read_text(encoding="utf-8") for kind in ("toml", "urdf"))
     return RobotFiles(toml=toml, urdf=urdf)
 

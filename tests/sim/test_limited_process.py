@@ -10,13 +10,18 @@ from pathlib import Path
 
 import pytest
 
-from sim.errors import KernelBuildError, ProcessEnded, RobotFileError, SimulationInputError
-from sim.kernel.compiled import derivation
-from sim.kernel.emitted.source import kernel_source
-from sim.limited_process import LimitedProcesses
-from sim.robot import check, load_robot
-from sim.robot.check import check_files
-from sim.robot.robot import parse_robot
+from gaitswarm.sim.errors import (
+    KernelBuildError,
+    ProcessEnded,
+    RobotFileError,
+    SimulationInputError,
+)
+from gaitswarm.sim.kernel.compiled import derivation
+from gaitswarm.sim.kernel.emitted.source import kernel_source
+from gaitswarm.sim.limited_process import LimitedProcesses
+from gaitswarm.sim.robot import check, load_robot
+from gaitswarm.sim.robot.check import check_files
+from gaitswarm.sim.robot.robot import parse_robot
 from tests.examples.paths import QUADRUPED
 
 pytestmark = pytest.mark.slow

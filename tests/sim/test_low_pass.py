@@ -7,10 +7,10 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from sim.gait.low_pass import FirWindow, fir_gains, low_pass
-from sim.gait.trajectory import desired_angles
-from sim.robot import Robot
-from sim.scenario import SCENARIOS
+from gaitswarm.sim.gait.low_pass import FirWindow, fir_gains, low_pass
+from gaitswarm.sim.gait.trajectory import desired_angles
+from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.scenario import SCENARIOS
 
 
 @pytest.mark.parametrize("taps", [1, 6, 50])

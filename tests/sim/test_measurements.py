@@ -8,16 +8,16 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from sim.assembly import Backend, control_steps, measure, plan_walk
-from sim.controllers import CONTROLLERS
-from sim.kernel.compiled.native import native_kernel
-from sim.kernel.observation import walk_log
-from sim.kernel.walk import Coding
-from sim.outcome import MEASUREMENT_NAMES, Measurements, Status
-from sim.robot import Robot, load_robot
-from sim.robot.description import EnergyConvention
-from sim.scenario import SCENARIOS
-from sim.simulate import Simulation, simulate
+from gaitswarm.sim.assembly import Backend, control_steps, measure, plan_walk
+from gaitswarm.sim.controllers import CONTROLLERS
+from gaitswarm.sim.kernel.compiled.native import native_kernel
+from gaitswarm.sim.kernel.observation import walk_log
+from gaitswarm.sim.kernel.walk import Coding
+from gaitswarm.sim.outcome import MEASUREMENT_NAMES, Measurements, Status
+from gaitswarm.sim.robot import Robot, load_robot
+from gaitswarm.sim.robot.description import EnergyConvention
+from gaitswarm.sim.scenario import SCENARIOS
+from gaitswarm.sim.simulate import Simulation, simulate
 from tests.examples.robots import changed
 from tests.examples.walks import short_walk, walk
 

@@ -9,13 +9,13 @@ from typing import Any, Final
 import numpy as np
 import pytest
 
-from sim.controllers import CONTROLLERS, ControllerName
-from sim.errors import SimulationInputError
-from sim.kernel.parameters import GRAVITY, Layout, pack_parameters
-from sim.outcome import Status
-from sim.robot import DEFAULT_ROBOT, RobotVariant, load_robot
-from sim.scenario import find_scenario
-from sim.simulate import Simulation, check_reach
+from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.kernel.parameters import GRAVITY, Layout, pack_parameters
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotVariant, load_robot
+from gaitswarm.sim.scenario import find_scenario
+from gaitswarm.sim.simulate import Simulation, check_reach
 from tests.examples.robots import changed
 from tests.examples.walks import logged_walk, short_walk, walk
 

@@ -12,14 +12,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim.compiler.compilation import build_library, load_library, vector_header
-from sim.compiler.toolchain import COMPILER_MEMORY
-from sim.errors import KernelBuildError, SimulationInputError
-from sim.kernel.compiled.native import NativeKernel, native_kernel, text_size
-from sim.kernel.dynamics.kinds import robot_constants
-from sim.kernel.parameters import Layout
-from sim.robot import DEFAULT_ROBOT, Robot, RobotFiles, load_robot
-from sim.simulate import prepare
+from gaitswarm.sim.compiler.compilation import build_library, load_library, vector_header
+from gaitswarm.sim.compiler.toolchain import COMPILER_MEMORY
+from gaitswarm.sim.errors import KernelBuildError, SimulationInputError
+from gaitswarm.sim.kernel.compiled.native import NativeKernel, native_kernel, text_size
+from gaitswarm.sim.kernel.dynamics.kinds import robot_constants
+from gaitswarm.sim.kernel.parameters import Layout
+from gaitswarm.sim.robot import DEFAULT_ROBOT, Robot, RobotFiles, load_robot
+from gaitswarm.sim.simulate import prepare
+from tests.examples.paths import copy_package
 from tests.sim.processes import ROOT, run_python
 
 pytestmark = pytest.mark.slow
@@ -55,7 +56,7 @@ def test_a_refused_source_says_why_and_leaves_nothing(
 
 def test_processes_that_start_together_share_one_compilation(tmp_path: Path) -> None:
     code = (
-        "from sim.compiler.compilation import load_library\n"
+        "from gaitswarm.sim.compiler.compilation import load_library\n"
         "print(load_library('race', b'', lambda: 'int f(void) { return 7; }').f())"
     )
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "XDG_CACHE_HOME": str(tmp_path)}
@@ -71,7 +72,7 @@ def test_a_process_with_a_warm_cache_needs_neither_casadi_nor_pinocchio() -> Non
     assert native_kernel(load_robot(DEFAULT_ROBOT)) is not None
     done = run_python(
         "import sys\n"
-        "from sim.benchmark import measure\n"
+        "from gaitswarm.sim.benchmark import measure\n"
         "measure(repeats=1, walkers=1)\n"
         "print(sorted({'casadi', 'pinocchio', 'ray', 'sqlalchemy', 'fastapi'} & set(sys.modules)))"
     )
@@ -80,7 +81,8 @@ def test_a_process_with_a_warm_cache_needs_neither_casadi_nor_pinocchio() -> Non
 
 def test_without_a_compiler_the_interpreter_serves_and_says_so(tmp_path: Path) -> None:
     done = run_python(
-        "import sim.compiler.compilation as c\nfrom sim.simulate import prepare\nprint(prepare())",
+        "import gaitswarm.sim.compiler.compilation as c\n"
+        "from gaitswarm.sim.simulate import prepare\nprint(prepare())",
         PATH="",
         CC="",
         XDG_CACHE_HOME=str(tmp_path),
@@ -95,9 +97,9 @@ def test_without_a_compiler_single_precision_is_refused_rather_than_computed_in_
     tmp_path: Path,
 ) -> None:
     done = run_python(
-        "from services.optimizer.jobs.kinds.tuning import JobSpec\n"
-        "from sim.errors import SimulationInputError\n"
-        "from sim.simulate import prepare\n"
+        "from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec\n"
+        "from gaitswarm.sim.errors import SimulationInputError\n"
+        "from gaitswarm.sim.simulate import prepare\n"
         "for asked in (lambda: prepare(precision='single'),\n"
         "              JobSpec(precision='single').check_can_be_simulated):\n"
         "    try:\n"
@@ -156,7 +158,7 @@ def test_a_compiler_that_takes_too_long_is_ended_with_all_that_it_started(tmp_pa
     slow = _compiler_that(tmp_path, f'sleep 1000 > "{alive}" & wait')
     cache = tmp_path / "cache"
     code = (
-        "from sim.compiler.compilation import load_library\n"
+        "from gaitswarm.sim.compiler.compilation import load_library\n"
         "load_library('slow', b'', lambda: 'int f(void) { return 7; }', time_limit=3.0)"
     )
     with ThreadPoolExecutor(1) as pool:
@@ -174,7 +176,7 @@ def test_a_compiler_that_takes_too_long_is_ended_with_all_that_it_started(tmp_pa
 def test_a_compiler_has_limits_of_memory_and_of_a_processors_time(tmp_path: Path) -> None:
     tells = _compiler_that(tmp_path, "echo limits $(ulimit -d) $(ulimit -t) >&2; exit 1")
     code = (
-        "from sim.compiler.compilation import load_library\n"
+        "from gaitswarm.sim.compiler.compilation import load_library\n"
         "load_library('limited', b'', lambda: '', time_limit=7.5)"
     )
     done = run_python(code, CC=tells, XDG_CACHE_HOME=str(tmp_path / "cache"))
@@ -184,9 +186,9 @@ def test_a_compiler_has_limits_of_memory_and_of_a_processors_time(tmp_path: Path
 LOAD_QUADRUPED = """
 import os
 from pathlib import Path
-from sim.kernel.dynamics.kinds import robot_constants
-from sim.kernel.compiled.native import native_kernel
-from sim.robot import RobotFiles, load_robot
+from gaitswarm.sim.kernel.dynamics.kinds import robot_constants
+from gaitswarm.sim.kernel.compiled.native import native_kernel
+from gaitswarm.sim.robot import RobotFiles, load_robot
 files = Path(os.environ["FILES"])
 toml, urdf = ((files / f"robot.{kind}").read_text() for kind in ("toml", "urdf"))
 print(native_kernel(load_robot(RobotFiles(toml=toml, urdf=urdf))).backend)
@@ -194,10 +196,10 @@ print(native_kernel(load_robot(RobotFiles(toml=toml, urdf=urdf))).backend)
 COMPILE_ANOTHER = """
 import os, threading
 from pathlib import Path
-from sim.errors import KernelBuildError, SimulationInputError
-from sim.kernel.dynamics.kinds import robot_constants
-from sim.kernel.compiled.native import native_kernel
-from sim.robot import load_robot
+from gaitswarm.sim.errors import KernelBuildError, SimulationInputError
+from gaitswarm.sim.kernel.dynamics.kinds import robot_constants
+from gaitswarm.sim.kernel.compiled.native import native_kernel
+from gaitswarm.sim.robot import load_robot
 def compile_another():
     try:
         native_kernel(load_robot("szabadka2"))
@@ -245,12 +247,12 @@ def test_integers_wrap_rather_than_let_the_compiler_assume_that_they_never_do() 
 def test_a_source_is_derived_without_the_files_that_its_identity_leaves_out() -> None:
     done = run_python(
         "import sys\n"
-        "from sim.kernel.emitted.source import kernel_source\n"
-        "from sim.robot import load_robot\n"
+        "from gaitswarm.sim.kernel.emitted.source import kernel_source\n"
+        "from gaitswarm.sim.robot import load_robot\n"
         "kernel_source(load_robot('szabadka2'))\n"
-        "print(*sorted(name for name in sys.modules if name.startswith('sim.kernel.')))"
+        "print(*sorted(name for name in sys.modules if name.startswith('gaitswarm.sim.kernel.')))"
     )
-    derived_by = {name.removeprefix("sim.kernel.") for name in done.stdout.split()}
+    derived_by = {name.removeprefix("gaitswarm.sim.kernel.") for name in done.stdout.split()}
     assert {"dynamics.articulated_body", "emitted.emit_c", "emitted.source"} <= derived_by, (
         done.stderr
     )
@@ -258,19 +260,18 @@ def test_a_source_is_derived_without_the_files_that_its_identity_leaves_out() ->
 
 
 def test_an_identity_changes_with_any_file_that_a_source_may_be_derived_by(tmp_path: Path) -> None:
-    shutil.copytree(ROOT / "sim", tmp_path / "sim", ignore=shutil.ignore_patterns("__pycache__"))
+    kernel = copy_package(tmp_path) / "sim" / "kernel"
 
     def identity() -> str:
         done = run_python(
-            "from sim.kernel.emitted.source import kernel_identity\n"
-            "from sim.robot import load_robot\n"
+            "from gaitswarm.sim.kernel.emitted.source import kernel_identity\n"
+            "from gaitswarm.sim.robot import load_robot\n"
             "print(kernel_identity(load_robot('szabadka2')).hex())",
             PYTHONPATH=str(tmp_path),
         )
         assert done.returncode == 0, done.stderr
         return done.stdout
 
-    kernel = tmp_path / "sim" / "kernel"
     found = [identity()]
     for changed in ("emitted/tick.c", "dynamics/spatial.py", "emitted/a_new_law.py"):
         with (kernel / changed).open("a") as file:
@@ -292,10 +293,10 @@ def test_a_robot_may_have_any_name() -> None:
 IDENTITIES = """
 import os, sys
 from pathlib import Path
-import sim.kernel
-from sim.kernel.emitted.source import kernel_identity
-from sim.robot import load_robot
-robot, folder = load_robot("szabadka2"), Path(sim.kernel.__file__).parent
+import gaitswarm.sim.kernel
+from gaitswarm.sim.kernel.emitted.source import kernel_identity
+from gaitswarm.sim.robot import load_robot
+robot, folder = load_robot("szabadka2"), Path(gaitswarm.sim.kernel.__file__).parent
 for name in ["unchanged", *sys.argv[1:]]:
     # What a process has read of the files it keeps, so each is looked at by a process of its own.
     if (child := os.fork()) == 0:
@@ -311,11 +312,11 @@ for name in ["unchanged", *sys.argv[1:]]:
 def test_a_kernel_is_made_anew_if_a_file_changes_that_its_source_is_made_by(tmp_path: Path) -> None:
     used = run_python(
         "import sys\n"
-        "from sim.kernel.emitted import emit_c, pieces, source\n"
+        "from gaitswarm.sim.kernel.emitted import emit_c, pieces, source\n"
         "print(*(module.__file__ for name, module in sys.modules.items()"
-        " if name.startswith('sim.kernel.')), sep='\\n')"
+        " if name.startswith('gaitswarm.sim.kernel.')), sep='\\n')"
     )
-    kernel = ROOT / "sim/kernel"
+    kernel = ROOT / "gaitswarm/sim/kernel"
     files = [
         *(str(path.relative_to(kernel)) for path in kernel.rglob("*.[ch]")),
         *(str(Path(line).relative_to(kernel)) for line in used.stdout.splitlines()),
@@ -323,7 +324,7 @@ def test_a_kernel_is_made_anew_if_a_file_changes_that_its_source_is_made_by(tmp_
     assert {
         "emitted/tick.c", "emitted/pool.c", "emitted/pieces.py", "dynamics/limb.py", "parameters.py"
     } < set(files)  # fmt: skip
-    shutil.copytree(ROOT / "sim", tmp_path / "sim", ignore=shutil.ignore_patterns("__pycache__"))
+    copy_package(tmp_path)
     done = subprocess.run(
         [sys.executable, "-B", "-c", IDENTITIES, *files],
         capture_output=True,

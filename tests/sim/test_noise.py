@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from sim.assembly import plan_walk
-from sim.errors import SimulationInputError
-from sim.kernel.dynamics.physics_step import physics_model
-from sim.kernel.parameters import pack_parameters
-from sim.noise import LinkNoise
-from sim.robot import Robot, load_robot
-from sim.robot.robot import with_shafts
-from sim.scenario import SCENARIOS
-from sim.studies.accuracy import Deviation, noise_on_links
+from gaitswarm.sim.assembly import plan_walk
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.kernel.dynamics.physics_step import physics_model
+from gaitswarm.sim.kernel.parameters import pack_parameters
+from gaitswarm.sim.noise import LinkNoise
+from gaitswarm.sim.robot import Robot, load_robot
+from gaitswarm.sim.robot.robot import with_shafts
+from gaitswarm.sim.scenario import SCENARIOS
+from gaitswarm.sim.studies.accuracy import Deviation, noise_on_links
 from tests.examples.walks import short_walk, walk
 
 PI = {"P": 0.45, "I": 0.1}

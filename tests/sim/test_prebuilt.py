@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
+from gaitswarm.sim.compiler.compilation import build_library, load_library
+from gaitswarm.sim.compiler.target import ARM, X86, target
+from gaitswarm.sim.errors import KernelBuildError
+from gaitswarm.sim.robot import DEFAULT_ROBOT
 from scripts.prebuilt import TARGETS, main
-from sim.compiler.compilation import build_library, load_library
-from sim.compiler.target import ARM, X86, target
-from sim.errors import KernelBuildError
-from sim.robot import DEFAULT_ROBOT
 from tests.sim.emulated import tools_for_arm
 from tests.sim.processes import ROOT, run_python
 
@@ -22,15 +22,15 @@ pytestmark = pytest.mark.slow
 
 ANSWER = "int answer(void) { return 42; }"
 WALK = """
-from sim.simulate import prepare
+from gaitswarm.sim.simulate import prepare
 from tests.examples.walks import short_walk, walk
 for precision in ("double", "single"):
     done = walk(short_walk(cycle_time=0.4), precision=precision)
     print(prepare(), done.outcome.objectives.tobytes().hex())
 """
 PREPARE_ANOTHER = """
-from sim.robot import RobotVariant
-from sim.simulate import prepare
+from gaitswarm.sim.robot import RobotVariant
+from gaitswarm.sim.simulate import prepare
 print(prepare(RobotVariant(contact_law="karnopp")))
 """
 
@@ -54,9 +54,10 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Our packages from a wheel with this machine's kernels, unpacked."""
     folder = tmp_path_factory.mktemp("installed")
     source = folder / "source"
+    # As in a checkout, with symbolic links in the package.
     ignored = shutil.ignore_patterns("__pycache__", "prebuilt", "page", "manual", "node_modules")
     for name in ("sim", "services", "gaitswarm", "api", "cli"):
-        shutil.copytree(ROOT / name, source / name, ignore=ignored)
+        shutil.copytree(ROOT / name, source / name, ignore=ignored, symlinks=True)
     # With what git ignores, so that a wheel brings it only because it is told to.
     for name in ("pyproject.toml", "README.md", ".gitignore"):
         shutil.copy(ROOT / name, source)
@@ -110,7 +111,7 @@ def test_a_damaged_kernel_of_a_wheel_is_refused_with_what_to_do(
     installed: Path, tmp_path: Path
 ) -> None:
     copied = Path(shutil.copytree(installed, tmp_path / "packages"))
-    (kernel,) = copied.glob("sim/compiler/prebuilt/kernel-double-*.so")
+    (kernel,) = copied.glob("gaitswarm/sim/compiler/prebuilt/kernel-double-*.so")
     kernel.write_bytes(kernel.read_bytes()[:-1])
     done = walk_without_a_compiler(copied, tmp_path)
     assert done.returncode == 1
@@ -120,11 +121,13 @@ def test_a_damaged_kernel_of_a_wheel_is_refused_with_what_to_do(
 
 @pytest.mark.parametrize("built", BUILT)
 def test_a_wheel_brings_what_was_built_for_people(installed: Path, built: str) -> None:
-    assert (installed / built).is_file()
+    assert (installed / "gaitswarm" / built).is_file()
 
 
 def test_every_library_of_a_wheel_has_its_checksum(installed: Path) -> None:
-    files = {path.name for path in (installed / "sim" / "compiler" / "prebuilt").iterdir()}
+    files = {
+        path.name for path in (installed / "gaitswarm" / "sim" / "compiler" / "prebuilt").iterdir()
+    }
     libraries = {name for name in files if name.endswith(".so")}
     kinds = {"-".join(name.split("-")[:2]) for name in libraries if name.startswith("kernel")}
     assert kinds == {"kernel-single", "kernel-double"}
@@ -136,7 +139,7 @@ def test_every_library_of_a_wheel_has_its_checksum(installed: Path) -> None:
 def prebuilt(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A directory with a library that was built beforehand; and an empty cache."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.setattr("sim.compiler.compilation.PREBUILT", tmp_path / "prebuilt")
+    monkeypatch.setattr("gaitswarm.sim.compiler.compilation.PREBUILT", tmp_path / "prebuilt")
     monkeypatch.delenv("CC", raising=False)
     assert build_library("robot", b"", lambda: ANSWER, directory=tmp_path / "prebuilt")
     return tmp_path / "prebuilt"

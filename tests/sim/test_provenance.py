@@ -8,32 +8,32 @@ from pathlib import Path
 
 import pytest
 
-from sim.plugins import source_digest
-from sim.provenance import Provenance, provenance_of, simulator_files
-from sim.robot import DEFAULT_ROBOT, RobotFiles, RobotVariant
+from gaitswarm.sim.plugins import source_digest
+from gaitswarm.sim.provenance import Provenance, provenance_of, simulator_files
+from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotFiles, RobotVariant
 from tests.examples.paths import ROOT
 from tests.examples.processes import python
 
 PROGRAM = """
 import json, sys
 import numpy as np
-from sim.case import Walk
-from sim.identification.current_fit import CurrentFit
-from sim.provenance import provenance_of
-from sim.scenario import Scenario
-from sim.simulate import prepare
+from gaitswarm.sim.case import Walk
+from gaitswarm.sim.identification.current_fit import CurrentFit
+from gaitswarm.sim.provenance import provenance_of
+from gaitswarm.sim.scenario import Scenario
+from gaitswarm.sim.simulate import prepare
 
 short = Scenario(name="short", cycle_time=0.6, radius=0.16, hip_height=0.15, cycles=1)
 Walk("szabadka2", "pi", short, ("P", "I")).run(np.array([[0.3, 0.1]]))
 prepare(backend="reference")
-from sim.kernel.emitted import emit_c
-files = [m.__file__ for name, m in sys.modules.items() if name.startswith("sim.")]
+from gaitswarm.sim.kernel.emitted import emit_c
+files = [m.__file__ for name, m in sys.modules.items() if name.startswith("gaitswarm.sim.")]
 print(json.dumps([provenance_of("szabadka2").model_dump(), files]))
 """
 
 
 def robot_file(name: str) -> str:
-    return (resources.files("sim.robot") / "szabadka2" / name).read_text(encoding="utf-8")
+    return (resources.files("gaitswarm.sim.robot") / "szabadka2" / name).read_text(encoding="utf-8")
 
 
 SHIPPED = RobotFiles(toml=robot_file("robot.toml"), urdf=robot_file("robot.urdf"))
@@ -46,9 +46,10 @@ def test_all_modules_that_a_case_runs_through_are_in_the_digest_which_any_proces
     found, loaded = json.loads(done.stdout)
     assert Provenance(**found) == provenance_of("szabadka2")
     covered = set(simulator_files())
-    assert {Path(file) for file in loaded} - covered == {ROOT / "sim" / "provenance.py"}
+    uncovered = {Path(file) for file in loaded} - covered
+    assert uncovered == {ROOT / "gaitswarm" / "sim" / "provenance.py"}
     for source in ("kernel/emitted/driver.c", "controllers/estimate.c", "compiler/vec.h"):
-        assert ROOT / "sim" / source in covered
+        assert ROOT / "gaitswarm" / "sim" / source in covered
 
 
 def test_a_robot_is_known_by_its_content_and_not_by_how_it_is_named() -> None:

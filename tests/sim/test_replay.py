@@ -8,12 +8,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sim.kernel.observation import WalkLog
-from sim.outcome import Status
-from sim.replay import Replay, replay, ticks_at
-from sim.robot import DEFAULT_ROBOT, Robot, RobotVariant, load_robot
-from sim.robot.posture import feet_below_body
-from sim.scenario import SCENARIOS, Scenario
+from gaitswarm.sim.kernel.observation import WalkLog
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.replay import Replay, replay, ticks_at
+from gaitswarm.sim.robot import DEFAULT_ROBOT, Robot, RobotVariant, load_robot
+from gaitswarm.sim.robot.posture import feet_below_body
+from gaitswarm.sim.scenario import SCENARIOS, Scenario
 from tests.examples.paths import QUADRUPED
 from tests.examples.robots import with_feet
 from tests.examples.walks import quadruped_files, walk

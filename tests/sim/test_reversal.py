@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sim.controllers import CONTROLLERS
-from sim.controllers.base import Inference
-from sim.controllers.fuzzy_sets import LARGE_BEGINS
+from gaitswarm.sim.controllers import CONTROLLERS
+from gaitswarm.sim.controllers.base import Inference
+from gaitswarm.sim.controllers.fuzzy_sets import LARGE_BEGINS
 
 FUZZY: Final = CONTROLLERS["fuzzy-pi"]
 

@@ -10,12 +10,12 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
-from sim.errors import SimulationInputError, UnreachablePose
-from sim.gait_variables import GAIT_VARIABLES, with_gait
-from sim.outcome import OBJECTIVE_NAMES, Status
-from sim.robot import DEFAULT_ROBOT, RobotChoice, load_robot
-from sim.scenario import SCENARIOS, Scenario, find_scenario
-from sim.simulate import check_reach, simulate
+from gaitswarm.sim.errors import SimulationInputError, UnreachablePose
+from gaitswarm.sim.gait_variables import GAIT_VARIABLES, with_gait
+from gaitswarm.sim.outcome import OBJECTIVE_NAMES, Status
+from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotChoice, load_robot
+from gaitswarm.sim.scenario import SCENARIOS, Scenario, find_scenario
+from gaitswarm.sim.simulate import check_reach, simulate
 from tests.examples.robots import with_feet
 from tests.examples.walks import (
     LONG_STRIDES,

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sim.assembly import control_steps, plan_walk
-from sim.controllers import control_law
-from sim.errors import SimulationInputError
-from sim.kernel.compiled.native import NativeKernel, native_kernel
-from sim.kernel.readable.reference import reference_kernel
-from sim.kernel.sensors import LARGEST_DELAY, SensorErrors, Sensors, philox
-from sim.kernel.walk import Coding, Precision, WalkResult, WalkSetup
-from sim.robot import Robot, RobotVariant, load_robot
+from gaitswarm.sim.assembly import control_steps, plan_walk
+from gaitswarm.sim.controllers import control_law
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.kernel.compiled.native import NativeKernel, native_kernel
+from gaitswarm.sim.kernel.readable.reference import reference_kernel
+from gaitswarm.sim.kernel.sensors import LARGEST_DELAY, SensorErrors, Sensors, philox
+from gaitswarm.sim.kernel.walk import Coding, Precision, WalkResult, WalkSetup
+from gaitswarm.sim.robot import Robot, RobotVariant, load_robot
 from tests.examples.walks import PUBLISHED_A, short_walk
 
 Floats = NDArray[np.float64]

@@ -8,10 +8,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sim.errors import RobotFileError
-from sim.robot import Robot
-from sim.robot.shapes import Shape, VisibleLink, visible_links
-from sim.robot.urdf import parse_urdf
+from gaitswarm.sim.errors import RobotFileError
+from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.shapes import Shape, VisibleLink, visible_links
+from gaitswarm.sim.robot.urdf import parse_urdf
 
 WITHOUT = '<link name="body">'
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sim.assembly import control_steps, plan_walk
-from sim.controllers import control_law
-from sim.kernel.compiled.native import native_kernel
-from sim.kernel.walk import WalkResult
-from sim.outcome import Status
-from sim.robot import Robot, RobotVariant, load_robot
-from sim.scenario import Scenario, find_scenario
+from gaitswarm.sim.assembly import control_steps, plan_walk
+from gaitswarm.sim.controllers import control_law
+from gaitswarm.sim.kernel.compiled.native import native_kernel
+from gaitswarm.sim.kernel.walk import WalkResult
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.robot import Robot, RobotVariant, load_robot
+from gaitswarm.sim.scenario import Scenario, find_scenario
 from tests.examples.walks import logged_walk, short_walk, walk
 
 Floats = NDArray[np.float64]

@@ -9,17 +9,17 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from sim.assembly import control_steps, judge, plan_walk
-from sim.compiler.compilation import load_library, vector_header
-from sim.compiler.target import Target, target
-from sim.controllers import CONTROLLERS
-from sim.controllers.base import ControlLaw
-from sim.controllers.fixed_point import CONTROL_PERIOD
-from sim.kernel.compiled.native import NativeKernel, load_kernel, native_kernel
-from sim.kernel.walk import Floats, Precision, WalkSetup
-from sim.outcome import Status
-from sim.robot import Robot, RobotVariant, load_robot
-from sim.scenario import SCENARIOS
+from gaitswarm.sim.assembly import control_steps, judge, plan_walk
+from gaitswarm.sim.compiler.compilation import load_library, vector_header
+from gaitswarm.sim.compiler.target import Target, target
+from gaitswarm.sim.controllers import CONTROLLERS
+from gaitswarm.sim.controllers.base import ControlLaw
+from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
+from gaitswarm.sim.kernel.compiled.native import NativeKernel, load_kernel, native_kernel
+from gaitswarm.sim.kernel.walk import Floats, Precision, WalkSetup
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.robot import Robot, RobotVariant, load_robot
+from gaitswarm.sim.scenario import SCENARIOS
 
 TOLERANCE = 1e-4
 """Of objectives, as a share of themselves, of a walk that is not sensitive itself."""

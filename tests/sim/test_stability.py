@@ -6,9 +6,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sim.gait.stability import static_stability, support_margin
-from sim.robot import Robot, load_robot
-from sim.robot.posture import feet_and_centre_of_mass, feet_in_body
+from gaitswarm.sim.gait.stability import static_stability, support_margin
+from gaitswarm.sim.robot import Robot, load_robot
+from gaitswarm.sim.robot.posture import feet_and_centre_of_mass, feet_in_body
 from tests.examples.walks import quadruped_files, short_walk
 
 SQUARE = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.kernel.compiled.native import native_kernel
-from sim.kernel.dynamics.physics_step import physics_model
-from sim.kernel.parameters import STATIC_FRICTION_RATE, pack_parameters
-from sim.robot import Robot, load_robot
-from sim.scenario import SCENARIOS
+from gaitswarm.sim.kernel.compiled.native import native_kernel
+from gaitswarm.sim.kernel.dynamics.physics_step import physics_model
+from gaitswarm.sim.kernel.parameters import STATIC_FRICTION_RATE, pack_parameters
+from gaitswarm.sim.robot import Robot, load_robot
+from gaitswarm.sim.scenario import SCENARIOS
 from tests.examples.robots import changed
 from tests.examples.walks import short_walk, walk
 

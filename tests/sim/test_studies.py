@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import pytest
 
-from sim.assembly import PHYSICS_RATE, plan_walk
-from sim.controllers.fuzzy_pi import FuzzyPi
-from sim.errors import SimulationInputError
-from sim.kernel.compiled.native import native_kernel
-from sim.kernel.walk import Coding
-from sim.outcome import Status
-from sim.robot import DEFAULT_ROBOT, RobotName, load_robot
-from sim.scenario import SCENARIOS
-from sim.studies.accuracy import noise_on_links, step_halving, tables_against_inference
-from sim.studies.drives import DRIVES, compare, drive_of_design, find_drive, walk_figures
+from gaitswarm.sim.assembly import PHYSICS_RATE, plan_walk
+from gaitswarm.sim.controllers.fuzzy_pi import FuzzyPi
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.kernel.compiled.native import native_kernel
+from gaitswarm.sim.kernel.walk import Coding
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotName, load_robot
+from gaitswarm.sim.scenario import SCENARIOS
+from gaitswarm.sim.studies.accuracy import noise_on_links, step_halving, tables_against_inference
+from gaitswarm.sim.studies.drives import DRIVES, compare, drive_of_design, find_drive, walk_figures
 from tests.examples.walks import PUBLISHED_A
 
 pytestmark = pytest.mark.slow

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.controllers import CONTROLLERS
-from sim.controllers.base import LookupTable
-from sim.controllers.fuzzy_pi import inference_system
-from sim.controllers.fuzzy_pi_3 import integral_system
-from sim.controllers.mamdani import Shape
-from sim.controllers.surface import Surface, surface
+from gaitswarm.sim.controllers import CONTROLLERS
+from gaitswarm.sim.controllers.base import LookupTable
+from gaitswarm.sim.controllers.fuzzy_pi import inference_system
+from gaitswarm.sim.controllers.fuzzy_pi_3 import integral_system
+from gaitswarm.sim.controllers.mamdani import Shape
+from gaitswarm.sim.controllers.surface import Surface, surface
 from tests.examples.walks import PUBLISHED_A
 
 CHAPTER_3 = CONTROLLERS["fuzzy-pi-3"].published["fuzzy-pso-ps"]

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from sim.compiler.target import ARM, X86, Target, cpu_flags, host_architecture, target
-from sim.compiler.toolchain import Compiler, find_compiler, without_compiler
+from gaitswarm.sim.compiler.target import ARM, X86, Target, cpu_flags, host_architecture, target
+from gaitswarm.sim.compiler.toolchain import Compiler, find_compiler, without_compiler
 from tests.examples.walks import SHORT_WALK
 from tests.sim.processes import run_python
 
@@ -53,7 +53,7 @@ def test_the_target_is_the_widest_whose_instructions_the_cpu_has(
     monkeypatch: pytest.MonkeyPatch, flags: str, expected: Target, system: str, machine: str
 ) -> None:
     pretend(monkeypatch, system, machine)
-    monkeypatch.setattr("sim.compiler.target.cpu_flags", lambda: frozenset(flags.split()))
+    monkeypatch.setattr("gaitswarm.sim.compiler.target.cpu_flags", lambda: frozenset(flags.split()))
     assert target() == expected
 
 
@@ -141,7 +141,7 @@ done = walk(short_walk(cycle_time=0.3), {"P": 0.45, "I": 0.1}, "pi")
 print(done.outcome.statuses, done.outcome.objectives[0, 0])
 """
 OPTIMIZE = """
-from cli.main import main
+from gaitswarm.cli.main import main
 sys.argv = "gaitswarm optimize --particles 2 --iterations 1 --evaluator in-process".split()
 sys.argv += ["--controller", "pi", "--scenarios", os.environ["SCENARIO"]]
 main()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sim.robot import load_robot
+from gaitswarm.sim.robot import load_robot
 
 TABLE_3 = {
     "coxa": (0.141, (0.0336, 1.84e-3, -1.26e-3),

@@ -11,21 +11,21 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sim.assembly import control_steps, kernel_of, plan_walk
-from sim.compiler.target import X86, Target, host_architecture, target
-from sim.controllers import control_law
-from sim.controllers.base import ControlLaw, JointPd
-from sim.errors import SimulationInputError
-from sim.kernel.compiled.native import load_kernel, native_kernel
-from sim.kernel.dynamics.physics_step import physics_model
-from sim.kernel.observation import split_states
-from sim.kernel.parameters import pack_parameters
-from sim.kernel.walk import WalkResult, WalkSetup
-from sim.outcome import Status
-from sim.robot import Robot, load_robot
-from sim.robot.actuators import TorqueActuator
-from sim.scenario import SCENARIOS
-from sim.simulate import simulate
+from gaitswarm.sim.assembly import control_steps, kernel_of, plan_walk
+from gaitswarm.sim.compiler.target import X86, Target, host_architecture, target
+from gaitswarm.sim.controllers import control_law
+from gaitswarm.sim.controllers.base import ControlLaw, JointPd
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.kernel.compiled.native import load_kernel, native_kernel
+from gaitswarm.sim.kernel.dynamics.physics_step import physics_model
+from gaitswarm.sim.kernel.observation import split_states
+from gaitswarm.sim.kernel.parameters import pack_parameters
+from gaitswarm.sim.kernel.walk import WalkResult, WalkSetup
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.robot import Robot, load_robot
+from gaitswarm.sim.robot.actuators import TorqueActuator
+from gaitswarm.sim.scenario import SCENARIOS
+from gaitswarm.sim.simulate import simulate
 from tests.examples.walks import random_state, short_walk, torque_quadruped_files
 from tests.sim.pinocchio_oracle import Oracle
 

@@ -6,11 +6,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sim.errors import RobotFileError
-from sim.robot import Robot, RobotVariant, load_robot
-from sim.robot.urdf import parse_urdf
-from sim.scenario import SCENARIOS
-from sim.simulate import simulate
+from gaitswarm.sim.errors import RobotFileError
+from gaitswarm.sim.robot import Robot, RobotVariant, load_robot
+from gaitswarm.sim.robot.urdf import parse_urdf
+from gaitswarm.sim.scenario import SCENARIOS
+from gaitswarm.sim.simulate import simulate
 from tests.sim.pinocchio_oracle import ROBOTS, robot_named
 
 CAMERA = """

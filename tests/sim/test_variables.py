@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from sim.variables import Variable, VariableValue
+from gaitswarm.sim.variables import Variable, VariableValue
 
 LAW = Variable(name="law", kind="categorical", choices=("linear", "stick", "jump"))
 

@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from sim.assembly import plan_walk
-from sim.controllers import CONTROLLERS
-from sim.kernel.compiled.native import native_kernel
-from sim.kernel.dynamics.physics_step import physics_model
-from sim.kernel.observation import walk_log
-from sim.kernel.parameters import internal_state_size, pack_parameters
-from sim.kernel.walk import Coding
-from sim.noise import LinkNoise
-from sim.outcome import Status
-from sim.robot import DEFAULT_ROBOT, RobotVariant, load_robot
-from sim.robot.description import ContactLaw
-from sim.scenario import SCENARIOS, Scenario
-from sim.simulate import simulate
+from gaitswarm.sim.assembly import plan_walk
+from gaitswarm.sim.controllers import CONTROLLERS
+from gaitswarm.sim.kernel.compiled.native import native_kernel
+from gaitswarm.sim.kernel.dynamics.physics_step import physics_model
+from gaitswarm.sim.kernel.observation import walk_log
+from gaitswarm.sim.kernel.parameters import internal_state_size, pack_parameters
+from gaitswarm.sim.kernel.walk import Coding
+from gaitswarm.sim.noise import LinkNoise
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotVariant, load_robot
+from gaitswarm.sim.robot.description import ContactLaw
+from gaitswarm.sim.scenario import SCENARIOS, Scenario
+from gaitswarm.sim.simulate import simulate
 from tests.examples.robots import changed
 
 pytestmark = pytest.mark.slow

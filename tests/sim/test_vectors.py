@@ -14,9 +14,16 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sim.compiler.compilation import load_library, vector_header
-from sim.compiler.target import X86, X86_TARGETS, Target, cpu_flags, host_architecture, target
-from sim.kernel.walk import Precision
+from gaitswarm.sim.compiler.compilation import load_library, vector_header
+from gaitswarm.sim.compiler.target import (
+    X86,
+    X86_TARGETS,
+    Target,
+    cpu_flags,
+    host_architecture,
+    target,
+)
+from gaitswarm.sim.kernel.walk import Precision
 
 pytestmark = pytest.mark.slow
 

@@ -13,16 +13,16 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sim.case import run_together
-from sim.controllers import ControllerName
-from sim.errors import SimulationInputError
-from sim.gait.trajectory import desired_angles
-from sim.kernel.parameters import GRAVITY
-from sim.outcome import Outcome, Status
-from sim.robot import DEFAULT_ROBOT, SHIPPED, RobotSource, RobotVariant, load_robot
-from sim.robot.identifiable import with_parameters
-from sim.scenario import HELD_OUT, PRESETS, SCENARIOS, Scenario
-from sim.worlds import (
+from gaitswarm.sim.case import run_together
+from gaitswarm.sim.controllers import ControllerName
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.gait.trajectory import desired_angles
+from gaitswarm.sim.kernel.parameters import GRAVITY
+from gaitswarm.sim.outcome import Outcome, Status
+from gaitswarm.sim.robot import DEFAULT_ROBOT, SHIPPED, RobotSource, RobotVariant, load_robot
+from gaitswarm.sim.robot.identifiable import with_parameters
+from gaitswarm.sim.scenario import HELD_OUT, PRESETS, SCENARIOS, Scenario
+from gaitswarm.sim.worlds import (
     PERTURBATIONS,
     MeasuredPerturbedWalk,
     PerturbedWalk,
@@ -242,7 +242,7 @@ def test_worlds_are_drawn_by_seed_and_index_and_variable() -> None:
 
 
 def test_bounds_of_table_2_7_span_the_intervals_of_all_legs() -> None:
-    folder = resources.files("sim.robot") / "szabadka2-identified"
+    folder = resources.files("gaitswarm.sim.robot") / "szabadka2-identified"
     intervals, document = (
         tomllib.loads((folder / f"{name}.toml").read_text(encoding="utf-8"))
         for name in ("intervals", "parameters")

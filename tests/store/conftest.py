@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 from sqlalchemy import text
 
-from services.optimizer.store.connections.engine import connect, parse_url
-from services.optimizer.store.rows.tables import metadata
-from services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
+from gaitswarm.services.optimizer.store.rows.tables import metadata
+from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
 from tests.store.examples import Clock
 from tests.store.postgres_server import PostgresServer, postgres_server, server_binaries
 

@@ -7,11 +7,11 @@ from datetime import UTC, datetime, timedelta
 
 import numpy as np
 
-from services.optimizer.jobs.iteration import Ask, CompletedIteration
-from services.optimizer.jobs.job import Claim
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.store.sql_store import SqlStore
-from sim.outcome import Outcome, Status
+from gaitswarm.services.optimizer.jobs.iteration import Ask, CompletedIteration
+from gaitswarm.services.optimizer.jobs.job import Claim
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.sim.outcome import Outcome, Status
 
 LEASE = 30.0
 

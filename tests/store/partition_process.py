@@ -15,10 +15,10 @@ from threading import Thread
 
 from sqlalchemy import text
 
-from services.optimizer.errors import LeaseLost, StoreUnavailable
-from services.optimizer.store.connections import postgresql
-from services.optimizer.store.connections.engine import connect, parse_url
-from services.optimizer.store.sql_store import open_store
+from gaitswarm.services.optimizer.errors import LeaseLost, StoreUnavailable
+from gaitswarm.services.optimizer.store.connections import postgresql
+from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
+from gaitswarm.services.optimizer.store.sql_store import open_store
 from tests.store.examples import ask, completed, spec
 from tests.store.postgres_server import postgres_binaries, postgres_server
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from services.optimizer.jobs.labels import LabelsChange
-from services.optimizer.store.sql_store import open_store
+from gaitswarm.services.optimizer.jobs.labels import LabelsChange
+from gaitswarm.services.optimizer.store.sql_store import open_store
 from tests.store.examples import spec
 
 

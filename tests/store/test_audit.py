@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 
-from services.optimizer.access import Scope
-from services.optimizer.errors import Conflict, InvalidRequest, NotFound
-from services.optimizer.jobs.audit import AuditAction
-from services.optimizer.jobs.job import Command, JobState
-from services.optimizer.store.sql_store import SqlStore
-from services.optimizer.store.transactions import deletion
+from gaitswarm.services.optimizer.access import Scope
+from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, NotFound
+from gaitswarm.services.optimizer.jobs.audit import AuditAction
+from gaitswarm.services.optimizer.jobs.job import Command, JobState
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store.transactions import deletion
 from tests.store.examples import LEASE, Clock, ask, begun, completed, spec
 from tests.store.test_recordings import recording
 

@@ -10,12 +10,12 @@ from typing import Any
 import pytest
 from sqlalchemy import select
 
-from services.optimizer.errors import Conflict, InvalidRequest, NotFound, StoreUnavailable
-from services.optimizer.store.connections.engine import connect, parse_url
-from services.optimizer.store.rows.tables import metadata
-from services.optimizer.store.schema.backup import backup, restore
-from services.optimizer.store.schema.maintenance import check
-from services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, NotFound, StoreUnavailable
+from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
+from gaitswarm.services.optimizer.store.rows.tables import metadata
+from gaitswarm.services.optimizer.store.schema.backup import backup, restore
+from gaitswarm.services.optimizer.store.schema.maintenance import check
+from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
 from tests.store.examples import ask, begun, completed, spec
 from tests.store.test_upgrades import JOB, store_older
 

@@ -10,11 +10,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from services.optimizer.jobs.iteration import Ask, CompletedIteration
-from services.optimizer.jobs.job import JobState
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.store.sql_store import SqlStore
-from sim.outcome import Outcome
+from gaitswarm.services.optimizer.jobs.iteration import Ask, CompletedIteration
+from gaitswarm.services.optimizer.jobs.job import JobState
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.sim.outcome import Outcome
 from tests.store.examples import LEASE, spec
 
 # The fixture's database is shared by the examples on purpose: each makes a job of its own.

@@ -11,20 +11,20 @@ import numpy as np
 import pytest
 from sqlalchemy import text
 
-from services.optimizer.analysis.verification import HistoryCheck, check_history
-from services.optimizer.jobs.chain import (
+from gaitswarm.services.optimizer.analysis.verification import HistoryCheck, check_history
+from gaitswarm.services.optimizer.jobs.chain import (
     ChainDocuments,
     Link,
     Outcomes,
     ask_digest,
     iteration_digest,
 )
-from services.optimizer.jobs.fork import Fork, Lineage, TakenHistory
-from services.optimizer.jobs.iteration import Reevaluation
-from services.optimizer.jobs.job import Claim, Command, JobState
-from services.optimizer.jobs.provenance import JobProvenance, job_provenance
-from services.optimizer.store.connections.engine import connect, parse_url
-from services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.jobs.fork import Fork, Lineage, TakenHistory
+from gaitswarm.services.optimizer.jobs.iteration import Reevaluation
+from gaitswarm.services.optimizer.jobs.job import Claim, Command, JobState
+from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
+from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from tests.store.examples import LEASE, ask, begun, completed, spec
 
 

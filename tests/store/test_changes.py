@@ -10,9 +10,9 @@ from contextlib import ExitStack, closing
 import pytest
 from sqlalchemy import text
 
-from services.optimizer.jobs.job import Command
-from services.optimizer.store.connections.engine import connect, parse_url
-from services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.jobs.job import Command
+from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
+from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
 from tests.examples.processes import eventually
 from tests.store.examples import LEASE, ask, begun, completed, spec
 from tests.store.postgres_server import postgres_server, server_binaries
@@ -159,7 +159,7 @@ def test_where_nobody_can_listen_changes_are_polled_for(
     store: SqlStore, waiting: SqlStore, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        "services.optimizer.store.connections.changes._CHANNEL", "no name of a channel"
+        "gaitswarm.services.optimizer.store.connections.changes._CHANNEL", "no name of a channel"
     )
     claim = begun(store)
     woken = threading.Event()
@@ -207,7 +207,7 @@ def test_a_thread_that_has_ended_is_told_of_while_somebody_waits(
     with closing(open_store(database_url)) as store:
         assert store.changes.trouble() is None
         monkeypatch.setattr(
-            "services.optimizer.store.connections.changes.select", lambda *_: sys.exit()
+            "gaitswarm.services.optimizer.store.connections.changes.select", lambda *_: sys.exit()
         )
         with store.changes.watch("nosuchjob123", lambda: None, poll_seconds=0.01):
             eventually(lambda: store.changes.trouble() is not None)

@@ -7,15 +7,15 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from services.optimizer.errors import LeaseLost
-from services.optimizer.jobs.job import (
+from gaitswarm.services.optimizer.errors import LeaseLost
+from gaitswarm.services.optimizer.jobs.job import (
     LONGEST_LEASE_SECONDS,
     QUARANTINE_AFTER,
     Claim,
     Command,
     JobState,
 )
-from services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from tests.store.examples import LEASE, Clock, ask, begun, completed, spec
 
 DAY = 86400.0

@@ -11,13 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from services.optimizer.analysis.history_cache import HistoryCache, HistoryMemory
-from services.optimizer.errors import Conflict, EvaluatorUnavailable, NotFound
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.iteration import CompletedIteration
-from services.optimizer.jobs.job import Claim, Job
-from services.optimizer.store.sql_store import SqlStore
-from sim.outcome import Outcome, Status
+from gaitswarm.services.optimizer.analysis.history_cache import HistoryCache, HistoryMemory
+from gaitswarm.services.optimizer.errors import Conflict, EvaluatorUnavailable, NotFound
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
+from gaitswarm.services.optimizer.jobs.job import Claim, Job
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.sim.outcome import Outcome, Status
 from tests.store.examples import LEASE, ask, begun, completed, spec
 from tests.store.test_bits import anything, column, finite, many
 

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from services.optimizer.errors import StoreUnavailable
-from services.optimizer.store.connections import engine
-from services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.errors import StoreUnavailable
+from gaitswarm.services.optimizer.store.connections import engine
+from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
 from tests.store.examples import begun, completed, spec
 
 

@@ -9,13 +9,13 @@ from datetime import timedelta
 import pytest
 from sqlalchemy import func, select
 
-from services.optimizer.errors import Conflict, LeaseLost, NotFound
-from services.optimizer.jobs.fork import Fork, Lineage, TakenHistory
-from services.optimizer.jobs.iteration import CompletedIteration
-from services.optimizer.jobs.job import Command, Job, JobState
-from services.optimizer.store.connections.engine import connect, parse_url
-from services.optimizer.store.rows.tables import metadata
-from services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.errors import Conflict, LeaseLost, NotFound
+from gaitswarm.services.optimizer.jobs.fork import Fork, Lineage, TakenHistory
+from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
+from gaitswarm.services.optimizer.jobs.job import Command, Job, JobState
+from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
+from gaitswarm.services.optimizer.store.rows.tables import metadata
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from tests.store.examples import LEASE, Clock, ask, begun, completed, spec
 
 KEYS = (b"\0" * 16, b"\xff" * 16)

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from services.optimizer.errors import BudgetChanged, Conflict, InvalidRequest, NotFound
-from services.optimizer.jobs.job import Command, JobState
-from services.optimizer.jobs.spec import Spec
-from services.optimizer.search.registry import OPTIMIZERS
-from services.optimizer.store.schema.migrate import upgrade
-from services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.errors import BudgetChanged, Conflict, InvalidRequest, NotFound
+from gaitswarm.services.optimizer.jobs.job import Command, JobState
+from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.services.optimizer.search.registry import OPTIMIZERS
+from gaitswarm.services.optimizer.store.schema.migrate import upgrade
+from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
 from tests.certificate.examples import small
 from tests.store.examples import LEASE, Clock, ask, begun, completed, spec
 from tests.store.test_job_states import in_state

@@ -6,10 +6,10 @@ from pathlib import Path, PurePosixPath
 
 import pytest
 
-from services.optimizer.errors import StoreUnavailable
-from services.optimizer.store.connections import file_system
-from services.optimizer.store.connections.file_system import mount_of
-from services.optimizer.store.sql_store import open_store
+from gaitswarm.services.optimizer.errors import StoreUnavailable
+from gaitswarm.services.optimizer.store.connections import file_system
+from gaitswarm.services.optimizer.store.connections.file_system import mount_of
+from gaitswarm.services.optimizer.store.sql_store import open_store
 
 MOUNTS = r"""22 27 0:21 / /proc rw,relatime - proc proc rw
 27 1 254:0 / / rw,relatime - ext4 /dev/vda rw,discard

@@ -7,10 +7,10 @@ from typing import Any
 
 from sqlalchemy import Table, select, update
 
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.store.connections.engine import connect, parse_url
-from services.optimizer.store.rows.tables import jobs, recordings
-from services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
+from gaitswarm.services.optimizer.store.rows.tables import jobs, recordings
+from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
 from tests.examples.walks import SHORT_WALK
 from tests.store.test_recordings import recording
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from sqlalchemy import select
 
-from services.optimizer.errors import Conflict, InvalidRequest, LeaseLost, NotFound
-from services.optimizer.jobs.job import Claim, Command, JobState
-from services.optimizer.service import JobService
-from services.optimizer.store.connections.engine import connect, parse_url
-from services.optimizer.store.rows.tables import iterations
-from services.optimizer.store.sql_store import SqlStore
-from sim.outcome import Status
+from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, LeaseLost, NotFound
+from gaitswarm.services.optimizer.jobs.job import Claim, Command, JobState
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
+from gaitswarm.services.optimizer.store.rows.tables import iterations
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.sim.outcome import Status
 from tests.store.examples import Clock, ask, begun, completed
 
 INF = math.inf

@@ -6,9 +6,9 @@ from datetime import UTC
 
 import pytest
 
-from services.optimizer.errors import IdempotencyConflict, InvalidRequest, NotFound
-from services.optimizer.jobs.job import Command, Job, JobOrder, JobState
-from services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.errors import IdempotencyConflict, InvalidRequest, NotFound
+from gaitswarm.services.optimizer.jobs.job import Command, Job, JobOrder, JobState
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from tests.store.examples import LEASE, Clock, ask, completed, spec
 from tests.tournament.problems import tournament
 

@@ -10,16 +10,16 @@ from typing import Any
 import pytest
 from sqlalchemy import Connection, Engine, create_engine, event, text
 
-from services.optimizer.jobs.job import Command, Job, JobOrder, JobState
-from services.optimizer.jobs.labels import JobFilter, LabelsChange
-from services.optimizer.store import sql_store
-from services.optimizer.store.connections.engine import connect, parse_url
-from services.optimizer.store.rows.job_rows import JobDocuments
-from services.optimizer.store.rows.job_views import RowMemory
-from services.optimizer.store.sql_store import SqlStore, open_store
-from services.optimizer.store.statements import job_entries
-from services.optimizer.store.statements.job_entries import JobEntry, _Memory
-from services.optimizer.store.statements.job_list import jobs_of
+from gaitswarm.services.optimizer.jobs.job import Command, Job, JobOrder, JobState
+from gaitswarm.services.optimizer.jobs.labels import JobFilter, LabelsChange
+from gaitswarm.services.optimizer.store import sql_store
+from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
+from gaitswarm.services.optimizer.store.rows.job_rows import JobDocuments
+from gaitswarm.services.optimizer.store.rows.job_views import RowMemory
+from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.store.statements import job_entries
+from gaitswarm.services.optimizer.store.statements.job_entries import JobEntry, _Memory
+from gaitswarm.services.optimizer.store.statements.job_list import jobs_of
 from tests.store.examples import completed, spec
 from tests.store.test_job_list import with_fitness
 

@@ -6,9 +6,9 @@ from itertools import product
 
 import pytest
 
-from services.optimizer.errors import Conflict
-from services.optimizer.jobs.job import TRANSITIONS, Command, JobState, commanded
-from services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.errors import Conflict
+from gaitswarm.services.optimizer.jobs.job import TRANSITIONS, Command, JobState, commanded
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from tests.store.examples import LEASE, Clock, ask, begun, completed, spec
 
 ALLOWED = {

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 from sqlalchemy import text
 
-from services.optimizer.store.connections.engine import connect, parse_url
-from services.optimizer.store.sql_store import SqlStore
-from sim.outcome import Status
+from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.sim.outcome import Status
 from tests.store.examples import begun, completed
 
 KEYS = (b"\0" * 16, b"\xff" * 16)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from services.optimizer.errors import InvalidRequest, NotFound
-from services.optimizer.jobs.job import Command, Job, JobOrder
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.labels import JobFilter, LabelsChange, robot_name
-from services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
+from gaitswarm.services.optimizer.jobs.job import Command, Job, JobOrder
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.labels import JobFilter, LabelsChange, robot_name
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from tests.examples.walks import quadruped_files
 from tests.store.examples import Clock
 

@@ -9,12 +9,12 @@ from typing import Any
 import pytest
 from sqlalchemy import Connection, Engine, create_engine, text
 
-from services.optimizer.jobs.job import Command, JobOrder
-from services.optimizer.jobs.labels import LabelsChange
-from services.optimizer.store.connections.engine import parse_url
-from services.optimizer.store.sql_store import SqlStore, open_store
-from services.optimizer.store.statements import job_list
-from services.optimizer.store.statements.job_list import read_long
+from gaitswarm.services.optimizer.jobs.job import Command, JobOrder
+from gaitswarm.services.optimizer.jobs.labels import LabelsChange
+from gaitswarm.services.optimizer.store.connections.engine import parse_url
+from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.store.statements import job_list
+from gaitswarm.services.optimizer.store.statements.job_list import read_long
 from tests.store.examples import spec
 from tests.store.test_job_reading import statements
 

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from services.optimizer.analysis.all_histories import check_histories
-from services.optimizer.errors import NotFound, StoreUnavailable
-from services.optimizer.jobs.job import Command, JobState
-from services.optimizer.store.schema.maintenance import Pruned, check, prune
-from services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.analysis.all_histories import check_histories
+from gaitswarm.services.optimizer.errors import NotFound, StoreUnavailable
+from gaitswarm.services.optimizer.jobs.job import Command, JobState
+from gaitswarm.services.optimizer.store.schema.maintenance import Pruned, check, prune
+from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
 from tests.store.examples import ask, begun, completed
 from tests.store.examples import spec as walks
 from tests.store.test_opening import edit

@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from gaitswarm.jobs.database.jobs import DatabaseJobs
+from gaitswarm.services.optimizer.masking import masked_url
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from gaitswarm.settings import Settings
-from services.optimizer.masking import masked_url
-from services.optimizer.service import JobService
-from services.optimizer.store.sql_store import SqlStore
 
 SECRET = "postgresql://u:secret@h/d?sslpassword=secret"
 

@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 from sqlalchemy import update
 
-from services.optimizer.errors import StoreReplaced
-from services.optimizer.jobs.job import Command
-from services.optimizer.store.connections.engine import Database, connect, parse_url
-from services.optimizer.store.rows.tables import jobs, metadata
-from services.optimizer.store.schema.backup import backup
-from services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.errors import StoreReplaced
+from gaitswarm.services.optimizer.jobs.job import Command
+from gaitswarm.services.optimizer.store.connections.engine import Database, connect, parse_url
+from gaitswarm.services.optimizer.store.rows.tables import jobs, metadata
+from gaitswarm.services.optimizer.store.schema.backup import backup
+from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
 from tests.store.examples import begun, completed, spec
 
 REPLACED = "removed or replaced while it was open; restart"

@@ -12,12 +12,12 @@ import pytest
 from alembic.script import ScriptDirectory
 from sqlalchemy import text
 
-from services.optimizer.errors import StoreUnavailable
-from services.optimizer.store.connections import engine as engine_module
-from services.optimizer.store.connections.engine import Database, connect, parse_url
-from services.optimizer.store.schema.migrate import lock_for_migration
-from services.optimizer.store.schema.revisions import MIGRATIONS, head
-from services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.errors import StoreUnavailable
+from gaitswarm.services.optimizer.store.connections import engine as engine_module
+from gaitswarm.services.optimizer.store.connections.engine import Database, connect, parse_url
+from gaitswarm.services.optimizer.store.schema.migrate import lock_for_migration
+from gaitswarm.services.optimizer.store.schema.revisions import MIGRATIONS, head
+from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
 from tests.examples.forked import ForkedCommand
 from tests.examples.processes import loaded_by, output
 from tests.store import worker_process
@@ -88,7 +88,8 @@ def test_the_newest_revision_is_the_head_of_all_migrations() -> None:
 
 @pytest.mark.slow
 def test_a_database_is_made_and_opened_without_alembic(tmp_path: Path) -> None:
-    opened = f"from services.runtime import open_store; open_store({str(tmp_path / 'jobs.db')!r})"
+    path = str(tmp_path / "jobs.db")
+    opened = f"from gaitswarm.services.runtime import open_store; open_store({path!r})"
     for _ in range(2):
         assert loaded_by(opened, ["alembic", "sqlalchemy"]) == {"sqlalchemy"}
 

@@ -16,12 +16,12 @@ from typing import Any
 import pytest
 from sqlalchemy import text
 
-from services.optimizer.errors import StoreUnavailable
-from services.optimizer.jobs.job import Job, JobState
-from services.optimizer.run.runner import Runner
-from services.optimizer.store.connections import postgresql
-from services.optimizer.store.connections.engine import Database, connect, parse_url
-from services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.errors import StoreUnavailable
+from gaitswarm.services.optimizer.jobs.job import Job, JobState
+from gaitswarm.services.optimizer.run.runner import Runner
+from gaitswarm.services.optimizer.store.connections import postgresql
+from gaitswarm.services.optimizer.store.connections.engine import Database, connect, parse_url
+from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
 from tests.examples import requirements
 from tests.examples.jobs import Bits, history
 from tests.examples.paths import ROOT

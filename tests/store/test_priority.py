@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from services.optimizer.errors import Conflict, NotFound
-from services.optimizer.jobs.job import Command, JobState
-from services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.errors import Conflict, NotFound
+from gaitswarm.services.optimizer.jobs.job import Command, JobState
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from tests.store.examples import LEASE, Clock, ask, begun, completed, spec
 
 

@@ -13,10 +13,10 @@ from itertools import islice
 import pytest
 from sqlalchemy import text
 
-from services.optimizer.errors import Conflict
-from services.optimizer.jobs.job import Claim, Command, Job, JobState
-from services.optimizer.store.connections.engine import connect, parse_url
-from services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.errors import Conflict
+from gaitswarm.services.optimizer.jobs.job import Claim, Command, Job, JobState
+from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
+from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
 from tests.examples.forked import ForkedCommand
 from tests.examples.processes import output
 from tests.store import worker_process

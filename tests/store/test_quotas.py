@@ -6,11 +6,11 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from services.optimizer.errors import QuotaExceeded
-from services.optimizer.jobs.job import Command, JobState
-from services.optimizer.jobs.quota import Quota
-from services.optimizer.service import JobService
-from services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.errors import QuotaExceeded
+from gaitswarm.services.optimizer.jobs.job import Command, JobState
+from gaitswarm.services.optimizer.jobs.quota import Quota
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from tests.store.examples import spec
 
 TWO = Quota(jobs=2, seconds=1e9)

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from sqlalchemy import Connection
 
-from services.optimizer.errors import InvalidRequest, NotFound
-from services.optimizer.jobs.kinds.identification import IdentificationSpec
-from services.optimizer.service import JobService
-from services.optimizer.store.sql_store import SqlStore
-from services.optimizer.store.statements import recordings as statements
-from services.optimizer.store.statements.recordings import _words
-from sim.identification.recorded_walk import RecordedWalk
-from sim.robot import load_robot
+from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
+from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store.statements import recordings as statements
+from gaitswarm.services.optimizer.store.statements.recordings import _words
+from gaitswarm.sim.identification.recorded_walk import RecordedWalk
+from gaitswarm.sim.robot import load_robot
 from tests.examples.walks import PUBLISHED_A, SHORT_WALK
 from tests.store.examples import Clock
 

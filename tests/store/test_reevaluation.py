@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from services.optimizer.jobs.iteration import CompletedIteration, Reevaluation
-from services.optimizer.jobs.job import Claim
-from services.optimizer.store.sql_store import SqlStore
-from sim.outcome import Status
+from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration, Reevaluation
+from gaitswarm.services.optimizer.jobs.job import Claim
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.sim.outcome import Status
 from tests.store.examples import LEASE, ask, completed, spec
 
 NAN = math.nan

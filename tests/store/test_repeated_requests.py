@@ -7,13 +7,13 @@ from collections.abc import Callable
 import pytest
 from sqlalchemy import text
 
-from services.optimizer.errors import IdempotencyConflict
-from services.optimizer.jobs.kinds import walks
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.preference import PREFERENCES
-from services.optimizer.store.connections.engine import connect, parse_url
-from services.optimizer.store.sql_store import SqlStore
-from sim.scenario import Scenario, find_scenario
+from gaitswarm.services.optimizer.errors import IdempotencyConflict
+from gaitswarm.services.optimizer.jobs.kinds import walks
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
+from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.sim.scenario import Scenario, find_scenario
 
 REQUEST = {"controller": "pi", "scenarios": ["1", "2"], "preference": "A"}
 

@@ -9,13 +9,13 @@ from typing import Any
 
 import pytest
 
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.job import Job, JobState, Progress
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.time_left import TimeLeft, recent_pace, time_left
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
 from gaitswarm.settings import Settings
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.job import Job, JobState, Progress
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.time_left import TimeLeft, recent_pace, time_left
-from services.optimizer.service import JobService
-from services.optimizer.store.sql_store import SqlStore, open_store
 from tests.examples.walks import SHORT_WALK
 from tests.store.examples import spec
 

@@ -11,10 +11,10 @@ from contextlib import closing
 import httpx2
 import pytest
 
-from services.optimizer.errors import StoreUnavailable
-from services.optimizer.jobs.job import Claim
-from services.optimizer.service import JobService
-from services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.errors import StoreUnavailable
+from gaitswarm.services.optimizer.jobs.job import Claim
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
 from tests.examples.processes import within
 from tests.examples.servers import Server
 from tests.store.examples import ask, begun, completed

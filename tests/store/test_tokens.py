@@ -8,10 +8,10 @@ from contextlib import closing
 import pytest
 from sqlalchemy import text
 
-from services.optimizer.access import Scope, Token
-from services.optimizer.errors import InvalidRequest, NotFound
-from services.optimizer.store.connections.engine import connect, parse_url
-from services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.access import Scope, Token
+from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
+from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
+from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
 from tests.store.examples import Clock, spec
 
 

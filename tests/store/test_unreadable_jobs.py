@@ -9,13 +9,13 @@ from typing import Any
 import pytest
 from sqlalchemy import Text, cast, select, text
 
-from services.optimizer.errors import Conflict, IdempotencyConflict, Unreadable
-from services.optimizer.jobs.job import Command, Job, JobOrder, JobState
-from services.optimizer.jobs.kinds.identification import IdentificationSpec
-from services.optimizer.service import JobService
-from services.optimizer.store.connections.engine import connect, parse_url
-from services.optimizer.store.rows.tables import jobs
-from services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.errors import Conflict, IdempotencyConflict, Unreadable
+from gaitswarm.services.optimizer.jobs.job import Command, Job, JobOrder, JobState
+from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
+from gaitswarm.services.optimizer.store.rows.tables import jobs
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from tests.examples.hostile import TOML, URDF, chain
 from tests.store.examples import LEASE, Clock, begun, completed, spec
 from tests.store.test_recordings import recording

@@ -11,14 +11,14 @@ from alembic import command
 from alembic.config import Config
 from sqlalchemy import Connection, text
 
-from services.optimizer.errors import Conflict, StoreUnavailable
-from services.optimizer.jobs.job import LONGEST_LEASE_SECONDS
-from services.optimizer.store.connections.engine import connect, parse_url
-from services.optimizer.store.rows.tables import metadata
-from services.optimizer.store.schema.in_use import exclusive
-from services.optimizer.store.schema.migrate import create, upgrade
-from services.optimizer.store.schema.revisions import MIGRATIONS, head, read_revision
-from services.optimizer.store.sql_store import open_store
+from gaitswarm.services.optimizer.errors import Conflict, StoreUnavailable
+from gaitswarm.services.optimizer.jobs.job import LONGEST_LEASE_SECONDS
+from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
+from gaitswarm.services.optimizer.store.rows.tables import metadata
+from gaitswarm.services.optimizer.store.schema.in_use import exclusive
+from gaitswarm.services.optimizer.store.schema.migrate import create, upgrade
+from gaitswarm.services.optimizer.store.schema.revisions import MIGRATIONS, head, read_revision
+from gaitswarm.services.optimizer.store.sql_store import open_store
 from tests.examples.forked import ForkedCommand
 from tests.examples.processes import output
 from tests.store import worker_process
@@ -186,7 +186,7 @@ def test_a_process_that_outlived_an_upgrade_is_refused_when_it_connects_again(
 
 
 def test_nobody_comes_in_during_an_upgrade(fresh_url: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("services.optimizer.store.connections.engine.BUSY_SECONDS", 0.2)
+    monkeypatch.setattr("gaitswarm.services.optimizer.store.connections.engine.BUSY_SECONDS", 0.2)
     open_store(fresh_url).close()
     with (
         closing(connect(parse_url(fresh_url), for_migration=True)) as database,

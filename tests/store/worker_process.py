@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import sys
 
-from services.optimizer.store.connections.engine import connect, parse_url
-from services.optimizer.store.schema import revisions
-from services.optimizer.store.schema.in_use import admit
-from services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
+from gaitswarm.services.optimizer.store.schema import revisions
+from gaitswarm.services.optimizer.store.schema.in_use import admit
+from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
 from tests.store.examples import ask, completed
 
 PARTICLES = 25

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from services.optimizer.jobs.iteration import Ask, CompletedIteration
-from services.optimizer.jobs.job import Job
-from services.optimizer.jobs.kinds.tournament import TournamentSpec
-from services.optimizer.service import JobService
-from sim.outcome import Outcome, Status
+from gaitswarm.services.optimizer.jobs.iteration import Ask, CompletedIteration
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.kinds.tournament import TournamentSpec
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.sim.outcome import Outcome, Status
 from tests.tournament.problems import tournament
 
 CHECKPOINTS = (1, 10, 40)

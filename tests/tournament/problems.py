@@ -7,10 +7,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.jobs.documents import SPECS
-from services.optimizer.jobs.kinds.tournament import TournamentSpec
-from services.optimizer.search.space import Axis, Space
-from services.optimizer.tournament.race import Evaluate, Search
+from gaitswarm.services.optimizer.jobs.documents import SPECS
+from gaitswarm.services.optimizer.jobs.kinds.tournament import TournamentSpec
+from gaitswarm.services.optimizer.search.space import Axis, Space
+from gaitswarm.services.optimizer.tournament.race import Evaluate, Search
 
 Floats = NDArray[np.float64]
 

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from services.optimizer.analysis.ranks import average_ranks, spearman
-from services.optimizer.analysis.tournaments.tournament import (
+from gaitswarm.services.optimizer.analysis.ranks import average_ranks, spearman
+from gaitswarm.services.optimizer.analysis.tournaments.tournament import (
     Runs,
     data_profile,
     expected_running_time,

@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-import cli.tournament.report
-from cli.tournament.plan import PRESETS, Size, tournament_jobs
-from cli.tournament.runs import read_runs
-from services.optimizer.jobs.kinds.problem import TuningProblem
-from services.optimizer.jobs.preference import PREFERENCES
-from services.optimizer.tournament.methods import method_names
+import gaitswarm.cli.tournament.report
+from gaitswarm.cli.tournament.plan import PRESETS, Size, tournament_jobs
+from gaitswarm.cli.tournament.runs import read_runs
+from gaitswarm.services.optimizer.jobs.kinds.problem import TuningProblem
+from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
+from gaitswarm.services.optimizer.tournament.methods import method_names
 from tests.examples.commands import Result, run_command
 from tests.examples.forked import ForkedCommand
 from tests.examples.processes import output
@@ -51,7 +51,7 @@ def numbers(folder: Path) -> dict[tuple[str, str], tuple[bytes, bytes]]:
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Reports without pictures, which take longer than the runs."""
-    monkeypatch.setattr(cli.tournament.report, "_picture", lambda _: "")
+    monkeypatch.setattr(gaitswarm.cli.tournament.report, "_picture", lambda _: "")
 
 
 def jobs(folder: Path) -> dict[str, int]:

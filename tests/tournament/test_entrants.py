@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 
 from gaitswarm.requests.tournament import run_problem, run_standings, run_tournaments
-from services.optimizer.errors import Conflict, InvalidRequest, NotFound
-from services.optimizer.jobs.job import Command
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.provenance import job_provenance
-from services.optimizer.service import JobService
-from services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, NotFound
+from gaitswarm.services.optimizer.jobs.job import Command
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.provenance import job_provenance
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from tests.tournament.examples import entrant, submitted
 
 

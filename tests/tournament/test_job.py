@@ -13,18 +13,22 @@ from multiprocessing import get_context
 import numpy as np
 import pytest
 
-from services.optimizer.errors import EvaluatorUnavailable
-from services.optimizer.jobs.job import JobState
-from services.optimizer.jobs.kinds.race_case import RaceCase
-from services.optimizer.jobs.kinds.tournament import TournamentSpec
-from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped, Evaluator
-from services.optimizer.service import JobService
-from services.optimizer.store.port.base import Store
-from services.runtime import open_evaluator, run_embedded
-from services.worker.dispatch import Dispatcher
-from sim.case import LongCase
-from sim.errors import SimulationError
-from sim.provenance import provenance_of
+from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
+from gaitswarm.services.optimizer.jobs.job import JobState
+from gaitswarm.services.optimizer.jobs.kinds.race_case import RaceCase
+from gaitswarm.services.optimizer.jobs.kinds.tournament import TournamentSpec
+from gaitswarm.services.optimizer.run.evaluator import (
+    EvaluationRequest,
+    EvaluationStopped,
+    Evaluator,
+)
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.runtime import open_evaluator, run_embedded
+from gaitswarm.services.worker.dispatch import Dispatcher
+from gaitswarm.sim.case import LongCase
+from gaitswarm.sim.errors import SimulationError
+from gaitswarm.sim.provenance import provenance_of
 from tests.examples.jobs import history
 from tests.examples.walks import SHORT_WALK
 from tests.tournament.problems import tournament
@@ -140,7 +144,7 @@ def test_a_worker_with_other_search_code_runs_nothing() -> None:
 def test_a_run_that_breaks_fails_the_job_with_its_reason(
     store: Store, evaluator: Evaluator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from services.optimizer.jobs.kinds import race_case as module
+    from gaitswarm.services.optimizer.jobs.kinds import race_case as module
 
     def broken(*_: object) -> None:
         raise ZeroDivisionError("the simplex is flat")

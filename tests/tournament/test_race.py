@@ -8,9 +8,9 @@ from itertools import product
 import numpy as np
 import pytest
 
-from services.optimizer.search.method import missing_of
-from services.optimizer.search.space import Axis, Space
-from services.optimizer.tournament.methods import (
+from gaitswarm.services.optimizer.search.method import missing_of
+from gaitswarm.services.optimizer.search.space import Axis, Space
+from gaitswarm.services.optimizer.tournament.methods import (
     drawn_settings,
     libraries_of,
     method_names,
@@ -19,15 +19,15 @@ from services.optimizer.tournament.methods import (
     search_of,
     settings_models,
 )
-from services.optimizer.tournament.race import (
+from gaitswarm.services.optimizer.tournament.race import (
     Run,
     RunAbandoned,
     Terms,
     default_checkpoints,
     race,
 )
-from services.optimizer.tournament.rivals import RIVALS
-from sim.variables import Variable
+from gaitswarm.services.optimizer.tournament.rivals import RIVALS
+from gaitswarm.sim.variables import Variable
 from tests.tournament.problems import MIXED, Bowl, script
 
 LINE = Space([Axis(-1.0, 3.0)])

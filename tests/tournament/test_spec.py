@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.documents import SPECS
-from services.optimizer.jobs.kinds.problem import TuningProblem
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.spec import create_optimizer
-from services.optimizer.tournament.rivals import RIVALS, Rival
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.documents import SPECS
+from gaitswarm.services.optimizer.jobs.kinds.problem import TuningProblem
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.spec import create_optimizer
+from gaitswarm.services.optimizer.tournament.rivals import RIVALS, Rival
 from tests.examples.walks import SHORT_WALK
 from tests.tournament.problems import tournament
 

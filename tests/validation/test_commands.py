@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from cli.main import run
-from sim.measurement.measured_csv import format_measured_log
-from sim.robot import DEFAULT_ROBOT
-from sim.validation.comparison import compare
-from sim.validation.measures import Tolerance
+from gaitswarm.cli.main import run
+from gaitswarm.sim.measurement.measured_csv import format_measured_log
+from gaitswarm.sim.robot import DEFAULT_ROBOT
+from gaitswarm.sim.validation.comparison import compare
+from gaitswarm.sim.validation.measures import Tolerance
 from tests.examples.commands import Result, run_command
 from tests.examples.paths import QUADRUPED
 from tests.validation.conftest import TwoWalks

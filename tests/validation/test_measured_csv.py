@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sim.errors import MeasuredLogError, SimulationInputError
-from sim.measurement.measured_csv import format_measured_log, parse_measured_log
-from sim.measurement.measured_log import MeasuredLog, Quantity
-from sim.robot import Robot
+from gaitswarm.sim.errors import MeasuredLogError, SimulationInputError
+from gaitswarm.sim.measurement.measured_csv import format_measured_log, parse_measured_log
+from gaitswarm.sim.measurement.measured_log import MeasuredLog, Quantity
+from gaitswarm.sim.robot import Robot
 from tests.validation.walks import renamed_robot, szabadka, walking_log, without_supplements
 
 ROWS = 120

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim.errors import MeasuredLogError
-from sim.measurement.synchronise import find_lag, synchronise
+from gaitswarm.sim.errors import MeasuredLogError
+from gaitswarm.sim.measurement.synchronise import find_lag, synchronise
 from tests.validation.walks import CYCLE, CYCLE_TIME, renamed_robot, szabadka, walking_log
 
 

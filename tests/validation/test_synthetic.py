@@ -7,18 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sim.errors import SimulationInputError
-from sim.measurement.measured_csv import parse_measured_log
-from sim.measurement.measured_log import Quantity, simulated_log
-from sim.measurement.synthetic import (
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.measurement.measured_csv import parse_measured_log
+from gaitswarm.sim.measurement.measured_log import Quantity, simulated_log
+from gaitswarm.sim.measurement.synthetic import (
     Instruments,
     Perturbation,
     converted,
     perturbed,
     synthetic_log,
 )
-from sim.validation.comparison import compare
-from sim.validation.measures import Tolerance
+from gaitswarm.sim.validation.comparison import compare
+from gaitswarm.sim.validation.measures import Tolerance
 from tests.examples.walks import PUBLISHED_A, logged_walk
 from tests.validation.conftest import TwoWalks
 

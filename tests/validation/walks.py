@@ -7,8 +7,8 @@ from importlib import resources
 
 import numpy as np
 
-from sim.measurement.measured_log import MeasuredLog
-from sim.robot import Robot, load_robot, parse_robot
+from gaitswarm.sim.measurement.measured_log import MeasuredLog
+from gaitswarm.sim.robot import Robot, load_robot, parse_robot
 
 CYCLE_TIME = 0.5
 CYCLE = 250
@@ -21,7 +21,7 @@ def szabadka() -> Robot:
 
 def renamed_robot() -> Robot:
     """The same robot with other names of legs, and thus of joints."""
-    folder = resources.files("sim.robot") / "szabadka2"
+    folder = resources.files("gaitswarm.sim.robot") / "szabadka2"
     toml, urdf = (
         (folder / name).read_text(encoding="utf-8").replace("right_", "R-").replace("left_", "L-")
         for name in ("robot.toml", "robot.urdf")

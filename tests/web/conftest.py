@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 from playwright.sync_api import sync_playwright
 
-from api.page import FOLDER, is_built
-from services.optimizer.service import JobService
-from services.optimizer.store.sql_store import SqlStore
+from gaitswarm.api.page import FOLDER, is_built
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from tests.examples import requirements
 from tests.examples.jobs import SMALL_SPEC
 from tests.examples.servers import QUICK_EVENTS, Server, ServerProcess

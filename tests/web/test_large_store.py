@@ -26,14 +26,14 @@ from sqlalchemy import (
     update,
 )
 
-from api.page import FOLDER
 from benchmarks.large_store import PARTICLES, fill
 from benchmarks.page import measure
-from services.optimizer.service import JobService
-from services.optimizer.store.connections.engine import connect, parse_url
-from services.optimizer.store.rows.tables import evaluations, iterations, jobs
-from services.optimizer.store.statements.records import ID_ALPHABET
-from services.runtime import open_store
+from gaitswarm.api.page import FOLDER
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
+from gaitswarm.services.optimizer.store.rows.tables import evaluations, iterations, jobs
+from gaitswarm.services.optimizer.store.statements.records import ID_ALPHABET
+from gaitswarm.services.runtime import open_store
 from tests.examples.servers import Server
 from tests.web.job_page import wait_for_iteration
 from tests.web.pages import Pages

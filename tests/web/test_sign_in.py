@@ -7,8 +7,8 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import expect
 
-from services.optimizer.access import Scope
-from services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.access import Scope
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from tests.examples.servers import Server
 from tests.web.visit import Visit
 

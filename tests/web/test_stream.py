@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import expect
 
-from services.optimizer.jobs.job import JobState
-from services.runtime import open_store
+from gaitswarm.services.optimizer.jobs.job import JobState
+from gaitswarm.services.runtime import open_store
 from tests.examples.servers import Server, ServerProcess
 from tests.web.conftest import SMALL_JOB
 from tests.web.job_page import expect_state, job_element, shown_iteration, wait_for_iteration

@@ -19,15 +19,15 @@ from unittest.mock import patch
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.errors import EvaluatorUnavailable
-from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped
-from services.worker.cluster import nodes, pump, ray_nodes
-from services.worker.cluster.shares import REPORT_SECONDS
-from services.worker.ray_evaluator import RayEvaluator
-from sim.case import Walk
-from sim.kernel.walk import Precision
-from sim.outcome import Objective, Outcome
-from sim.robot import RobotSource
+from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
+from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped
+from gaitswarm.services.worker.cluster import nodes, pump, ray_nodes
+from gaitswarm.services.worker.cluster.shares import REPORT_SECONDS
+from gaitswarm.services.worker.ray_evaluator import RayEvaluator
+from gaitswarm.sim.case import Walk
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.outcome import Objective, Outcome
+from gaitswarm.sim.robot import RobotSource
 from tests.examples.processes import eventually
 from tests.worker.requests import bits, never
 
@@ -106,14 +106,14 @@ def connect(address: str, patience: float = nodes.PATIENCE_SECONDS) -> None:
         vars(module)["PATIENCE_SECONDS"] = patience
     # Ray lets workers import from where a driver was started, here a checkout.
     os.chdir("/")
-    logging.getLogger("services").addHandler(logging.StreamHandler(_log))
+    logging.getLogger("gaitswarm.services").addHandler(logging.StreamHandler(_log))
     _evaluator = RayEvaluator(address)
     _evaluator.wait_until_open(never)
 
 
 def connect_from_elsewhere(address: str) -> None:
     """As from a machine that is no node of the cluster."""
-    with patch("services.worker.ray_session.comes_here", lambda _host, _port: False):
+    with patch("gaitswarm.services.worker.ray_session.comes_here", lambda _host, _port: False):
         connect(address)
 
 

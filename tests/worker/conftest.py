@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import pytest
 
-from services.optimizer.run.evaluator import Evaluator
-from services.worker.hybrid import HybridEvaluator
-from services.worker.in_process import InProcessEvaluator
-from services.worker.ray_evaluator import RayEvaluator
+from gaitswarm.services.optimizer.run.evaluator import Evaluator
+from gaitswarm.services.worker.hybrid import HybridEvaluator
+from gaitswarm.services.worker.in_process import InProcessEvaluator
+from gaitswarm.services.worker.ray_evaluator import RayEvaluator
 
 
 @pytest.fixture(scope="session")

@@ -9,11 +9,11 @@ import threading
 from dataclasses import replace
 from unittest.mock import patch
 
-from services.optimizer.errors import EvaluatorUnavailable
-from services.optimizer.run.evaluator import EvaluationStopped
-from services.worker.ray_evaluator import RayEvaluator
-from services.worker.ray_session import RaySession, open_ray
-from sim.case import Walk
+from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
+from gaitswarm.services.optimizer.run.evaluator import EvaluationStopped
+from gaitswarm.services.worker.ray_evaluator import RayEvaluator
+from gaitswarm.services.worker.ray_session import RaySession, open_ray
+from gaitswarm.sim.case import Walk
 from tests.worker.cluster_runner import Sleep
 from tests.worker.processes import descendants
 from tests.worker.requests import bits, never, request
@@ -36,7 +36,7 @@ def main(ending: str) -> None:
         for process in descendants(os.getpid()):
             if "gcs_server" in process.title:
                 os.kill(process.pid, signal.SIGKILL)
-        with patch("services.worker.cluster.pump.PULSE_SECONDS", 0.3):
+        with patch("gaitswarm.services.worker.cluster.pump.PULSE_SECONDS", 0.3):
             say(until_lost(evaluator))
         say(told_to_stop_while_reopening(evaluator))
         assert bits(evaluator.evaluate(request(2), never)) == walked
@@ -54,7 +54,7 @@ def told_to_stop_while_reopening(evaluator: RayEvaluator) -> str:
         may_open.wait()
         return open_ray(address, cpus=cpus)
 
-    with patch("services.worker.ray_evaluator.open_ray", open_slowly):
+    with patch("gaitswarm.services.worker.ray_evaluator.open_ray", open_slowly):
         try:
             evaluator.evaluate(request(2), reopening.is_set)
         except EvaluationStopped:

@@ -10,8 +10,8 @@ from dataclasses import replace
 from pathlib import Path
 from unittest.mock import Mock, patch
 
-from services.worker.hybrid import HybridEvaluator
-from services.worker.tasks import Task
+from gaitswarm.services.worker.hybrid import HybridEvaluator
+from gaitswarm.services.worker.tasks import Task
 from tests.examples.processes import eventually, within
 from tests.worker.processes import descendants
 from tests.worker.requests import bits, never, request, walked_at_once
@@ -51,7 +51,7 @@ def take_over(evaluator: HybridEvaluator, then: str) -> None:
             os.kill(process.pid, signal.SIGKILL)
 
     # Not asked of `on_ray`, which may say so between two requests and be true again at the next.
-    with patch("services.worker.cluster.pump.PULSE_SECONDS", 0.3):
+    with patch("gaitswarm.services.worker.cluster.pump.PULSE_SECONDS", 0.3):
         eventually(lambda: walked_here() > 0)
     eventually(lambda: evaluator.on_ray)
     assert walked_here() == 0

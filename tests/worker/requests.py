@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from services.optimizer.run.evaluator import EvaluationRequest
-from sim.case import Walk
-from sim.outcome import Outcome
-from sim.provenance import provenance_of
-from sim.scenario import Scenario
-from sim.simulate import simulate
+from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
+from gaitswarm.sim.case import Walk
+from gaitswarm.sim.outcome import Outcome
+from gaitswarm.sim.provenance import provenance_of
+from gaitswarm.sim.scenario import Scenario
+from gaitswarm.sim.simulate import simulate
 from tests.examples.walks import SHORT_WALK, UPHILL_WALK
 
 SCENARIOS = (

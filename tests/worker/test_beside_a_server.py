@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from services.runtime import open_evaluator, open_runtime
-from services.worker import EvaluatorKind
+from gaitswarm.services.runtime import open_evaluator, open_runtime
+from gaitswarm.services.worker import EvaluatorKind
 from tests.examples.processes import eventually
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="threads have no niceness here")

@@ -11,15 +11,15 @@ from pathlib import Path
 
 import pytest
 
-from services.optimizer.errors import InvalidRequest, KilledWorker
-from services.optimizer.jobs.priority import weight
-from services.runtime import open_evaluator
-from services.worker import joining
-from services.worker.cluster.handshake import Introduction, fingerprint, introducer
-from services.worker.cluster.nodes import Wanted
-from services.worker.cluster.shares import ledger, share
-from sim.case import Walk
-from tests.examples.paths import ROOT
+from gaitswarm.services.optimizer.errors import InvalidRequest, KilledWorker
+from gaitswarm.services.optimizer.jobs.priority import weight
+from gaitswarm.services.runtime import open_evaluator
+from gaitswarm.services.worker import joining
+from gaitswarm.services.worker.cluster.handshake import Introduction, fingerprint, introducer
+from gaitswarm.services.worker.cluster.nodes import Wanted
+from gaitswarm.services.worker.cluster.shares import ledger, share
+from gaitswarm.sim.case import Walk
+from tests.examples.paths import ROOT, copy_package
 from tests.examples.processes import eventually, within
 from tests.worker import cluster_host, cluster_runner
 from tests.worker.cluster_host import Process
@@ -74,9 +74,8 @@ def alone() -> list[tuple[bytes, bytes]]:
 
 def other_version(folder: Path) -> dict[str, str]:
     """The environment of a node that has an older gaitswarm, whose walks differ."""
-    for package in ("sim", "services", "tests"):
-        shutil.copytree(ROOT / package, folder / package, ignore=shutil.ignore_patterns("__py*"))
-    changed = folder / "sim" / "outcome.py"
+    shutil.copytree(ROOT / "tests", folder / "tests", ignore=shutil.ignore_patterns("__py*"))
+    changed = copy_package(folder) / "sim" / "outcome.py"
     changed.write_text(changed.read_text(encoding="utf-8") + "# older\n", encoding="utf-8")
     told = folder / "gaitswarm-0.0.9.dist-info"
     told.mkdir()

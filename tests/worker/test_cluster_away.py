@@ -13,10 +13,10 @@ from typing import Any, Final
 
 import pytest
 
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.store.sql_store import open_store
-from services.runtime import run_embedded
-from services.worker.in_process import InProcessEvaluator
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.store.sql_store import open_store
+from gaitswarm.services.runtime import run_embedded
+from gaitswarm.services.worker.in_process import InProcessEvaluator
 from tests.examples.jobs import LONG_SPEC, SMALL_SPEC
 from tests.examples.processes import COMMAND_LINE, eventually, line_with, start_python
 from tests.examples.servers import ServerProcess

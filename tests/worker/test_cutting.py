@@ -10,13 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.worker.cutting import Chunk, cut
-from services.worker.pace import Pace, TaskTime
-from services.worker.tasks import Task
-from sim.controllers.fixed_point import CONTROL_PERIOD
-from sim.kernel.walk import LaneUse
-from sim.scenario import SCENARIOS
-from sim.simulate import lanes
+from gaitswarm.services.worker.cutting import Chunk, cut
+from gaitswarm.services.worker.pace import Pace, TaskTime
+from gaitswarm.services.worker.tasks import Task
+from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
+from gaitswarm.sim.kernel.walk import LaneUse
+from gaitswarm.sim.scenario import SCENARIOS
+from gaitswarm.sim.simulate import lanes
 from tests.examples.walks import short_walk
 from tests.worker.requests import request
 

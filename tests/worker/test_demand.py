@@ -11,7 +11,7 @@ from unittest.mock import patch
 
 import pytest
 
-from services.worker.cluster.demand import Demand
+from gaitswarm.services.worker.cluster.demand import Demand
 
 
 class RayError(Exception):

@@ -10,16 +10,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from services.optimizer.errors import KilledWorker, ProvenanceChanged
-from services.optimizer.jobs.priority import weight
-from services.optimizer.run.evaluator import EvaluationRequest
-from services.worker.cutting import Part
-from services.worker.dispatch import Dispatcher, Work
-from services.worker.tasks import Answer, Task
-from sim.case import Case, Walk
-from sim.kernel.walk import Precision
-from sim.outcome import N_OBJECTIVES, Outcome, Status
-from sim.provenance import provenance_of
+from gaitswarm.services.optimizer.errors import KilledWorker, ProvenanceChanged
+from gaitswarm.services.optimizer.jobs.priority import weight
+from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
+from gaitswarm.services.worker.cutting import Part
+from gaitswarm.services.worker.dispatch import Dispatcher, Work
+from gaitswarm.services.worker.tasks import Answer, Task
+from gaitswarm.sim.case import Case, Walk
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.outcome import N_OBJECTIVES, Outcome, Status
+from gaitswarm.sim.provenance import provenance_of
 from tests.examples.processes import eventually
 from tests.worker.requests import SCENARIOS, request, walked_at_once
 

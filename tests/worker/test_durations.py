@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from services.worker.cutting import Chunk, Part
-from services.worker.durations import CaseTime, Durations, costs_of
+from gaitswarm.services.worker.cutting import Chunk, Part
+from gaitswarm.services.worker.durations import CaseTime, Durations, costs_of
 from tests.worker.requests import SCENARIOS, request
 
 PACE = {"level": 0.5, "slope": 2.0, "turn": 0.2}

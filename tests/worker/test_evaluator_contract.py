@@ -10,16 +10,16 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from services.optimizer.errors import EvaluatorUnavailable, ProvenanceChanged
-from services.optimizer.run.evaluator import EvaluationStopped, Evaluator
-from services.worker.in_process import InProcessEvaluator
-from sim import simulate
-from sim.case import Walk
-from sim.errors import KernelBuildError, SimulationInputError
-from sim.kernel.walk import Precision
-from sim.outcome import Outcome
-from sim.robot import RobotVariant
-from sim.scenario import Scenario
+from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, ProvenanceChanged
+from gaitswarm.services.optimizer.run.evaluator import EvaluationStopped, Evaluator
+from gaitswarm.services.worker.in_process import InProcessEvaluator
+from gaitswarm.sim import simulate
+from gaitswarm.sim.case import Walk
+from gaitswarm.sim.errors import KernelBuildError, SimulationInputError
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.outcome import Outcome
+from gaitswarm.sim.robot import RobotVariant
+from gaitswarm.sim.scenario import Scenario
 from tests.examples.walks import short_walk
 from tests.worker.requests import SCENARIOS, bits, never, request, walked_at_once
 

@@ -8,7 +8,7 @@ from itertools import combinations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.worker.fair_queue import FairQueue
+from gaitswarm.services.worker.fair_queue import FairQueue
 
 
 def drain(queue: FairQueue[str]) -> list[str]:

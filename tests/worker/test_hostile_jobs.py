@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from services.optimizer.jobs.job import JobState
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.run.runner import Runner
-from services.optimizer.store.sql_store import SqlStore
-from services.worker.in_process import InProcessEvaluator
-from sim.errors import ProcessEnded
-from sim.kernel.compiled import derivation
-from sim.robot import RobotFiles
+from gaitswarm.services.optimizer.jobs.job import JobState
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.run.runner import Runner
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.worker.in_process import InProcessEvaluator
+from gaitswarm.sim.errors import ProcessEnded
+from gaitswarm.sim.kernel.compiled import derivation
+from gaitswarm.sim.robot import RobotFiles
 from tests.examples.hostile import TOML, URDF
 from tests.examples.processes import eventually
 

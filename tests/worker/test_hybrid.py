@@ -12,11 +12,11 @@ from unittest.mock import patch
 
 import pytest
 
-from services.optimizer.errors import EvaluatorUnavailable
-from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped
-from services.worker.hybrid import HybridEvaluator
-from services.worker.ray_evaluator import RayEvaluator
-from services.worker.ray_session import RaySession
+from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
+from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped
+from gaitswarm.services.worker.hybrid import HybridEvaluator
+from gaitswarm.services.worker.ray_evaluator import RayEvaluator
+from gaitswarm.services.worker.ray_session import RaySession
 from tests.examples.processes import eventually, python
 from tests.examples.walks import short_walk
 from tests.worker.requests import bits, never, request, walked_at_once
@@ -28,7 +28,7 @@ def first_of_many(count: int = 9) -> EvaluationRequest:
 
 @contextmanager
 def ray_opened_by(opening: object) -> Iterator[None]:
-    with patch("services.worker.ray_evaluator.open_ray", opening):
+    with patch("gaitswarm.services.worker.ray_evaluator.open_ray", opening):
         yield
 
 
@@ -84,7 +84,9 @@ def test_the_time_that_a_kernel_takes_to_build_says_nothing_of_how_long_a_job_is
     opening: Opening, hybrid: HybridEvaluator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     takes = iter([1.0])
-    monkeypatch.setattr("sim.simulate.prepare", lambda _, precision: time.sleep(next(takes, 0.0)))
+    monkeypatch.setattr(
+        "gaitswarm.sim.simulate.prepare", lambda _, precision: time.sleep(next(takes, 0.0))
+    )
     hybrid.evaluate(replace(request(1), iterations_left=60), never)
     assert opening.count == 0
 

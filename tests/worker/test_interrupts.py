@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from services.worker.cluster.interrupts import interrupted_outside_imports
+from gaitswarm.services.worker.cluster.interrupts import interrupted_outside_imports
 
 MODULE = "gaitswarm_interrupted_module"
 LINES = "import signal\nfirst = 1\nsignal.raise_signal(signal.SIGINT)\nlast = 2\n"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from services.worker.cluster.nodes import Node, OwnNode, Wanted, chosen
+from gaitswarm.services.worker.cluster.nodes import Node, OwnNode, Wanted, chosen
 
 WANTED = Wanted(frozenset(), "")
 OTHER = Wanted(frozenset(), "other")

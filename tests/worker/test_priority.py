@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from services.worker.ray_evaluator import RayEvaluator
+from gaitswarm.services.worker.ray_evaluator import RayEvaluator
 from tests.examples.paths import ROOT
 from tests.worker.processes import walkers
 from tests.worker.requests import never, request
@@ -18,7 +18,7 @@ _TELLS = """
 import os
 from pathlib import Path
 from unittest.mock import patch
-from services.worker.cluster.priority import Priority
+from gaitswarm.services.worker.cluster.priority import Priority
 
 def tell():
     print(os.getsid(0) == os.getpid(), os.getpgid(0) == os.getpid(), end=" ")

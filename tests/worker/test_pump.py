@@ -13,14 +13,14 @@ from typing import Any, cast
 
 import pytest
 
-from services.optimizer.errors import KilledWorker
-from services.optimizer.run.evaluator import EvaluationStopped
-from services.worker.cluster import pump
-from services.worker.cluster.nodes import LOOK_AHEAD, Node, OwnNode, Wanted, chosen
-from services.worker.cluster.pump import Pump
-from services.worker.dispatch import Dispatcher
-from services.worker.ray_session import RaySession
-from services.worker.tries import MOST_KILLED
+from gaitswarm.services.optimizer.errors import KilledWorker
+from gaitswarm.services.optimizer.run.evaluator import EvaluationStopped
+from gaitswarm.services.worker.cluster import pump
+from gaitswarm.services.worker.cluster.nodes import LOOK_AHEAD, Node, OwnNode, Wanted, chosen
+from gaitswarm.services.worker.cluster.pump import Pump
+from gaitswarm.services.worker.dispatch import Dispatcher
+from gaitswarm.services.worker.ray_session import RaySession
+from gaitswarm.services.worker.tries import MOST_KILLED
 from tests.examples.processes import eventually
 from tests.worker.requests import SCENARIOS, request
 

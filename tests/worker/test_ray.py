@@ -22,13 +22,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from services.optimizer.errors import EvaluatorUnavailable, KilledWorker
-from services.optimizer.run.evaluator import EvaluationStopped
-from services.worker.ray_evaluator import RayEvaluator
-from services.worker.tasks import transportable
-from sim.case import Case
-from sim.errors import SimulationError, SimulationInputError, UnreachablePose
-from sim.outcome import Outcome
+from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, KilledWorker
+from gaitswarm.services.optimizer.run.evaluator import EvaluationStopped
+from gaitswarm.services.worker.ray_evaluator import RayEvaluator
+from gaitswarm.services.worker.tasks import transportable
+from gaitswarm.sim.case import Case
+from gaitswarm.sim.errors import SimulationError, SimulationInputError, UnreachablePose
+from gaitswarm.sim.outcome import Outcome
 from tests.examples.paths import ROOT
 from tests.examples.processes import output, within
 from tests.worker.processes import Process, descendants, walkers
@@ -95,7 +95,7 @@ def test_what_ray_tells_of_its_workers_is_logged_and_not_written_among_a_command
     capfd: pytest.CaptureFixture[str],
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    caplog.set_level(logging.INFO, logger="services.worker.ray_session")
+    caplog.set_level(logging.INFO, logger="gaitswarm.services.worker.ray_session")
     sound = request(2)
     deadly = Deadly(sound.cases[0], tmp_path / "deaths")
     with pytest.raises(KilledWorker):

@@ -27,7 +27,7 @@ def folder() -> Iterator[Path]:
 
 def is_alive(port: int) -> bool:
     """As a probe of liveness finds it."""
-    return python("-m", "services.worker.joining", str(port)).returncode == 0
+    return python("-m", "gaitswarm.services.worker.joining", str(port)).returncode == 0
 
 
 @pytest.mark.slow
@@ -37,7 +37,7 @@ def test_a_node_whose_raylet_ends_by_itself_ends_with_an_error_and_all_its_proce
 ) -> None:
     port = free_port()
     node = start_python(
-        *("-m", "services.worker.ray_node", "--head", f"--port={port}", "--num-cpus=0"),
+        *("-m", "gaitswarm.services.worker.ray_node", "--head", f"--port={port}", "--num-cpus=0"),
         *("--include-dashboard=false", "--include-log-monitor=false"),
         f"--object-store-memory={80 << 20}",
         environment=cluster_host.ray_environment(folder),

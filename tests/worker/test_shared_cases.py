@@ -11,10 +11,10 @@ from unittest.mock import Mock, patch
 
 import pytest
 
-from services.worker.cluster.shared_cases import CaseShelf, run_sent, sent
-from services.worker.cutting import Part
-from services.worker.tasks import Answer, Failure, Task
-from sim.case import Case
+from gaitswarm.services.worker.cluster.shared_cases import CaseShelf, run_sent, sent
+from gaitswarm.services.worker.cutting import Part
+from gaitswarm.services.worker.tasks import Answer, Failure, Task
+from gaitswarm.sim.case import Case
 from tests.worker.requests import bits, request, walked_at_once
 
 WANTED = request(4)
@@ -113,7 +113,10 @@ def test_a_worker_ends_whose_modules_a_cancellation_has_left_half_imported(
     walks = Task.of(WANTED.cases, WANTED.designs, PARTS, WANTED.provenance)
     task = SimpleNamespace(shared=shared, chosen=(0,), task=walks)
     with (
-        patch("services.worker.cluster.shared_cases.run_in_worker", return_value=Failure(error)),
+        patch(
+            "gaitswarm.services.worker.cluster.shared_cases.run_in_worker",
+            return_value=Failure(error),
+        ),
         patch("os._exit", side_effect=SystemExit) as left,
         suppress(SystemExit),
     ):

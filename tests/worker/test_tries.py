@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from services.worker.tries import MOST_KILLED, Running, Tries, Verdict, straggler
+from gaitswarm.services.worker.tries import MOST_KILLED, Running, Tries, Verdict, straggler
 
 
 def test_a_task_is_tried_on_three_workers_and_then_given_up() -> None:

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from cli.inputs.options import Db, Json
+from gaitswarm.cli.inputs.options import Db, Json
 
 Force = Annotated[bool, typer.Option("--force", help="Replace what is there.")]
 
@@ -25,9 +25,9 @@ def upgrade(db: Db = None) -> None:
 
     It must not be in use, and a backup of it is advisable.
     """
-    from cli.output import note
-    from services.optimizer.store.schema import migrate
-    from services.optimizer.store.schema.revisions import head
+    from gaitswarm.cli.output import note
+    from gaitswarm.services.optimizer.store.schema import migrate
+    from gaitswarm.services.optimizer.store.schema.revisions import head
 
     before = migrate.upgrade(_database(db))
     if before == head():
@@ -51,11 +51,11 @@ def check(
     import json
     from contextlib import closing
 
-    from cli.exit_codes import CheckFailed
-    from cli.output import note, print_text
-    from services.optimizer.analysis.all_histories import check_histories
-    from services.optimizer.store.schema import maintenance
-    from services.optimizer.store.sql_store import open_store
+    from gaitswarm.cli.exit_codes import CheckFailed
+    from gaitswarm.cli.output import note, print_text
+    from gaitswarm.services.optimizer.analysis.all_histories import check_histories
+    from gaitswarm.services.optimizer.store.schema import maintenance
+    from gaitswarm.services.optimizer.store.sql_store import open_store
 
     database = _database(db)
     findings = maintenance.check(database)
@@ -80,8 +80,8 @@ def backup(
 
     The file is an SQLite database, whatever the database is.
     """
-    from cli.output import note
-    from services.optimizer.store.schema import backup
+    from gaitswarm.cli.output import note
+    from gaitswarm.services.optimizer.store.schema import backup
 
     backup.backup(_database(db), file, overwrite=force)
     note(f"{file} holds all of the database")
@@ -97,10 +97,10 @@ def restore(
     A backup by an older version comes in this version's schema, one of SQLite may be restored to
     PostgreSQL, and the other way round.
     """
-    from cli.output import note
+    from gaitswarm.cli.output import note
     from gaitswarm.jobs.open import database_to_write
+    from gaitswarm.services.optimizer.store.schema import backup
     from gaitswarm.settings import read_settings
-    from services.optimizer.store.schema import backup
 
     backup.restore(database_to_write(read_settings(db=db or None)), file, overwrite=force)
     note(f"the database holds what {file} does")
@@ -127,10 +127,10 @@ def prune(
     """
     from datetime import timedelta
 
-    from cli.output import note
-    from services.optimizer.errors import InvalidRequest
-    from services.optimizer.jobs.job import ENDED, JobState
-    from services.optimizer.store.schema import maintenance
+    from gaitswarm.cli.output import note
+    from gaitswarm.services.optimizer.errors import InvalidRequest
+    from gaitswarm.services.optimizer.jobs.job import ENDED, JobState
+    from gaitswarm.services.optimizer.store.schema import maintenance
 
     if state is not None and older_than is None:
         raise InvalidRequest("deletes nothing without --older-than", field="state")

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from cli.inputs.options import (
+from gaitswarm.cli.inputs.options import (
     ControllerOption,
     JobName,
     Json,
@@ -120,16 +120,16 @@ def certify(
     from contextlib import closing
     from dataclasses import asdict
 
-    from cli.embedded import Embedded, job_run
-    from cli.inputs.certificate_spec import certificate_spec
-    from cli.output import print_json
-    from cli.tables.certificate import show_certificate, show_world
+    from gaitswarm.cli.embedded import Embedded, job_run
+    from gaitswarm.cli.inputs.certificate_spec import certificate_spec
+    from gaitswarm.cli.output import print_json
+    from gaitswarm.cli.tables.certificate import show_certificate, show_world
     from gaitswarm.jobs.database.jobs import DatabaseJobs
     from gaitswarm.jobs.open import database_to_write
+    from gaitswarm.services.optimizer.errors import InvalidRequest
+    from gaitswarm.services.optimizer.service import JobService
+    from gaitswarm.services.runtime import open_store
     from gaitswarm.settings import read_settings
-    from services.optimizer.errors import InvalidRequest
-    from services.optimizer.service import JobService
-    from services.runtime import open_store
 
     given = {
         "worlds": worlds,

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.inputs.options import Db, Json, RobotOption, Server
+from gaitswarm.cli.inputs.options import Db, Json, RobotOption, Server
 
 if TYPE_CHECKING:
-    from sim.studies.drives import NamedDrive, WalkFigures
+    from gaitswarm.sim.studies.drives import NamedDrive, WalkFigures
 
 
 def register(app: typer.Typer) -> None:
@@ -40,11 +40,11 @@ def compare(
     as_json: Json = False,
 ) -> None:
     """Let several drives walk the same scenarios: speed, power, effectivity, objectives."""
-    from cli.inputs.robots import chosen_robot, chosen_scenarios
-    from cli.output import note, print_text
-    from cli.pictures.plots import draw_comparison, save
-    from sim.studies.drives import DRIVES
-    from sim.studies.drives import compare as compare_drives
+    from gaitswarm.cli.inputs.robots import chosen_robot, chosen_scenarios
+    from gaitswarm.cli.output import note, print_text
+    from gaitswarm.cli.pictures.plots import draw_comparison, save
+    from gaitswarm.sim.studies.drives import DRIVES
+    from gaitswarm.sim.studies.drives import compare as compare_drives
 
     chosen = [_drive(name, server, db) for name in drives or DRIVES]
     figures = compare_drives(chosen, chosen_scenarios(scenario, robot), robot=chosen_robot(robot))
@@ -58,10 +58,10 @@ def compare(
 
 
 def _drive(name: str, server: str | None, db: str | None) -> NamedDrive:
-    from cli.inputs.design_file import given_design, read_design
-    from services.optimizer.errors import InvalidRequest
-    from sim.controllers import CONTROLLERS
-    from sim.studies.drives import drive_of_design, find_drive
+    from gaitswarm.cli.inputs.design_file import given_design, read_design
+    from gaitswarm.services.optimizer.errors import InvalidRequest
+    from gaitswarm.sim.controllers import CONTROLLERS
+    from gaitswarm.sim.studies.drives import drive_of_design, find_drive
 
     kind, colon, what = name.partition(":")
     if not colon:
@@ -90,9 +90,9 @@ def _row(figures: WalkFigures) -> dict[str, object]:
 
 
 def _show(drives: list[NamedDrive], figures: tuple[WalkFigures, ...]) -> None:
-    from cli.output import stdout_console
-    from cli.tables.fitted import Table
-    from cli.tables.views import number
+    from gaitswarm.cli.output import stdout_console
+    from gaitswarm.cli.tables.fitted import Table
+    from gaitswarm.cli.tables.views import number
 
     table = Table(box=None, header_style="bold", pad_edge=False)
     table.add_column("scenario\ndrive", no_wrap=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.inputs.options import ControllerOption, Db, Json, RobotOption, Server
+from gaitswarm.cli.inputs.options import ControllerOption, Db, Json, RobotOption, Server
 
 if TYPE_CHECKING:
     from gaitswarm.views.firmware import FirmwareView
@@ -51,9 +51,9 @@ def firmware(
     as_json: Json = False,
 ) -> None:
     """Write a design as C for the robot's microcontrollers, with a test that repeats its walks."""
-    from cli.inputs.design_file import given_design
-    from cli.inputs.robots import chosen_scenarios
-    from cli.output import print_json
+    from gaitswarm.cli.inputs.design_file import given_design
+    from gaitswarm.cli.inputs.robots import chosen_scenarios
+    from gaitswarm.cli.output import print_json
     from gaitswarm.firmware import write_firmware
 
     given = given_design(design, controller, robot=robot, server=server, db=db)
@@ -79,15 +79,15 @@ def firmware(
 def _bits(text: str) -> tuple[int, int]:
     """Raises InvalidRequest."""
     from gaitswarm.errors import simulation_errors
-    from sim.firmware import parsed_table_bits
+    from gaitswarm.sim.firmware import parsed_table_bits
 
     with simulation_errors("table_bits"):
         return parsed_table_bits(text)
 
 
 def _show(view: FirmwareView) -> None:
-    from cli.output import note, stdout_console
-    from cli.tables.fitted import Table
+    from gaitswarm.cli.output import note, stdout_console
+    from gaitswarm.cli.tables.fitted import Table
 
     table = Table(box=None, padding=(0, 2, 0, 0))
     table.add_column("scenario", no_wrap=True)

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.inputs.options import Db, JobId, Json, Server
+from gaitswarm.cli.inputs.options import Db, JobId, Json, Server
 
 if TYPE_CHECKING:
-    from cli.tables.front import Placed
+    from gaitswarm.cli.tables.front import Placed
     from gaitswarm.jobs.port import Jobs
 
 
@@ -41,11 +41,11 @@ def front(
     Its knees, the best design in each objective, the best under A, B and C and under the job's own
     preference, and the hypervolume.
     """
-    from cli.atomic_file import replacing
-    from cli.output import note, print_json, stdout_console
-    from cli.tables.front import front_csv, marked_table, placed_lines, summary
+    from gaitswarm.cli.atomic_file import replacing
+    from gaitswarm.cli.output import note, print_json, stdout_console
+    from gaitswarm.cli.tables.front import front_csv, marked_table, placed_lines, summary
     from gaitswarm.jobs.open import open_jobs
-    from services.optimizer.errors import InvalidRequest
+    from gaitswarm.services.optimizer.errors import InvalidRequest
 
     if output is not None and output.suffix != ".csv":
         raise InvalidRequest(f"{output} must end in .csv", field="output")
@@ -69,11 +69,11 @@ def front(
 
 def _published(jobs: Jobs, job_id: str) -> dict[str, Placed]:
     """Where the published designs lie; raises InvalidRequest where they cannot be compared."""
-    from cli.comparison import published_walk
-    from cli.tables.front import placed
-    from services.optimizer.errors import InvalidRequest
-    from services.optimizer.jobs.kinds.tuning import JobSpec
-    from sim.controllers import CONTROLLERS
+    from gaitswarm.cli.comparison import published_walk
+    from gaitswarm.cli.tables.front import placed
+    from gaitswarm.services.optimizer.errors import InvalidRequest
+    from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+    from gaitswarm.sim.controllers import CONTROLLERS
 
     spec, view = jobs.job(job_id).spec, jobs.front(job_id, most=10_000)
     if not isinstance(spec, JobSpec) or spec.worlds is not None:

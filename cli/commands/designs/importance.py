@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from cli.inputs.options import Db, JobId, Json, Server
+from gaitswarm.cli.inputs.options import Db, JobId, Json, Server
 
 if TYPE_CHECKING:
     from gaitswarm.views.importance import (
@@ -28,7 +28,7 @@ def importance(job_id: JobId, server: Server = None, db: Db = None, as_json: Jso
     First-order Sobol' indices for the fitness, for each objective and for failing, with intervals;
     and whether the winner lies at a bound of the search.
     """
-    from cli.output import print_json
+    from gaitswarm.cli.output import print_json
     from gaitswarm.jobs.open import open_jobs
 
     with open_jobs(server, db) as jobs:
@@ -40,9 +40,9 @@ def importance(job_id: JobId, server: Server = None, db: Db = None, as_json: Jso
 
 
 def _print(view: ImportanceView) -> None:
-    from cli.output import stdout_console
-    from cli.tables.fitted import Table
-    from cli.tables.views import MISSING, SHORT
+    from gaitswarm.cli.output import stdout_console
+    from gaitswarm.cli.tables.fitted import Table
+    from gaitswarm.cli.tables.views import MISSING, SHORT
 
     table = Table(box=None, padding=(0, 1, 0, 0))
     table.add_column("variable", no_wrap=True)
@@ -72,7 +72,7 @@ def _order(variable: VariableImportanceView) -> float:
 
 
 def _lines(view: ImportanceView) -> Iterator[str]:
-    from services.optimizer.analysis.importance import LEAST_DESIGNS
+    from gaitswarm.services.optimizer.analysis.importance import LEAST_DESIGNS
 
     if view.designs < LEAST_DESIGNS:
         yield (

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.commands.designs.robustness import (
+from gaitswarm.cli.commands.designs.robustness import (
     Radius,
     Samples,
     Scenarios,
@@ -15,7 +15,7 @@ from cli.commands.designs.robustness import (
     estimate,
     robustness_request,
 )
-from cli.inputs.options import ControllerOption, Db, JobId, Precision, RobotOption, Server
+from gaitswarm.cli.inputs.options import ControllerOption, Db, JobId, Precision, RobotOption, Server
 
 if TYPE_CHECKING:
     from gaitswarm.requests.robustness import RobustnessRequest
@@ -39,8 +39,8 @@ def register(app: typer.Typer) -> None:
 
 def convergence(job_id: JobId, output: Output, server: Server = None, db: Db = None) -> None:
     """Draw a job's fitness over its iterations: best so far, and its designs."""
-    from cli.output import note
-    from cli.pictures.plots import draw_convergence, save
+    from gaitswarm.cli.output import note
+    from gaitswarm.cli.pictures.plots import draw_convergence, save
     from gaitswarm.jobs.open import open_jobs
 
     with open_jobs(server, db) as jobs:
@@ -52,9 +52,9 @@ def convergence(job_id: JobId, output: Output, server: Server = None, db: Db = N
 
 def front(job_id: JobId, output: Output, server: Server = None, db: Db = None) -> None:
     """Draw the Pareto front of a job in every pair of objectives, with its knees and winners."""
-    from cli.output import note
-    from cli.pictures.plots import save
-    from cli.tables.front import draw_front
+    from gaitswarm.cli.output import note
+    from gaitswarm.cli.pictures.plots import save
+    from gaitswarm.cli.tables.front import draw_front
     from gaitswarm.jobs.open import open_jobs
 
     with open_jobs(server, db) as jobs:
@@ -77,11 +77,11 @@ def surface(
     db: Db = None,
 ) -> None:
     """Draw the output of a Fuzzy-PI design over angle error and motor current, as quantised."""
-    from cli.inputs.design_file import given_design
-    from cli.output import note
-    from cli.pictures.plots import draw_surface, save
-    from sim.controllers import CONTROLLERS
-    from sim.controllers.surface import surface as surface_of
+    from gaitswarm.cli.inputs.design_file import given_design
+    from gaitswarm.cli.output import note
+    from gaitswarm.cli.pictures.plots import draw_surface, save
+    from gaitswarm.sim.controllers import CONTROLLERS
+    from gaitswarm.sim.controllers.surface import surface as surface_of
 
     given = given_design(design, "fuzzy-pi", server=server, db=db)
     (inference,) = CONTROLLERS["fuzzy-pi"].inferences(given.values)
@@ -107,11 +107,11 @@ def robustness(
     db: Db = None,
 ) -> None:
     """Draw designs' robustness indices by scenario side by side, with their intervals."""
-    from cli.inputs.design_file import given_design
-    from cli.output import note
-    from cli.pictures.plots import save
-    from cli.tables.robustness import draw_robustness
-    from services.optimizer.errors import InvalidRequest
+    from gaitswarm.cli.inputs.design_file import given_design
+    from gaitswarm.cli.output import note
+    from gaitswarm.cli.pictures.plots import save
+    from gaitswarm.cli.tables.robustness import draw_robustness
+    from gaitswarm.services.optimizer.errors import InvalidRequest
 
     requests: dict[str, RobustnessRequest] = {}
     for design in designs:

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from cli.commands.designs.robustness import Radius, Samples, Seed
-from cli.inputs.options import Db, JobId, Json, Precision, Server
+from gaitswarm.cli.commands.designs.robustness import Radius, Samples, Seed
+from gaitswarm.cli.inputs.options import Db, JobId, Json, Precision, Server
 
 if TYPE_CHECKING:
+    from gaitswarm.sim.kernel.walk import Precision as PhysicsPrecision
     from gaitswarm.views.preferences import RobustPreferencesView
-    from sim.kernel.walk import Precision as PhysicsPrecision
 
 
 def register(app: typer.Typer) -> None:
@@ -50,8 +50,8 @@ def preferences(
     if for_design is not None:
         _suit(job_id, for_design, server=server, db=db, as_json=as_json)
         return
-    from cli.commands.designs.robustness import shown_progress
-    from cli.output import print_json
+    from gaitswarm.cli.commands.designs.robustness import shown_progress
+    from gaitswarm.cli.output import print_json
     from gaitswarm.jobs.open import open_jobs
     from gaitswarm.preferences import robust_preferences
 
@@ -76,8 +76,8 @@ def preferences(
 def _suit(
     job_id: str, for_design: str, *, server: str | None, db: str | None, as_json: bool
 ) -> None:
-    from cli.output import print_json, stdout_console
-    from cli.tables.front import fits_table, verdict
+    from gaitswarm.cli.output import print_json, stdout_console
+    from gaitswarm.cli.tables.front import fits_table, verdict
     from gaitswarm.jobs.open import open_jobs
     from gaitswarm.places import read_place
 
@@ -93,9 +93,9 @@ def _suit(
 
 
 def _print(view: RobustPreferencesView) -> None:
-    from cli.output import stdout_console
-    from cli.tables.fitted import Table
-    from cli.tables.views import MISSING, number
+    from gaitswarm.cli.output import stdout_console
+    from gaitswarm.cli.tables.fitted import Table
+    from gaitswarm.cli.tables.views import MISSING, number
     from gaitswarm.places import place_of
 
     table = Table(box=None, padding=(0, 2, 0, 0))

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cli.inputs.options import ControllerOption, Db, Json, Precision, RobotOption, Server
+from gaitswarm.cli.inputs.options import ControllerOption, Db, Json, Precision, RobotOption, Server
 
 if TYPE_CHECKING:
-    from cli.inputs.design_file import GivenDesign
+    from gaitswarm.cli.inputs.design_file import GivenDesign
     from gaitswarm.requests.robustness import Progress, RobustnessRequest
     from gaitswarm.views.robustness import RobustnessView
 
@@ -59,8 +59,8 @@ def robustness(
     It is the norm of the Jacobian of the objectives' logarithms, by the variables as shares of
     their bounds, from a regression over designs that are drawn around the given one.
     """
-    from cli.inputs.design_file import given_design
-    from cli.output import print_json
+    from gaitswarm.cli.inputs.design_file import given_design
+    from gaitswarm.cli.output import print_json
 
     given = given_design(design, controller, robot=robot, server=server, db=db)
     request = robustness_request(
@@ -95,7 +95,7 @@ def robustness_request(
     """
     from pydantic import ValidationError
 
-    from cli.inputs.robots import robot_defaults, scenario_data
+    from gaitswarm.cli.inputs.robots import robot_defaults, scenario_data
     from gaitswarm.errors import invalid_request
     from gaitswarm.requests.robustness import RobustnessRequest
 
@@ -134,7 +134,7 @@ def shown_progress() -> Iterator[Progress]:
     """A line on stderr every two seconds."""
     import time
 
-    from cli.output import note
+    from gaitswarm.cli.output import note
 
     told = time.monotonic()
 
@@ -148,8 +148,8 @@ def shown_progress() -> Iterator[Progress]:
 
 
 def _print(view: RobustnessView) -> None:
-    from cli.output import stdout_console
-    from cli.tables.robustness import scenarios_table, summary, variables_table
+    from gaitswarm.cli.output import stdout_console
+    from gaitswarm.cli.tables.robustness import scenarios_table, summary, variables_table
 
     console = stdout_console()
     console.print(scenarios_table(view))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.inputs.options import Db, JobId, Json, Server
+from gaitswarm.cli.inputs.options import Db, JobId, Json, Server
 
 if TYPE_CHECKING:
     from gaitswarm.views.families import LossView, ScenarioFamiliesView
@@ -31,7 +31,7 @@ def scenarios(
     What would the job have taken for its best without one of them, or with few? A search with fewer
     scenarios goes elsewhere, so check the answer by a job.
     """
-    from cli.output import print_json
+    from gaitswarm.cli.output import print_json
     from gaitswarm.jobs.open import open_jobs
 
     with open_jobs(server, db) as jobs:
@@ -43,9 +43,9 @@ def scenarios(
 
 
 def _print(view: ScenarioFamiliesView) -> None:
-    from cli.output import stdout_console
-    from cli.tables.fitted import Table
-    from cli.tables.views import MISSING, number
+    from gaitswarm.cli.output import stdout_console
+    from gaitswarm.cli.tables.fitted import Table
+    from gaitswarm.cli.tables.views import MISSING, number
 
     without = Table(title="Left out", title_justify="left", box=None, padding=(0, 1, 0, 0))
     without.add_column("scenario", no_wrap=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cli.inputs.options import ControllerOption, Db, Json, Precision, RobotOption, Server
+from gaitswarm.cli.inputs.options import ControllerOption, Db, Json, Precision, RobotOption, Server
 
 if TYPE_CHECKING:
     from gaitswarm.views import SimulationView
@@ -69,10 +69,10 @@ def simulate(
     """Let one design walk and say what it is worth; a fall is a result, not an error."""
     from pydantic import ValidationError
 
-    from cli.inputs.design_file import given_design
-    from cli.inputs.robots import robot_defaults, scenario_data
-    from cli.inputs.spec_file import json_object
-    from cli.output import note
+    from gaitswarm.cli.inputs.design_file import given_design
+    from gaitswarm.cli.inputs.robots import robot_defaults, scenario_data
+    from gaitswarm.cli.inputs.spec_file import json_object
+    from gaitswarm.cli.output import note
     from gaitswarm.errors import invalid_request
     from gaitswarm.requests.walk import SimulationRequest, run_simulation
 
@@ -99,7 +99,7 @@ def simulate(
         raise invalid_request(error, data) from error
     view = run_simulation(request)
     if log is not None:
-        from cli.walk_log import write_walk_logs
+        from gaitswarm.cli.walk_log import write_walk_logs
 
         write_walk_logs(log, {name: result.log for name, result in view.scenarios.items()})
         note(f"log written to {log}")
@@ -107,9 +107,9 @@ def simulate(
 
 
 def _show(view: SimulationView, *, as_json: bool) -> None:
-    from cli.output import print_text, stdout_console
-    from cli.tables.views import gait_in_words, measurements_table, results_table, worth
-    from sim.outcome import OBJECTIVES
+    from gaitswarm.cli.output import print_text, stdout_console
+    from gaitswarm.cli.tables.views import gait_in_words, measurements_table, results_table, worth
+    from gaitswarm.sim.outcome import OBJECTIVES
 
     if as_json:
         print_text(view.model_dump_json(indent=2, exclude={"scenarios": {"__all__": {"log"}}}))

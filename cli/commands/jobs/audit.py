@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
-from cli.inputs.job_ids import completed
-from cli.inputs.options import Db, Json
+from gaitswarm.cli.inputs.job_ids import completed
+from gaitswarm.cli.inputs.options import Db, Json
 
 
 def register(app: typer.Typer) -> None:
@@ -34,11 +34,11 @@ def audit(
     """
     from contextlib import closing
 
-    from cli.output import note, print_json_list, print_text
+    from gaitswarm.cli.output import note, print_json_list, print_text
     from gaitswarm.jobs.open import database_to_write
+    from gaitswarm.services.runtime import open_store
     from gaitswarm.settings import read_settings
     from gaitswarm.views.audit import AuditEntryView
-    from services.runtime import open_store
 
     settings = read_settings(db=db or None)
     with closing(open_store(database_to_write(settings))) as store:

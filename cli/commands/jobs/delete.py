@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.inputs.options import Db, JobId, Json, Server
+from gaitswarm.cli.inputs.options import Db, JobId, Json, Server
 
 if TYPE_CHECKING:
     from gaitswarm.jobs.port import Jobs
@@ -28,9 +28,9 @@ def delete(
     """Delete a job that has ended or is paused, with all that it has found."""
     import sys
 
-    from cli.output import note, stdout_console
+    from gaitswarm.cli.output import note, stdout_console
     from gaitswarm.jobs.open import open_jobs
-    from services.optimizer.errors import InvalidRequest
+    from gaitswarm.services.optimizer.errors import InvalidRequest
 
     with open_jobs(server, db) as jobs:
         if not yes:
@@ -52,7 +52,7 @@ def keep(
     as_json: Json = False,
 ) -> None:
     """Protect a job from deletion, however long ago it ended."""
-    from cli.output import print_json, stdout_console
+    from gaitswarm.cli.output import print_json, stdout_console
     from gaitswarm.jobs.open import open_jobs
 
     with open_jobs(server, db) as jobs:

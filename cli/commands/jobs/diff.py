@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from cli.inputs.options import Db, JobIds, Json, Server
+from gaitswarm.cli.inputs.options import Db, JobIds, Json, Server
 
 if TYPE_CHECKING:
     from gaitswarm.views.comparison import JobComparisonView
@@ -27,7 +27,7 @@ def diff(
 
     With --json how they converged and how the fitness of their designs is distributed, too.
     """
-    from cli.output import print_json
+    from gaitswarm.cli.output import print_json
     from gaitswarm.jobs.open import open_jobs
 
     with open_jobs(server, db) as jobs:
@@ -39,9 +39,9 @@ def diff(
 
 
 def _print(view: JobComparisonView) -> None:
-    from cli.output import stdout_console
-    from cli.tables.fitted import Table
-    from cli.tables.views import MISSING, number
+    from gaitswarm.cli.output import stdout_console
+    from gaitswarm.cli.tables.fitted import Table
+    from gaitswarm.cli.tables.views import MISSING, number
 
     table = Table(box=None, padding=(0, 2, 0, 0))
     table.add_column("", no_wrap=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.inputs.options import Db, JobId, Json, Server
+from gaitswarm.cli.inputs.options import Db, JobId, Json, Server
 
 if TYPE_CHECKING:
     from gaitswarm.jobs.port import Jobs
@@ -31,8 +31,8 @@ def evidence(
     """Write one file with all that a job is and found, for `verify` and for people."""
     import hashlib
 
-    from cli.atomic_file import replacing
-    from cli.output import note
+    from gaitswarm.cli.atomic_file import replacing
+    from gaitswarm.cli.output import note
     from gaitswarm.jobs.open import open_jobs
 
     with open_jobs(server, db) as jobs:
@@ -79,9 +79,9 @@ def verify(
     A file needs neither database nor network, and is never trusted. Of a job the digests of its
     iterations are computed again from what is stored, and the first that differs is named.
     """
-    from cli.exit_codes import CheckFailed
-    from cli.inputs.job_ids import full_id
-    from cli.output import print_json
+    from gaitswarm.cli.exit_codes import CheckFailed
+    from gaitswarm.cli.inputs.job_ids import full_id
+    from gaitswarm.cli.output import print_json
     from gaitswarm.evidence.verify import verify as verified
     from gaitswarm.jobs.open import open_jobs
 
@@ -128,9 +128,9 @@ def _in_full(
 def _print(found: VerificationView | HistoryVerificationView) -> None:
     from rich.text import Text
 
-    from cli.output import stdout_console
-    from cli.tables.fitted import Table
-    from cli.tables.views import number
+    from gaitswarm.cli.output import stdout_console
+    from gaitswarm.cli.tables.fitted import Table
+    from gaitswarm.cli.tables.views import number
     from gaitswarm.places import place_of
     from gaitswarm.views.verification import VerificationView
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.inputs.options import Db, JobId, Server
+from gaitswarm.cli.inputs.options import Db, JobId, Server
 
 if TYPE_CHECKING:
     from gaitswarm.tables import TableFormat
@@ -27,8 +27,8 @@ def export(
     db: Db = None,
 ) -> None:
     """Write one row per evaluated design: fitness, variables, and results by scenario."""
-    from cli.atomic_file import replacing
-    from cli.output import note
+    from gaitswarm.cli.atomic_file import replacing
+    from gaitswarm.cli.output import note
     from gaitswarm.jobs.open import open_jobs
 
     file_format = _format(output)
@@ -42,7 +42,7 @@ def export(
 
 def _format(path: Path) -> TableFormat:
     """As the file's suffix says. Raises InvalidRequest for another."""
-    from services.optimizer.errors import InvalidRequest
+    from gaitswarm.services.optimizer.errors import InvalidRequest
 
     match path.suffix:
         case ".csv":

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.inputs.options import (
+from gaitswarm.cli.inputs.options import (
     AcceptChanges,
     Db,
     JobId,
@@ -79,10 +79,10 @@ def fork(
     as_json: Json = False,
 ) -> None:
     """Queue a job that begins with iterations of another one; what is not said is as in that."""
-    from cli.inputs.robots import chosen_robot, scenario_data
-    from cli.inputs.spec_file import optimizer_choice, preference_choice
-    from cli.output import note, print_json, stdout_console
-    from cli.tables.views import lineage_line
+    from gaitswarm.cli.inputs.robots import chosen_robot, scenario_data
+    from gaitswarm.cli.inputs.spec_file import optimizer_choice, preference_choice
+    from gaitswarm.cli.output import note, print_json, stdout_console
+    from gaitswarm.cli.tables.views import lineage_line
     from gaitswarm.jobs.open import open_jobs
 
     given = {

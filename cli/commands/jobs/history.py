@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from cli.inputs.options import Db, JobId, Json, Server
+from gaitswarm.cli.inputs.options import Db, JobId, Json, Server
 
 if TYPE_CHECKING:
     from gaitswarm.views import HistoryIterationView, JobView
@@ -24,8 +24,8 @@ def history(job_id: JobId, server: Server = None, db: Db = None, as_json: Json =
 
     With --json also every design: its values, fitness, statuses and raw objectives.
     """
-    from cli.output import stdout_console
-    from cli.tables.views import iterations_table
+    from gaitswarm.cli.output import stdout_console
+    from gaitswarm.cli.tables.views import iterations_table
     from gaitswarm.jobs.open import open_jobs
 
     with open_jobs(server, db) as jobs:
@@ -38,8 +38,8 @@ def history(job_id: JobId, server: Server = None, db: Db = None, as_json: Json =
 
 def best(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = False) -> None:
     """Show the best design that a job has found so far, scenario by scenario."""
-    from cli.output import print_json, stdout_console
-    from cli.tables.views import print_best, worth
+    from gaitswarm.cli.output import print_json, stdout_console
+    from gaitswarm.cli.tables.views import print_best, worth
     from gaitswarm.jobs.open import open_jobs
     from gaitswarm.places import place_of
 
@@ -62,7 +62,7 @@ def _print_history(job: JobView, iterations: Iterator[HistoryIterationView]) -> 
     import json
     import sys
 
-    from cli.output import write_json_items
+    from gaitswarm.cli.output import write_json_items
 
     head = {
         "id": job.id,

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from cli.inputs.options import Db, JobId, Json, Server
+from gaitswarm.cli.inputs.options import Db, JobId, Json, Server
 
 
 def register(app: typer.Typer) -> None:
@@ -33,7 +33,7 @@ def label(
     as_json: Json = False,
 ) -> None:
     """Name, note, tag or archive a job; its spec and its results stay as they are."""
-    from cli.output import print_json, stdout_console
+    from gaitswarm.cli.output import print_json, stdout_console
     from gaitswarm.jobs.open import open_jobs
 
     tags = [] if no_tags else tag or None

@@ -7,8 +7,8 @@ from typing import Annotated, TypeVar
 
 import typer
 
-from cli.inputs.job_ids import completed
-from cli.inputs.options import (
+from gaitswarm.cli.inputs.job_ids import completed
+from gaitswarm.cli.inputs.options import (
     AcceptChanges,
     Db,
     JobId,
@@ -49,8 +49,8 @@ def submit(
     as_json: Json = False,
 ) -> None:
     """Queue a job for a running server; see `optimize` to run one here and now."""
-    from cli.inputs.spec_file import build_spec
-    from cli.output import note, print_json, stdout_console
+    from gaitswarm.cli.inputs.spec_file import build_spec
+    from gaitswarm.cli.output import note, print_json, stdout_console
     from gaitswarm.jobs.open import open_jobs
 
     asked = build_spec(options)
@@ -117,12 +117,12 @@ def list_jobs(
     as_json: Json = False,
 ) -> None:
     """List jobs, newest first unless another order is chosen."""
-    from cli.output import note, print_json_list, stdout_console
-    from cli.tables.views import jobs_table
+    from gaitswarm.cli.output import note, print_json_list, stdout_console
+    from gaitswarm.cli.tables.views import jobs_table
     from gaitswarm.jobs.open import open_jobs
-    from services.optimizer.errors import InvalidRequest
-    from services.optimizer.jobs.job import JobOrder, JobState
-    from services.optimizer.jobs.labels import JobFilter
+    from gaitswarm.services.optimizer.errors import InvalidRequest
+    from gaitswarm.services.optimizer.jobs.job import JobOrder, JobState
+    from gaitswarm.services.optimizer.jobs.labels import JobFilter
 
     if everything and archived is not None:
         raise InvalidRequest("leaves out none; choose one of both", field="all")
@@ -154,8 +154,8 @@ def list_jobs(
 
 def status(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = False) -> None:
     """Show a job: state, progress, best design, and why it failed if it did."""
-    from cli.output import print_json
-    from cli.tables.views import print_job
+    from gaitswarm.cli.output import print_json
+    from gaitswarm.cli.tables.views import print_job
     from gaitswarm.jobs.open import open_jobs
 
     with open_jobs(server, db) as jobs:
@@ -171,7 +171,7 @@ def watch(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = F
 
     With --json every committed iteration is one line, as is every change of the job's state.
     """
-    from cli.progress import watch_as_json, watch_with_progress
+    from gaitswarm.cli.progress import watch_as_json, watch_with_progress
     from gaitswarm.jobs.open import open_jobs
 
     with open_jobs(server, db) as jobs:
@@ -206,7 +206,7 @@ def extend(
     as_json: Json = False,
 ) -> None:
     """Give a job another budget; one that has succeeded is queued and goes on from its end."""
-    from cli.output import print_json, stdout_console
+    from gaitswarm.cli.output import print_json, stdout_console
     from gaitswarm.jobs.open import open_jobs
 
     with open_jobs(server, db) as jobs:
@@ -228,7 +228,7 @@ def prioritize(
     as_json: Json = False,
 ) -> None:
     """Give a job that waits or runs another priority."""
-    from cli.output import print_json, stdout_console
+    from gaitswarm.cli.output import print_json, stdout_console
     from gaitswarm.jobs.open import open_jobs
 
     with open_jobs(server, db) as jobs:
@@ -248,7 +248,7 @@ def cancel(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = 
 
 def _one_of(kind: type[S], text: str, option: str) -> S:
     """Raises InvalidRequest that says which there are."""
-    from services.optimizer.errors import InvalidRequest
+    from gaitswarm.services.optimizer.errors import InvalidRequest
 
     try:
         return kind(text)
@@ -266,9 +266,9 @@ def _command(
     as_json: bool,
     accept_changes: bool = False,
 ) -> None:
-    from cli.output import print_json, stdout_console
+    from gaitswarm.cli.output import print_json, stdout_console
     from gaitswarm.jobs.open import open_jobs
-    from services.optimizer.jobs.job import Command
+    from gaitswarm.services.optimizer.jobs.job import Command
 
     with open_jobs(server, db) as jobs:
         job = jobs.command(job_id, Command(command), accept_changes=accept_changes)

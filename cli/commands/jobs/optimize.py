@@ -6,8 +6,14 @@ from typing import Annotated
 
 import typer
 
-from cli.inputs.job_ids import completed
-from cli.inputs.options import AcceptChanges, Json, SpecOptions, WorkerOptions, with_groups
+from gaitswarm.cli.inputs.job_ids import completed
+from gaitswarm.cli.inputs.options import (
+    AcceptChanges,
+    Json,
+    SpecOptions,
+    WorkerOptions,
+    with_groups,
+)
 
 
 def register(app: typer.Typer) -> None:
@@ -49,16 +55,16 @@ def optimize(
     from contextlib import closing
     from dataclasses import asdict
 
-    from cli.embedded import Embedded, finish, job_run, resumed_job
-    from cli.inputs.spec_file import build_spec, by_other_optimizer, check_optimizer_name
-    from cli.output import note
+    from gaitswarm.cli.embedded import Embedded, finish, job_run, resumed_job
+    from gaitswarm.cli.inputs.spec_file import build_spec, by_other_optimizer, check_optimizer_name
+    from gaitswarm.cli.output import note
     from gaitswarm.jobs.database.jobs import DatabaseJobs
     from gaitswarm.jobs.open import database_to_write
+    from gaitswarm.services.optimizer.errors import InvalidRequest
+    from gaitswarm.services.optimizer.masking import masked_url
+    from gaitswarm.services.optimizer.service import JobService
+    from gaitswarm.services.runtime import open_store
     from gaitswarm.settings import read_settings
-    from services.optimizer.errors import InvalidRequest
-    from services.optimizer.masking import masked_url
-    from services.optimizer.service import JobService
-    from services.runtime import open_store
 
     for option, given in {
         "compare-published": compare_published,
@@ -96,8 +102,8 @@ def optimize(
 
 def optimizers(as_json: Json = False) -> None:
     """List search methods with what can be set of them."""
-    from cli.output import print_json_list, stdout_console
-    from cli.tables.views import optimizers_table
+    from gaitswarm.cli.output import print_json_list, stdout_console
+    from gaitswarm.cli.tables.views import optimizers_table
     from gaitswarm.views import optimizer_views
 
     if as_json:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from cli.inputs.options import Json
+from gaitswarm.cli.inputs.options import Json
 
 
 def register(app: typer.Typer) -> None:
@@ -17,8 +17,8 @@ def plugins(as_json: Json = False) -> None:
     """List plug-ins: controllers, cases and search methods of other packages that are installed."""
     from rich.text import Text
 
-    from cli.output import print_json_list, stdout_console
-    from cli.tables.fitted import Table
+    from gaitswarm.cli.output import print_json_list, stdout_console
+    from gaitswarm.cli.tables.fitted import Table
     from gaitswarm.views import plugin_views
 
     if as_json:
@@ -35,8 +35,8 @@ def cases(as_json: Json = False) -> None:
     """List cases of plug-ins, which evaluate designs in place of walks, with their settings."""
     from rich.text import Text
 
-    from cli.output import print_json_list, stdout_console
-    from cli.tables.fitted import Table
+    from gaitswarm.cli.output import print_json_list, stdout_console
+    from gaitswarm.cli.tables.fitted import Table
     from gaitswarm.views import case_views
 
     if as_json:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.inputs.options import Db, JobId, Json, Server
+from gaitswarm.cli.inputs.options import Db, JobId, Json, Server
 
 if TYPE_CHECKING:
     from gaitswarm.views import RankingRequest, RankingView
@@ -33,7 +33,7 @@ def rank(
     as_json: Json = False,
 ) -> None:
     """Rank all designs of a job by another preference, from what is stored: no walk is run."""
-    from cli.output import print_json
+    from gaitswarm.cli.output import print_json
     from gaitswarm.jobs.open import open_jobs
 
     request = _request(preference, top)
@@ -49,7 +49,7 @@ def _request(preference: str, top: int) -> RankingRequest:
     """Raises InvalidRequest that names the field."""
     from pydantic import ValidationError
 
-    from cli.inputs.spec_file import preference_choice
+    from gaitswarm.cli.inputs.spec_file import preference_choice
     from gaitswarm.errors import invalid_request
     from gaitswarm.views import RankingRequest
 
@@ -61,8 +61,8 @@ def _request(preference: str, top: int) -> RankingRequest:
 
 
 def _print(ranking: RankingView) -> None:
-    from cli.output import stdout_console
-    from cli.tables.views import MISSING, number, ranking_table
+    from gaitswarm.cli.output import stdout_console
+    from gaitswarm.cli.tables.views import MISSING, number, ranking_table
 
     console = stdout_console()
     console.print(ranking_table(ranking))

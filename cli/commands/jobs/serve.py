@@ -9,20 +9,20 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from cli.inputs.options import RunnerOptions, with_groups
+from gaitswarm.cli.inputs.options import RunnerOptions, with_groups
 
 if TYPE_CHECKING:
     import threading
     from collections.abc import Callable, Iterator
     from contextlib import AbstractContextManager
 
-    from api.dependencies import Component
+    from gaitswarm.api.dependencies import Component
+    from gaitswarm.services.monitoring.activity import Activity
+    from gaitswarm.services.monitoring.metrics import Metrics
+    from gaitswarm.services.monitoring.tracing import Tracing
+    from gaitswarm.services.optimizer.run.runner import Runner
+    from gaitswarm.services.runtime import Runtime
     from gaitswarm.settings import Settings
-    from services.monitoring.activity import Activity
-    from services.monitoring.metrics import Metrics
-    from services.monitoring.tracing import Tracing
-    from services.optimizer.run.runner import Runner
-    from services.runtime import Runtime
 
 _GLANCE: Final = 0.2
 """Seconds after which a signal is seen at the latest."""
@@ -72,16 +72,16 @@ def serve(
         import logging
         from dataclasses import asdict
 
-        from api.app import create_app
-        from api.connections import ConnectionLimits
-        from api.page import is_built
-        from api.server import ApiServer
-        from cli.logs import log_to_stderr
-        from cli.output import note
+        from gaitswarm.api.app import create_app
+        from gaitswarm.api.connections import ConnectionLimits
+        from gaitswarm.api.page import is_built
+        from gaitswarm.api.server import ApiServer
+        from gaitswarm.cli.logs import log_to_stderr
+        from gaitswarm.cli.output import note
+        from gaitswarm.services.monitoring.activity import Activity
+        from gaitswarm.services.monitoring.metrics import Metrics
+        from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
         from gaitswarm.settings import read_settings
-        from services.monitoring.activity import Activity
-        from services.monitoring.metrics import Metrics
-        from services.optimizer.errors import EvaluatorUnavailable
 
         settings = read_settings(
             **asdict(options), api_host=host, api_port=port, robots=robots or None
@@ -138,10 +138,10 @@ def runner(options: RunnerOptions) -> None:
     from contextlib import suppress
     from dataclasses import asdict
 
-    from cli.logs import log_to_stderr
+    from gaitswarm.cli.logs import log_to_stderr
+    from gaitswarm.services.optimizer.run.evaluator import EvaluationStopped
+    from gaitswarm.services.runtime import stop_on_signals
     from gaitswarm.settings import read_settings
-    from services.optimizer.run.evaluator import EvaluationStopped
-    from services.runtime import stop_on_signals
 
     settings = read_settings(**asdict(options))
     log_to_stderr(settings.log_level, settings.log_format)
@@ -149,7 +149,7 @@ def runner(options: RunnerOptions) -> None:
     stop, at_once = threading.Event(), threading.Event()
     metrics = None
     if settings.metrics_port is not None:
-        from services.monitoring.metrics import Metrics
+        from gaitswarm.services.monitoring.metrics import Metrics
 
         metrics = Metrics()
     # A stop while a cluster is connected ends the command before it is ready.
@@ -184,7 +184,7 @@ def _drain(runner: Runner | None, settings: Settings, at_once: threading.Event) 
 
 def _components(opened: Runtime, runner: Runner | None) -> tuple[Component, ...]:
     """Parts of the process that it tells of. Jobs wait for workers that are away."""
-    from api.dependencies import Component
+    from gaitswarm.api.dependencies import Component
 
     events = Component("events", opened.service.store.changes.trouble)
     if runner is None:
@@ -229,7 +229,7 @@ def _runtime(
     activity: Activity | None = None,
 ) -> AbstractContextManager[Runtime]:
     from gaitswarm.jobs.open import database_to_write
-    from services.runtime import open_runtime
+    from gaitswarm.services.runtime import open_runtime
 
     return open_runtime(
         database_to_write(settings),
@@ -263,7 +263,7 @@ def _tracing() -> Tracing | None:
     if not any(os.environ.get(name) for name in names):
         return None
     try:
-        from services.monitoring.tracing import exporting_tracing
+        from gaitswarm.services.monitoring.tracing import exporting_tracing
     except ModuleNotFoundError as error:
         # Other programs on the machine may have asked for it.
         logging.getLogger(__name__).warning(
@@ -279,8 +279,8 @@ def _served(metrics: Metrics | None, settings: Settings, opened: Runtime) -> Ite
     if metrics is None or settings.metrics_port is None:
         yield None
         return
-    from services.monitoring.exposition import MetricsAccess, metrics_server
-    from services.monitoring.hosts import HostNames
+    from gaitswarm.services.monitoring.exposition import MetricsAccess, metrics_server
+    from gaitswarm.services.monitoring.hosts import HostNames
 
     access = MetricsAccess(
         lambda: opened.service.store.tokens, required=settings.metrics_need_token

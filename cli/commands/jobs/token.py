@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from cli.inputs.options import Db, Json
+from gaitswarm.cli.inputs.options import Db, Json
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from services.optimizer.access import Token, Tokens
+    from gaitswarm.services.optimizer.access import Token, Tokens
 
 Name = Annotated[str, typer.Argument(metavar="NAME", help="Of the token: whose jobs its jobs are.")]
 
@@ -39,8 +39,8 @@ def create(
     as_json: Json = False,
 ) -> None:
     """Make a token. Its secret is printed once, and stored nowhere."""
-    from cli.output import note, print_text
-    from services.optimizer.access import Scope
+    from gaitswarm.cli.output import note, print_text
+    from gaitswarm.services.optimizer.access import Scope
 
     with _tokens(db) as tokens:
         token, secret = tokens.create(name, Scope(scope))
@@ -53,7 +53,7 @@ def create(
 
 def list_(db: Db = None, as_json: Json = False) -> None:
     """List all tokens, the oldest first."""
-    from cli.output import note, print_text
+    from gaitswarm.cli.output import note, print_text
 
     with _tokens(db, made=False) as tokens:
         found = tokens.all()
@@ -70,7 +70,7 @@ def list_(db: Db = None, as_json: Json = False) -> None:
 
 def revoke(name: Name, db: Db = None, as_json: Json = False) -> None:
     """Let a token allow nothing any more; servers know within five seconds."""
-    from cli.output import note
+    from gaitswarm.cli.output import note
 
     with _tokens(db, made=False) as tokens:
         token = tokens.revoke(name)
@@ -89,8 +89,8 @@ def _tokens(db: str | None, *, made: bool = True) -> Iterator[Tokens]:
     from contextlib import closing
 
     from gaitswarm.jobs.open import database_to_read, database_to_write
+    from gaitswarm.services.runtime import open_store
     from gaitswarm.settings import read_settings
-    from services.runtime import open_store
 
     find = database_to_write if made else database_to_read
     with closing(open_store(find(read_settings(db=db or None)))) as store:
@@ -109,6 +109,6 @@ def _document(token: Token) -> dict[str, Any]:
 def _print_json(document: Any) -> None:
     import json
 
-    from cli.output import print_text
+    from gaitswarm.cli.output import print_text
 
     print_text(json.dumps(document, indent=2))

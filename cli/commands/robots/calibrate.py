@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from cli.inputs.options import (
+from gaitswarm.cli.inputs.options import (
     Db,
     JobIds,
     JobName,
@@ -17,7 +17,7 @@ from cli.inputs.options import (
     WorkerOptions,
     with_groups,
 )
-from sim.input.near_names import instead_of
+from gaitswarm.sim.input.near_names import instead_of
 
 if TYPE_CHECKING:
     from gaitswarm.jobs.port import Jobs
@@ -81,9 +81,9 @@ def calibrate(
     as_json: Json = False,
 ) -> None:
     """Fit a robot and open conventions to a table of results, here and now."""
-    from cli.embedded import run_seeds
-    from cli.inputs.spec_file import parse_spec
-    from cli.inputs.target_file import read_targets
+    from gaitswarm.cli.embedded import run_seeds
+    from gaitswarm.cli.inputs.spec_file import parse_spec
+    from gaitswarm.cli.inputs.target_file import read_targets
     from gaitswarm.requests.arguments import leave_out
 
     leave_out(leave_one_out)
@@ -134,8 +134,8 @@ def targets(
 def _show(jobs: Jobs, job_ids: list[str], leave_one_out: str | None, *, as_json: bool) -> None:
     import json
 
-    from cli.output import print_text
-    from cli.tables.targets import show_targets
+    from gaitswarm.cli.output import print_text
+    from gaitswarm.cli.tables.targets import show_targets
     from gaitswarm.requests.arguments import leave_out
 
     reached = jobs.targets(job_ids, leave_out=leave_out(leave_one_out))
@@ -150,7 +150,7 @@ def _show(jobs: Jobs, job_ids: list[str], leave_one_out: str | None, *, as_json:
 
 def _robots(text: str | None) -> dict[str, Any]:
     """What a spec has of one robot, or of several shipped ones."""
-    from cli.inputs.robots import chosen_robot
+    from gaitswarm.cli.inputs.robots import chosen_robot
 
     if text is None or text.lstrip().startswith("{") or "," not in text:
         return {"robot": chosen_robot(text)}
@@ -159,9 +159,9 @@ def _robots(text: str | None) -> dict[str, Any]:
 
 def _variables(document: dict[str, Any], text: str) -> list[Any]:
     """Names, and variables with bounds or choices of the user's own."""
-    from cli.inputs.spec_file import parse_spec
-    from services.optimizer.errors import InvalidRequest
-    from services.optimizer.jobs.kinds.calibration import CalibrationSpec
+    from gaitswarm.cli.inputs.spec_file import parse_spec
+    from gaitswarm.services.optimizer.errors import InvalidRequest
+    from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
 
     entries = _entries(text)
     if not any("=" in entry for entry in entries):
@@ -197,7 +197,7 @@ def _entries(text: str | None) -> list[str]:
 
 
 def _pair(entry: str, option: str) -> tuple[str, str]:
-    from services.optimizer.errors import InvalidRequest
+    from gaitswarm.services.optimizer.errors import InvalidRequest
 
     name, equals, value = entry.partition("=")
     if not (name and equals and value):

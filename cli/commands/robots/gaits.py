@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.inputs.options import Json, RobotOption
+from gaitswarm.cli.inputs.options import Json, RobotOption
 
 if TYPE_CHECKING:
     from gaitswarm.gaits import GaitsView, GaitView
@@ -37,8 +37,8 @@ def gaits(
     as_json: Json = False,
 ) -> None:
     """List gaits: order of footfalls, feet that stand, and whether they are statically stable."""
-    from cli.inputs.robots import chosen_robot, one_scenario
-    from cli.output import print_json, print_text
+    from gaitswarm.cli.inputs.robots import chosen_robot, one_scenario
+    from gaitswarm.cli.output import print_json, print_text
     from gaitswarm.gaits import planned_gaits
 
     view = planned_gaits(
@@ -82,6 +82,6 @@ def diagram(item: GaitView) -> str:
 
 
 def _plan(item: GaitView) -> str:
-    from cli.tables.views import gait_in_words
+    from gaitswarm.cli.tables.views import gait_in_words
 
     return "out of the legs' reach" if item.planned is None else gait_in_words(item.planned)

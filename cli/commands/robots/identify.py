@@ -7,13 +7,13 @@ from typing import Annotated
 
 import typer
 
-from cli.inputs.measured_walk import (
+from gaitswarm.cli.inputs.measured_walk import (
     CyclesOption,
     DesignOption,
     ScenarioOption,
     TrajectoryOption,
 )
-from cli.inputs.options import (
+from gaitswarm.cli.inputs.options import (
     ControllerOption,
     Db,
     JobIds,
@@ -58,10 +58,10 @@ def record(
     as_json: Json = False,
 ) -> None:
     """Keep a measured walk where jobs can fit a robot to it; prints the recording's id."""
-    from cli.inputs.measured_walk import read_measured, read_walk, synchronised
-    from cli.output import note, print_json, stdout_console
+    from gaitswarm.cli.inputs.measured_walk import read_measured, read_walk, synchronised
+    from gaitswarm.cli.output import note, print_json, stdout_console
     from gaitswarm.jobs.open import open_jobs
-    from sim.identification.recorded_walk import record as recorded
+    from gaitswarm.sim.identification.recorded_walk import record as recorded
 
     walk = read_walk(scenario, controller, design, trajectory, cycles, robot, server=server, db=db)
     log = read_measured(measured, walk.robot)
@@ -109,10 +109,10 @@ def identify(
     as_json: Json = False,
 ) -> None:
     """Fit parameters of a robot to recorded walks, here and now, and say which can be trusted."""
-    from cli.embedded import run_seeds
-    from cli.inputs.robots import chosen_robot
-    from cli.inputs.spec_file import parse_spec
-    from cli.tables.parameters import read_truth, show_parameters
+    from gaitswarm.cli.embedded import run_seeds
+    from gaitswarm.cli.inputs.robots import chosen_robot
+    from gaitswarm.cli.inputs.spec_file import parse_spec
+    from gaitswarm.cli.tables.parameters import read_truth, show_parameters
 
     known = read_truth(truth)
     document = {
@@ -156,9 +156,9 @@ def parameters(
 
     Of one job, or of jobs of one problem that differ in their seed.
     """
-    from cli.output import note
-    from cli.pictures.plots import save
-    from cli.tables.parameters import draw_parameters, read_truth, show_parameters
+    from gaitswarm.cli.output import note
+    from gaitswarm.cli.pictures.plots import save
+    from gaitswarm.cli.tables.parameters import draw_parameters, read_truth, show_parameters
     from gaitswarm.jobs.open import open_jobs
 
     known = read_truth(truth)

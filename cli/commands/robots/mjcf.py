@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from cli.inputs.options import RobotOption
+from gaitswarm.cli.inputs.options import RobotOption
 
 
 def register(app: typer.Typer) -> None:
@@ -39,16 +39,16 @@ def mjcf(
     Needs pip install 'gaitswarm[mujoco]'. The viewer comes with pip install mujoco:
     python -m mujoco.viewer --mjcf=FILE.xml.
     """
-    from cli.inputs.robots import chosen_robot, one_scenario
-    from cli.output import note, print_text
-    from services.optimizer.errors import InvalidRequest
-    from sim.mujoco.engines import check_installed
-    from sim.robot import load_robot
+    from gaitswarm.cli.inputs.robots import chosen_robot, one_scenario
+    from gaitswarm.cli.output import note, print_text
+    from gaitswarm.services.optimizer.errors import InvalidRequest
+    from gaitswarm.sim.mujoco.engines import check_installed
+    from gaitswarm.sim.robot import load_robot
 
     machine = load_robot(chosen_robot(robot))
     chosen = one_scenario(scenario, robot, preset="normal-fast")
     check_installed()
-    from sim.mujoco.export import exported
+    from gaitswarm.sim.mujoco.export import exported
 
     text = exported(machine, chosen, contacts=contacts)
     if output is None:

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.inputs.options import WorkerOptions, with_groups
+from gaitswarm.cli.inputs.options import WorkerOptions, with_groups
 
 if TYPE_CHECKING:
-    from services.optimizer.jobs.columns import EvaluationColumns
-    from services.optimizer.jobs.kinds.calibration import CalibrationSpec
+    from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+    from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
 
 
 def register(app: typer.Typer) -> None:
@@ -61,14 +61,14 @@ def reconstruct(
     """
     from concurrent.futures import ThreadPoolExecutor
 
-    from cli.output import note, print_text
-    from cli.reconstruction.alternatives import alternatives
-    from cli.reconstruction.evidence import gather
-    from cli.reconstruction.plan import Size, calibrations
-    from cli.reconstruction.report import write_report
+    from gaitswarm.cli.output import note, print_text
+    from gaitswarm.cli.reconstruction.alternatives import alternatives
+    from gaitswarm.cli.reconstruction.evidence import gather
+    from gaitswarm.cli.reconstruction.plan import Size, calibrations
+    from gaitswarm.cli.reconstruction.report import write_report
+    from gaitswarm.services.optimizer.errors import InvalidRequest
+    from gaitswarm.services.worker.in_process import available_cpus
     from gaitswarm.settings import read_settings
-    from services.optimizer.errors import InvalidRequest
-    from services.worker.in_process import available_cpus
 
     defaults = (12, 8, 100) if quick else (40, 50, 1000)
     given = (particles, iterations, samples)
@@ -101,12 +101,12 @@ def _calibrated(
     from contextlib import closing
     from dataclasses import asdict
 
-    from cli.embedded import Embedded, job_run
+    from gaitswarm.cli.embedded import Embedded, job_run
     from gaitswarm.jobs.database.jobs import DatabaseJobs
     from gaitswarm.jobs.open import database_to_write
+    from gaitswarm.services.optimizer.service import JobService
+    from gaitswarm.services.runtime import open_store
     from gaitswarm.settings import read_settings
-    from services.optimizer.service import JobService
-    from services.runtime import open_store
 
     settings = read_settings(**asdict(workers))
     url = database_to_write(settings)

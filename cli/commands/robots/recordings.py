@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from cli.inputs.options import Db, Json, Server
+from gaitswarm.cli.inputs.options import Db, Json, Server
 
 
 def register(app: typer.Typer) -> None:
@@ -28,8 +28,8 @@ def recordings(
     as_json: Json = False,
 ) -> None:
     """List recorded walks, newest first: their ids are what `identify` takes."""
-    from cli.output import note, print_json_list, stdout_console
-    from cli.tables.recordings import recordings_table
+    from gaitswarm.cli.output import note, print_json_list, stdout_console
+    from gaitswarm.cli.tables.recordings import recordings_table
     from gaitswarm.jobs.open import open_jobs
 
     with open_jobs(server, db) as jobs:

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
 
 import typer
 
-from cli.inputs.options import Json
+from gaitswarm.cli.inputs.options import Json
 
 if TYPE_CHECKING:
     from gaitswarm.mesh_copies import MeshCopies
+    from gaitswarm.sim.proposal.drive import ActuatorChoice
+    from gaitswarm.sim.proposal.frame import Axis
+    from gaitswarm.sim.robot import RobotFiles
     from gaitswarm.views.robot_check import RobotCheckView
-    from sim.proposal.drive import ActuatorChoice
-    from sim.proposal.frame import Axis
-    from sim.robot import RobotFiles
 
 _Choice = TypeVar("_Choice", bound=str)
 
@@ -92,7 +92,7 @@ def init(
     what jobs of this robot have unless they say otherwise. Then --robot FOLDER works in every
     command.
     """
-    from cli.output import note, print_text
+    from gaitswarm.cli.output import note, print_text
     from gaitswarm.robots import init_robot
 
     made = init_robot(
@@ -137,13 +137,13 @@ def check(
     as_json: Json = False,
 ) -> None:
     """Load a robot, let it stand for a second, and say what there is to it."""
-    from cli.output import note, print_json, print_text
+    from gaitswarm.cli.output import note, print_json, print_text
     from gaitswarm.robot_checks import check_robot
 
     view = check_robot(_files(folder), folder=folder, packages=package_path or [])
     if draw is not None:
-        from cli.pictures.plots import save
-        from cli.pictures.robot import draw_robot
+        from gaitswarm.cli.pictures.plots import save
+        from gaitswarm.cli.pictures.robot import draw_robot
 
         save(draw_robot(view), draw, "draw")
         note(f"picture written to {draw}")
@@ -156,19 +156,19 @@ def check(
 
 
 def _kind(text: str) -> ActuatorChoice:
-    from sim.proposal.drive import ACTUATOR_CHOICES
+    from gaitswarm.sim.proposal.drive import ACTUATOR_CHOICES
 
     return _one_of(text, ACTUATOR_CHOICES, "actuator")
 
 
 def _axis(text: str | None, field: str) -> Axis | None:
-    from sim.proposal.frame import AXES
+    from gaitswarm.sim.proposal.frame import AXES
 
     return None if text is None else _one_of(text, AXES, field)
 
 
 def _one_of(text: str, choices: Sequence[_Choice], field: str) -> _Choice:
-    from services.optimizer.errors import InvalidRequest
+    from gaitswarm.services.optimizer.errors import InvalidRequest
 
     for choice in choices:
         if choice == text:
@@ -188,9 +188,9 @@ def _copied(meshes: MeshCopies) -> str:
 
 
 def _files(folder: Path) -> RobotFiles:
-    from cli.inputs.robots import chosen_robot
-    from services.optimizer.errors import InvalidRequest
-    from sim.robot import RobotFiles
+    from gaitswarm.cli.inputs.robots import chosen_robot
+    from gaitswarm.services.optimizer.errors import InvalidRequest
+    from gaitswarm.sim.robot import RobotFiles
 
     if not folder.is_dir():
         raise InvalidRequest(f"{folder} is no folder", field="folder")
@@ -235,6 +235,6 @@ def _told(view: RobotCheckView) -> str:
 def _print(document: dict[str, Any]) -> None:
     import json
 
-    from cli.output import print_text
+    from gaitswarm.cli.output import print_text
 
     print_text(json.dumps(document, indent=2, ensure_ascii=False) + "\n")

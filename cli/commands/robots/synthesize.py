@@ -7,13 +7,13 @@ from typing import Annotated
 
 import typer
 
-from cli.inputs.measured_walk import (
+from gaitswarm.cli.inputs.measured_walk import (
     CyclesOption,
     DesignOption,
     ScenarioOption,
     TrajectoryOption,
 )
-from cli.inputs.options import ControllerOption, Db, RobotOption, Server
+from gaitswarm.cli.inputs.options import ControllerOption, Db, RobotOption, Server
 
 
 def register(app: typer.Typer) -> None:
@@ -45,14 +45,14 @@ def synthesize(
     db: Db = None,
 ) -> None:
     """Write a SYNTHETIC log: a perturbed twin of the robot, with sensor noise. No measurement."""
-    from cli.atomic_file import replacing
-    from cli.inputs.measured_walk import read_walk
-    from cli.output import note
-    from cli.tables.parameters import read_truth
-    from services.optimizer.errors import InvalidRequest
-    from sim.measurement.measured_csv import format_measured_log
-    from sim.measurement.synthetic import Perturbation, synthetic_log
-    from sim.robot.identifiable import identifiable_variables
+    from gaitswarm.cli.atomic_file import replacing
+    from gaitswarm.cli.inputs.measured_walk import read_walk
+    from gaitswarm.cli.output import note
+    from gaitswarm.cli.tables.parameters import read_truth
+    from gaitswarm.services.optimizer.errors import InvalidRequest
+    from gaitswarm.sim.measurement.measured_csv import format_measured_log
+    from gaitswarm.sim.measurement.synthetic import Perturbation, synthetic_log
+    from gaitswarm.sim.robot.identifiable import identifiable_variables
 
     if output.suffix != ".csv":
         raise InvalidRequest(f"{output} must end in .csv", field="output")

@@ -7,13 +7,13 @@ from typing import Annotated
 
 import typer
 
-from cli.inputs.measured_walk import (
+from gaitswarm.cli.inputs.measured_walk import (
     CyclesOption,
     DesignOption,
     ScenarioOption,
     TrajectoryOption,
 )
-from cli.inputs.options import ControllerOption, Db, Json, RobotOption, Server
+from gaitswarm.cli.inputs.options import ControllerOption, Db, Json, RobotOption, Server
 
 
 def register(app: typer.Typer) -> None:
@@ -47,11 +47,16 @@ def validate(
     as_json: Json = False,
 ) -> None:
     """Simulate the walk that was measured, and judge the differences by tolerance classes."""
-    from cli.inputs.measured_walk import read_measured, read_walk, synchronised
-    from cli.output import note, print_json, stdout_console
-    from cli.tables.validation import alignment, comparison_table, confidence_table, remarks
-    from cli.validation_report import write_report
-    from sim.validation.comparison import compare_synchronised
+    from gaitswarm.cli.inputs.measured_walk import read_measured, read_walk, synchronised
+    from gaitswarm.cli.output import note, print_json, stdout_console
+    from gaitswarm.cli.tables.validation import (
+        alignment,
+        comparison_table,
+        confidence_table,
+        remarks,
+    )
+    from gaitswarm.cli.validation_report import write_report
+    from gaitswarm.sim.validation.comparison import compare_synchronised
 
     walk = read_walk(scenario, controller, design, trajectory, cycles, robot, server=server, db=db)
     logs = {path: read_measured(path, walk.robot) for path in (measured, *(repeat or ()))}

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from cli.inputs.options import Json, Precision
+from gaitswarm.cli.inputs.options import Json, Precision
 
 if TYPE_CHECKING:
-    from services.profile import JobProfile
+    from gaitswarm.services.profile import JobProfile
 
 _SHARES: Final = {
     "physics": "in kernels, the steps",
@@ -51,15 +51,15 @@ def bench(
     from dataclasses import asdict
     from typing import get_args
 
-    from cli.output import print_text
-    from services.worker import EvaluatorKind
-    from sim import benchmark
-    from sim.assembly import Backend
-    from sim.kernel import walk
+    from gaitswarm.cli.output import print_text
+    from gaitswarm.services.worker import EvaluatorKind
+    from gaitswarm.sim import benchmark
+    from gaitswarm.sim.assembly import Backend
+    from gaitswarm.sim.kernel import walk
 
     digits: walk.Precision = _one_of("precision", precision or "double", get_args(walk.Precision))
     if profile:
-        from services.profile import profile_job
+        from gaitswarm.services.profile import profile_job
 
         kind: EvaluatorKind = _one_of("evaluator", evaluator, get_args(EvaluatorKind))
         found = profile_job(evaluator=kind, precision=digits)
@@ -82,7 +82,7 @@ def bench(
 
 
 def _one_of(field: str, value: str, known: tuple[Any, ...]) -> Any:
-    from services.optimizer.errors import InvalidRequest
+    from gaitswarm.services.optimizer.errors import InvalidRequest
 
     if value not in known:
         raise InvalidRequest(f"{value!r} is none of {', '.join(known)}", field=field)

@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from cli.commands.studies.study_controllers import controllers
-from cli.commands.studies.study_precision import precision
-from cli.commands.studies.study_worlds import worlds
-from cli.inputs.options import ControllerOption, Db, Json, RobotOption, Server
+from gaitswarm.cli.commands.studies.study_controllers import controllers
+from gaitswarm.cli.commands.studies.study_precision import precision
+from gaitswarm.cli.commands.studies.study_worlds import worlds
+from gaitswarm.cli.inputs.options import ControllerOption, Db, Json, RobotOption, Server
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from sim.studies.accuracy import Deviation
+    from gaitswarm.sim.studies.accuracy import Deviation
 
 NoiseKind = Literal["angle", "torque"]
 
@@ -48,9 +48,9 @@ def tables(
     as_json: Json = False,
 ) -> None:
     """Compare a Fuzzy-PI's tables of 6 x 6, 8 x 8 and 10 x 6 bits with full inference."""
-    from cli.inputs.design_file import given_design
-    from cli.inputs.robots import chosen_scenarios
-    from sim.studies.accuracy import tables_against_inference
+    from gaitswarm.cli.inputs.design_file import given_design
+    from gaitswarm.cli.inputs.robots import chosen_scenarios
+    from gaitswarm.sim.studies.accuracy import tables_against_inference
 
     given = given_design(design, "fuzzy-pi", robot=robot, server=server, db=db)
     chosen = chosen_scenarios(scenario, robot)
@@ -68,9 +68,9 @@ def steps(
     as_json: Json = False,
 ) -> None:
     """Compare physics at 2.5, 5, 10 and 20 kHz with 40 kHz."""
-    from cli.inputs.design_file import given_design
-    from cli.inputs.robots import chosen_scenarios
-    from sim.studies.accuracy import step_halving
+    from gaitswarm.cli.inputs.design_file import given_design
+    from gaitswarm.cli.inputs.robots import chosen_scenarios
+    from gaitswarm.sim.studies.accuracy import step_halving
 
     given = given_design(design, controller, robot=robot, server=server, db=db)
     chosen = chosen_scenarios(scenario, robot)
@@ -97,9 +97,9 @@ def noise(
     as_json: Json = False,
 ) -> None:
     """Put noise on one kind of link after the other; ratios to the noiseless walk (table 2.9)."""
-    from cli.inputs.design_file import given_design
-    from cli.inputs.robots import chosen_scenarios
-    from sim.studies.accuracy import noise_on_links
+    from gaitswarm.cli.inputs.design_file import given_design
+    from gaitswarm.cli.inputs.robots import chosen_scenarios
+    from gaitswarm.sim.studies.accuracy import noise_on_links
 
     given = given_design(design, controller, robot=robot, server=server, db=db)
     chosen = chosen_scenarios(scenario, robot)
@@ -123,9 +123,9 @@ def _show(deviations: Iterable[Deviation], *, as_json: bool, ratios: bool = Fals
     import json
     import math
 
-    from cli.output import print_text, stdout_console
-    from cli.tables.fitted import Table
-    from sim.outcome import OBJECTIVE_NAMES
+    from gaitswarm.cli.output import print_text, stdout_console
+    from gaitswarm.cli.tables.fitted import Table
+    from gaitswarm.sim.outcome import OBJECTIVE_NAMES
 
     def finite(value: float) -> float | None:
         return value if math.isfinite(value) else None

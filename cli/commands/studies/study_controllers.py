@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.inputs.options import Json, Precision, WorkerOptions, with_groups
+from gaitswarm.cli.inputs.options import Json, Precision, WorkerOptions, with_groups
 
 if TYPE_CHECKING:
-    from cli.studies.controllers import Comparison, Runs
+    from gaitswarm.cli.studies.controllers import Comparison, Runs
 
 
 @with_groups
@@ -41,11 +41,11 @@ def controllers(
     """
     import json
 
-    from cli.inputs.robots import chosen_robot
-    from cli.output import note, print_text, stdout_console
-    from cli.studies.controllers import Budget, comparisons, study_document, study_table
-    from services.optimizer.errors import InvalidRequest
-    from sim.robot.shipped import SHIPPED
+    from gaitswarm.cli.inputs.robots import chosen_robot
+    from gaitswarm.cli.output import note, print_text, stdout_console
+    from gaitswarm.cli.studies.controllers import Budget, comparisons, study_document, study_table
+    from gaitswarm.services.optimizer.errors import InvalidRequest
+    from gaitswarm.sim.robot.shipped import SHIPPED
 
     names = SHIPPED if robots is None else robots.split(",")
     chosen = [chapter.strip() for chapter in chapters.split(",")]
@@ -72,7 +72,7 @@ def _run(planned: list[Comparison], workers: WorkerOptions) -> list[Comparison]:
     """Run what has not been run before. Raises JobEnded, and KeyboardInterrupt if interrupted."""
     from dataclasses import replace
 
-    from cli.embedded import study_jobs
+    from gaitswarm.cli.embedded import study_jobs
 
     with study_jobs(workers) as (_, run):
 

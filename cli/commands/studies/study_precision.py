@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from cli.inputs.options import Json
+from gaitswarm.cli.inputs.options import Json
 
 
 def precision(
@@ -35,11 +35,11 @@ def precision(
     """
     import json
 
-    from cli.output import note, print_text, stdout_console
-    from cli.studies.precision import compare, study_document, study_tables, variants
-    from services.optimizer.errors import InvalidRequest
-    from sim.robot import DEFAULT_ROBOT
-    from sim.robot.shipped import SHIPPED
+    from gaitswarm.cli.output import note, print_text, stdout_console
+    from gaitswarm.cli.studies.precision import compare, study_document, study_tables, variants
+    from gaitswarm.services.optimizer.errors import InvalidRequest
+    from gaitswarm.sim.robot import DEFAULT_ROBOT
+    from gaitswarm.sim.robot.shipped import SHIPPED
 
     name = robot or DEFAULT_ROBOT
     if name not in SHIPPED:

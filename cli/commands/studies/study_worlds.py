@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cli.inputs.options import Json, RobotOption, WorkerOptions, with_groups
+from gaitswarm.cli.inputs.options import Json, RobotOption, WorkerOptions, with_groups
 
 if TYPE_CHECKING:
-    from cli.studies.worlds import Contestant, HeldOut
+    from gaitswarm.cli.studies.worlds import Contestant, HeldOut
 
 
 @with_groups
@@ -67,9 +67,9 @@ def worlds(
     """
     import json
 
-    from cli.inputs.robots import chosen_robot, robot_defaults
-    from cli.output import note, print_text, stdout_console
-    from cli.studies.worlds import (
+    from gaitswarm.cli.inputs.robots import chosen_robot, robot_defaults
+    from gaitswarm.cli.output import note, print_text, stdout_console
+    from gaitswarm.cli.studies.worlds import (
         HeldOut,
         check_held_out,
         contestants,
@@ -77,8 +77,8 @@ def worlds(
         study_document,
         study_table,
     )
-    from services.optimizer.analysis.interval import CONFIDENCE
-    from services.optimizer.search.registry import DEFAULT_METHOD
+    from gaitswarm.services.optimizer.analysis.interval import CONFIDENCE
+    from gaitswarm.services.optimizer.search.registry import DEFAULT_METHOD
 
     judged_in = HeldOut(held_out, held_out_seed)
     check_held_out(judged_in, seeds)
@@ -116,7 +116,7 @@ def worlds(
 
 
 def _counts(given: str) -> list[int]:
-    from services.optimizer.errors import InvalidRequest
+    from gaitswarm.services.optimizer.errors import InvalidRequest
 
     try:
         return [int(count) for count in given.split(",")]
@@ -128,8 +128,8 @@ def _run(planned: list[Contestant], held_out: HeldOut, workers: WorkerOptions) -
     """Run what has not been run before. Raises JobEnded, and KeyboardInterrupt if interrupted."""
     from dataclasses import replace
 
-    from cli.embedded import study_jobs
-    from cli.studies.worlds import Run, certificate_of
+    from gaitswarm.cli.embedded import study_jobs
+    from gaitswarm.cli.studies.worlds import Run, certificate_of
 
     with study_jobs(workers) as (jobs, run):
 

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from cli.inputs.options import Json, WorkerOptions, with_groups
+from gaitswarm.cli.inputs.options import Json, WorkerOptions, with_groups
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from services.optimizer.analysis.tournaments.standings import Standings
-    from services.optimizer.jobs.kinds.tournament import TournamentSpec
+    from gaitswarm.services.optimizer.analysis.tournaments.standings import Standings
+    from gaitswarm.services.optimizer.jobs.kinds.tournament import TournamentSpec
 
 Preset = Annotated[
     Literal["thesis", "robot"],
@@ -98,14 +98,20 @@ def tournament(
     """
     import json
 
-    from cli.inputs.spec_file import read_json_object
-    from cli.output import print_text
-    from cli.tournament.plan import PRESETS, Size, chosen_methods, chosen_problems, tournament_jobs
-    from cli.tournament.report import write_report
-    from cli.tournament.runs import read_runs, results_of, run_jobs, write_runs
+    from gaitswarm.cli.inputs.spec_file import read_json_object
+    from gaitswarm.cli.output import print_text
+    from gaitswarm.cli.tournament.plan import (
+        PRESETS,
+        Size,
+        chosen_methods,
+        chosen_problems,
+        tournament_jobs,
+    )
+    from gaitswarm.cli.tournament.report import write_report
+    from gaitswarm.cli.tournament.runs import read_runs, results_of, run_jobs, write_runs
+    from gaitswarm.services.optimizer.analysis.tournaments.standings import standings_of
+    from gaitswarm.services.optimizer.errors import InvalidRequest
     from gaitswarm.views.tournament import StandingsView
-    from services.optimizer.analysis.tournaments.standings import standings_of
-    from services.optimizer.errors import InvalidRequest
 
     known = PRESETS[preset]
     if settings not in (None, "random", "default"):
@@ -164,8 +170,8 @@ def _versions(specs: Iterable[TournamentSpec]) -> dict[str, str]:
 
 def _show(found: Standings) -> None:
     """Mean ranks, and medians of the best at the end of the budget."""
-    from cli.output import stdout_console
-    from cli.tables.fitted import Table
+    from gaitswarm.cli.output import stdout_console
+    from gaitswarm.cli.tables.fitted import Table
 
     table = Table(box=None, header_style="bold", pad_edge=False)
     for heading in ("method", "mean rank", "from", "to", *found.by_problem):

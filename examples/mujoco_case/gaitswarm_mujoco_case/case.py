@@ -70,7 +70,7 @@ class MujocoWalk:
     def run_until(self, designs: np.ndarray, should_stop: Callable[[], bool]) -> Outcome:
         """Let every design walk; a walk takes seconds, and a job that is paused breaks it off."""
         # MuJoCo is imported by workers alone.
-        from sim.mujoco.kernel import MujocoKernel
+        from gaitswarm.sim.mujoco.kernel import MujocoKernel
 
         kernel = MujocoKernel(
             load_robot(self.walk.robot),

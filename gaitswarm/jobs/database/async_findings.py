@@ -10,6 +10,8 @@ from typing import TypeVar
 from anyio import to_thread
 
 from gaitswarm.jobs.database.findings import DatabaseFindings
+from gaitswarm.services.optimizer.analysis.fits.targets import LeaveOut
+from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.specs import (
     PreferenceInput,
 )
@@ -30,8 +32,6 @@ from gaitswarm.views.preferences import RobustPreferencesView
 from gaitswarm.views.tournament import ProblemRunsView, TournamentStandingsView, TournamentView
 from gaitswarm.views.trade_offs import FrontView, PreferenceForView
 from gaitswarm.views.verification import HistoryVerificationView
-from services.optimizer.analysis.fits.targets import LeaveOut
-from sim.kernel.walk import Precision
 
 T = TypeVar("T")
 

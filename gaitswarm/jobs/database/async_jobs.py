@@ -18,6 +18,11 @@ from gaitswarm.jobs.database.async_walks import AsyncLocalWalks
 from gaitswarm.jobs.database.jobs import DatabaseJobs
 from gaitswarm.jobs.port import JobEvent
 from gaitswarm.requests.firmware import FirmwareOptions
+from gaitswarm.services.optimizer.jobs.job import Command, JobOrder, JobState
+from gaitswarm.services.optimizer.jobs.labels import ANY_JOB, JobFilter
+from gaitswarm.services.optimizer.run.evaluator import Evaluator
+from gaitswarm.services.runtime import EvaluatorKind
+from gaitswarm.sim.identification.recorded_walk import RecordedWalk
 from gaitswarm.specs import (
     ForkOptions,
     SpecInput,
@@ -31,11 +36,6 @@ from gaitswarm.views import (
 )
 from gaitswarm.views.firmware import FirmwareView
 from gaitswarm.views.identification import RecordingEntryView, RecordingView
-from services.optimizer.jobs.job import Command, JobOrder, JobState
-from services.optimizer.jobs.labels import ANY_JOB, JobFilter
-from services.optimizer.run.evaluator import Evaluator
-from services.runtime import EvaluatorKind
-from sim.identification.recorded_walk import RecordedWalk
 
 T = TypeVar("T")
 

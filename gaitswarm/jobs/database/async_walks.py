@@ -11,14 +11,14 @@ from anyio import to_thread
 
 from gaitswarm.jobs.database.walks import LocalWalks
 from gaitswarm.requests.robustness import RobustnessOptions
+from gaitswarm.sim.controllers import ControllerName
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.robot import DEFAULT_ROBOT
 from gaitswarm.simulation_result import SimulationResult
 from gaitswarm.specs import PreferenceInput, RobotInput, ScenarioInput
 from gaitswarm.views.replay import WalkReplay
 from gaitswarm.views.robustness import RobustnessView
 from gaitswarm.views.surface import SurfaceView
-from sim.controllers import ControllerName
-from sim.kernel.walk import Precision
-from sim.robot import DEFAULT_ROBOT
 
 
 class AsyncLocalWalks(ABC):

@@ -10,15 +10,15 @@ from dataclasses import dataclass
 from typing import Any, Final, get_args
 
 from gaitswarm.errors import Conflict, Interrupted, InvalidRequest, ProvenanceChanged
+from gaitswarm.services.optimizer.analysis.reference import note_reference
+from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
+from gaitswarm.services.optimizer.jobs.job import Claim, Command, Job, JobState
+from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.services.optimizer.run.evaluator import Evaluator
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.runtime import EvaluatorKind, open_evaluator, run_embedded
 from gaitswarm.settings import read_settings
 from gaitswarm.views import JobView
-from services.optimizer.analysis.reference import note_reference
-from services.optimizer.jobs.iteration import CompletedIteration
-from services.optimizer.jobs.job import Claim, Command, Job, JobState
-from services.optimizer.jobs.spec import Spec
-from services.optimizer.run.evaluator import Evaluator
-from services.optimizer.service import JobService
-from services.runtime import EvaluatorKind, open_evaluator, run_embedded
 
 _TAKEN_UP: Final = (JobState.PAUSED, JobState.PAUSING, JobState.FAILED)
 """States in which going on with a job needs the command to."""

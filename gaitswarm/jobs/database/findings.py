@@ -16,6 +16,9 @@ from gaitswarm.requests.importance import run_importance
 from gaitswarm.requests.preferences import run_preferences
 from gaitswarm.requests.targets import run_targets
 from gaitswarm.requests.trade_offs import DESIGNS, run_front, run_preference_for
+from gaitswarm.services.optimizer.analysis.fits.targets import LeaveOut
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.specs import PreferenceInput
 from gaitswarm.tables import EvaluationTable, TableFormat, encoded_table
 from gaitswarm.views import (
@@ -34,9 +37,6 @@ from gaitswarm.views.preferences import RobustPreferencesView
 from gaitswarm.views.tournament import ProblemRunsView, TournamentStandingsView, TournamentView
 from gaitswarm.views.trade_offs import FrontView, PreferenceForView
 from gaitswarm.views.verification import HistoryVerificationView
-from services.optimizer.analysis.fits.targets import LeaveOut
-from services.optimizer.service import JobService
-from sim.kernel.walk import Precision
 
 
 class DatabaseFindings(Findings, Tournaments):

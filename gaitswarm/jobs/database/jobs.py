@@ -19,7 +19,15 @@ from gaitswarm.jobs.database.walks import LocalWalks
 from gaitswarm.jobs.port import JobEvent, Jobs
 from gaitswarm.requests import arguments, design_arguments
 from gaitswarm.requests.firmware import FirmwareOptions
+from gaitswarm.services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState
+from gaitswarm.services.optimizer.jobs.labels import ANY_JOB, JobFilter
+from gaitswarm.services.optimizer.masking import masked_url
+from gaitswarm.services.optimizer.run.evaluator import Evaluator
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.store.port.reading import Page
+from gaitswarm.services.runtime import EvaluatorKind
 from gaitswarm.settings import default_database
+from gaitswarm.sim.identification.recorded_walk import RecordedWalk
 from gaitswarm.specs import ForkOptions, SpecInput, SpecOptions, chosen_spec
 from gaitswarm.views import (
     EstimateView,
@@ -29,14 +37,6 @@ from gaitswarm.views import (
 )
 from gaitswarm.views.firmware import FirmwareView
 from gaitswarm.views.identification import RecordingEntryView, RecordingView
-from services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState
-from services.optimizer.jobs.labels import ANY_JOB, JobFilter
-from services.optimizer.masking import masked_url
-from services.optimizer.run.evaluator import Evaluator
-from services.optimizer.service import JobService
-from services.optimizer.store.port.reading import Page
-from services.runtime import EvaluatorKind
-from sim.identification.recorded_walk import RecordedWalk
 
 T = TypeVar("T")
 

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from typing import Final
 
 from gaitswarm.jobs.port import JobEvent
+from gaitswarm.services.optimizer.jobs.job import JobState
+from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.views import IterationView, StateView
-from services.optimizer.jobs.job import JobState
-from services.optimizer.service import JobService
 
 PAGE: Final = 100
 """Items that are read at once."""

@@ -11,15 +11,15 @@ from gaitswarm.requests import arguments, design_arguments
 from gaitswarm.requests.replay import run_replay
 from gaitswarm.requests.robustness import RobustnessOptions, run_robustness
 from gaitswarm.requests.surface import run_surface
+from gaitswarm.sim.controllers import ControllerName
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.robot import DEFAULT_ROBOT
 from gaitswarm.simulation import simulate_request
 from gaitswarm.simulation_result import SimulationResult
 from gaitswarm.specs import PreferenceInput, RobotInput, ScenarioInput
 from gaitswarm.views.replay import WalkReplay, decoded_replay
 from gaitswarm.views.robustness import RobustnessView
 from gaitswarm.views.surface import SurfaceView
-from sim.controllers import ControllerName
-from sim.kernel.walk import Precision
-from sim.robot import DEFAULT_ROBOT
 
 
 class LocalWalks(Walks):

@@ -16,6 +16,8 @@ from gaitswarm.jobs.server.attempts import (
 )
 from gaitswarm.jobs.server.call import Call
 from gaitswarm.requests import arguments
+from gaitswarm.services.optimizer.analysis.fits.targets import LeaveOut
+from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.specs import (
     PreferenceInput,
 )
@@ -37,8 +39,6 @@ from gaitswarm.views.preferences import RobustPreferencesView
 from gaitswarm.views.tournament import ProblemRunsView, TournamentStandingsView, TournamentView
 from gaitswarm.views.trade_offs import FrontView, PreferenceForView
 from gaitswarm.views.verification import HistoryVerificationView
-from services.optimizer.analysis.fits.targets import LeaveOut
-from sim.kernel.walk import Precision
 
 T = TypeVar("T")
 V = TypeVar("V", bound=BaseModel)

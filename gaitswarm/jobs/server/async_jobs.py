@@ -34,6 +34,10 @@ from gaitswarm.jobs.server.call import Call
 from gaitswarm.jobs.server.jobs import TIMEOUT
 from gaitswarm.requests import arguments, design_arguments
 from gaitswarm.requests.firmware import FirmwareOptions
+from gaitswarm.services.optimizer.jobs.job import Command, JobOrder, JobState
+from gaitswarm.services.optimizer.jobs.labels import ANY_JOB, JobFilter
+from gaitswarm.services.optimizer.run.outage import Backoff
+from gaitswarm.sim.identification.recorded_walk import RecordedWalk
 from gaitswarm.specs import (
     ForkOptions,
     SpecInput,
@@ -49,10 +53,6 @@ from gaitswarm.views import (
 )
 from gaitswarm.views.firmware import FirmwareView
 from gaitswarm.views.identification import RecordingEntryView, RecordingView
-from services.optimizer.jobs.job import Command, JobOrder, JobState
-from services.optimizer.jobs.labels import ANY_JOB, JobFilter
-from services.optimizer.run.outage import Backoff
-from sim.identification.recorded_walk import RecordedWalk
 
 T = TypeVar("T")
 V = TypeVar("V", bound=BaseModel)

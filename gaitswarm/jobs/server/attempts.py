@@ -33,10 +33,10 @@ from gaitswarm.errors import (
 )
 from gaitswarm.jobs.port import JobEvent
 from gaitswarm.jobs.server.call import Call
+from gaitswarm.services.optimizer.jobs.job import JobState
+from gaitswarm.services.optimizer.masking import masked_url
+from gaitswarm.services.optimizer.run.outage import Backoff
 from gaitswarm.views import IterationView, ProblemView, StateView
-from services.optimizer.jobs.job import JobState
-from services.optimizer.masking import masked_url
-from services.optimizer.run.outage import Backoff
 
 T = TypeVar("T")
 

@@ -9,6 +9,11 @@ from collections.abc import Sequence
 from dataclasses import asdict
 
 from gaitswarm.jobs.server.call import Call, got, job_path, page, posted, segment
+from gaitswarm.services.optimizer.analysis.fits.targets import LeaveOut
+from gaitswarm.services.optimizer.jobs.job import JobOrder, JobState
+from gaitswarm.services.optimizer.jobs.labels import JobFilter
+from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.sim.identification.recorded_walk import RecordedWalk
 from gaitswarm.tables import EvaluationTable, TableFormat
 from gaitswarm.views import (
     BestView,
@@ -33,11 +38,6 @@ from gaitswarm.views.tournament import (
     TournamentsView,
 )
 from gaitswarm.views.verification import HistoryVerificationView, VerificationRequest
-from services.optimizer.analysis.fits.targets import LeaveOut
-from services.optimizer.jobs.job import JobOrder, JobState
-from services.optimizer.jobs.labels import JobFilter
-from services.optimizer.jobs.spec import Spec
-from sim.identification.recorded_walk import RecordedWalk
 
 
 def estimate(spec: Spec) -> Call[EstimateView]:

@@ -8,8 +8,8 @@ from urllib.parse import SplitResult, urlsplit
 
 from gaitswarm.errors import InvalidRequest
 from gaitswarm.jobs.server.attempts import server_url
+from gaitswarm.services.optimizer.masking import masked_url
 from gaitswarm.settings import Settings, is_loopback
-from services.optimizer.masking import masked_url
 
 _PORTS: Final = {"http": 80, "https": 443}
 

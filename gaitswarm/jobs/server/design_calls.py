@@ -8,6 +8,7 @@ from gaitswarm.requests.replay import ReplayRequest
 from gaitswarm.requests.robustness import RobustnessRequest
 from gaitswarm.requests.surface import SurfaceRequest
 from gaitswarm.requests.walk import SimulationRequest
+from gaitswarm.sim.controllers import ControllerName
 from gaitswarm.simulation_result import SimulationResult
 from gaitswarm.views import SimulationView
 from gaitswarm.views.firmware import FirmwareView
@@ -15,7 +16,6 @@ from gaitswarm.views.replay import WalkReplay, decoded_replay
 from gaitswarm.views.robustness import RobustnessView
 from gaitswarm.views.surface import SurfaceView
 from gaitswarm.zip_archive import unzipped
-from sim.controllers import ControllerName
 
 
 def simulate(request: SimulationRequest) -> Call[SimulationResult]:

@@ -13,12 +13,12 @@ from gaitswarm.jobs.server.call import (
     posted,
 )
 from gaitswarm.requests import arguments
+from gaitswarm.services.optimizer.jobs.fork import ForkRequest
+from gaitswarm.services.optimizer.jobs.job import Command
+from gaitswarm.services.optimizer.jobs.labels import LabelsChange
+from gaitswarm.services.optimizer.jobs.priority import DEFAULT
+from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.views import JobView
-from services.optimizer.jobs.fork import ForkRequest
-from services.optimizer.jobs.job import Command
-from services.optimizer.jobs.labels import LabelsChange
-from services.optimizer.jobs.priority import DEFAULT
-from services.optimizer.jobs.spec import Spec
 
 
 def submit(

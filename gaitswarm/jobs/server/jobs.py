@@ -32,6 +32,11 @@ from gaitswarm.jobs.server.findings import ServerFindings
 from gaitswarm.jobs.server.walks import ServerWalks
 from gaitswarm.requests import arguments, design_arguments
 from gaitswarm.requests.firmware import FirmwareOptions
+from gaitswarm.services.optimizer.jobs.job import Command, JobOrder, JobState
+from gaitswarm.services.optimizer.jobs.labels import ANY_JOB, JobFilter
+from gaitswarm.services.optimizer.masking import masked_url
+from gaitswarm.services.optimizer.run.outage import Backoff
+from gaitswarm.sim.identification.recorded_walk import RecordedWalk
 from gaitswarm.specs import (
     ForkOptions,
     SpecInput,
@@ -47,11 +52,6 @@ from gaitswarm.views import (
 )
 from gaitswarm.views.firmware import FirmwareView
 from gaitswarm.views.identification import RecordingEntryView, RecordingView
-from services.optimizer.jobs.job import Command, JobOrder, JobState
-from services.optimizer.jobs.labels import ANY_JOB, JobFilter
-from services.optimizer.masking import masked_url
-from services.optimizer.run.outage import Backoff
-from sim.identification.recorded_walk import RecordedWalk
 
 T = TypeVar("T")
 V = TypeVar("V", bound=BaseModel)

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from itertools import islice
 from typing import Final
 
-from services.optimizer.analysis.verification import check_history
-from services.optimizer.errors import NotFound
-from services.optimizer.jobs.job import Job
-from services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.analysis.verification import check_history
+from gaitswarm.services.optimizer.errors import NotFound
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.store.port.base import Store
 
 _MOST: Final = 20
 """Findings; what comes after them is not looked at."""

@@ -23,12 +23,12 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.analysis.search_path import retraced
-from services.optimizer.analysis.start import best_designs
-from services.optimizer.errors import Conflict, InvalidRequest, ProvenanceChanged
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.documents import AnySpec, checked_spec
-from services.optimizer.jobs.fork import (
+from gaitswarm.services.optimizer.analysis.search_path import retraced
+from gaitswarm.services.optimizer.analysis.start import best_designs
+from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, ProvenanceChanged
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.documents import AnySpec, checked_spec
+from gaitswarm.services.optimizer.jobs.fork import (
     Fork,
     ForkRequest,
     Lineage,
@@ -36,9 +36,9 @@ from services.optimizer.jobs.fork import (
     changed_fields,
     forked_spec,
 )
-from services.optimizer.jobs.job import Job
-from services.optimizer.jobs.provenance import JobProvenance, changes_since
-from services.optimizer.search.optimizer import Optimizer, Rejudging
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, changes_since
+from gaitswarm.services.optimizer.search.optimizer import Optimizer, Rejudging
 
 Floats = NDArray[np.float64]
 

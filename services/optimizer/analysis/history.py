@@ -7,10 +7,10 @@ from itertools import groupby
 from operator import attrgetter
 from typing import Final
 
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.iteration import Evaluation, Iteration
-from services.optimizer.jobs.job import Job
-from services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Iteration
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.store.port.base import Store
 
 PIECE: Final = 2000
 """Evaluations read in one transaction."""

@@ -16,11 +16,11 @@ from typing import Final
 
 import numpy as np
 
-from services.optimizer.analysis.history import PIECE, iterations_of
-from services.optimizer.errors import Conflict, EvaluatorUnavailable
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.job import Job
-from services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.analysis.history import PIECE, iterations_of
+from gaitswarm.services.optimizer.errors import Conflict, EvaluatorUnavailable
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.store.port.base import Store
 
 DEFAULT_BYTES: Final = 512 << 20
 """Ten jobs of 100 000 evaluations in six scenarios."""

@@ -23,10 +23,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.analysis.interval import Interval, percentile_interval
-from services.optimizer.analysis.ranks import average_ranks
-from services.optimizer.search.random_stream import RandomNumbers
-from sim.variables import Variable
+from gaitswarm.services.optimizer.analysis.interval import Interval, percentile_interval
+from gaitswarm.services.optimizer.analysis.ranks import average_ranks
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.sim.variables import Variable
 
 Floats = NDArray[np.float64]
 

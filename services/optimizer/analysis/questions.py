@@ -8,25 +8,25 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.analysis.distribution import (
+from gaitswarm.services.optimizer.analysis.distribution import (
     Distribution,
     distribution,
     iteration_starts,
 )
-from services.optimizer.analysis.fits.identifiability import (
+from gaitswarm.services.optimizer.analysis.fits.identifiability import (
     Identifiability,
     check_comparable,
     identifiability,
 )
-from services.optimizer.analysis.history import PIECE, read_columns, read_history
-from services.optimizer.analysis.history_cache import HistoryCache
-from services.optimizer.analysis.ranking import RankedJob, rank, tuning_of
-from services.optimizer.analysis.reference import with_reference
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.iteration import Evaluation, Iteration, Reevaluation
-from services.optimizer.jobs.job import Job
-from services.optimizer.jobs.preference import Preference
-from services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.analysis.history import PIECE, read_columns, read_history
+from gaitswarm.services.optimizer.analysis.history_cache import HistoryCache
+from gaitswarm.services.optimizer.analysis.ranking import RankedJob, rank, tuning_of
+from gaitswarm.services.optimizer.analysis.reference import with_reference
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Iteration, Reevaluation
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.preference import Preference
+from gaitswarm.services.optimizer.store.port.base import Store
 
 
 @dataclass(frozen=True, slots=True)

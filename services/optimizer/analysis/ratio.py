@@ -9,7 +9,7 @@ from math import comb
 
 import numpy as np
 
-from services.optimizer.analysis.interval import CONFIDENCE
+from gaitswarm.services.optimizer.analysis.interval import CONFIDENCE
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,17 +10,17 @@ from typing import Final
 
 import numpy as np
 
-from services.optimizer.errors import StoreUnavailable
-from services.optimizer.jobs.job import Job
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.provenance import changes_since, job_provenance
-from services.optimizer.jobs.reference import START, Reference, reference_design
-from services.optimizer.jobs.spec import Spec
-from services.optimizer.store.port.base import Store
-from sim.case import Walk, run_together
-from sim.errors import SimulationError
-from sim.outcome import Status
-from sim.worlds.perturbed_walk import PerturbedWalk
+from gaitswarm.services.optimizer.errors import StoreUnavailable
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.provenance import changes_since, job_provenance
+from gaitswarm.services.optimizer.jobs.reference import START, Reference, reference_design
+from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.sim.case import Walk, run_together
+from gaitswarm.sim.errors import SimulationError
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.worlds.perturbed_walk import PerturbedWalk
 
 NONE: Final = Reference(None, None)
 """Of a job of a shipped robot for which nothing was published."""

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.jobs.spec import Spec, create_optimizer
-from services.optimizer.search.optimizer import Optimizer
+from gaitswarm.services.optimizer.jobs.spec import Spec, create_optimizer
+from gaitswarm.services.optimizer.search.optimizer import Optimizer
 
 Floats = NDArray[np.float64]
 

@@ -7,12 +7,12 @@ from itertools import chain, zip_longest
 
 import numpy as np
 
-from services.optimizer.errors import GaitswarmError, InvalidRequest
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.design_space import DesignSpace
-from services.optimizer.jobs.job import Job
-from services.optimizer.jobs.spec import Spec
-from services.optimizer.jobs.start import EarlierJobs
+from gaitswarm.services.optimizer.errors import GaitswarmError, InvalidRequest
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.services.optimizer.jobs.start import EarlierJobs
 
 Design = dict[str, float | str]
 

@@ -1,6 +1,6 @@
 """Bias-weighted product and geometric mean (eq. 3.8, 4.1, 4.2) of many designs at once.
 
-The same numbers as `services.optimizer.jobs.preference` to twelve digits. numpy's logarithm may
+The same numbers as `gaitswarm.services.optimizer.jobs.preference` to twelve digits. numpy's logarithm may
 differ from Python's in the last bit, so that nothing that is stored is computed here.
 """
 
@@ -12,11 +12,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
-from services.optimizer.jobs.preference import HEIGHT_LOSS, Preference
-from services.optimizer.jobs.spec import Spec
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
+from gaitswarm.services.optimizer.jobs.preference import HEIGHT_LOSS, Preference
+from gaitswarm.services.optimizer.jobs.spec import Spec
 
 Floats = NDArray[np.float64]
 

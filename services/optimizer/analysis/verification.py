@@ -10,20 +10,20 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.jobs.chain import (
+from gaitswarm.services.optimizer.jobs.chain import (
     ChainDocuments,
     Link,
     Outcomes,
     ask_digest,
     iteration_digest,
 )
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.documents import AnySpec
-from services.optimizer.jobs.iteration import Reevaluation, best_particle
-from services.optimizer.jobs.job import Job
-from services.optimizer.store.port.base import Store
-from services.optimizer.store.port.reading import StoredLink
-from services.optimizer.store.rows.evaluation_rows import fitness_summary
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.documents import AnySpec
+from gaitswarm.services.optimizer.jobs.iteration import Reevaluation, best_particle
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.store.port.reading import StoredLink
+from gaitswarm.services.optimizer.store.rows.evaluation_rows import fitness_summary
 
 _PIECE: Final = 2000
 """Evaluations read in one transaction."""

@@ -9,8 +9,8 @@ from pydantic import BeforeValidator, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from sim.case_registry import CASES, CaseFamily, CaseSettings
-from sim.plugins import PluginSettings
+from gaitswarm.sim.case_registry import CASES, CaseFamily, CaseSettings
+from gaitswarm.sim.plugins import PluginSettings
 
 
 def _settings(choice: object) -> object:

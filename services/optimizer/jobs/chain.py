@@ -23,9 +23,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.iteration import CompletedIteration, Reevaluation
-from sim.outcome import Status
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration, Reevaluation
+from gaitswarm.sim.outcome import Status
 
 VERSION: Final = 1
 """Of the encoding, in every digest."""
@@ -96,7 +96,7 @@ class Outcomes:
     Attributes:
         designs: (n, v).
         objectives: (n, K, m), NaN or infinite where there is none.
-        statuses: (n, K) values of `sim.outcome.Status`.
+        statuses: (n, K) values of `gaitswarm.sim.outcome.Status`.
         fitness: (n,), +inf for a design that failed.
         reevaluation: Of its best design in double precision, if there is one.
     """

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.outcome import Status
+from gaitswarm.sim.outcome import Status
 
 Floats = NDArray[np.float64]
 
@@ -22,7 +22,7 @@ class EvaluationColumns:
         designs: (r, v) values of `Spec.design_space().names`, in the variables' units.
         objectives: (r, K, m) raw objectives, cases and objectives in the spec's order, in their
             units, NaN where there is none.
-        statuses: (r, K) values of `sim.outcome.Status`.
+        statuses: (r, K) values of `gaitswarm.sim.outcome.Status`.
         fitness: (r,) by the job's own measure, minimized, +inf if a case failed.
     """
 

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.search.space import Axis, Space
-from sim.errors import SimulationInputError
-from sim.input.near_names import instead_of
-from sim.variables import Variable, VariableCatalogue
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.search.space import Axis, Space
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.input.near_names import instead_of
+from gaitswarm.sim.variables import Variable, VariableCatalogue
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,13 +7,13 @@ from typing import Annotated, Any, Final
 
 from pydantic import Discriminator, Tag, TypeAdapter, ValidationError
 
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.kinds.calibration import CalibrationSpec
-from services.optimizer.jobs.kinds.certificate import CertificateSpec
-from services.optimizer.jobs.kinds.identification import IdentificationSpec
-from services.optimizer.jobs.kinds.tournament import TournamentSpec
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from sim.input.wording import message_of
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
+from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
+from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
+from gaitswarm.services.optimizer.jobs.kinds.tournament import TournamentSpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.sim.input.wording import message_of
 
 _TUNING: Final = "<tuning>"
 _IDENTIFICATION: Final = "<identification>"

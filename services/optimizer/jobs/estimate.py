@@ -13,18 +13,18 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.design_space import DesignSpace
-from services.optimizer.jobs.job import Job
-from services.optimizer.jobs.kinds.certificate import CertificateSpec
-from services.optimizer.jobs.kinds.tournament import TournamentSpec
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.spec import Spec, create_optimizer
-from services.optimizer.search.random_stream import RandomNumbers
-from sim.case import Case, LongCase, Walk
-from sim.outcome import Status
-from sim.simulate import prepare
-from sim.worlds.perturbed_walk import PerturbedWalk
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
+from gaitswarm.services.optimizer.jobs.kinds.tournament import TournamentSpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.spec import Spec, create_optimizer
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.sim.case import Case, LongCase, Walk
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.simulate import prepare
+from gaitswarm.sim.worlds.perturbed_walk import PerturbedWalk
 
 _MOST_JOBS: Final = 5
 """Jobs whose rates are averaged, so that one on a busy machine does not count for all."""

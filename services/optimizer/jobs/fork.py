@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.documents import AnySpec, checked_spec
-from services.optimizer.jobs.optimizer_choice import OptimizerChoice
-from services.optimizer.jobs.preference import PreferenceChoice
-from services.optimizer.jobs.provenance import ProvenanceRecords
-from sim.robot import RobotSource
-from sim.scenario import ScenarioChoice
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.documents import AnySpec, checked_spec
+from gaitswarm.services.optimizer.jobs.optimizer_choice import OptimizerChoice
+from gaitswarm.services.optimizer.jobs.preference import PreferenceChoice
+from gaitswarm.services.optimizer.jobs.provenance import ProvenanceRecords
+from gaitswarm.sim.robot import RobotSource
+from gaitswarm.sim.scenario import ScenarioChoice
 
 _LAID: Final = ("name", "preference", "optimizer", "scenarios", "robot", "iterations")
 """Fields of a request that are those of a spec."""

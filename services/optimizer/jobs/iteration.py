@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.jobs.columns import EvaluationColumns
-from sim.kernel.walk import Precision
-from sim.outcome import Outcome
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.outcome import Outcome
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,7 +22,7 @@ class Reevaluation:
     Attributes:
         particle: of the swarm of its iteration, from 0.
         objectives: (K, m) raw objectives by case, as in `Evaluation`.
-        statuses: (K,) values of `sim.outcome.Status`.
+        statuses: (K,) values of `gaitswarm.sim.outcome.Status`.
         fitness: as `Job.spec.judge` has it, minimized, +inf if any case failed.
     """
 
@@ -42,7 +42,7 @@ class Evaluation:
         design: (v,) values of `Job.spec.design_space().names`, in the variables' units.
         objectives: (K, m) raw objectives by case, columns as in `Job.spec.objectives`, in their
             units, NaN where there is none.
-        statuses: (K,) values of `sim.outcome.Status`.
+        statuses: (K,) values of `gaitswarm.sim.outcome.Status`.
         fitness: as `Job.spec.judge` has it, minimized, +inf if any case failed.
         reevaluation: of the same design, with a job's best where the search is in single
             precision; None otherwise.
@@ -123,7 +123,7 @@ class Known:
 
     Attributes:
         objectives: (K, m) raw objectives by case, NaN where there is none.
-        statuses: (K,) values of `sim.outcome.Status`.
+        statuses: (K,) values of `gaitswarm.sim.outcome.Status`.
     """
 
     objectives: NDArray[np.float64]

@@ -8,14 +8,18 @@ from datetime import datetime
 from enum import StrEnum
 from typing import Final
 
-from services.optimizer.errors import Conflict, InvalidRequest, Unreadable
-from services.optimizer.jobs.documents import AnySpec
-from services.optimizer.jobs.fork import Lineage
-from services.optimizer.jobs.iteration import Answered, Ask
-from services.optimizer.jobs.labels import Labels
-from services.optimizer.jobs.provenance import JobProvenance, ProvenanceRecords, changes_since
-from services.optimizer.jobs.reference import Reference
-from sim.identification.recorded_walk import Recordings
+from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, Unreadable
+from gaitswarm.services.optimizer.jobs.documents import AnySpec
+from gaitswarm.services.optimizer.jobs.fork import Lineage
+from gaitswarm.services.optimizer.jobs.iteration import Answered, Ask
+from gaitswarm.services.optimizer.jobs.labels import Labels
+from gaitswarm.services.optimizer.jobs.provenance import (
+    JobProvenance,
+    ProvenanceRecords,
+    changes_since,
+)
+from gaitswarm.services.optimizer.jobs.reference import Reference
+from gaitswarm.sim.identification.recorded_walk import Recordings
 
 
 class JobState(StrEnum):

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.outcome import Outcome, Status
+from gaitswarm.sim.outcome import Outcome, Status
 
 Floats = NDArray[np.float64]
 

@@ -12,8 +12,8 @@ from typing import Annotated, Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
-from services.optimizer.jobs.preference import PREFERENCES
-from sim.robot.shipped import SHIPPED
+from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
+from gaitswarm.sim.robot.shipped import SHIPPED
 
 OWN: Final = "own"
 """What a preference is called that is none of those shipped, and a robot that says no name."""

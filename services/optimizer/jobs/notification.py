@@ -8,7 +8,7 @@ from datetime import datetime
 from typing import Any, Final, Protocol
 from urllib.parse import urlsplit
 
-from services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.errors import InvalidRequest
 
 MOST_ATTEMPTS: Final = 16
 """Some six hours, with the pauses below."""

@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Union
 from pydantic import BaseModel, BeforeValidator, Discriminator, Tag, ValidationError
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from services.optimizer.search.automatic import (
+from gaitswarm.services.optimizer.search.automatic import (
     CHOICES,
     AutoSettings,
     ChoiceName,
     ChosenSettings,
 )
-from services.optimizer.search.method import settings_of
-from services.optimizer.search.optimizer import SearchSettings
-from services.optimizer.search.registry import DEFAULT_METHOD, METHODS
-from sim.input.near_names import instead_of, nearest
-from sim.plugins import PluginSettings
+from gaitswarm.services.optimizer.search.method import settings_of
+from gaitswarm.services.optimizer.search.optimizer import SearchSettings
+from gaitswarm.services.optimizer.search.registry import DEFAULT_METHOD, METHODS
+from gaitswarm.sim.input.near_names import instead_of, nearest
+from gaitswarm.sim.plugins import PluginSettings
 
 _BUILT_IN: Final[dict[str, type[SearchSettings]]] = {
     "auto": AutoSettings,

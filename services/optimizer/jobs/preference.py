@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, Tag, model_validator
 
-from services.optimizer.jobs.judgement import Judgement, exponential
-from sim.input.choice import NAME, OWN, alternatives
+from gaitswarm.services.optimizer.jobs.judgement import Judgement, exponential
+from gaitswarm.sim.input.choice import NAME, OWN, alternatives
 
 _FIELDS: Final = (
     "torque",

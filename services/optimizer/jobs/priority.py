@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from services.optimizer.errors import Conflict, InvalidRequest
-from services.optimizer.jobs.job import JobState
+from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest
+from gaitswarm.services.optimizer.jobs.job import JobState
 
 DEFAULT: Final = 0
 """Of a job for which nobody has said more."""

@@ -11,10 +11,10 @@ from typing import Final
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
-from services.optimizer.jobs.spec import Spec
-from sim.outcome import OBJECTIVES_VERSION, Objective
-from sim.plugins import source_digest
-from sim.provenance import LIBRARIES, Provenance, provenance_of, version_changes
+from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.sim.outcome import OBJECTIVES_VERSION, Objective
+from gaitswarm.sim.plugins import source_digest
+from gaitswarm.sim.provenance import LIBRARIES, Provenance, provenance_of, version_changes
 
 _OPTIMIZER: Final = Path(__file__).parents[1]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from services.optimizer.errors import QuotaExceeded
+from gaitswarm.services.optimizer.errors import QuotaExceeded
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,12 +8,12 @@ from typing import Final, Literal
 
 import numpy as np
 
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.labels import is_own_robot
-from services.optimizer.jobs.preference import PREFERENCES
-from services.optimizer.jobs.spec import Spec
-from sim.controllers import CONTROLLERS
-from sim.gait_variables import GAIT_CATALOGUE
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.labels import is_own_robot
+from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
+from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.sim.controllers import CONTROLLERS
+from gaitswarm.sim.gait_variables import GAIT_CATALOGUE
 
 ReferenceKind = Literal["published", "start"]
 

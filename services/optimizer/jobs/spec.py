@@ -19,14 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from services.optimizer.errors import InvalidRequest, NotFound
-from services.optimizer.jobs.design_space import DesignSpace
-from services.optimizer.jobs.judgement import Judgement, by_design
-from services.optimizer.jobs.optimizer_choice import OptimizerChoice
-from services.optimizer.jobs.start import EarlierJobs, StartChoice
-from services.optimizer.search.automatic import AutoSettings, chosen_method
-from services.optimizer.search.optimizer import Optimizer
-from services.optimizer.search.registry import (
+from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
+from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
+from gaitswarm.services.optimizer.jobs.judgement import Judgement, by_design
+from gaitswarm.services.optimizer.jobs.optimizer_choice import OptimizerChoice
+from gaitswarm.services.optimizer.jobs.start import EarlierJobs, StartChoice
+from gaitswarm.services.optimizer.search.automatic import AutoSettings, chosen_method
+from gaitswarm.services.optimizer.search.optimizer import Optimizer
+from gaitswarm.services.optimizer.search.registry import (
     DEFAULT_METHOD,
     LONGEST_REPLAY,
     METHODS,
@@ -34,14 +34,14 @@ from services.optimizer.search.registry import (
     OptimizerSettings,
     create_search,
 )
-from sim.assembly import check_precision
-from sim.case import Case
-from sim.errors import SimulationInputError
-from sim.identification.recorded_walk import RecordedWalk, Recordings
-from sim.kernel.walk import Precision
-from sim.outcome import Objective, Outcome
-from sim.robot import DEFAULT_ROBOT, RobotSource, load_robot
-from sim.variables import VariableChoice, VariableName, VariableValue
+from gaitswarm.sim.assembly import check_precision
+from gaitswarm.sim.case import Case
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.identification.recorded_walk import RecordedWalk, Recordings
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.outcome import Objective, Outcome
+from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotSource, load_robot
+from gaitswarm.sim.variables import VariableChoice, VariableName, VariableValue
 
 Floats = NDArray[np.float64]
 

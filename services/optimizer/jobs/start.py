@@ -7,7 +7,7 @@ from typing import Annotated, Any, Final
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 
-from sim.variables import VariableName, VariableValue
+from gaitswarm.sim.variables import VariableName, VariableValue
 
 _DESIGNS: Final = "<designs>"
 _JOBS: Final = "<jobs>"

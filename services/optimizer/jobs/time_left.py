@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Final
 
-from services.optimizer.jobs.job import Job, JobState
+from gaitswarm.services.optimizer.jobs.job import Job, JobState
 
 _WEIGHT: Final = 0.3
 """Of the last iteration, against all before."""

@@ -9,8 +9,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.jobs.spec import Spec
-from sim.provenance import Provenance
+from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.sim.provenance import Provenance
 
 KEY_BYTES: Final = 16
 """Of 10^12 different designs, two have the same key with a chance of 10^-15."""

@@ -1,6 +1,6 @@
 """What happens next in a job: a pure function of (state, event) -> (state, actions).
 
-No I/O, clock or thread is in here; `services.optimizer.run.execution` executes the actions, in
+No I/O, clock or thread is in here; `gaitswarm.services.optimizer.run.execution` executes the actions, in
 order, and answers the last of them with an event. An action that raises voids those after it.
 
 event                  in phase         actions                      phase after
@@ -43,14 +43,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.jobs.iteration import Answered, Ask, CompletedIteration, Reevaluation
-from services.optimizer.jobs.job import Job, JobState, refusal
-from services.optimizer.jobs.judgement import by_design
-from services.optimizer.jobs.provenance import JobProvenance
-from services.optimizer.jobs.spec import Spec, create_optimizer, judge_outcomes
-from services.optimizer.jobs.walk_keys import walk_keys
-from services.optimizer.run.evaluator import EvaluationRequest
-from services.optimizer.run.events import (
+from gaitswarm.services.optimizer.jobs.iteration import (
+    Answered,
+    Ask,
+    CompletedIteration,
+    Reevaluation,
+)
+from gaitswarm.services.optimizer.jobs.job import Job, JobState, refusal
+from gaitswarm.services.optimizer.jobs.judgement import by_design
+from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
+from gaitswarm.services.optimizer.jobs.spec import Spec, create_optimizer, judge_outcomes
+from gaitswarm.services.optimizer.jobs.walk_keys import walk_keys
+from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
+from gaitswarm.services.optimizer.run.events import (
     Action,
     Begin,
     Claimed,
@@ -70,9 +75,9 @@ from services.optimizer.run.events import (
     Wait,
     Waited,
 )
-from services.optimizer.run.outage import Backoff
-from services.optimizer.search.optimizer import Optimizer
-from sim.identification.recorded_walk import Recordings
+from gaitswarm.services.optimizer.run.outage import Backoff
+from gaitswarm.services.optimizer.search.optimizer import Optimizer
+from gaitswarm.sim.identification.recorded_walk import Recordings
 
 
 class Phase(StrEnum):

@@ -9,11 +9,11 @@ from typing import Final
 
 import numpy as np
 
-from services.optimizer.errors import StoreUnavailable
-from services.optimizer.jobs.iteration import Known
-from services.optimizer.run.evaluator import EvaluationRequest, Evaluator
-from services.optimizer.store.port.base import Store
-from sim.outcome import Outcome, Status
+from gaitswarm.services.optimizer.errors import StoreUnavailable
+from gaitswarm.services.optimizer.jobs.iteration import Known
+from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, Evaluator
+from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.sim.outcome import Outcome, Status
 
 _NEW: Final = -1
 

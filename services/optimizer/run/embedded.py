@@ -9,15 +9,15 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Final
 
-from services.optimizer.errors import GaitswarmError, LeaseLost
-from services.optimizer.jobs.iteration import CompletedIteration, Iteration
-from services.optimizer.jobs.job import Claim, Job, JobState
-from services.optimizer.run.evaluator import EvaluationStopped, Evaluator
-from services.optimizer.run.execution import OnCommit, OnRetry, Surroundings, run_claim
-from services.optimizer.run.heartbeat import Heartbeat
-from services.optimizer.run.outage import Backoff
-from services.optimizer.run.runner import runner_name
-from services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.errors import GaitswarmError, LeaseLost
+from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration, Iteration
+from gaitswarm.services.optimizer.jobs.job import Claim, Job, JobState
+from gaitswarm.services.optimizer.run.evaluator import EvaluationStopped, Evaluator
+from gaitswarm.services.optimizer.run.execution import OnCommit, OnRetry, Surroundings, run_claim
+from gaitswarm.services.optimizer.run.heartbeat import Heartbeat
+from gaitswarm.services.optimizer.run.outage import Backoff
+from gaitswarm.services.optimizer.run.runner import runner_name
+from gaitswarm.services.optimizer.store.port.base import Store
 
 EMBEDDED_LEASE_SECONDS: Final = 5.0
 """Short, because a person waits for it when the process before was killed."""

@@ -9,9 +9,9 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.case import Case
-from sim.outcome import Outcome
-from sim.provenance import Provenance
+from gaitswarm.sim.case import Case
+from gaitswarm.sim.outcome import Outcome
+from gaitswarm.sim.provenance import Provenance
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from services.optimizer.jobs.iteration import Ask, CompletedIteration
-from services.optimizer.jobs.job import Claim, Job, JobState
-from services.optimizer.jobs.provenance import JobProvenance
-from services.optimizer.run.evaluator import EvaluationRequest
-from sim.outcome import Outcome
+from gaitswarm.services.optimizer.jobs.iteration import Ask, CompletedIteration
+from gaitswarm.services.optimizer.jobs.job import Claim, Job, JobState
+from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
+from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
+from gaitswarm.sim.outcome import Outcome
 
 
 @dataclass(frozen=True, slots=True)

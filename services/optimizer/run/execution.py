@@ -14,7 +14,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Final, TypeVar
 
-from services.optimizer.errors import (
+from gaitswarm.services.optimizer.errors import (
     BudgetChanged,
     GaitswarmError,
     KilledWorker,
@@ -24,16 +24,20 @@ from services.optimizer.errors import (
     StoreUnavailable,
     Unavailable,
 )
-from services.optimizer.jobs.iteration import CompletedIteration
-from services.optimizer.jobs.job import Claim, Job, JobState
-from services.optimizer.jobs.priority import weight
-from services.optimizer.jobs.provenance import JobProvenance, job_provenance
-from services.optimizer.jobs.spec import Spec
-from services.optimizer.log_context import log_context
-from services.optimizer.run.coordinator import Coordination, Phase, handle
-from services.optimizer.run.economy import evaluate_unknown
-from services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped, Evaluator
-from services.optimizer.run.events import (
+from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
+from gaitswarm.services.optimizer.jobs.job import Claim, Job, JobState
+from gaitswarm.services.optimizer.jobs.priority import weight
+from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
+from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.services.optimizer.log_context import log_context
+from gaitswarm.services.optimizer.run.coordinator import Coordination, Phase, handle
+from gaitswarm.services.optimizer.run.economy import evaluate_unknown
+from gaitswarm.services.optimizer.run.evaluator import (
+    EvaluationRequest,
+    EvaluationStopped,
+    Evaluator,
+)
+from gaitswarm.services.optimizer.run.events import (
     Action,
     Begin,
     Claimed,
@@ -54,9 +58,9 @@ from services.optimizer.run.events import (
     Waited,
     iteration_of,
 )
-from services.optimizer.run.heartbeat import Heartbeat
-from services.optimizer.run.outage import Backoff, Outage, is_infrastructure
-from services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.run.heartbeat import Heartbeat
+from gaitswarm.services.optimizer.run.outage import Backoff, Outage, is_infrastructure
+from gaitswarm.services.optimizer.store.port.base import Store
 
 OnCommit = Callable[[CompletedIteration, JobState], None]
 """Called after an iteration is stored, in the thread that runs the job."""

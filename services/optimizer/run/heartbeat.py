@@ -8,11 +8,11 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Final, Self
 
-from services.optimizer.errors import LeaseLost
-from services.optimizer.jobs.job import Claim, JobState
-from services.optimizer.log_context import log_context
-from services.optimizer.run.outage import Outage, is_infrastructure
-from services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.errors import LeaseLost
+from gaitswarm.services.optimizer.jobs.job import Claim, JobState
+from gaitswarm.services.optimizer.log_context import log_context
+from gaitswarm.services.optimizer.run.outage import Outage, is_infrastructure
+from gaitswarm.services.optimizer.store.port.base import Store
 
 _BEATS_PER_LEASE: Final = 3
 _LONGEST_INTERVAL: Final = 1.0

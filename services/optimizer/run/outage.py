@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Final
 
-from services.optimizer.errors import Unavailable
-from sim.errors import KernelBuildError
+from gaitswarm.services.optimizer.errors import Unavailable
+from gaitswarm.sim.errors import KernelBuildError
 
 _OF_THE_MACHINE: Final = frozenset(
     {

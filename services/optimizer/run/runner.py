@@ -16,15 +16,15 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Final
 
-from services.optimizer.errors import GaitswarmError, NotFound
-from services.optimizer.jobs.job import QUARANTINE_AFTER, Claim, Job, JobState
-from services.optimizer.jobs.provenance import optimizer_digest
-from services.optimizer.log_context import log_context
-from services.optimizer.run.evaluator import Evaluator
-from services.optimizer.run.execution import Surroundings, run_claim
-from services.optimizer.run.outage import Backoff, Outage, is_infrastructure
-from services.optimizer.store.port.base import Store
-from sim.provenance import simulator_digest
+from gaitswarm.services.optimizer.errors import GaitswarmError, NotFound
+from gaitswarm.services.optimizer.jobs.job import QUARANTINE_AFTER, Claim, Job, JobState
+from gaitswarm.services.optimizer.jobs.provenance import optimizer_digest
+from gaitswarm.services.optimizer.log_context import log_context
+from gaitswarm.services.optimizer.run.evaluator import Evaluator
+from gaitswarm.services.optimizer.run.execution import Surroundings, run_claim
+from gaitswarm.services.optimizer.run.outage import Backoff, Outage, is_infrastructure
+from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.sim.provenance import simulator_digest
 
 _PAUSES: Final = Backoff(first=0.5, longest=10.0)
 """Between attempts to claim a job while the store, or a thread for the job, is not to be had."""

@@ -7,16 +7,16 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Final, Literal, TypeAlias
 
-from services.optimizer.search.optimizer import SearchSettings
-from services.optimizer.search.registry import (
+from gaitswarm.services.optimizer.search.optimizer import SearchSettings
+from gaitswarm.services.optimizer.search.registry import (
     DEFAULT_METHOD,
     LONGEST_REPLAY,
     METHODS,
     NamedSettings,
     OptimizerSettings,
 )
-from services.optimizer.search.space import Kind, Space
-from sim.plugins import KnownName
+from gaitswarm.services.optimizer.search.space import Kind, Space
+from gaitswarm.sim.plugins import KnownName
 
 
 class AutoSettings(SearchSettings):

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, NonNegativeInt
 
-from services.optimizer.search.optimizer import checked_fitness, parse_state
+from gaitswarm.services.optimizer.search.optimizer import checked_fitness, parse_state
 
 Floats = NDArray[np.float64]
 

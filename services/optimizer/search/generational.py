@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, FiniteFloat, NonNegativeInt
 
-from services.optimizer.search.optimizer import (
+from gaitswarm.services.optimizer.search.optimizer import (
     SearchSettings,
     checked_fitness,
     checked_start,
     matrix,
     parse_state,
 )
-from services.optimizer.search.space import Space
+from gaitswarm.services.optimizer.search.space import Space
 
 Floats = NDArray[np.float64]
 

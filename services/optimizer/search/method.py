@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
-from services.optimizer.search.optimizer import Optimizer, SearchSettings
-from services.optimizer.search.replayed import Replayed
-from services.optimizer.search.space import Space
-from sim.plugins import MISSING, version_of
+from gaitswarm.services.optimizer.search.optimizer import Optimizer, SearchSettings
+from gaitswarm.services.optimizer.search.replayed import Replayed
+from gaitswarm.services.optimizer.search.space import Space
+from gaitswarm.sim.plugins import MISSING, version_of
 
 Create = Callable[[Any, Space, int, int], Optimizer]
 """(settings, space, budget [evaluations], seed) -> the optimizer before its first ask."""

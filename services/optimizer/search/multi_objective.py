@@ -7,14 +7,14 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.search.generational import (
+from gaitswarm.services.optimizer.search.generational import (
     Generational,
     GenerationState,
     Worth,
     of_worth,
     worth,
 )
-from services.optimizer.search.optimizer import SearchSettings, checked_fitness
+from gaitswarm.services.optimizer.search.optimizer import SearchSettings, checked_fitness
 
 Floats = NDArray[np.float64]
 

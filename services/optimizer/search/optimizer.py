@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from services.optimizer.search.space import Space
-from sim.input.wording import message_of
+from gaitswarm.services.optimizer.search.space import Space
+from gaitswarm.sim.input.wording import message_of
 
 
 class SearchSettings(BaseModel):

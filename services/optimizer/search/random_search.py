@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Literal
 
-from services.optimizer.search.optimizer import SearchSettings
-from services.optimizer.search.random_stream import RandomNumbers
-from services.optimizer.search.replayed import Proposals
-from services.optimizer.search.space import Space
+from gaitswarm.services.optimizer.search.optimizer import SearchSettings
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.replayed import Proposals
+from gaitswarm.services.optimizer.search.space import Space
 
 
 class RandomSearchSettings(SearchSettings):

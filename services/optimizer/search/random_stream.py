@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.memory import require_room_for_scipy
+from gaitswarm.sim.memory import require_room_for_scipy
 
 _DOUBLE_BITS: Final = 53
 

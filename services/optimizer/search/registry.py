@@ -10,33 +10,33 @@ from typing import TYPE_CHECKING, Annotated, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.search.evolution.cma_es import CmaEs, CmaEsSettings
-from services.optimizer.search.evolution.differential_evolution import (
+from gaitswarm.services.optimizer.search.evolution.cma_es import CmaEs, CmaEsSettings
+from gaitswarm.services.optimizer.search.evolution.differential_evolution import (
     DeSettings,
     DifferentialEvolution,
 )
-from services.optimizer.search.evolution.genetic import GaSettings
-from services.optimizer.search.evolution.hype import Hype, HypeSettings
-from services.optimizer.search.local.annealing import AnnealingSettings
-from services.optimizer.search.local.directed_tabu import DirectedTabuSettings
-from services.optimizer.search.local.mads import MadsSettings
-from services.optimizer.search.local.nelder_mead import NelderMeadSettings
-from services.optimizer.search.local.pattern_search import PatternSearchSettings
-from services.optimizer.search.method import Method, from_generator, settings_of
-from services.optimizer.search.model.bayesian import BayesianSettings
-from services.optimizer.search.multistart.global_search import (
+from gaitswarm.services.optimizer.search.evolution.genetic import GaSettings
+from gaitswarm.services.optimizer.search.evolution.hype import Hype, HypeSettings
+from gaitswarm.services.optimizer.search.local.annealing import AnnealingSettings
+from gaitswarm.services.optimizer.search.local.directed_tabu import DirectedTabuSettings
+from gaitswarm.services.optimizer.search.local.mads import MadsSettings
+from gaitswarm.services.optimizer.search.local.nelder_mead import NelderMeadSettings
+from gaitswarm.services.optimizer.search.local.pattern_search import PatternSearchSettings
+from gaitswarm.services.optimizer.search.method import Method, from_generator, settings_of
+from gaitswarm.services.optimizer.search.model.bayesian import BayesianSettings
+from gaitswarm.services.optimizer.search.multistart.global_search import (
     GlobalBfgsSettings,
     GlobalNelderMeadSettings,
     GlobalUnirandiSettings,
 )
-from services.optimizer.search.optimizer import Optimizer, SearchSettings
-from services.optimizer.search.random_search import RandomSearchSettings
-from services.optimizer.search.space import Space
-from services.optimizer.search.swarm.gsa import GsaSettings
-from services.optimizer.search.swarm.pso import ParticleSwarm, PsoSettings
-from services.optimizer.search.swarm.pso_ps import PsoPsSettings
-from services.optimizer.search.swarm.tlbo import TlboSettings
-from sim.plugins import (
+from gaitswarm.services.optimizer.search.optimizer import Optimizer, SearchSettings
+from gaitswarm.services.optimizer.search.random_search import RandomSearchSettings
+from gaitswarm.services.optimizer.search.space import Space
+from gaitswarm.services.optimizer.search.swarm.gsa import GsaSettings
+from gaitswarm.services.optimizer.search.swarm.pso import ParticleSwarm, PsoSettings
+from gaitswarm.services.optimizer.search.swarm.pso_ps import PsoPsSettings
+from gaitswarm.services.optimizer.search.swarm.tlbo import TlboSettings
+from gaitswarm.sim.plugins import (
     KnownName,
     Plugin,
     PluginSettings,
@@ -51,7 +51,7 @@ LONGEST_REPLAY: Final = 250_000
 """Most evaluations of a job whose search is replayed when it is resumed."""
 
 
-_HERE: Final = "services.optimizer.search"
+_HERE: Final = "gaitswarm.services.optimizer.search"
 
 _BUILT_IN: Final[dict[str, Method]] = {
     "bayesian": from_generator(

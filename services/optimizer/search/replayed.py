@@ -14,15 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, NonNegativeInt, PositiveInt
 
-from services.optimizer.search.generational import Worth, of_worth, worth
-from services.optimizer.search.optimizer import (
+from gaitswarm.services.optimizer.search.generational import Worth, of_worth, worth
+from gaitswarm.services.optimizer.search.optimizer import (
     SearchSettings,
     checked_fitness,
     checked_start,
     parse_state,
 )
-from services.optimizer.search.random_stream import RandomNumbers
-from services.optimizer.search.space import Space
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.space import Space
 
 Floats = NDArray[np.float64]
 

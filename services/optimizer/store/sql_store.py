@@ -8,11 +8,11 @@ from typing import Any, Final
 from sqlalchemy import update
 from sqlalchemy.exc import IntegrityError
 
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.audit import LOCAL, AuditAction, AuditEntry
-from services.optimizer.jobs.documents import check_budget
-from services.optimizer.jobs.fork import Fork
-from services.optimizer.jobs.job import (
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.audit import LOCAL, AuditAction, AuditEntry
+from gaitswarm.services.optimizer.jobs.documents import check_budget
+from gaitswarm.services.optimizer.jobs.fork import Fork
+from gaitswarm.services.optimizer.jobs.job import (
     Claim,
     Command,
     Job,
@@ -21,14 +21,14 @@ from services.optimizer.jobs.job import (
     commanded,
     extended,
 )
-from services.optimizer.jobs.labels import ANY_JOB, FacetCounts, JobFilter, LabelsChange
-from services.optimizer.jobs.priority import check_can_be_prioritized
-from services.optimizer.jobs.provenance import JobProvenance, first_record
-from services.optimizer.jobs.quota import Quota
-from services.optimizer.jobs.reference import Reference
-from services.optimizer.jobs.spec import Spec
-from services.optimizer.store.connections.changes import SqlChanges
-from services.optimizer.store.connections.engine import (
+from gaitswarm.services.optimizer.jobs.labels import ANY_JOB, FacetCounts, JobFilter, LabelsChange
+from gaitswarm.services.optimizer.jobs.priority import check_can_be_prioritized
+from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, first_record
+from gaitswarm.services.optimizer.jobs.quota import Quota
+from gaitswarm.services.optimizer.jobs.reference import Reference
+from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.services.optimizer.store.connections.changes import SqlChanges
+from gaitswarm.services.optimizer.store.connections.engine import (
     Clock,
     Database,
     check_file,
@@ -36,48 +36,52 @@ from services.optimizer.store.connections.engine import (
     database_time,
     parse_url,
 )
-from services.optimizer.store.connections.file_system import check_file_system
-from services.optimizer.store.port.reading import Page, Queue
-from services.optimizer.store.rows.job_rows import request_digest, to_job
-from services.optimizer.store.rows.tables import jobs
-from services.optimizer.store.schema.in_use import admit
-from services.optimizer.store.schema.migrate import create
-from services.optimizer.store.schema.revisions import check_revision
-from services.optimizer.store.statements.audit import audit_page, note_change, note_submission
-from services.optimizer.store.statements.claims import (
+from gaitswarm.services.optimizer.store.connections.file_system import check_file_system
+from gaitswarm.services.optimizer.store.port.reading import Page, Queue
+from gaitswarm.services.optimizer.store.rows.job_rows import request_digest, to_job
+from gaitswarm.services.optimizer.store.rows.tables import jobs
+from gaitswarm.services.optimizer.store.schema.in_use import admit
+from gaitswarm.services.optimizer.store.schema.migrate import create
+from gaitswarm.services.optimizer.store.schema.revisions import check_revision
+from gaitswarm.services.optimizer.store.statements.audit import (
+    audit_page,
+    note_change,
+    note_submission,
+)
+from gaitswarm.services.optimizer.store.statements.claims import (
     has_live_lease,
     take_job,
 )
-from services.optimizer.store.statements.job_cursors import cursor_of
-from services.optimizer.store.statements.job_list import (
+from gaitswarm.services.optimizer.store.statements.job_cursors import cursor_of
+from gaitswarm.services.optimizer.store.statements.job_list import (
     among_jobs,
     fittest_jobs,
     jobs_of,
     newest_jobs,
 )
-from services.optimizer.store.statements.job_orders import sort_jobs
-from services.optimizer.store.statements.labels import count_facets, label_job
-from services.optimizer.store.statements.queue import count_jobs
-from services.optimizer.store.statements.records import (
+from gaitswarm.services.optimizer.store.statements.job_orders import sort_jobs
+from gaitswarm.services.optimizer.store.statements.labels import count_facets, label_job
+from gaitswarm.services.optimizer.store.statements.queue import count_jobs
+from gaitswarm.services.optimizer.store.statements.records import (
     entering,
     job_row,
     job_to_show,
     require_readable,
     update_job,
 )
-from services.optimizer.store.statements.submissions import (
+from gaitswarm.services.optimizer.store.statements.submissions import (
     Submission,
     check_quota,
     insert_job,
     repeated_job,
 )
-from services.optimizer.store.transactions.at_once import SqlAtOnce
-from services.optimizer.store.transactions.deletion import SqlDeletion
-from services.optimizer.store.transactions.history import SqlHistory, checked_limit
-from services.optimizer.store.transactions.outbox import SqlOutbox
-from services.optimizer.store.transactions.recordings import SqlRecordings
-from services.optimizer.store.transactions.runs import SqlRuns
-from services.optimizer.store.transactions.tokens import SqlTokens
+from gaitswarm.services.optimizer.store.transactions.at_once import SqlAtOnce
+from gaitswarm.services.optimizer.store.transactions.deletion import SqlDeletion
+from gaitswarm.services.optimizer.store.transactions.history import SqlHistory, checked_limit
+from gaitswarm.services.optimizer.store.transactions.outbox import SqlOutbox
+from gaitswarm.services.optimizer.store.transactions.recordings import SqlRecordings
+from gaitswarm.services.optimizer.store.transactions.runs import SqlRuns
+from gaitswarm.services.optimizer.store.transactions.tokens import SqlTokens
 
 _LONGEST_KEY: Final = 200
 

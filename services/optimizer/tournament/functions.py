@@ -39,7 +39,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.search.random_stream import uniform
+from gaitswarm.services.optimizer.search.random_stream import uniform
 
 ACCEPTANCE: Final = 1e-3
 """A run that reaches this value has solved a function. The thesis draws such a line in figs. 3.1 to

@@ -9,15 +9,20 @@ from typing import Any, Final
 
 from pydantic import ValidationError
 
-from services.optimizer.search.automatic import CHOICES, RULES, AutoSettings, chosen_method
-from services.optimizer.search.optimizer import SearchSettings
-from services.optimizer.search.registry import METHODS, create_search
-from services.optimizer.search.space import Space
-from services.optimizer.tournament.race import Evaluate, Search
-from services.optimizer.tournament.rivals import RIVALS
-from sim.input.near_names import instead_of
-from sim.input.wording import message_of
-from sim.variables import Variable
+from gaitswarm.services.optimizer.search.automatic import (
+    CHOICES,
+    RULES,
+    AutoSettings,
+    chosen_method,
+)
+from gaitswarm.services.optimizer.search.optimizer import SearchSettings
+from gaitswarm.services.optimizer.search.registry import METHODS, create_search
+from gaitswarm.services.optimizer.search.space import Space
+from gaitswarm.services.optimizer.tournament.race import Evaluate, Search
+from gaitswarm.services.optimizer.tournament.rivals import RIVALS
+from gaitswarm.sim.input.near_names import instead_of
+from gaitswarm.sim.input.wording import message_of
+from gaitswarm.sim.variables import Variable
 
 _UNBOUNDED: Final = 1e9
 """In place of a bound that a setting does not have."""

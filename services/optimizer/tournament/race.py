@@ -11,7 +11,7 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.search.space import Space
+from gaitswarm.services.optimizer.search.space import Space
 
 Floats = NDArray[np.float64]
 

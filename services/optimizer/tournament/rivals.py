@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from services.optimizer.search.optimizer import SearchSettings
-from services.optimizer.search.space import Axis, Space
-from services.optimizer.tournament.race import Evaluate
+from gaitswarm.services.optimizer.search.optimizer import SearchSettings
+from gaitswarm.services.optimizer.search.space import Axis, Space
+from gaitswarm.services.optimizer.tournament.race import Evaluate
 
 if TYPE_CHECKING:
     from optuna.distributions import BaseDistribution

@@ -11,9 +11,9 @@ from typing import Final
 
 import numpy as np
 
-from sim.compiler.target import target
-from sim.plugins import plugin_versions, source_digest
-from sim.provenance import simulator_digest
+from gaitswarm.sim.compiler.target import target
+from gaitswarm.sim.plugins import plugin_versions, source_digest
+from gaitswarm.sim.provenance import simulator_digest
 
 _ROOT: Final = Path(__file__).parents[1]
 
@@ -101,7 +101,7 @@ def introducer() -> Callable[[], dict[str, str]]:
         said = {"host": platform.node(), "gaitswarm": "none"}
         try:
             said["gaitswarm"] = metadata.version("gaitswarm")
-            from services.worker.cluster.handshake import fingerprint  # noqa: PLC0415
+            from gaitswarm.services.worker.cluster.handshake import fingerprint  # noqa: PLC0415
 
             said |= fingerprint()
         except Exception as error:  # noqa: BLE001 - anything may be wrong there

@@ -8,9 +8,9 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from typing import Any, Final, Protocol
 
-from services.optimizer.run.evaluator import EvaluationRequest
-from sim.kernel.walk import Precision
-from sim.robot import RobotSource
+from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.robot import RobotSource
 
 LOOK_AHEAD: Final = 2
 """Tasks with Ray per slot: one that runs, and one that is at hand when it ends."""

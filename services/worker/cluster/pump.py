@@ -8,13 +8,19 @@ import time
 from collections import deque
 from typing import Any, Final
 
-from services.optimizer.errors import EvaluatorUnavailable
-from services.worker.cluster.nodes import LOOK_AHEAD, PATIENCE_SECONDS, Node, Nodes, Wanted
-from services.worker.cluster.shared_cases import CaseShelf, run_behind_others, sent
-from services.worker.cluster.shares import Shares
-from services.worker.dispatch import Dispatcher, Work
-from services.worker.ray_session import RaySession
-from services.worker.tasks import Answer, Failure, warm_up
+from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
+from gaitswarm.services.worker.cluster.nodes import (
+    LOOK_AHEAD,
+    PATIENCE_SECONDS,
+    Node,
+    Nodes,
+    Wanted,
+)
+from gaitswarm.services.worker.cluster.shared_cases import CaseShelf, run_behind_others, sent
+from gaitswarm.services.worker.cluster.shares import Shares
+from gaitswarm.services.worker.dispatch import Dispatcher, Work
+from gaitswarm.services.worker.ray_session import RaySession
+from gaitswarm.services.worker.tasks import Answer, Failure, warm_up
 
 _GLANCE: Final = 0.02
 """Seconds between looks for new work, while a slot is free."""

@@ -11,14 +11,14 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import Any, Final
 
-from services.optimizer.errors import EvaluatorUnavailable
-from services.optimizer.run.evaluator import EvaluationRequest
-from services.worker.cluster.demand import Demand
-from services.worker.cluster.handshake import Introduction, introducer
-from services.worker.cluster.nodes import PATIENCE_SECONDS, Node, Wanted, chosen
-from services.worker.ray_session import RaySession, listens
-from sim import simulate
-from sim.provenance import Provenance, provenance_of
+from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
+from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
+from gaitswarm.services.worker.cluster.demand import Demand
+from gaitswarm.services.worker.cluster.handshake import Introduction, introducer
+from gaitswarm.services.worker.cluster.nodes import PATIENCE_SECONDS, Node, Wanted, chosen
+from gaitswarm.services.worker.ray_session import RaySession, listens
+from gaitswarm.sim import simulate
+from gaitswarm.sim.provenance import Provenance, provenance_of
 
 LOOK_SECONDS: Final = 1.0
 """Between looks at which nodes there are."""

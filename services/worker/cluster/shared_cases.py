@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 from types import ModuleType
 from typing import Any, Final
 
-from services.worker.cluster.interrupts import interrupted_outside_imports
-from services.worker.cluster.priority import Priority
-from services.worker.tasks import Answer, Failure, Task, run_in_worker
-from sim.case import Case
+from gaitswarm.services.worker.cluster.interrupts import interrupted_outside_imports
+from gaitswarm.services.worker.cluster.priority import Priority
+from gaitswarm.services.worker.tasks import Answer, Failure, Task, run_in_worker
+from gaitswarm.sim.case import Case
 
 _KEPT: Final = 32
 """Lists of cases, of as many jobs: those that were used last."""

@@ -8,7 +8,7 @@ import time
 import uuid
 from typing import Any, Final
 
-from services.worker.ray_session import RaySession
+from gaitswarm.services.worker.ray_session import RaySession
 
 REPORT_SECONDS: Final = 1.0
 """Between reports of a runner."""

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from sim.errors import KernelBuildError, ProcessEnded
-from sim.kernel.emitted.source import kernel_source
-from sim.limited_process import Document, LimitedProcesses, serve
-from sim.robot import Robot
-from sim.robot.description import RobotDescription
-from sim.robot.robot import assembled
+from gaitswarm.sim.errors import KernelBuildError, ProcessEnded
+from gaitswarm.sim.kernel.emitted.source import kernel_source
+from gaitswarm.sim.limited_process import Document, LimitedProcesses, serve
+from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.description import RobotDescription
+from gaitswarm.sim.robot.robot import assembled
 
 if TYPE_CHECKING:
-    from sim.kernel.walk import Precision
+    from gaitswarm.sim.kernel.walk import Precision
 
 SECONDS: Final = 120.0
 """That a derivation may take; it takes one or two, and a second more to start."""
@@ -24,7 +24,7 @@ MEMORY: Final = 4 << 30
 
 # Not kept: CasADi's symbols would take memory, and robots with a new kernel are rare.
 PROCESSES: Final = LimitedProcesses(
-    "sim.kernel.compiled.derivation",
+    "gaitswarm.sim.kernel.compiled.derivation",
     count=2,
     seconds=SECONDS,
     cpu_seconds=CPU_SECONDS,

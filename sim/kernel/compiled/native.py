@@ -13,24 +13,24 @@ from typing import Final
 
 import numpy as np
 
-from sim.compiler.compilation import load_library
-from sim.compiler.target import Target
-from sim.errors import KernelBuildError
-from sim.kernel.compiled.derivation import derived_source
-from sim.kernel.compiled.lanes import plan_lanes
-from sim.kernel.compiled.sharing import SHARED_STRUCTURES, Pool
-from sim.kernel.compiled.structures import (
+from gaitswarm.sim.compiler.compilation import load_library
+from gaitswarm.sim.compiler.target import Target
+from gaitswarm.sim.errors import KernelBuildError
+from gaitswarm.sim.kernel.compiled.derivation import derived_source
+from gaitswarm.sim.kernel.compiled.lanes import plan_lanes
+from gaitswarm.sim.kernel.compiled.sharing import SHARED_STRUCTURES, Pool
+from gaitswarm.sim.kernel.compiled.structures import (
     STRUCTURES,
     Addresses,
     CodingStructure,
     SensorErrorsStructure,
     Walker,
 )
-from sim.kernel.dynamics.kinds import robot_constants
-from sim.kernel.emitted.source import kernel_identity
-from sim.kernel.gains import check_gains
-from sim.kernel.parameters import Layout, internal_state_size
-from sim.kernel.walk import (
+from gaitswarm.sim.kernel.dynamics.kinds import robot_constants
+from gaitswarm.sim.kernel.emitted.source import kernel_identity
+from gaitswarm.sim.kernel.gains import check_gains
+from gaitswarm.sim.kernel.parameters import Layout, internal_state_size
+from gaitswarm.sim.kernel.walk import (
     Coding,
     LaneUse,
     Precision,
@@ -38,8 +38,8 @@ from sim.kernel.walk import (
     WalkResults,
     WalkSetup,
 )
-from sim.outcome import Status
-from sim.robot import Robot
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.robot import Robot
 
 _CODED: Final = tuple(field.name for field in dataclasses.fields(Coding))
 

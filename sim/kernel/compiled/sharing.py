@@ -28,7 +28,7 @@ class _Pool(ctypes.Structure):
 
 
 class LaneCounts(ctypes.Structure):
-    """As `sim.kernel.walk.LaneUse`, of the lanes of one thread."""
+    """As `gaitswarm.sim.kernel.walk.LaneUse`, of the lanes of one thread."""
 
     _fields_ = [(name, ctypes.c_int64) for name in ("walked", "computed", "timed", "control")]
 

@@ -9,8 +9,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers.base import ControlLaw, JointPd, LookupTable, Response
-from sim.errors import SimulationInputError
+from gaitswarm.sim.controllers.base import ControlLaw, JointPd, LookupTable, Response
+from gaitswarm.sim.errors import SimulationInputError
 
 Floats = NDArray[np.float64]
 

@@ -14,15 +14,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sim.kernel.dynamics.inertia import (
+from gaitswarm.sim.kernel.dynamics.inertia import (
     Force,
     Inertia,
     Motion,
     RigidBody,
     angular_acceleration_tensor,
 )
-from sim.kernel.dynamics.rotation import Rotation
-from sim.kernel.dynamics.spatial import (
+from gaitswarm.sim.kernel.dynamics.rotation import Rotation
+from gaitswarm.sim.kernel.dynamics.spatial import (
     Matrix,
     Scalar,
     Vector,

@@ -6,15 +6,15 @@ from collections.abc import Mapping, Sequence
 
 import casadi as ca
 
-from sim.kernel.dynamics.articulated_body import LinkState, free_acceleration
-from sim.kernel.dynamics.inertia import (
+from gaitswarm.sim.kernel.dynamics.articulated_body import LinkState, free_acceleration
+from gaitswarm.sim.kernel.dynamics.inertia import (
     Force,
     Inertia,
     Motion,
     RigidBody,
     angular_acceleration_tensor,
 )
-from sim.kernel.dynamics.spatial import (
+from gaitswarm.sim.kernel.dynamics.spatial import (
     Scalar,
     Vector,
     add,

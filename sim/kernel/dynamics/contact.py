@@ -1,6 +1,6 @@
 """Ground contact of a point foot and its laws of friction, as symbols (thesis 2.2.6).
 
-What a law reads and carries from step to step, as data: `sim.kernel.parameters.CONTACT_LAWS`.
+What a law reads and carries from step to step, as data: `gaitswarm.sim.kernel.parameters.CONTACT_LAWS`.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from typing import Final
 
 import casadi as ca
 
-from sim.kernel.dynamics.articulated_body import LinkState
-from sim.kernel.dynamics.spatial import (
+from gaitswarm.sim.kernel.dynamics.articulated_body import LinkState
+from gaitswarm.sim.kernel.dynamics.spatial import (
     Matrix,
     Scalar,
     Vector,
@@ -26,7 +26,7 @@ from sim.kernel.dynamics.spatial import (
     scale,
     subtract,
 )
-from sim.robot.description import ContactLaw
+from gaitswarm.sim.robot.description import ContactLaw
 
 InternalState = tuple[Scalar, ...]
 """What a law carries of one foot from step to step; for most laws nothing."""
@@ -137,7 +137,7 @@ def foot_on_ground(
     Args:
         link: State of the tibia.
         at: The tibia's end in its frame [m].
-        ground: Parameters of the foot by the names of `sim.robot.description.Contact`.
+        ground: Parameters of the foot by the names of `gaitswarm.sim.robot.description.Contact`.
         mobility: Upper bound of the tibia's end's acceleration under a force [1/kg].
 
     Returns:

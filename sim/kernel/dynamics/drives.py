@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from sim.kernel.dynamics.electrical import supply_voltage
-from sim.kernel.dynamics.gearhead import static_friction, static_friction_slope
-from sim.kernel.dynamics.spatial import Scalar
-from sim.robot.limbs import LimbJoint, is_torque_controlled
+from gaitswarm.sim.kernel.dynamics.electrical import supply_voltage
+from gaitswarm.sim.kernel.dynamics.gearhead import static_friction, static_friction_slope
+from gaitswarm.sim.kernel.dynamics.spatial import Scalar
+from gaitswarm.sim.robot.limbs import LimbJoint, is_torque_controlled
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +156,7 @@ def battery_voltage(
     higher one is taken. A battery that cannot give P gives all it can, at half its own voltage.
 
     Args:
-        constants: As `sim.robot.limbs.electrical_constants` has them, (2 J,).
+        constants: As `gaitswarm.sim.robot.limbs.electrical_constants` has them, (2 J,).
         duty: Motor voltage per supply voltage, or commanded torque per torque limit, (J,) [1].
         rates: Of the motors at the joints, (J,) [rad/s].
         source: Open-circuit voltage of the battery [V].

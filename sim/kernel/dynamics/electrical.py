@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from sim.kernel.dynamics.spatial import Scalar
+from gaitswarm.sim.kernel.dynamics.spatial import Scalar
 
 
 def supply_voltage(

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import casadi as ca
 
-from sim.kernel.dynamics.spatial import Scalar
-from sim.kernel.parameters import STATIC_FRICTION_RATE
+from gaitswarm.sim.kernel.dynamics.spatial import Scalar
+from gaitswarm.sim.kernel.parameters import STATIC_FRICTION_RATE
 
 
 def shaft_torque(

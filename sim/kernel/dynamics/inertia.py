@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sim.kernel.dynamics.rotation import Rotation
-from sim.kernel.dynamics.spatial import (
+from gaitswarm.sim.kernel.dynamics.rotation import Rotation
+from gaitswarm.sim.kernel.dynamics.spatial import (
     Matrix,
     Scalar,
     Vector,

@@ -10,10 +10,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.kernel.dynamics.spatial import Scalar
-from sim.kernel.dynamics.tree import leaves, mapped
-from sim.robot import Robot
-from sim.robot.limbs import Limb, LimbJoint, electrical_constants, limbs_of
+from gaitswarm.sim.kernel.dynamics.spatial import Scalar
+from gaitswarm.sim.kernel.dynamics.tree import leaves, mapped
+from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.limbs import Limb, LimbJoint, electrical_constants, limbs_of
 
 
 @lru_cache(maxsize=64)

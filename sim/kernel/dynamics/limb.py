@@ -14,14 +14,14 @@ from typing import Final
 
 import casadi as ca
 
-from sim.controllers.fixed_point import CONTROL_PERIOD
-from sim.kernel.dynamics.articulated_body import Link, LinkState, Passed, inward, outward
-from sim.kernel.dynamics.contact import FRICTION, foot_on_ground
-from sim.kernel.dynamics.drives import Drive, at_middle, drive_of, friction_of
-from sim.kernel.dynamics.gearhead import shaft_torque
-from sim.kernel.dynamics.inertia import Force, Inertia, Motion, RigidBody
-from sim.kernel.dynamics.rotation import Rotation
-from sim.kernel.dynamics.spatial import (
+from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
+from gaitswarm.sim.kernel.dynamics.articulated_body import Link, LinkState, Passed, inward, outward
+from gaitswarm.sim.kernel.dynamics.contact import FRICTION, foot_on_ground
+from gaitswarm.sim.kernel.dynamics.drives import Drive, at_middle, drive_of, friction_of
+from gaitswarm.sim.kernel.dynamics.gearhead import shaft_torque
+from gaitswarm.sim.kernel.dynamics.inertia import Force, Inertia, Motion, RigidBody
+from gaitswarm.sim.kernel.dynamics.rotation import Rotation
+from gaitswarm.sim.kernel.dynamics.spatial import (
     Matrix,
     Scalar,
     Vector,
@@ -32,9 +32,9 @@ from sim.kernel.dynamics.spatial import (
     scale,
     subtract,
 )
-from sim.kernel.parameters import CONTACT_LAWS
-from sim.robot.description import ContactLaw
-from sim.robot.limbs import Limb, LimbJoint
+from gaitswarm.sim.kernel.parameters import CONTACT_LAWS
+from gaitswarm.sim.robot.description import ContactLaw
+from gaitswarm.sim.robot.limbs import Limb, LimbJoint
 
 Scalars = tuple[Scalar, ...]
 

@@ -2,7 +2,7 @@
 
 The readable form: the reference kernel steps with it, logs are observed through it, and it is what
 the tests hold against Pinocchio and MuJoCo. The compiled kernel has the same formulas limb by limb
-(`sim.kernel.emitted.pieces`).
+(`gaitswarm.sim.kernel.emitted.pieces`).
 """
 
 from __future__ import annotations
@@ -17,20 +17,35 @@ import casadi as ca
 import numpy as np
 import pinocchio as pin
 
-from sim.kernel.dynamics.articulated_body import LinkState
-from sim.kernel.dynamics.body import body_integrands, body_of, body_state, drifted, pushed, solved
-from sim.kernel.dynamics.drives import battery_voltage
-from sim.kernel.dynamics.inertia import Force
-from sim.kernel.dynamics.kinds import LimbKind, limb_kinds
-from sim.kernel.dynamics.limb import After, Before, Environment, LimbState, Scalars, after, before
-from sim.kernel.dynamics.spatial import Scalar, add
-from sim.kernel.dynamics.traced import Traced, outline
-from sim.kernel.parameters import Layout, internal_state_size
-from sim.robot import Robot
-from sim.robot.chain import Placement
-from sim.robot.description import JOINTS_PER_LEG
-from sim.robot.inertia import BodyInertia
-from sim.robot.limbs import Limb, electrical_constants, limb_of, limbs_of
+from gaitswarm.sim.kernel.dynamics.articulated_body import LinkState
+from gaitswarm.sim.kernel.dynamics.body import (
+    body_integrands,
+    body_of,
+    body_state,
+    drifted,
+    pushed,
+    solved,
+)
+from gaitswarm.sim.kernel.dynamics.drives import battery_voltage
+from gaitswarm.sim.kernel.dynamics.inertia import Force
+from gaitswarm.sim.kernel.dynamics.kinds import LimbKind, limb_kinds
+from gaitswarm.sim.kernel.dynamics.limb import (
+    After,
+    Before,
+    Environment,
+    LimbState,
+    Scalars,
+    after,
+    before,
+)
+from gaitswarm.sim.kernel.dynamics.spatial import Scalar, add
+from gaitswarm.sim.kernel.dynamics.traced import Traced, outline
+from gaitswarm.sim.kernel.parameters import Layout, internal_state_size
+from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.chain import Placement
+from gaitswarm.sim.robot.description import JOINTS_PER_LEG
+from gaitswarm.sim.robot.inertia import BodyInertia
+from gaitswarm.sim.robot.limbs import Limb, electrical_constants, limb_of, limbs_of
 
 Trees = TypeVarTuple("Trees")
 T = TypeVar("T")

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sim.kernel.dynamics.spatial import (
+from gaitswarm.sim.kernel.dynamics.spatial import (
     Matrix,
     Scalar,
     Vector,

@@ -7,8 +7,8 @@ from typing import Any, Generic, TypeVar, TypeVarTuple
 
 import casadi as ca
 
-from sim.kernel.dynamics.spatial import Scalar
-from sim.kernel.dynamics.tree import leaves, mapped
+from gaitswarm.sim.kernel.dynamics.spatial import Scalar
+from gaitswarm.sim.kernel.dynamics.tree import leaves, mapped
 
 Trees = TypeVarTuple("Trees")
 T = TypeVar("T")

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import fields, is_dataclass, replace
 from typing import TypeVar
 
-from sim.kernel.dynamics.spatial import Scalar
+from gaitswarm.sim.kernel.dynamics.spatial import Scalar
 
 T = TypeVar("T")
 

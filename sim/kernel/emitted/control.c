@@ -10,14 +10,14 @@ typedef struct {
   const double *robot; /* NR, its constants */
 } Coding;
 
-/* sim.controllers.base.LookupTable; values is NULL where there is none. */
+/* gaitswarm.sim.controllers.base.LookupTable; values is NULL where there is none. */
 typedef struct {
   const int8_t *values;
   int64_t n_error, n_current, n_velocity;
   int64_t error_gain, current_gain, velocity_gain, output_gain;
 } Table;
 
-/* sim.controllers.base.ControlLaw. */
+/* gaitswarm.sim.controllers.base.ControlLaw. */
 typedef struct {
   int64_t proportional_gain, integral_gain, derivative_gain;
   Table direct, integrated;

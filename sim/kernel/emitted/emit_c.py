@@ -9,8 +9,8 @@ from typing import Any, Final
 
 import casadi
 
-from sim.errors import SimulationError
-from sim.kernel.emitted.order import Statement, ordered
+from gaitswarm.sim.errors import SimulationError
+from gaitswarm.sim.kernel.emitted.order import Statement, ordered
 
 _BINARY: Final[dict[str, str]] = {
     "OP_MUL": "{0} * {1}",

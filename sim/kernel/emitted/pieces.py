@@ -13,19 +13,19 @@ from typing import Any, Final
 import casadi as ca
 import numpy as np
 
-from sim.kernel.dynamics.articulated_body import LinkState
-from sim.kernel.dynamics.body import body_integrands, body_of, body_state, pushed, solved
-from sim.kernel.dynamics.drives import battery_voltage
-from sim.kernel.dynamics.inertia import Force, Inertia, Motion
-from sim.kernel.dynamics.kinds import LimbKind, limb_kinds
-from sim.kernel.dynamics.limb import Environment, Held, LimbState, after, before
-from sim.kernel.dynamics.spatial import Scalar
-from sim.kernel.dynamics.tree import leaves, mapped
-from sim.kernel.emitted.emit_c import emit_c
-from sim.kernel.parameters import CONTACT_LAWS, Layout, internal_state_size
-from sim.robot import Robot
-from sim.robot.description import JOINTS_PER_LEG
-from sim.robot.limbs import Limb, limbs_of
+from gaitswarm.sim.kernel.dynamics.articulated_body import LinkState
+from gaitswarm.sim.kernel.dynamics.body import body_integrands, body_of, body_state, pushed, solved
+from gaitswarm.sim.kernel.dynamics.drives import battery_voltage
+from gaitswarm.sim.kernel.dynamics.inertia import Force, Inertia, Motion
+from gaitswarm.sim.kernel.dynamics.kinds import LimbKind, limb_kinds
+from gaitswarm.sim.kernel.dynamics.limb import Environment, Held, LimbState, after, before
+from gaitswarm.sim.kernel.dynamics.spatial import Scalar
+from gaitswarm.sim.kernel.dynamics.tree import leaves, mapped
+from gaitswarm.sim.kernel.emitted.emit_c import emit_c
+from gaitswarm.sim.kernel.parameters import CONTACT_LAWS, Layout, internal_state_size
+from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.description import JOINTS_PER_LEG
+from gaitswarm.sim.robot.limbs import Limb, limbs_of
 
 _PASSED: Final = 27
 """Numbers that a limb passes to the body: an inertia (6 + 9 + 6), and a force (6)."""

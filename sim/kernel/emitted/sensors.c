@@ -6,7 +6,7 @@
 
 enum { ANGLE, CURRENT, SENSORS };
 
-/* sim.kernel.sensors.SensorErrors. Field by field as in native.py. */
+/* gaitswarm.sim.kernel.sensors.SensorErrors. Field by field as in native.py. */
 typedef struct {
   double noise[SENSORS];  /* per unit of a sum of bytes [rad], [A] */
   int64_t delay[SENSORS]; /* control ticks */

@@ -8,17 +8,17 @@ from functools import lru_cache
 from importlib import metadata, resources
 from typing import TYPE_CHECKING, Final
 
-from sim.compiler.compilation import vector_header
-from sim.kernel.dynamics.kinds import limb_kinds
-from sim.kernel.parameters import Layout, internal_state_size
-from sim.robot import Robot
-from sim.robot.actuators import CONTROL_RATE
-from sim.robot.limbs import limbs_of
+from gaitswarm.sim.compiler.compilation import vector_header
+from gaitswarm.sim.kernel.dynamics.kinds import limb_kinds
+from gaitswarm.sim.kernel.parameters import Layout, internal_state_size
+from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.actuators import CONTROL_RATE
+from gaitswarm.sim.robot.limbs import limbs_of
 
 if TYPE_CHECKING:
-    from sim.kernel.walk import Precision
+    from gaitswarm.sim.kernel.walk import Precision
 
-_MADE_BY: Final = ("sim.kernel.dynamics", "sim.kernel.emitted")
+_MADE_BY: Final = ("gaitswarm.sim.kernel.dynamics", "gaitswarm.sim.kernel.emitted")
 """Rooms whose files, each of them, the source depends on, beside the layout of parameters."""
 
 _deriving: Final = threading.Lock()
@@ -60,7 +60,7 @@ def kernel_source(robot: Robot, precision: Precision = "double") -> str:
         C text that lacks the definition of DOUBLES only.
     """
     # Imported only to compile: a worker with a warm cache needs neither CasADi nor Pinocchio.
-    from sim.kernel.emitted.pieces import kernel_pieces  # noqa: PLC0415
+    from gaitswarm.sim.kernel.emitted.pieces import kernel_pieces  # noqa: PLC0415
 
     layout = Layout(robot)
     with _deriving:
@@ -99,14 +99,14 @@ def control_tick() -> str:
 
 
 def _own_file(name: str) -> str:
-    return (resources.files("sim.kernel.emitted") / name).read_text(encoding="utf-8")
+    return (resources.files("gaitswarm.sim.kernel.emitted") / name).read_text(encoding="utf-8")
 
 
 @lru_cache(maxsize=1)
 def _generator() -> bytes:
     """What the source of every robot's kernel depends on."""
     digest = hashlib.sha256(vector_header().encode())
-    digest.update((resources.files("sim.kernel") / "parameters.py").read_bytes())
+    digest.update((resources.files("gaitswarm.sim.kernel") / "parameters.py").read_bytes())
     for room in _MADE_BY:
         for file in sorted(resources.files(room).iterdir(), key=lambda file: file.name):
             if file.name.endswith((".py", ".c", ".h")):

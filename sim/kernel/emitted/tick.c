@@ -19,7 +19,7 @@ typedef struct {
   int used; /* whether any lane has one */
 } Tables;
 
-/* sim.controllers.base.ControlLaw. */
+/* gaitswarm.sim.controllers.base.ControlLaw. */
 typedef struct {
   fine proportional_gain[HALVES], derivative_gain[HALVES], direct_gain[HALVES];
   integral integral_gain[HALVES], integrated_gain[HALVES];

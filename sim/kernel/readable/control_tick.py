@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers.base import ControlLaw
-from sim.controllers.fixed_point import FRACTION_BITS, INTEGRAL_BITS, descale
-from sim.kernel.walk import CODE_LIMIT, Coding, WalkSetup, coarsen
-from sim.outcome import Status
+from gaitswarm.sim.controllers.base import ControlLaw
+from gaitswarm.sim.controllers.fixed_point import FRACTION_BITS, INTEGRAL_BITS, descale
+from gaitswarm.sim.kernel.walk import CODE_LIMIT, Coding, WalkSetup, coarsen
+from gaitswarm.sim.outcome import Status
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -7,10 +7,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.controllers.base import JointPd
-from sim.kernel.walk import Coding, WalkSetup
-from sim.robot import Robot
-from sim.robot.actuators import CONTROL_RATE
+from gaitswarm.sim.controllers.base import JointPd
+from gaitswarm.sim.kernel.walk import Coding, WalkSetup
+from gaitswarm.sim.robot import Robot
+from gaitswarm.sim.robot.actuators import CONTROL_RATE
 
 Floats = NDArray[np.float64]
 

@@ -14,9 +14,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.kernel.dynamics.physics_step import PhysicsModel, physics_model
-from sim.kernel.gains import check_gains
-from sim.kernel.readable.control_tick import (
+from gaitswarm.sim.kernel.dynamics.physics_step import PhysicsModel, physics_model
+from gaitswarm.sim.kernel.gains import check_gains
+from gaitswarm.sim.kernel.readable.control_tick import (
     Past,
     coded,
     control,
@@ -24,9 +24,9 @@ from sim.kernel.readable.control_tick import (
     padded_states,
     status_of,
 )
-from sim.kernel.readable.joint_pd import InnerLoop
-from sim.kernel.sensors import Sensors
-from sim.kernel.walk import (
+from gaitswarm.sim.kernel.readable.joint_pd import InnerLoop
+from gaitswarm.sim.kernel.sensors import Sensors
+from gaitswarm.sim.kernel.walk import (
     INTEGRANDS,
     Coding,
     LaneUse,
@@ -34,8 +34,8 @@ from sim.kernel.walk import (
     WalkResults,
     WalkSetup,
 )
-from sim.outcome import Status
-from sim.robot import Robot
+from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.robot import Robot
 
 Floats = NDArray[np.float64]
 

@@ -15,12 +15,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.errors import Conflict, InvalidRequest
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.job import Job
-from services.optimizer.jobs.spec import DECISIVE, Spec
-from services.optimizer.search.swarm.pso import PsoSettings
-from sim.variables import Variable
+from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.spec import DECISIVE, Spec
+from gaitswarm.services.optimizer.search.swarm.pso import PsoSettings
+from gaitswarm.sim.variables import Variable
 
 Floats = NDArray[np.float64]
 

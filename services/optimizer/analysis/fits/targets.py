@@ -10,11 +10,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.iteration import Evaluation
-from services.optimizer.jobs.kinds.calibration import CalibrationSpec
-from sim.calibration.targets import Target
-from sim.outcome import Status
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.iteration import Evaluation
+from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
+from gaitswarm.sim.calibration.targets import Target
+from gaitswarm.sim.outcome import Status
 
 Floats = NDArray[np.float64]
 

@@ -9,14 +9,17 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.analysis.ranks import spearman
-from services.optimizer.analysis.robustness.engines import ComparedEngine, compared_engines
-from services.optimizer.errors import Conflict
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.kinds.certificate import CertificateSpec
-from services.optimizer.jobs.preference import HEIGHT_LOSS
-from sim.memory import require_room_for_scipy
-from sim.outcome import Status
+from gaitswarm.services.optimizer.analysis.ranks import spearman
+from gaitswarm.services.optimizer.analysis.robustness.engines import (
+    ComparedEngine,
+    compared_engines,
+)
+from gaitswarm.services.optimizer.errors import Conflict
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
+from gaitswarm.services.optimizer.jobs.preference import HEIGHT_LOSS
+from gaitswarm.sim.memory import require_room_for_scipy
+from gaitswarm.sim.outcome import Status
 
 Floats = NDArray[np.float64]
 

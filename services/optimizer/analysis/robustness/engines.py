@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.kinds.certificate import CertificateSpec
-from services.optimizer.jobs.preference import HEIGHT_LOSS
-from sim.mujoco.engines import EngineName
-from sim.outcome import Status
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
+from gaitswarm.services.optimizer.jobs.preference import HEIGHT_LOSS
+from gaitswarm.sim.mujoco.engines import EngineName
+from gaitswarm.sim.outcome import Status
 
 Floats = NDArray[np.float64]
 

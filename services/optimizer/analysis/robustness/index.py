@@ -15,10 +15,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.analysis.interval import CONFIDENCE, Interval
-from services.optimizer.search.random_stream import swarm_uniform
-from sim.outcome import OBJECTIVES
-from sim.variables import Variable
+from gaitswarm.services.optimizer.analysis.interval import CONFIDENCE, Interval
+from gaitswarm.services.optimizer.search.random_stream import swarm_uniform
+from gaitswarm.sim.outcome import OBJECTIVES
+from gaitswarm.sim.variables import Variable
 
 Floats = NDArray[np.float64]
 

@@ -12,12 +12,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.analysis.ranking import fitness_by
-from services.optimizer.analysis.robustness.index import NORMALISED_OBJECTIVES
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
-from services.optimizer.jobs.preference import PREFERENCES, Preference
-from services.optimizer.search.random_stream import swarm_uniform
+from gaitswarm.services.optimizer.analysis.ranking import fitness_by
+from gaitswarm.services.optimizer.analysis.robustness.index import NORMALISED_OBJECTIVES
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
+from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference
+from gaitswarm.services.optimizer.search.random_stream import swarm_uniform
 
 Floats = NDArray[np.float64]
 

@@ -16,9 +16,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.analysis.interval import Interval, percentile_interval
-from services.optimizer.analysis.ranking import rank_correlation
-from services.optimizer.search.random_stream import RandomNumbers, uniform
+from gaitswarm.services.optimizer.analysis.interval import Interval, percentile_interval
+from gaitswarm.services.optimizer.analysis.ranking import rank_correlation
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers, uniform
 
 Floats = NDArray[np.float64]
 

@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from services.optimizer.analysis.tournaments.tournament import Runs, runs_of
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.job import Job, JobState
-from services.optimizer.jobs.kinds.tournament import TournamentSpec
+from gaitswarm.services.optimizer.analysis.tournaments.tournament import Runs, runs_of
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.job import Job, JobState
+from gaitswarm.services.optimizer.jobs.kinds.tournament import TournamentSpec
 
 NAME_PREFIX: Final = "tournament: "
 """What the names of jobs begin with that `gaitswarm tournament` submits; then comes the label."""

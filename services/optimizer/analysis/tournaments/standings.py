@@ -9,8 +9,8 @@ from typing import Final
 
 import numpy as np
 
-from services.optimizer.analysis.interval import Interval
-from services.optimizer.analysis.tournaments.tournament import (
+from gaitswarm.services.optimizer.analysis.interval import Interval
+from gaitswarm.services.optimizer.analysis.tournaments.tournament import (
     Floats,
     Results,
     Runs,

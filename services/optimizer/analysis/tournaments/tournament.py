@@ -11,11 +11,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.analysis.interval import Interval, percentile_interval
-from services.optimizer.analysis.ranks import average_ranks, spearman
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.kinds.tournament import TournamentSpec
-from services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.analysis.interval import Interval, percentile_interval
+from gaitswarm.services.optimizer.analysis.ranks import average_ranks, spearman
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.kinds.tournament import TournamentSpec
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 
 Floats = NDArray[np.float64]
 

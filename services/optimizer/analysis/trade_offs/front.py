@@ -10,12 +10,15 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.analysis.ranking import fitness_by
-from services.optimizer.analysis.robustness.preference_winners import NAMED
-from services.optimizer.analysis.trade_offs.dominance import non_dominated
-from services.optimizer.analysis.trade_offs.hypervolume import HypervolumeCurve, hypervolume_curve
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
+from gaitswarm.services.optimizer.analysis.ranking import fitness_by
+from gaitswarm.services.optimizer.analysis.robustness.preference_winners import NAMED
+from gaitswarm.services.optimizer.analysis.trade_offs.dominance import non_dominated
+from gaitswarm.services.optimizer.analysis.trade_offs.hypervolume import (
+    HypervolumeCurve,
+    hypervolume_curve,
+)
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.search.random_stream import uniform
+from gaitswarm.services.optimizer.search.random_stream import uniform
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]

@@ -13,14 +13,14 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.analysis.ranking import fitness_by
-from services.optimizer.analysis.robustness.preference_winners import NAMED
-from services.optimizer.analysis.utilities import objective_vectors
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
-from services.optimizer.jobs.preference import Preference
-from services.optimizer.search.random_stream import uniform
-from sim.memory import require_room_for_scipy
+from gaitswarm.services.optimizer.analysis.ranking import fitness_by
+from gaitswarm.services.optimizer.analysis.robustness.preference_winners import NAMED
+from gaitswarm.services.optimizer.analysis.utilities import objective_vectors
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
+from gaitswarm.services.optimizer.jobs.preference import Preference
+from gaitswarm.services.optimizer.search.random_stream import uniform
+from gaitswarm.sim.memory import require_room_for_scipy
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]

@@ -11,26 +11,26 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, model_validator
 
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.design_space import DesignSpace
-from services.optimizer.jobs.judgement import Judgement
-from services.optimizer.jobs.kinds.misfit import difference, reached, root_mean_square
-from services.optimizer.jobs.spec import Spec
-from sim.calibration.catalogue import robot_variables, varied_robot, walk_variables
-from sim.calibration.targets import QUANTITIES, Target, TargetWalk
-from sim.calibration.walk import RESULTS, CalibrationWalk
-from sim.case import Case
-from sim.catalogue import design_shown
-from sim.controllers import CONTROLLERS
-from sim.errors import SimulationInputError
-from sim.gait_variables import GAIT_CATALOGUE, orders_searched
-from sim.identification.recorded_walk import Recordings
-from sim.outcome import Objective
-from sim.robot import RobotSource
-from sim.robot.shipped import RobotName
-from sim.scenario import Scenario
-from sim.simulate import check_drives, check_gait, check_reach
-from sim.variables import Variable
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
+from gaitswarm.services.optimizer.jobs.judgement import Judgement
+from gaitswarm.services.optimizer.jobs.kinds.misfit import difference, reached, root_mean_square
+from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.sim.calibration.catalogue import robot_variables, varied_robot, walk_variables
+from gaitswarm.sim.calibration.targets import QUANTITIES, Target, TargetWalk
+from gaitswarm.sim.calibration.walk import RESULTS, CalibrationWalk
+from gaitswarm.sim.case import Case
+from gaitswarm.sim.catalogue import design_shown
+from gaitswarm.sim.controllers import CONTROLLERS
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, orders_searched
+from gaitswarm.sim.identification.recorded_walk import Recordings
+from gaitswarm.sim.outcome import Objective
+from gaitswarm.sim.robot import RobotSource
+from gaitswarm.sim.robot.shipped import RobotName
+from gaitswarm.sim.scenario import Scenario
+from gaitswarm.sim.simulate import check_drives, check_gait, check_reach
+from gaitswarm.sim.variables import Variable
 
 Floats = NDArray[np.float64]
 

@@ -10,30 +10,30 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.design_space import DesignSpace
-from services.optimizer.jobs.kinds.certified_worlds import (
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
+from gaitswarm.services.optimizer.jobs.kinds.certified_worlds import (
     with_engine,
     world_positions,
     world_space,
 )
-from services.optimizer.jobs.kinds.held_out import certificate_scenarios
-from services.optimizer.jobs.kinds.walks import WalksSpec
-from services.optimizer.jobs.optimizer_choice import OptimizerChoice
-from services.optimizer.jobs.preference import PreferenceChoice
-from services.optimizer.search.enumeration import Enumeration
-from services.optimizer.search.optimizer import Optimizer
-from services.optimizer.search.random_search import RandomSearchSettings
-from sim.case import Case
-from sim.catalogue import check_design, design_numbers, design_shown
-from sim.controllers import CONTROLLERS, ControllerName
-from sim.errors import SimulationInputError
-from sim.identification.recorded_walk import Recordings
-from sim.mujoco.engines import ENGINES, LIBRARY, EngineName, check_installed
-from sim.scenario import HELD_OUT, ScenarioChoice, ScenarioName
-from sim.simulate import check_reach
-from sim.variables import VariableName, VariableValue
-from sim.worlds import EngineWalk, WorldWalk, check_worlds, sample_worlds
+from gaitswarm.services.optimizer.jobs.kinds.held_out import certificate_scenarios
+from gaitswarm.services.optimizer.jobs.kinds.walks import WalksSpec
+from gaitswarm.services.optimizer.jobs.optimizer_choice import OptimizerChoice
+from gaitswarm.services.optimizer.jobs.preference import PreferenceChoice
+from gaitswarm.services.optimizer.search.enumeration import Enumeration
+from gaitswarm.services.optimizer.search.optimizer import Optimizer
+from gaitswarm.services.optimizer.search.random_search import RandomSearchSettings
+from gaitswarm.sim.case import Case
+from gaitswarm.sim.catalogue import check_design, design_numbers, design_shown
+from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.identification.recorded_walk import Recordings
+from gaitswarm.sim.mujoco.engines import ENGINES, LIBRARY, EngineName, check_installed
+from gaitswarm.sim.scenario import HELD_OUT, ScenarioChoice, ScenarioName
+from gaitswarm.sim.simulate import check_reach
+from gaitswarm.sim.variables import VariableName, VariableValue
+from gaitswarm.sim.worlds import EngineWalk, WorldWalk, check_worlds, sample_worlds
 
 Floats = NDArray[np.float64]
 

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.jobs.design_space import DesignSpace
-from sim.mujoco.engines import EngineName, engine_variable
-from sim.variables import Variable
-from sim.worlds import PERTURBATIONS, sample_worlds
-from sim.worlds.perturbations import NOMINAL
+from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
+from gaitswarm.sim.mujoco.engines import EngineName, engine_variable
+from gaitswarm.sim.variables import Variable
+from gaitswarm.sim.worlds import PERTURBATIONS, sample_worlds
+from gaitswarm.sim.worlds.perturbations import NOMINAL
 
 Floats = NDArray[np.float64]
 

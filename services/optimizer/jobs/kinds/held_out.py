@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
-from sim.errors import SimulationInputError
-from sim.gait_variables import GAIT_CATALOGUE, with_gait
-from sim.robot import DEFAULT_ROBOT, RobotChoice, load_robot
-from sim.scenario import HELD_OUT, SCENARIOS, Scenario
-from sim.simulate import check_reach
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
+from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotChoice, load_robot
+from gaitswarm.sim.scenario import HELD_OUT, SCENARIOS, Scenario
+from gaitswarm.sim.simulate import check_reach
 
 CASES: Final = 8
 """Scenarios of a certificate that names none."""

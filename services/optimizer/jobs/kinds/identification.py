@@ -9,16 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, model_validator
 
-from services.optimizer.jobs.design_space import DesignSpace
-from services.optimizer.jobs.judgement import Judgement
-from services.optimizer.jobs.spec import Spec
-from sim.case import Case
-from sim.errors import SimulationInputError
-from sim.identification.current_fit import LINK_CURRENTS, CurrentFit
-from sim.identification.recorded_walk import Recordings
-from sim.outcome import Objective
-from sim.robot import load_robot
-from sim.robot.identifiable import identifiable_variables, with_parameters
+from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
+from gaitswarm.services.optimizer.jobs.judgement import Judgement
+from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.sim.case import Case
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.identification.current_fit import LINK_CURRENTS, CurrentFit
+from gaitswarm.sim.identification.recorded_walk import Recordings
+from gaitswarm.sim.outcome import Objective
+from gaitswarm.sim.robot import load_robot
+from gaitswarm.sim.robot.identifiable import identifiable_variables, with_parameters
 
 Floats = NDArray[np.float64]
 

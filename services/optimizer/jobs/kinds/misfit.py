@@ -9,14 +9,14 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.jobs.preference import (
+from gaitswarm.services.optimizer.jobs.preference import (
     PREFERENCES,
     PreferenceName,
     figure_of_merit,
     judge,
 )
-from sim.calibration.targets import QUANTITIES, Target
-from sim.calibration.walk import RESULTS
+from gaitswarm.sim.calibration.targets import QUANTITIES, Target
+from gaitswarm.sim.calibration.walk import RESULTS
 
 Floats = NDArray[np.float64]
 

@@ -19,12 +19,12 @@ from pydantic import (
     model_validator,
 )
 
-from services.optimizer.jobs.kinds.tuning import JobSpec
-from services.optimizer.jobs.spec import judge_outcomes
-from services.optimizer.search.space import Axis, Space
-from services.optimizer.tournament.functions import ACCEPTANCE, FUNCTIONS, draw
-from sim.case import run_together
-from sim.robot import RobotSource
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.spec import judge_outcomes
+from gaitswarm.services.optimizer.search.space import Axis, Space
+from gaitswarm.services.optimizer.tournament.functions import ACCEPTANCE, FUNCTIONS, draw
+from gaitswarm.sim.case import run_together
+from gaitswarm.sim.robot import RobotSource
 
 Floats = NDArray[np.float64]
 

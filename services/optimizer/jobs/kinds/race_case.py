@@ -8,16 +8,16 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.jobs.kinds.problem import FunctionProblem, TuningProblem
-from services.optimizer.jobs.provenance import optimizer_digest
-from services.optimizer.search.optimizer import SearchSettings
-from services.optimizer.tournament.methods import drawn_settings, search_of
-from services.optimizer.tournament.race import Stop, Terms, race
-from sim.errors import SimulationError
-from sim.kernel.walk import Precision
-from sim.outcome import Objective, Outcome, Status
-from sim.robot import RobotSource
-from sim.variables import Variable
+from gaitswarm.services.optimizer.jobs.kinds.problem import FunctionProblem, TuningProblem
+from gaitswarm.services.optimizer.jobs.provenance import optimizer_digest
+from gaitswarm.services.optimizer.search.optimizer import SearchSettings
+from gaitswarm.services.optimizer.tournament.methods import drawn_settings, search_of
+from gaitswarm.services.optimizer.tournament.race import Stop, Terms, race
+from gaitswarm.sim.errors import SimulationError
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.outcome import Objective, Outcome, Status
+from gaitswarm.sim.robot import RobotSource
+from gaitswarm.sim.variables import Variable
 
 Floats = NDArray[np.float64]
 

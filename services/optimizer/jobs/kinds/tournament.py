@@ -20,18 +20,18 @@ from pydantic import (
     model_validator,
 )
 
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.design_space import DesignSpace
-from services.optimizer.jobs.judgement import Judgement
-from services.optimizer.jobs.kinds.problem import ProblemChoice, TuningProblem
-from services.optimizer.jobs.kinds.race_case import SEED, RaceCase, settings_of_run
-from services.optimizer.jobs.optimizer_choice import OptimizerChoice
-from services.optimizer.jobs.provenance import optimizer_digest
-from services.optimizer.jobs.spec import Spec, create_optimizer
-from services.optimizer.search.method import missing_of, versions_of
-from services.optimizer.search.optimizer import SearchSettings
-from services.optimizer.search.random_search import RandomSearchSettings
-from services.optimizer.tournament.methods import (
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
+from gaitswarm.services.optimizer.jobs.judgement import Judgement
+from gaitswarm.services.optimizer.jobs.kinds.problem import ProblemChoice, TuningProblem
+from gaitswarm.services.optimizer.jobs.kinds.race_case import SEED, RaceCase, settings_of_run
+from gaitswarm.services.optimizer.jobs.optimizer_choice import OptimizerChoice
+from gaitswarm.services.optimizer.jobs.provenance import optimizer_digest
+from gaitswarm.services.optimizer.jobs.spec import Spec, create_optimizer
+from gaitswarm.services.optimizer.search.method import missing_of, versions_of
+from gaitswarm.services.optimizer.search.optimizer import SearchSettings
+from gaitswarm.services.optimizer.search.random_search import RandomSearchSettings
+from gaitswarm.services.optimizer.tournament.methods import (
     extra_of,
     libraries_of,
     method_names,
@@ -40,11 +40,11 @@ from services.optimizer.tournament.methods import (
     settings_variables,
     why_unknown,
 )
-from services.optimizer.tournament.race import Terms, default_checkpoints
-from sim.case import Case
-from sim.identification.recorded_walk import Recordings
-from sim.outcome import Objective
-from sim.robot import RobotSource
+from gaitswarm.services.optimizer.tournament.race import Terms, default_checkpoints
+from gaitswarm.sim.case import Case
+from gaitswarm.sim.identification.recorded_walk import Recordings
+from gaitswarm.sim.outcome import Objective
+from gaitswarm.sim.robot import RobotSource
 
 Floats = NDArray[np.float64]
 

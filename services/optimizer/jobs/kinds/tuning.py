@@ -10,25 +10,25 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, model_validator
 
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.case_choice import CaseChoice
-from services.optimizer.jobs.design_space import DesignSpace
-from services.optimizer.jobs.judgement import Judgement
-from services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
-from services.optimizer.jobs.kinds.walks import WalksSpec
-from services.optimizer.jobs.preference import PreferenceChoice, objective_vectors
-from services.optimizer.search.registry import METHODS
-from sim.case import Case, Walk
-from sim.case_registry import CASES, create_case
-from sim.controllers import CONTROLLERS, ControllerName
-from sim.errors import BeyondJointLimit, SimulationInputError, UnreachablePose
-from sim.gait_variables import GAIT_CATALOGUE, GAIT_VARIABLES, orders_searched, with_gait
-from sim.identification.recorded_walk import Recordings
-from sim.scenario import SCENARIOS, ScenarioChoice
-from sim.simulate import check_reach
-from sim.variables import Variable, split_name
-from sim.worlds import check_worlds
-from sim.worlds.perturbed_walk import PerturbedWalk
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.case_choice import CaseChoice
+from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
+from gaitswarm.services.optimizer.jobs.judgement import Judgement
+from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
+from gaitswarm.services.optimizer.jobs.kinds.walks import WalksSpec
+from gaitswarm.services.optimizer.jobs.preference import PreferenceChoice, objective_vectors
+from gaitswarm.services.optimizer.search.registry import METHODS
+from gaitswarm.sim.case import Case, Walk
+from gaitswarm.sim.case_registry import CASES, create_case
+from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
+from gaitswarm.sim.errors import BeyondJointLimit, SimulationInputError, UnreachablePose
+from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, GAIT_VARIABLES, orders_searched, with_gait
+from gaitswarm.sim.identification.recorded_walk import Recordings
+from gaitswarm.sim.scenario import SCENARIOS, ScenarioChoice
+from gaitswarm.sim.simulate import check_reach
+from gaitswarm.sim.variables import Variable, split_name
+from gaitswarm.sim.worlds import check_worlds
+from gaitswarm.sim.worlds.perturbed_walk import PerturbedWalk
 
 Floats = NDArray[np.float64]
 

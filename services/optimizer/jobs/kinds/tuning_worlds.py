@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from services.optimizer.jobs.judgement import Judgement
-from services.optimizer.jobs.preference import Preference, geometric_mean, log_utilities
-from sim.input.near_names import instead_of
-from sim.input.wording import message_of
-from sim.variables import Variable, VariableChoice
-from sim.worlds import PERTURBATIONS, sample_worlds
+from gaitswarm.services.optimizer.jobs.judgement import Judgement
+from gaitswarm.services.optimizer.jobs.preference import Preference, geometric_mean, log_utilities
+from gaitswarm.sim.input.near_names import instead_of
+from gaitswarm.sim.input.wording import message_of
+from gaitswarm.sim.variables import Variable, VariableChoice
+from gaitswarm.sim.worlds import PERTURBATIONS, sample_worlds
 
 Floats = NDArray[np.float64]
 

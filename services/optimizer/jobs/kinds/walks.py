@@ -8,21 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import model_validator
 
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.judgement import Judgement
-from services.optimizer.jobs.preference import (
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.judgement import Judgement
+from gaitswarm.services.optimizer.jobs.preference import (
     PREFERENCES,
     Preference,
     PreferenceChoice,
     figure_of_merit,
     judge,
 )
-from services.optimizer.jobs.spec import Spec
-from sim.controllers import ControlLaw
-from sim.errors import SimulationInputError
-from sim.outcome import OBJECTIVES, Objective
-from sim.scenario import Scenario, ScenarioChoice, find_scenario
-from sim.simulate import check_drives
+from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.sim.controllers import ControlLaw
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.outcome import OBJECTIVES, Objective
+from gaitswarm.sim.scenario import Scenario, ScenarioChoice, find_scenario
+from gaitswarm.sim.simulate import check_drives
 
 Floats = NDArray[np.float64]
 

@@ -10,15 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, NonNegativeInt
 
-from services.optimizer.search.evolution.normal_distribution import (
+from gaitswarm.services.optimizer.search.evolution.normal_distribution import (
     DistributionState,
     NormalDistribution,
 )
-from services.optimizer.search.generational import Generational, GenerationState, Worth, of_worth
-from services.optimizer.search.generational import worth as as_json
-from services.optimizer.search.optimizer import SearchSettings
-from services.optimizer.search.random_stream import RandomNumbers
-from services.optimizer.search.space import Space
+from gaitswarm.services.optimizer.search.generational import (
+    Generational,
+    GenerationState,
+    Worth,
+    of_worth,
+)
+from gaitswarm.services.optimizer.search.generational import worth as as_json
+from gaitswarm.services.optimizer.search.optimizer import SearchSettings
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.space import Space
 
 Floats = NDArray[np.float64]
 

@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, FiniteFloat, NonNegativeInt, model_validator
 
-from services.optimizer.search.evolution.variation import (
+from gaitswarm.services.optimizer.search.evolution.variation import (
     crossed,
     indices,
     latin_hypercube,
     with_choices,
     without_duplicates,
 )
-from services.optimizer.search.generational import (
+from gaitswarm.services.optimizer.search.generational import (
     Generational,
     GenerationState,
     Row,
@@ -24,9 +24,9 @@ from services.optimizer.search.generational import (
     of_worth,
     worth,
 )
-from services.optimizer.search.optimizer import SearchSettings, matrix
-from services.optimizer.search.random_stream import RandomNumbers
-from services.optimizer.search.space import Space
+from gaitswarm.services.optimizer.search.optimizer import SearchSettings, matrix
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.space import Space
 
 Floats = NDArray[np.float64]
 

@@ -8,19 +8,23 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from services.optimizer.search.evolution.pareto import SampledHypervolume, pareto_ranks
-from services.optimizer.search.evolution.variation import (
+from gaitswarm.services.optimizer.search.evolution.pareto import SampledHypervolume, pareto_ranks
+from gaitswarm.services.optimizer.search.evolution.variation import (
     crossed,
     indices,
     latin_hypercube,
     with_choices,
     without_duplicates,
 )
-from services.optimizer.search.generational import Row, Worth
-from services.optimizer.search.multi_objective import MultiObjective, VectorState, vectors_of
-from services.optimizer.search.optimizer import SearchSettings, matrix
-from services.optimizer.search.random_stream import RandomNumbers
-from services.optimizer.search.space import Space
+from gaitswarm.services.optimizer.search.generational import Row, Worth
+from gaitswarm.services.optimizer.search.multi_objective import (
+    MultiObjective,
+    VectorState,
+    vectors_of,
+)
+from gaitswarm.services.optimizer.search.optimizer import SearchSettings, matrix
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.space import Space
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, FiniteFloat, PositiveFloat
 
-from services.optimizer.search.evolution.symmetric import eigen, product
-from services.optimizer.search.optimizer import matrix
-from services.optimizer.search.random_stream import RandomNumbers
-from services.optimizer.search.space import Space
-from sim.memory import require_room_for_scipy
+from gaitswarm.services.optimizer.search.evolution.symmetric import eigen, product
+from gaitswarm.services.optimizer.search.optimizer import matrix
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.space import Space
+from gaitswarm.sim.memory import require_room_for_scipy
 
 Floats = NDArray[np.float64]
 

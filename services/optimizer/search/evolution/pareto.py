@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -7,8 +7,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.search.random_stream import RandomNumbers
-from services.optimizer.search.space import Space
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.space import Space
 
 Floats = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.search.local.walk import Axes, Point, Walk, gains, judged
+from gaitswarm.services.optimizer.search.local.walk import Axes, Point, Walk, gains, judged
 
 Floats = NDArray[np.float64]
 

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from services.optimizer.search.local.walk import Axes, Point, Walk, gains, judged
-from services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.local.walk import Axes, Point, Walk, gains, judged
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 
 
 def unirandi(

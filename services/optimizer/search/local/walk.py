@@ -19,9 +19,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.search.random_stream import RandomNumbers
-from services.optimizer.search.replayed import Proposals, Start
-from services.optimizer.search.space import Space
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.replayed import Proposals, Start
+from gaitswarm.services.optimizer.search.space import Space
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]

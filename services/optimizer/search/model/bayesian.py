@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from services.optimizer.search.model.gaussian_process import GaussianProcess
-from services.optimizer.search.optimizer import SearchSettings
-from services.optimizer.search.random_stream import RandomNumbers
-from services.optimizer.search.replayed import Proposals, Start
-from services.optimizer.search.space import Space
-from sim.memory import require_room_for_scipy
+from gaitswarm.services.optimizer.search.model.gaussian_process import GaussianProcess
+from gaitswarm.services.optimizer.search.optimizer import SearchSettings
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.replayed import Proposals, Start
+from gaitswarm.services.optimizer.search.space import Space
+from gaitswarm.sim.memory import require_room_for_scipy
 
 if TYPE_CHECKING:
     from collections.abc import Generator

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.search.space import Space
-from sim.memory import require_room_for_scipy
+from gaitswarm.services.optimizer.search.space import Space
+from gaitswarm.sim.memory import require_room_for_scipy
 
 if TYPE_CHECKING:
     from sklearn.gaussian_process import GaussianProcessRegressor

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from services.optimizer.search.local.bfgs import bfgs
-from services.optimizer.search.local.nelder_mead import simplex_search
-from services.optimizer.search.local.unirandi import unirandi
-from services.optimizer.search.local.walk import (
+from gaitswarm.services.optimizer.search.local.bfgs import bfgs
+from gaitswarm.services.optimizer.search.local.nelder_mead import simplex_search
+from gaitswarm.services.optimizer.search.local.unirandi import unirandi
+from gaitswarm.services.optimizer.search.local.walk import (
     Axes,
     Endless,
     LocalSearch,
@@ -22,10 +22,10 @@ from services.optimizer.search.local.walk import (
     mixed,
     sampled,
 )
-from services.optimizer.search.optimizer import SearchSettings
-from services.optimizer.search.random_stream import RandomNumbers
-from services.optimizer.search.replayed import Proposals, Start
-from services.optimizer.search.space import Space
+from gaitswarm.services.optimizer.search.optimizer import SearchSettings
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.replayed import Proposals, Start
+from gaitswarm.services.optimizer.search.space import Space
 
 Floats = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, NonNegativeInt, model_validator
 
-from services.optimizer.search.generational import (
+from gaitswarm.services.optimizer.search.generational import (
     Generational,
     GenerationState,
     Row,
@@ -18,10 +18,10 @@ from services.optimizer.search.generational import (
     of_worth,
     worth,
 )
-from services.optimizer.search.optimizer import SearchSettings, matrix
-from services.optimizer.search.random_stream import swarm_uniform
-from services.optimizer.search.space import Space
-from services.optimizer.search.swarm.topology import leaders, random_informants, ring
+from gaitswarm.services.optimizer.search.optimizer import SearchSettings, matrix
+from gaitswarm.services.optimizer.search.random_stream import swarm_uniform
+from gaitswarm.services.optimizer.search.space import Space
+from gaitswarm.services.optimizer.search.swarm.topology import leaders, random_informants, ring
 
 _SCATTER: Final = 1
 _MOVE: Final = 2

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from services.optimizer.search.local.pattern_search import Polls, PollSettings, polls
-from services.optimizer.search.random_stream import RandomNumbers
-from services.optimizer.search.replayed import Proposals, Start
-from services.optimizer.search.space import Judged, Space
-from services.optimizer.search.swarm.pso import ParticleSwarm, SwarmSettings
+from gaitswarm.services.optimizer.search.local.pattern_search import Polls, PollSettings, polls
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.replayed import Proposals, Start
+from gaitswarm.services.optimizer.search.space import Judged, Space
+from gaitswarm.services.optimizer.search.swarm.pso import ParticleSwarm, SwarmSettings
 
 Floats = NDArray[np.float64]
 

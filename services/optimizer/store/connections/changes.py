@@ -13,9 +13,9 @@ from typing import Any, Final
 
 from sqlalchemy import Connection, func, select
 
-from services.optimizer.errors import StoreUnavailable
-from services.optimizer.store.connections.engine import Database
-from services.optimizer.store.rows.tables import EXISTING, jobs
+from gaitswarm.services.optimizer.errors import StoreUnavailable
+from gaitswarm.services.optimizer.store.connections.engine import Database
+from gaitswarm.services.optimizer.store.rows.tables import EXISTING, jobs
 
 _CHANNEL: Final = "gaitswarm_jobs"
 

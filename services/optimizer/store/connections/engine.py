@@ -33,10 +33,10 @@ from sqlalchemy.exc import (
 )
 from sqlalchemy.exc import TimeoutError as PoolTimeout
 
-from services.optimizer.errors import StoreUnavailable
-from services.optimizer.masking import HARMLESS, masked_url
-from services.optimizer.store.connections.open_file import OpenFile
-from services.optimizer.store.connections.postgresql import postgresql_engine
+from gaitswarm.services.optimizer.errors import StoreUnavailable
+from gaitswarm.services.optimizer.masking import HARMLESS, masked_url
+from gaitswarm.services.optimizer.store.connections.open_file import OpenFile
+from gaitswarm.services.optimizer.store.connections.postgresql import postgresql_engine
 
 BUSY_SECONDS: Final = 15.0
 """How long a transaction waits for another's lock before the store counts as unavailable."""

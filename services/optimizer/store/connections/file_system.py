@@ -13,7 +13,7 @@ from typing import Final
 
 from sqlalchemy import URL
 
-from services.optimizer.errors import StoreUnavailable
+from gaitswarm.services.optimizer.errors import StoreUnavailable
 
 MOUNTS: Final = Path("/proc/self/mountinfo")
 

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from sqlalchemy import Engine, event
 
-from services.optimizer.errors import StoreReplaced
+from gaitswarm.services.optimizer.errors import StoreReplaced
 
 _COUNTED: Final = "counted as open"
 

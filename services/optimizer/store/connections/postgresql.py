@@ -10,7 +10,7 @@ from typing import Any, Final
 from sqlalchemy import URL, Engine, create_engine, event
 from sqlalchemy.exc import InvalidatePoolError
 
-from services.optimizer.errors import StoreUnavailable
+from gaitswarm.services.optimizer.errors import StoreUnavailable
 
 SILENCE_SECONDS: Final = 15
 """After so long without a sign of life from the other end of a connection it has gone [s]."""

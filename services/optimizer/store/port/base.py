@@ -4,27 +4,33 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
-from services.optimizer.access import Tokens
-from services.optimizer.jobs.audit import LOCAL, AuditEntry
-from services.optimizer.jobs.fork import Fork
-from services.optimizer.jobs.job import (
+from gaitswarm.services.optimizer.access import Tokens
+from gaitswarm.services.optimizer.jobs.audit import LOCAL, AuditEntry
+from gaitswarm.services.optimizer.jobs.fork import Fork
+from gaitswarm.services.optimizer.jobs.job import (
     Claim,
     Command,
     Job,
     JobOrder,
     JobState,
 )
-from services.optimizer.jobs.labels import ANY_JOB, JobFilter
-from services.optimizer.jobs.notification import Outbox
-from services.optimizer.jobs.provenance import JobProvenance
-from services.optimizer.jobs.quota import Quota
-from services.optimizer.jobs.reference import Reference
-from services.optimizer.jobs.spec import Spec
-from services.optimizer.store.port.deletions import Deletions
-from services.optimizer.store.port.labelling import Labelling
-from services.optimizer.store.port.reading import AtOnce, Changes, CommittedHistory, Page, Queue
-from services.optimizer.store.port.recordings import KeptRecordings
-from services.optimizer.store.port.running import Runs
+from gaitswarm.services.optimizer.jobs.labels import ANY_JOB, JobFilter
+from gaitswarm.services.optimizer.jobs.notification import Outbox
+from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
+from gaitswarm.services.optimizer.jobs.quota import Quota
+from gaitswarm.services.optimizer.jobs.reference import Reference
+from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.services.optimizer.store.port.deletions import Deletions
+from gaitswarm.services.optimizer.store.port.labelling import Labelling
+from gaitswarm.services.optimizer.store.port.reading import (
+    AtOnce,
+    Changes,
+    CommittedHistory,
+    Page,
+    Queue,
+)
+from gaitswarm.services.optimizer.store.port.recordings import KeptRecordings
+from gaitswarm.services.optimizer.store.port.running import Runs
 
 
 class Store(CommittedHistory, Deletions, KeptRecordings, Labelling, Runs, Protocol):

@@ -6,8 +6,8 @@ from collections.abc import Callable, Collection
 from datetime import datetime
 from typing import Protocol
 
-from services.optimizer.jobs.audit import LOCAL
-from services.optimizer.jobs.job import ENDED, Job, JobState
+from gaitswarm.services.optimizer.jobs.audit import LOCAL
+from gaitswarm.services.optimizer.jobs.job import ENDED, Job, JobState
 
 
 class Deletions(Protocol):

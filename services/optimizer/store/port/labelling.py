@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from services.optimizer.jobs.audit import LOCAL
-from services.optimizer.jobs.job import Job
-from services.optimizer.jobs.labels import FacetCounts, LabelsChange
+from gaitswarm.services.optimizer.jobs.audit import LOCAL
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.labels import FacetCounts, LabelsChange
 
 
 class Labelling(Protocol):

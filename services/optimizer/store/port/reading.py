@@ -10,10 +10,10 @@ from typing import Any, Final, Generic, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from services.optimizer.jobs.chain import ChainDocuments, Link
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.iteration import Evaluation, Iteration, Known, Reevaluation
-from services.optimizer.jobs.job import Job, JobState
+from gaitswarm.services.optimizer.jobs.chain import ChainDocuments, Link
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Iteration, Known, Reevaluation
+from gaitswarm.services.optimizer.jobs.job import Job, JobState
 
 T = TypeVar("T")
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Protocol
 
-from services.optimizer.jobs.audit import LOCAL
-from services.optimizer.store.port.reading import Page
-from sim.identification.recorded_walk import RecordedWalk, Recordings
+from gaitswarm.services.optimizer.jobs.audit import LOCAL
+from gaitswarm.services.optimizer.store.port.reading import Page
+from gaitswarm.sim.identification.recorded_walk import RecordedWalk, Recordings
 
 
 @dataclass(frozen=True, slots=True)

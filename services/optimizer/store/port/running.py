@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from services.optimizer.jobs.iteration import Ask, CompletedIteration
-from services.optimizer.jobs.job import QUARANTINE_AFTER, Claim, JobState, Renewal
-from services.optimizer.jobs.provenance import JobProvenance
+from gaitswarm.services.optimizer.jobs.iteration import Ask, CompletedIteration
+from gaitswarm.services.optimizer.jobs.job import QUARANTINE_AFTER, Claim, JobState, Renewal
+from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
 
 
 class Runs(Protocol):

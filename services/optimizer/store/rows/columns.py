@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter
 from sqlalchemy import Connection, Text, cast, select
 
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.iteration import Known
-from services.optimizer.store.rows.tables import evaluations
-from sim.outcome import Status
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.iteration import Known
+from gaitswarm.services.optimizer.store.rows.tables import evaluations
+from gaitswarm.sim.outcome import Status
 
 # Faster than the standard library's parser by half, and as exact.
 _JSON: Final = TypeAdapter(Any)

@@ -14,16 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy import func, select
 
-from services.optimizer.jobs.chain import ask_digest
-from services.optimizer.jobs.iteration import (
+from gaitswarm.services.optimizer.jobs.chain import ask_digest
+from gaitswarm.services.optimizer.jobs.iteration import (
     Ask,
     CompletedIteration,
     Evaluation,
     Iteration,
     Reevaluation,
 )
-from services.optimizer.store.rows.tables import evaluations, iterations
-from sim.outcome import Status
+from gaitswarm.services.optimizer.store.rows.tables import evaluations, iterations
+from gaitswarm.sim.outcome import Status
 
 Row = Mapping[Any, Any]
 """Columns of one row by name, as selected or as they are about to be."""

@@ -9,18 +9,18 @@ from typing import Any, Final
 
 from pydantic import ValidationError
 
-from services.optimizer.errors import Unreadable
-from services.optimizer.jobs.chain import ChainDocuments
-from services.optimizer.jobs.documents import SPECS, AnySpec
-from services.optimizer.jobs.fork import Lineage
-from services.optimizer.jobs.job import Job, JobState, Progress, UnreadableSpec
-from services.optimizer.jobs.labels import Labels
-from services.optimizer.jobs.provenance import RECORDS, ProvenanceRecords
-from services.optimizer.jobs.reference import Reference
-from services.optimizer.jobs.spec import Spec
-from services.optimizer.store.rows.evaluation_rows import Row
-from services.optimizer.store.rows.tables import UnparsedText
-from sim.input.wording import message_of
+from gaitswarm.services.optimizer.errors import Unreadable
+from gaitswarm.services.optimizer.jobs.chain import ChainDocuments
+from gaitswarm.services.optimizer.jobs.documents import SPECS, AnySpec
+from gaitswarm.services.optimizer.jobs.fork import Lineage
+from gaitswarm.services.optimizer.jobs.job import Job, JobState, Progress, UnreadableSpec
+from gaitswarm.services.optimizer.jobs.labels import Labels
+from gaitswarm.services.optimizer.jobs.provenance import RECORDS, ProvenanceRecords
+from gaitswarm.services.optimizer.jobs.reference import Reference
+from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.services.optimizer.store.rows.evaluation_rows import Row
+from gaitswarm.services.optimizer.store.rows.tables import UnparsedText
+from gaitswarm.sim.input.wording import message_of
 
 _KEPT: Final = (
     "what is stored stays as it is: run the gaitswarm that wrote it, or a newer one, and resume the"

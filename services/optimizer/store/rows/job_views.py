@@ -12,9 +12,9 @@ from sqlalchemy import Column, Dialect, Row, Text, cast, type_coerce
 from sqlalchemy.sql.elements import Label
 from sqlalchemy.types import NullType
 
-from services.optimizer.jobs.job import Job
-from services.optimizer.store.rows.job_rows import JobDocuments, read_documents, to_job
-from services.optimizer.store.rows.tables import Document, UnparsedText, UtcDateTime, jobs
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.store.rows.job_rows import JobDocuments, read_documents, to_job
+from gaitswarm.services.optimizer.store.rows.tables import Document, UnparsedText, UtcDateTime, jobs
 
 V = TypeVar("V")
 

@@ -12,13 +12,13 @@ from typing import Any, Final
 
 from sqlalchemy import JSON, URL, Connection, Table, bindparam, delete, func, insert, select
 
-from services.optimizer.errors import Conflict, InvalidRequest, NotFound, StoreUnavailable
-from services.optimizer.store.connections.engine import connect, parse_url
-from services.optimizer.store.connections.file_system import check_file_system
-from services.optimizer.store.rows.tables import Document, metadata
-from services.optimizer.store.schema.in_use import exclusive, lock_file
-from services.optimizer.store.schema.migrate import create, upgrade
-from services.optimizer.store.schema.revisions import check_revision
+from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, NotFound, StoreUnavailable
+from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
+from gaitswarm.services.optimizer.store.connections.file_system import check_file_system
+from gaitswarm.services.optimizer.store.rows.tables import Document, metadata
+from gaitswarm.services.optimizer.store.schema.in_use import exclusive, lock_file
+from gaitswarm.services.optimizer.store.schema.migrate import create, upgrade
+from gaitswarm.services.optimizer.store.schema.revisions import check_revision
 
 _ROWS: Final = 1000
 """Rows that are copied at once."""

@@ -9,12 +9,12 @@ from typing import Any, Final
 
 from sqlalchemy import Connection, event, inspect, select, text
 
-from services.optimizer.errors import Conflict, StoreUnavailable
-from services.optimizer.jobs.job import JobState
-from services.optimizer.store.connections.engine import Database, database_time
-from services.optimizer.store.rows.tables import jobs
-from services.optimizer.store.schema.revisions import require_newest
-from services.optimizer.store.statements.claims import lease_is_alive
+from gaitswarm.services.optimizer.errors import Conflict, StoreUnavailable
+from gaitswarm.services.optimizer.jobs.job import JobState
+from gaitswarm.services.optimizer.store.connections.engine import Database, database_time
+from gaitswarm.services.optimizer.store.rows.tables import jobs
+from gaitswarm.services.optimizer.store.schema.revisions import require_newest
+from gaitswarm.services.optimizer.store.statements.claims import lease_is_alive
 
 # "gaitswarm is in use", as a number that no other program is likely to lock by.
 _IN_USE: Final = 0x6761_6974_7377_6D02

@@ -11,9 +11,14 @@ from typing import Any, Final
 
 from sqlalchemy import Connection, Select, Text, cast, delete, exists, func, or_, select
 
-from services.optimizer.jobs.job import ENDED, JobState
-from services.optimizer.store.connections.engine import Database, connect, database_time, parse_url
-from services.optimizer.store.rows.tables import (
+from gaitswarm.services.optimizer.jobs.job import ENDED, JobState
+from gaitswarm.services.optimizer.store.connections.engine import (
+    Database,
+    connect,
+    database_time,
+    parse_url,
+)
+from gaitswarm.services.optimizer.store.rows.tables import (
     EXISTING,
     evaluations,
     iterations,
@@ -21,8 +26,8 @@ from services.optimizer.store.rows.tables import (
     metadata,
     recordings,
 )
-from services.optimizer.store.schema.revisions import check_revision
-from services.optimizer.store.transactions.deletion import SqlDeletion
+from gaitswarm.services.optimizer.store.schema.revisions import check_revision
+from gaitswarm.services.optimizer.store.transactions.deletion import SqlDeletion
 
 _MOST: Final = 20
 """Findings of one kind."""

@@ -10,12 +10,12 @@ from typing import Final
 from sqlalchemy import URL, Column, Connection, MetaData, PrimaryKeyConstraint, String, Table
 from sqlalchemy.exc import DBAPIError
 
-from services.optimizer.errors import StoreUnavailable
-from services.optimizer.store.connections.engine import Database, connect, parse_url
-from services.optimizer.store.connections.file_system import check_file_system
-from services.optimizer.store.rows.tables import metadata
-from services.optimizer.store.schema.in_use import exclusive
-from services.optimizer.store.schema.revisions import (
+from gaitswarm.services.optimizer.errors import StoreUnavailable
+from gaitswarm.services.optimizer.store.connections.engine import Database, connect, parse_url
+from gaitswarm.services.optimizer.store.connections.file_system import check_file_system
+from gaitswarm.services.optimizer.store.rows.tables import metadata
+from gaitswarm.services.optimizer.store.schema.in_use import exclusive
+from gaitswarm.services.optimizer.store.schema.revisions import (
     MIGRATIONS,
     head,
     read_revision,

@@ -7,8 +7,8 @@ from typing import Final
 
 from sqlalchemy import Connection, inspect
 
-from services.optimizer.errors import StoreUnavailable
-from services.optimizer.store.connections.engine import Database
+from gaitswarm.services.optimizer.errors import StoreUnavailable
+from gaitswarm.services.optimizer.store.connections.engine import Database
 
 MIGRATIONS: Final = Path(__file__).with_name("migrations")
 """Alembic's folder."""

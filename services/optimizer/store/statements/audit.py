@@ -8,12 +8,12 @@ from typing import Any
 
 from sqlalchemy import Connection, delete, insert, select
 
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.audit import LOCAL, AuditAction, AuditEntry
-from services.optimizer.jobs.job import Job
-from services.optimizer.store.port.reading import Page
-from services.optimizer.store.rows.evaluation_rows import Row
-from services.optimizer.store.rows.tables import audit
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.audit import LOCAL, AuditAction, AuditEntry
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.store.port.reading import Page
+from gaitswarm.services.optimizer.store.rows.evaluation_rows import Row
+from gaitswarm.services.optimizer.store.rows.tables import audit
 
 _LARGEST_INDEX = 2**63 - 1
 

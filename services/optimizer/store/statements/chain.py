@@ -8,19 +8,19 @@ from typing import Any, Final
 import numpy as np
 from sqlalchemy import Connection, bindparam, select, update
 
-from services.optimizer.jobs.chain import (
+from gaitswarm.services.optimizer.jobs.chain import (
     ChainDocuments,
     Link,
     Outcomes,
     ask_digest,
     iteration_digest,
 )
-from services.optimizer.jobs.iteration import CompletedIteration, Reevaluation
-from services.optimizer.store.port.reading import SUMMARY, StoredLink
-from services.optimizer.store.rows.columns import select_columns
-from services.optimizer.store.rows.evaluation_rows import Row, to_reevaluation
-from services.optimizer.store.rows.job_rows import chain_documents
-from services.optimizer.store.rows.tables import iterations, reevaluations
+from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration, Reevaluation
+from gaitswarm.services.optimizer.store.port.reading import SUMMARY, StoredLink
+from gaitswarm.services.optimizer.store.rows.columns import select_columns
+from gaitswarm.services.optimizer.store.rows.evaluation_rows import Row, to_reevaluation
+from gaitswarm.services.optimizer.store.rows.job_rows import chain_documents
+from gaitswarm.services.optimizer.store.rows.tables import iterations, reevaluations
 
 _PIECE: Final = 64
 """Iterations of a fork that are read at once."""

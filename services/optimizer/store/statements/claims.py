@@ -8,31 +8,31 @@ from typing import Any
 
 from sqlalchemy import ColumnElement, Connection, Select, and_, not_, or_, select
 
-from services.optimizer.errors import BudgetChanged, LeaseLost, NotFound, Unreadable
-from services.optimizer.jobs.iteration import Answered, Ask
-from services.optimizer.jobs.job import (
+from gaitswarm.services.optimizer.errors import BudgetChanged, LeaseLost, NotFound, Unreadable
+from gaitswarm.services.optimizer.jobs.iteration import Answered, Ask
+from gaitswarm.services.optimizer.jobs.job import (
     LONGEST_LEASE_SECONDS,
     Claim,
     JobState,
     UnreadableSpec,
 )
-from services.optimizer.store.rows.evaluation_rows import Row
-from services.optimizer.store.rows.job_rows import (
+from gaitswarm.services.optimizer.store.rows.evaluation_rows import Row
+from gaitswarm.services.optimizer.store.rows.job_rows import (
     budget,
     kept,
     storable,
     to_job,
 )
-from services.optimizer.store.rows.tables import jobs
-from services.optimizer.store.statements.recordings import load_recordings
-from services.optimizer.store.statements.records import (
+from gaitswarm.services.optimizer.store.rows.tables import jobs
+from gaitswarm.services.optimizer.store.statements.recordings import load_recordings
+from gaitswarm.services.optimizer.store.statements.records import (
     answered_ask,
     entering,
     job_row,
     outstanding_ask,
     update_job,
 )
-from sim.identification.recorded_walk import Recordings
+from gaitswarm.sim.identification.recorded_walk import Recordings
 
 
 def claimable(now: datetime, job_id: str | None) -> Select[*tuple[Any, ...]]:

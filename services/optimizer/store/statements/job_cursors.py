@@ -6,9 +6,9 @@ import re
 from datetime import UTC, datetime, timedelta
 from typing import Final
 
-from services.optimizer.errors import InvalidRequest
-from services.optimizer.jobs.job import Job, JobOrder
-from services.optimizer.store.statements.records import ID_ALPHABET
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.job import Job, JobOrder
+from gaitswarm.services.optimizer.store.statements.records import ID_ALPHABET
 
 _CURSOR: Final = re.compile(rf"([0-9]{{1,18}})\.([{ID_ALPHABET}]{{12}})", re.ASCII)
 _FITNESS_CURSOR: Final = re.compile(rf"fitness:([0-9.e+-]*):([{ID_ALPHABET}]{{12}})", re.ASCII)

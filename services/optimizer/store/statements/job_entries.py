@@ -12,11 +12,16 @@ from weakref import WeakKeyDictionary
 
 from sqlalchemy import Connection, Dialect, Engine, Select, and_, bindparam, func, select, text
 
-from services.optimizer.store.rows.job_rows import reference_of
-from services.optimizer.store.rows.job_views import LARGEST, RowMemory, as_stored, from_stored
-from services.optimizer.store.rows.tables import jobs
-from services.optimizer.store.statements.job_list import Among
-from services.optimizer.store.statements.labels import spec_field
+from gaitswarm.services.optimizer.store.rows.job_rows import reference_of
+from gaitswarm.services.optimizer.store.rows.job_views import (
+    LARGEST,
+    RowMemory,
+    as_stored,
+    from_stored,
+)
+from gaitswarm.services.optimizer.store.rows.tables import jobs
+from gaitswarm.services.optimizer.store.statements.job_list import Among
+from gaitswarm.services.optimizer.store.statements.labels import spec_field
 
 T = TypeVar("T")
 

@@ -21,9 +21,9 @@ from sqlalchemy import (
     tuple_,
 )
 
-from services.optimizer.jobs.job import Job, JobOrder, JobState
-from services.optimizer.store.port.reading import Page
-from services.optimizer.store.rows.job_views import (
+from gaitswarm.services.optimizer.jobs.job import Job, JobOrder, JobState
+from gaitswarm.services.optimizer.store.port.reading import Page
+from gaitswarm.services.optimizer.store.rows.job_views import (
     BRIEF,
     LARGEST,
     LONG,
@@ -33,13 +33,13 @@ from services.optimizer.store.rows.job_views import (
     length_of,
     shown_job,
 )
-from services.optimizer.store.rows.tables import EXISTING, jobs
-from services.optimizer.store.statements.job_cursors import (
+from gaitswarm.services.optimizer.store.rows.tables import EXISTING, jobs
+from gaitswarm.services.optimizer.store.statements.job_cursors import (
     cursor_of,
     from_cursor,
     from_fitness_cursor,
 )
-from services.optimizer.store.statements.records import is_job_id
+from gaitswarm.services.optimizer.store.statements.records import is_job_id
 
 _KEPT: Final = 64
 """Statements of a kind: to put one together takes longer than to run it."""

@@ -14,28 +14,28 @@ from typing import Any, Final
 
 from sqlalchemy import Connection, select
 
-from services.optimizer.jobs.job import JobOrder, JobState
-from services.optimizer.jobs.labels import JobFilter
-from services.optimizer.jobs.time_left import time_left
-from services.optimizer.store.rows.job_views import (
+from gaitswarm.services.optimizer.jobs.job import JobOrder, JobState
+from gaitswarm.services.optimizer.jobs.labels import JobFilter
+from gaitswarm.services.optimizer.jobs.time_left import time_left
+from gaitswarm.services.optimizer.store.rows.job_views import (
     SHOWN,
     shown_job,
 )
-from services.optimizer.store.rows.tables import EXISTING, jobs
-from services.optimizer.store.statements.job_cursors import (
+from gaitswarm.services.optimizer.store.rows.tables import EXISTING, jobs
+from gaitswarm.services.optimizer.store.statements.job_cursors import (
     from_cursor,
     from_fitness_cursor,
     from_place_cursor,
     no_cursor,
 )
-from services.optimizer.store.statements.job_entries import (
+from gaitswarm.services.optimizer.store.statements.job_entries import (
     JobEntries,
     JobEntry,
     job_entries,
     job_entry,
 )
-from services.optimizer.store.statements.job_list import Among
-from services.optimizer.store.statements.labels import facet_columns, to_facets
+from gaitswarm.services.optimizer.store.statements.job_list import Among
+from gaitswarm.services.optimizer.store.statements.labels import facet_columns, to_facets
 
 _STATES: Final = tuple(JobState)
 

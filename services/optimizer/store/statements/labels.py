@@ -8,8 +8,8 @@ from typing import Any, Final
 
 from sqlalchemy import ColumnElement, Connection, select
 
-from services.optimizer.jobs.audit import AuditAction
-from services.optimizer.jobs.labels import (
+from gaitswarm.services.optimizer.jobs.audit import AuditAction
+from gaitswarm.services.optimizer.jobs.labels import (
     FacetCounts,
     Facets,
     LabelsChange,
@@ -17,12 +17,12 @@ from services.optimizer.jobs.labels import (
     preference_name,
     robot_name,
 )
-from services.optimizer.store.rows.evaluation_rows import Row
-from services.optimizer.store.rows.job_rows import labels_of
-from services.optimizer.store.rows.tables import jobs
-from services.optimizer.store.statements.audit import note_change
-from services.optimizer.store.statements.documents import text_at
-from services.optimizer.store.statements.records import job_row, update_job
+from gaitswarm.services.optimizer.store.rows.evaluation_rows import Row
+from gaitswarm.services.optimizer.store.rows.job_rows import labels_of
+from gaitswarm.services.optimizer.store.rows.tables import jobs
+from gaitswarm.services.optimizer.store.statements.audit import note_change
+from gaitswarm.services.optimizer.store.statements.documents import text_at
+from gaitswarm.services.optimizer.store.statements.records import job_row, update_job
 
 _FIELDS: Final = ("robot", "controller", "preference")
 """Of a spec, by which jobs are found."""

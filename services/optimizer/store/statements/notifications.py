@@ -9,9 +9,9 @@ from typing import Any
 
 from sqlalchemy import Connection, insert, select, update
 
-from services.optimizer.jobs.notification import Notification, pause_after
-from services.optimizer.store.rows.evaluation_rows import Row
-from services.optimizer.store.rows.tables import notifications
+from gaitswarm.services.optimizer.jobs.notification import Notification, pause_after
+from gaitswarm.services.optimizer.store.rows.evaluation_rows import Row
+from gaitswarm.services.optimizer.store.rows.tables import notifications
 
 _BYTES = 12
 

@@ -7,10 +7,10 @@ from typing import Final
 
 from sqlalchemy import Connection, func, select
 
-from services.optimizer.jobs.job import JobState
-from services.optimizer.store.port.reading import Queue
-from services.optimizer.store.rows.tables import EXISTING, jobs
-from services.optimizer.store.statements.labels import spec_field
+from gaitswarm.services.optimizer.jobs.job import JobState
+from gaitswarm.services.optimizer.store.port.reading import Queue
+from gaitswarm.services.optimizer.store.rows.tables import EXISTING, jobs
+from gaitswarm.services.optimizer.store.statements.labels import spec_field
 
 _KINDS: Final = ("tuning", "certificate", "identification", "calibration", "tournament")
 

@@ -25,14 +25,14 @@ from sqlalchemy import (
     tuple_,
 )
 
-from services.optimizer.errors import InvalidRequest, NotFound
-from services.optimizer.store.port.reading import Page
-from services.optimizer.store.port.recordings import RecordingEntry
-from services.optimizer.store.rows.job_rows import first_problems, kept
-from services.optimizer.store.rows.tables import recordings
-from services.optimizer.store.statements.documents import length_at, text_at
-from services.optimizer.store.statements.job_cursors import time_of, to_cursor
-from sim.identification.recorded_walk import RecordedWalk, Recordings
+from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
+from gaitswarm.services.optimizer.store.port.reading import Page
+from gaitswarm.services.optimizer.store.port.recordings import RecordingEntry
+from gaitswarm.services.optimizer.store.rows.job_rows import first_problems, kept
+from gaitswarm.services.optimizer.store.rows.tables import recordings
+from gaitswarm.services.optimizer.store.statements.documents import length_at, text_at
+from gaitswarm.services.optimizer.store.statements.job_cursors import time_of, to_cursor
+from gaitswarm.sim.identification.recorded_walk import RecordedWalk, Recordings
 
 _SEARCHED_AT_ONCE: Final = 200
 """Walks whose words are read by one statement."""

@@ -11,14 +11,14 @@ from typing import Any, Final
 from sqlalchemy import Connection, Select, bindparam, insert, select, update
 from sqlalchemy import Row as SqlRow
 
-from services.optimizer.errors import Conflict, NotFound
-from services.optimizer.jobs.iteration import Answered, Ask, CompletedIteration
-from services.optimizer.jobs.job import Job, JobState
-from services.optimizer.jobs.provenance import JobProvenance, with_record
-from services.optimizer.jobs.time_left import recent_pace
-from services.optimizer.store.connections.changes import announce
-from services.optimizer.store.rows.columns import select_columns
-from services.optimizer.store.rows.evaluation_rows import (
+from gaitswarm.services.optimizer.errors import Conflict, NotFound
+from gaitswarm.services.optimizer.jobs.iteration import Answered, Ask, CompletedIteration
+from gaitswarm.services.optimizer.jobs.job import Job, JobState
+from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, with_record
+from gaitswarm.services.optimizer.jobs.time_left import recent_pace
+from gaitswarm.services.optimizer.store.connections.changes import announce
+from gaitswarm.services.optimizer.store.rows.columns import select_columns
+from gaitswarm.services.optimizer.store.rows.evaluation_rows import (
     Row,
     ask_columns,
     evaluation_rows,
@@ -26,17 +26,21 @@ from services.optimizer.store.rows.evaluation_rows import (
     reevaluation_row,
     to_ask,
 )
-from services.optimizer.store.rows.job_rows import provenance_document, provenance_records, to_job
-from services.optimizer.store.rows.job_views import SHOWN, shown_job
-from services.optimizer.store.rows.tables import (
+from gaitswarm.services.optimizer.store.rows.job_rows import (
+    provenance_document,
+    provenance_records,
+    to_job,
+)
+from gaitswarm.services.optimizer.store.rows.job_views import SHOWN, shown_job
+from gaitswarm.services.optimizer.store.rows.tables import (
     EXISTING,
     evaluations,
     iterations,
     jobs,
     reevaluations,
 )
-from services.optimizer.store.statements.chain import chained_columns
-from services.optimizer.store.statements.notifications import note_end
+from gaitswarm.services.optimizer.store.statements.chain import chained_columns
+from gaitswarm.services.optimizer.store.statements.notifications import note_end
 
 # No vowels, no look-alikes: an id is read aloud, and it spells no word.
 ID_ALPHABET: Final = "23456789bcdfghjkmnpqrstvwxz"

@@ -12,16 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy import Connection, Table, bindparam, func, insert, literal, select, update
 
-from services.optimizer.errors import Conflict, IdempotencyConflict, NotFound
-from services.optimizer.jobs.chain import ask_digest
-from services.optimizer.jobs.fork import Fork, Lineage, TakenHistory
-from services.optimizer.jobs.iteration import best_particle
-from services.optimizer.jobs.job import Job, JobState
-from services.optimizer.jobs.provenance import ProvenanceRecords
-from services.optimizer.jobs.quota import Quota
-from services.optimizer.jobs.spec import Spec
-from services.optimizer.store.rows.evaluation_rows import Row, fitness_summary
-from services.optimizer.store.rows.job_rows import (
+from gaitswarm.services.optimizer.errors import Conflict, IdempotencyConflict, NotFound
+from gaitswarm.services.optimizer.jobs.chain import ask_digest
+from gaitswarm.services.optimizer.jobs.fork import Fork, Lineage, TakenHistory
+from gaitswarm.services.optimizer.jobs.iteration import best_particle
+from gaitswarm.services.optimizer.jobs.job import Job, JobState
+from gaitswarm.services.optimizer.jobs.provenance import ProvenanceRecords
+from gaitswarm.services.optimizer.jobs.quota import Quota
+from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.services.optimizer.store.rows.evaluation_rows import Row, fitness_summary
+from gaitswarm.services.optimizer.store.rows.job_rows import (
     chain_documents,
     lineage_document,
     provenance_document,
@@ -29,9 +29,14 @@ from services.optimizer.store.rows.job_rows import (
     submitted_spec,
     to_job,
 )
-from services.optimizer.store.rows.tables import evaluations, iterations, jobs, reevaluations
-from services.optimizer.store.statements.chain import chain_taken
-from services.optimizer.store.statements.records import job_row, new_job_id, update_job
+from gaitswarm.services.optimizer.store.rows.tables import (
+    evaluations,
+    iterations,
+    jobs,
+    reevaluations,
+)
+from gaitswarm.services.optimizer.store.statements.chain import chain_taken
+from gaitswarm.services.optimizer.store.statements.records import job_row, new_job_id, update_job
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,10 +9,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
-from services.optimizer.jobs.job import Job
-from services.optimizer.store.connections.engine import Database
-from services.optimizer.store.rows.job_views import shown_job
-from services.optimizer.store.statements.records import SHOWN_JOB, is_job_id
+from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.store.connections.engine import Database
+from gaitswarm.services.optimizer.store.rows.job_views import shown_job
+from gaitswarm.services.optimizer.store.statements.records import SHOWN_JOB, is_job_id
 
 _VERSION: Final = "PRAGMA data_version"
 

@@ -14,22 +14,22 @@ from typing import Final
 
 from sqlalchemy import Connection, Table, delete, exists, func, select, update
 
-from services.optimizer.errors import Conflict
-from services.optimizer.jobs.audit import LOCAL, RETENTION, AuditAction
-from services.optimizer.jobs.job import DELETABLE, ENDED, Job, JobState
-from services.optimizer.store.connections.changes import announce
-from services.optimizer.store.connections.engine import Clock, Database
-from services.optimizer.store.rows.evaluation_rows import Row
-from services.optimizer.store.rows.job_rows import to_job
-from services.optimizer.store.rows.tables import (
+from gaitswarm.services.optimizer.errors import Conflict
+from gaitswarm.services.optimizer.jobs.audit import LOCAL, RETENTION, AuditAction
+from gaitswarm.services.optimizer.jobs.job import DELETABLE, ENDED, Job, JobState
+from gaitswarm.services.optimizer.store.connections.changes import announce
+from gaitswarm.services.optimizer.store.connections.engine import Clock, Database
+from gaitswarm.services.optimizer.store.rows.evaluation_rows import Row
+from gaitswarm.services.optimizer.store.rows.job_rows import to_job
+from gaitswarm.services.optimizer.store.rows.tables import (
     EXISTING,
     evaluations,
     jobs,
     metadata,
     notifications,
 )
-from services.optimizer.store.statements.audit import note_change, remove_oldest
-from services.optimizer.store.statements.records import job_row, update_job
+from gaitswarm.services.optimizer.store.statements.audit import note_change, remove_oldest
+from gaitswarm.services.optimizer.store.statements.records import job_row, update_job
 
 _PIECE: Final = 5000
 """Evaluations, or entries of the audit log, removed in one transaction."""

@@ -9,23 +9,23 @@ import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy import Integer, Select, Table, bindparam, select
 
-from services.optimizer.errors import InvalidRequest, NotFound
-from services.optimizer.jobs.chain import ChainDocuments
-from services.optimizer.jobs.columns import EvaluationColumns
-from services.optimizer.jobs.iteration import Evaluation, Iteration, Known, Reevaluation
-from services.optimizer.store.connections.engine import Database
-from services.optimizer.store.port.reading import Page, StoredLink
-from services.optimizer.store.rows.columns import select_columns, select_known
-from services.optimizer.store.rows.evaluation_rows import (
+from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
+from gaitswarm.services.optimizer.jobs.chain import ChainDocuments
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Iteration, Known, Reevaluation
+from gaitswarm.services.optimizer.store.connections.engine import Database
+from gaitswarm.services.optimizer.store.port.reading import Page, StoredLink
+from gaitswarm.services.optimizer.store.rows.columns import select_columns, select_known
+from gaitswarm.services.optimizer.store.rows.evaluation_rows import (
     LISTED,
     to_evaluation,
     to_iteration,
     to_reevaluation,
 )
-from services.optimizer.store.rows.job_rows import chain_documents
-from services.optimizer.store.rows.tables import evaluations, iterations, reevaluations
-from services.optimizer.store.statements.chain import select_links, select_reevaluations
-from services.optimizer.store.statements.records import job_row, job_to_show, require_job
+from gaitswarm.services.optimizer.store.rows.job_rows import chain_documents
+from gaitswarm.services.optimizer.store.rows.tables import evaluations, iterations, reevaluations
+from gaitswarm.services.optimizer.store.statements.chain import select_links, select_reevaluations
+from gaitswarm.services.optimizer.store.statements.records import job_row, job_to_show, require_job
 
 _LARGEST_INDEX: Final = 2**31 - 1
 _LARGEST_PAGE: Final = 10_000

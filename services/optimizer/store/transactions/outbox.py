@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from services.optimizer.jobs.notification import Notification
-from services.optimizer.store.connections.engine import Clock, Database
-from services.optimizer.store.statements.notifications import (
+from gaitswarm.services.optimizer.jobs.notification import Notification
+from gaitswarm.services.optimizer.store.connections.engine import Clock, Database
+from gaitswarm.services.optimizer.store.statements.notifications import (
     is_due,
     notifications_of,
     settle,
     take_due,
 )
-from services.optimizer.store.statements.records import require_job
+from gaitswarm.services.optimizer.store.statements.records import require_job
 
 
 class SqlOutbox:

@@ -6,19 +6,19 @@ from collections.abc import Sequence
 
 from sqlalchemy.exc import IntegrityError
 
-from services.optimizer.jobs.audit import LOCAL, AuditAction
-from services.optimizer.store.connections.engine import Clock, Database
-from services.optimizer.store.port.reading import Page
-from services.optimizer.store.port.recordings import RecordingEntry
-from services.optimizer.store.statements.audit import note_change
-from services.optimizer.store.statements.recordings import (
+from gaitswarm.services.optimizer.jobs.audit import LOCAL, AuditAction
+from gaitswarm.services.optimizer.store.connections.engine import Clock, Database
+from gaitswarm.services.optimizer.store.port.reading import Page
+from gaitswarm.services.optimizer.store.port.recordings import RecordingEntry
+from gaitswarm.services.optimizer.store.statements.audit import note_change
+from gaitswarm.services.optimizer.store.statements.recordings import (
     insert_recording,
     load_recordings,
     recording_id,
     recording_page,
 )
-from services.optimizer.store.transactions.history import checked_limit
-from sim.identification.recorded_walk import RecordedWalk, Recordings
+from gaitswarm.services.optimizer.store.transactions.history import checked_limit
+from gaitswarm.sim.identification.recorded_walk import RecordedWalk, Recordings
 
 
 class SqlRecordings:

@@ -6,21 +6,21 @@ import logging
 from datetime import timedelta
 from typing import Any
 
-from services.optimizer.errors import Unreadable
-from services.optimizer.jobs.iteration import Ask, CompletedIteration
-from services.optimizer.jobs.job import (
+from gaitswarm.services.optimizer.errors import Unreadable
+from gaitswarm.services.optimizer.jobs.iteration import Ask, CompletedIteration
+from gaitswarm.services.optimizer.jobs.job import (
     QUARANTINE_AFTER,
     Claim,
     JobState,
     Renewal,
 )
-from services.optimizer.jobs.provenance import JobProvenance
-from services.optimizer.store.connections.engine import (
+from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
+from gaitswarm.services.optimizer.store.connections.engine import (
     Clock,
     Database,
 )
-from services.optimizer.store.rows.job_rows import storable
-from services.optimizer.store.statements.claims import (
+from gaitswarm.services.optimizer.store.rows.job_rows import storable
+from gaitswarm.services.optimizer.store.statements.claims import (
     claimable,
     claimed_row,
     crashes_before,
@@ -30,7 +30,7 @@ from services.optimizer.store.statements.claims import (
     set_aside,
     take_job,
 )
-from services.optimizer.store.statements.records import (
+from gaitswarm.services.optimizer.store.statements.records import (
     complete_iteration,
     entering,
     insert_ask,

@@ -8,13 +8,13 @@ from typing import Final
 from sqlalchemy import Connection, func, insert, select, update
 from sqlalchemy.exc import IntegrityError
 
-from services.optimizer.access import Scope, Token, new_secret, secret_digest
-from services.optimizer.errors import InvalidRequest, NotFound
-from services.optimizer.jobs.audit import LOCAL, RETENTION, AuditAction
-from services.optimizer.store.connections.engine import Clock, Database
-from services.optimizer.store.rows.evaluation_rows import Row
-from services.optimizer.store.rows.tables import tokens
-from services.optimizer.store.statements.audit import note_change
+from gaitswarm.services.optimizer.access import Scope, Token, new_secret, secret_digest
+from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
+from gaitswarm.services.optimizer.jobs.audit import LOCAL, RETENTION, AuditAction
+from gaitswarm.services.optimizer.store.connections.engine import Clock, Database
+from gaitswarm.services.optimizer.store.rows.evaluation_rows import Row
+from gaitswarm.services.optimizer.store.rows.tables import tokens
+from gaitswarm.services.optimizer.store.statements.audit import note_change
 
 _NAME: Final = re.compile(r"[A-Za-z0-9_.-]{1,64}")
 

@@ -1,4 +1,4 @@
-"""Runs migrations on the connection that `services.optimizer.store.schema.migrate` hands over.
+"""Runs migrations on the connection that `gaitswarm.services.optimizer.store.schema.migrate` hands over.
 
 Alembic executes this file; it is not a module to import. The transaction belongs to the caller.
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 from alembic import context
 from sqlalchemy import Connection
 
-from services.optimizer.store.rows.tables import metadata
+from gaitswarm.services.optimizer.store.rows.tables import metadata
 
 
 def _run(connection: Connection) -> None:

@@ -1,0 +1,5 @@
+"""Command line: python -m gaitswarm"""
+
+from gaitswarm.cli.main import main
+
+main()

@@ -67,14 +67,7 @@ class AccessMiddleware:
     def __init__(
         self, app: ASGIApp, tokens: Callable[[], Tokens], rate: RequestRate, *, required: bool
     ) -> None:
-        """Take on the memory of tokens.
-
-        Args:
-            app: answers what is not refused.
-            tokens: gives the memory; called only for a request with a token.
-            rate: how often each asker may ask.
-            required: whether requests without a token are refused.
-        """
+        """Take on the memory of tokens."""
         self.app = app
         self.required = required
         self._tokens = KnownTokens(tokens)
@@ -132,14 +125,7 @@ async def _never() -> None:
 
 
 def secret_of(headers: Headers) -> str | None:
-    """The secret that a request came with.
-
-    Args:
-        headers: of the request. `Authorization` goes before the cookie.
-
-    Returns:
-        The secret, whatever it is; None where there is none.
-    """
+    """The secret that a request came with."""
     scheme, _, credentials = headers.get("authorization", "").partition(" ")
     if scheme.lower() == "bearer":
         return credentials.strip()
@@ -151,11 +137,7 @@ def secret_of(headers: Headers) -> str | None:
 
 
 async def asking(request: Request) -> Token | None:
-    """The token that a request came with; None where none is required and none was given.
-
-    Args:
-        request: under way.
-    """
+    """The token that a request came with; None where none is required and none was given."""
     return getattr(request.state, "token", None)
 
 
@@ -163,11 +145,7 @@ Asking = Annotated[Token | None, Depends(asking)]
 
 
 async def revocation(request: Request) -> Revocation:
-    """What returns when the token of a request was revoked.
-
-    Args:
-        request: under way.
-    """
+    """What returns when the token of a request was revoked."""
     return cast(Revocation, request.state.until_revoked)
 
 
@@ -175,17 +153,7 @@ UntilRevoked = Annotated[Revocation, Depends(revocation)]
 
 
 async def may_submit(token: Asking) -> str | None:
-    """Refuse whoever may only read.
-
-    Args:
-        token: of the request.
-
-    Returns:
-        The owner of what is submitted: the token's name, or None without one.
-
-    Raises:
-        Forbidden: the token is of another scope.
-    """
+    """Refuse whoever may only read."""
     if token is None:
         return None
     if not token.scope.allows(TokenScope.SUBMIT):
@@ -196,14 +164,7 @@ async def may_submit(token: Asking) -> str | None:
 
 
 async def actor(token: Asking) -> str:
-    """Whom the audit log names for what the request changes.
-
-    Args:
-        token: of the request.
-
-    Returns:
-        The token's name; `LOCAL` without one.
-    """
+    """Whom the audit log names for what the request changes."""
     return LOCAL if token is None else token.name
 
 
@@ -211,14 +172,7 @@ Actor = Annotated[str, Depends(actor)]
 
 
 async def may_administer(token: Asking) -> None:
-    """Refuse whoever may not see what others do.
-
-    Args:
-        token: of the request.
-
-    Raises:
-        Forbidden: the token is of another scope than `admin`.
-    """
+    """Refuse whoever may not see what others do."""
     if token is not None and not token.scope.allows(TokenScope.ADMIN):
         raise Forbidden(
             f"the token {token.name!r} is of scope `{token.scope}`; this needs one of scope `admin`"
@@ -229,30 +183,14 @@ Owner = Annotated[str | None, Depends(may_submit)]
 
 
 async def quota_of(token: Asking, settings: ServerSettings) -> Quota | None:
-    """What the unfinished jobs of an owner may come to.
-
-    Args:
-        token: of the request; one of scope `admin` may do more.
-        settings: with the limits.
-
-    Returns:
-        The limits; None for none.
-    """
+    """What the unfinished jobs of an owner may come to."""
     if token is not None and token.scope is TokenScope.ADMIN:
         return None
     return Quota(settings.api_max_unfinished_jobs, settings.api_max_unfinished_seconds)
 
 
 def check_may_prioritize(token: Token | None, priority: int) -> None:
-    """Refuse whoever may not put a job before those of others.
-
-    Args:
-        token: of the request; None without one, who may.
-        priority: that is asked for; 0 and less is for everybody who may command the job.
-
-    Raises:
-        Forbidden: the token is of another scope than `admin`.
-    """
+    """Refuse whoever may not put a job before those of others."""
     if priority > DEFAULT and token is not None and not token.scope.allows(TokenScope.ADMIN):
         raise Forbidden(
             f"the token {token.name!r} of scope `{token.scope}` may not give a priority above"
@@ -275,15 +213,7 @@ async def job_priority(
         ),
     ] = DEFAULT,
 ) -> int:
-    """The priority that a new job is to have.
-
-    Args:
-        token: of the request.
-        priority: as it was sent.
-
-    Raises:
-        Forbidden: the token is of another scope than the priority needs.
-    """
+    """The priority that a new job is to have."""
     check_may_prioritize(token, priority)
     return priority
 
@@ -294,15 +224,7 @@ OwnersQuota = Annotated[Quota | None, Depends(quota_of)]
 
 
 def may_command(job: ExistingJob, token: Asking) -> None:
-    """Refuse whoever may not command the job of the path.
-
-    Args:
-        job: of the path.
-        token: of the request.
-
-    Raises:
-        Forbidden: it is somebody else's job, or the token may only read.
-    """
+    """Refuse whoever may not command the job of the path."""
     if token is not None and not token.may_command(job.owner):
         whose = "nobody's" if job.owner is None else f"{job.owner!r}'s"
         raise Forbidden(

@@ -44,13 +44,7 @@ class Encoded:
     __slots__ = ("_compressed", "_job", "key", "plain")
 
     def __init__(self, plain: bytes, job: Job | None = None, key: Hashable | None = None) -> None:
-        """Take on a text.
-
-        Args:
-            plain: The text, in UTF-8.
-            job: That it tells of; kept, so that no other object is taken for it.
-            key: By which it is found.
-        """
+        """Take on a text."""
         self.plain = plain
         self.key = key
         self._job = job
@@ -65,14 +59,7 @@ class Encoded:
         return self._compressed
 
     def answer(self, request: Request) -> Response:
-        """Answer with it.
-
-        Args:
-            request: That asks.
-
-        Returns:
-            What it accepts: the text, or the text by gzip.
-        """
+        """Answer with it."""
         if len(self.plain) < LEAST_COMPRESSED or not _accepts_gzip(request):
             return Response(self.plain, media_type="application/json")
         headers = {"Content-Encoding": "gzip", "Vary": "Accept-Encoding"}
@@ -85,11 +72,7 @@ def _accepts_gzip(request: Request) -> bool:
 
 
 class Answers:
-    """Answers, and parts of them; of too many, those asked for longest ago go. Thread-safe.
-
-    Args:
-        largest: Bytes of all of them.
-    """
+    """Answers, and parts of them; of too many, those asked for longest ago go. Thread-safe."""
 
     def __init__(self, largest: int = _LARGEST) -> None:
         self._largest = largest
@@ -108,14 +91,6 @@ class Answers:
 
         The store gives the same object for a job of which nothing has changed. What is told of a
         job that runs depends on the time as well, and is not remembered.
-
-        Args:
-            what: Is told of the job.
-            job: As it was read.
-            make: Gives the JSON.
-
-        Returns:
-            The JSON, as it was encoded for this job or an earlier reading of it.
         """
         if job.state is JobState.RUNNING:
             return Encoded(make())
@@ -123,48 +98,19 @@ class Answers:
         return found or self._add((what, id(job)), Encoded(make(), job))
 
     def find_of_job(self, what: str, job: Job) -> Encoded | None:
-        """Look for what follows from a job alone.
-
-        Args:
-            what: Is told of the job.
-            job: As it was read.
-
-        Returns:
-            The JSON; None if it is not remembered.
-        """
+        """Look for what follows from a job alone."""
         return None if job.state is JobState.RUNNING else self._find((what, id(job)))
 
     def of_history(self, key: Hashable, make: Callable[[], bytes]) -> Encoded:
-        """Encode what never changes: whole iterations that are committed.
-
-        Args:
-            key: What is told, and of which job; whether the job is there still has been asked.
-            make: Gives the JSON.
-
-        Returns:
-            The JSON.
-        """
+        """Encode what never changes: whole iterations that are committed."""
         return self._find(key) or self._add(key, Encoded(make()))
 
     def find_of_history(self, key: Hashable) -> Encoded | None:
-        """Look for what never changes.
-
-        Args:
-            key: What is told, and of which job; whether the job is there still has been asked.
-
-        Returns:
-            The JSON; None if it is not remembered.
-        """
+        """Look for what never changes."""
         return self._find(key)
 
     def note_page(self, key: Hashable, version: Hashable, page: Encoded) -> None:
-        """Note what is answered as long as nothing is committed.
-
-        Args:
-            key: What is asked for, and of which store.
-            version: Of the store, asked for before the page was read.
-            page: The answer, as `same` gave it.
-        """
+        """Note what is answered as long as nothing is committed."""
         with self._lock:
             self._pages[key] = (version, page.key)
             self._pages.move_to_end(key)
@@ -172,27 +118,12 @@ class Answers:
                 self._pages.popitem(last=False)
 
     def find_page(self, key: Hashable, version: Hashable) -> Encoded | None:
-        """Look for what was noted.
-
-        Args:
-            key: What is asked for, and of which store.
-            version: Of the store by now.
-
-        Returns:
-            The JSON; None if something was committed since, or it is not remembered.
-        """
+        """Look for what was noted."""
         noted = self._pages.get(key)
         return None if noted is None or noted[0] != version else self._find(noted[1])
 
     def same(self, plain: bytes) -> Encoded:
-        """Find an answer by its text, so that it is compressed once.
-
-        Args:
-            plain: JSON.
-
-        Returns:
-            The JSON.
-        """
+        """Find an answer by its text, so that it is compressed once."""
         key = blake2b(plain, digest_size=16).digest()
         return self._find(key) or self._add(key, Encoded(plain, key=key))
 
@@ -215,13 +146,5 @@ class Answers:
 
 
 def page_of(items: Iterable[bytes], following: str | None) -> bytes:
-    """Put a page together.
-
-    Args:
-        items: JSON of each.
-        following: Place of the next page; None on the last.
-
-    Returns:
-        JSON of a `PageView`.
-    """
+    """Put a page together."""
     return b'{"items":[' + b",".join(items) + b'],"next":' + to_json(following) + b"}"

@@ -85,19 +85,6 @@ def create_app(
     """The application around a service: routes, problems, limits, documentation, page.
 
     Nothing is opened or started; the service's store stays its owner's to close.
-
-    Args:
-        service: answers the requests.
-        settings: limits and intervals.
-        page_folder: of the built page; there need be none.
-        manual_folder: of the built manual; there need be none.
-        metrics: of the process, which the application adds its own and the database's to; None:
-            there are no others.
-        components: parts of the process, beside the database, that /v1/readyz tells of.
-        activity: what happens to the jobs that the process runs; None where it runs none.
-
-    Returns:
-        The application, for `ApiServer` or any other ASGI server with lifespans.
     """
     metrics = metrics or Metrics()
     metrics.registry.register(QueueCollector(lambda: service.store))

@@ -27,15 +27,7 @@ MOST_VARIABLES: Final = 128
 
 
 def validated(model: Any, name: str) -> Callable[..., Any]:
-    """A dependency that reads the body of a request and validates it in a thread.
-
-    Args:
-        model: What the body is to be, for pydantic; the document shows it.
-        name: Of the body, in the document.
-
-    Returns:
-        For `Depends`; it answers the validated body, or raises RequestValidationError.
-    """
+    """A dependency that reads the body of a request and validates it in a thread."""
     adapter: TypeAdapter[Any] = TypeAdapter(model)
 
     async def read(http: Request, **body: Any) -> Any:

@@ -55,11 +55,7 @@ class ConnectionLimits:
 
     @classmethod
     def of(cls, settings: Settings) -> ConnectionLimits:
-        """Those of the settings.
-
-        Args:
-            settings: of the server.
-        """
+        """Those of the settings."""
         return cls(
             connections=settings.api_max_connections,
             of_client=settings.api_max_client_connections,
@@ -71,11 +67,7 @@ class ConnectionLimits:
         )
 
     def trusts(self, host: str) -> bool:
-        """Whether connections from an address are those of a trusted proxy.
-
-        Args:
-            host: the address.
-        """
+        """Whether connections from an address are those of a trusted proxy."""
         try:
             address = ip_address(host)
         except ValueError:
@@ -84,14 +76,7 @@ class ConnectionLimits:
 
 
 def limited_protocol(limits: ConnectionLimits) -> Callable[..., asyncio.Protocol]:
-    """The protocol of one server's connections.
-
-    Args:
-        limits: of them all.
-
-    Returns:
-        For uvicorn's option `http`.
-    """
+    """The protocol of one server's connections."""
     clients: Counter[str] = Counter()
 
     def make(
@@ -126,15 +111,7 @@ class LimitedProtocol(H11Protocol):
         limits: ConnectionLimits,
         clients: Counter[str],
     ) -> None:
-        """As uvicorn's own.
-
-        Args:
-            config: of the server.
-            server_state: that connections share.
-            app_state: that requests begin with.
-            limits: of all connections.
-            clients: how many connections each address has, but trusted proxies.
-        """
+        """As uvicorn's own."""
         super().__init__(config, server_state, app_state)
         self._limits = limits
         self._clients = clients
@@ -145,11 +122,7 @@ class LimitedProtocol(H11Protocol):
         self._deadline: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Take on a connection, unless there are too many.
-
-        Args:
-            transport: of the connection.
-        """
+        """Take on a connection, unless there are too many."""
         super().connection_made(transport)
         # asyncio does so only for sockets that say that they are of TCP, which ours do not. An
         # answer's body would wait for the client to acknowledge its head, which takes 40 ms.
@@ -178,11 +151,7 @@ class LimitedProtocol(H11Protocol):
         return None
 
     def data_received(self, data: bytes) -> None:
-        """Go on with a request.
-
-        Args:
-            data: that has come.
-        """
+        """Go on with a request."""
         if self._ended or self.transport.is_closing():
             return
         if self.conn.their_state is h11.IDLE:
@@ -196,11 +165,7 @@ class LimitedProtocol(H11Protocol):
         self._expect()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Forget the connection.
-
-        Args:
-            exc: why it broke; None where it was closed.
-        """
+        """Forget the connection."""
         if self._counted is not None:
             self._clients[self._counted] -= 1
             if not self._clients[self._counted]:
@@ -210,11 +175,7 @@ class LimitedProtocol(H11Protocol):
         super().connection_lost(exc)
 
     def send_400_response(self, msg: str) -> None:  # noqa: ARG002 - uvicorn's words
-        """Answer what is no request, or has too large a head.
-
-        Args:
-            msg: what uvicorn would say.
-        """
+        """Answer what is no request, or has too large a head."""
         if self._head_bytes > self._limits.header_bytes:
             self._refuse(headers_too_large(self._limits.header_bytes))
         else:

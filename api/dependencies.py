@@ -85,17 +85,7 @@ def lifespan(
     metrics: Metrics,
     activity: Activity | None = None,
 ) -> Callable[[FastAPI], AbstractAsyncContextManager[State]]:
-    """The lifespan of an application.
-
-    Args:
-        settings: of the application.
-        components: parts of the process beside the database.
-        metrics: of this process.
-        activity: what happens to the jobs that this process runs; None where it runs none.
-
-    Returns:
-        The context manager that FastAPI enters in the server's event loop.
-    """
+    """The lifespan of an application."""
 
     @asynccontextmanager
     async def run(_app: FastAPI) -> AsyncIterator[State]:
@@ -125,62 +115,32 @@ def lifespan(
 
 
 async def service(request: Request) -> JobService:
-    """The application's service.
-
-    Args:
-        request: under way.
-    """
+    """The application's service."""
     return service_of(request.scope)
 
 
 def service_of(scope: Scope) -> JobService:
-    """The same, where routes and their dependencies are not asked for.
-
-    Args:
-        scope: of a request under way.
-    """
+    """The same, where routes and their dependencies are not asked for."""
     return cast(JobService, scope["app"].state.service)
 
 
 async def settings(request: Request) -> Settings:
-    """The application's settings.
-
-    Args:
-        request: under way.
-    """
+    """The application's settings."""
     return cast(Settings, request.state.settings)
 
 
 async def slots(request: Request) -> AskersSlots:
-    """The application's room for walks on request, as whoever asks may use it.
-
-    Args:
-        request: under way.
-    """
+    """The application's room for walks on request, as whoever asks may use it."""
     return AskersSlots(cast(ComputingSlots, request.state.slots), request.state.asker)
 
 
 async def activity(request: Request) -> Activity | None:
-    """What happens to the jobs that this process runs, if it runs any.
-
-    Args:
-        request: under way.
-    """
+    """What happens to the jobs that this process runs, if it runs any."""
     return cast("Activity | None", request.state.activity)
 
 
 async def counted_stream(request: Request) -> AsyncIterator[None]:
-    """A stream of whoever asks, until its answer has ended.
-
-    Args:
-        request: under way.
-
-    Yields:
-        Nothing.
-
-    Raises:
-        TooManyRequests: the asker has as many open as may be.
-    """
+    """A stream of whoever asks, until its answer has ended."""
     with cast(OpenStreams, request.state.streams).one_of(request.state.asker):
         yield
 
@@ -196,38 +156,22 @@ Analysing = Depends(_analysing, scope="function")
 
 
 async def stopping(request: Request) -> asyncio.Event:
-    """Set when the server begins to stop.
-
-    Args:
-        request: under way.
-    """
+    """Set when the server begins to stop."""
     return cast(asyncio.Event, request.state.stopping)
 
 
 async def topics(request: Request) -> Topics:
-    """Jobs that event streams follow.
-
-    Args:
-        request: under way.
-    """
+    """Jobs that event streams follow."""
     return cast(Topics, request.state.topics)
 
 
 async def metrics(request: Request) -> Metrics:
-    """What this process tells monitoring systems.
-
-    Args:
-        request: under way.
-    """
+    """What this process tells monitoring systems."""
     return cast(Metrics, request.state.metrics)
 
 
 async def answers(request: Request) -> Answers:
-    """Answers that are remembered.
-
-    Args:
-        request: under way.
-    """
+    """Answers that are remembered."""
     return cast(Answers, request.state.answers)
 
 
@@ -258,15 +202,7 @@ JobId = Annotated[
 
 
 def existing_job(job_id: JobId, service: Service) -> Job:
-    """The job of the path, read before any answer has begun.
-
-    Args:
-        job_id: as the path has it.
-        service: where it is.
-
-    Raises:
-        NotFound: no job of that id.
-    """
+    """The job of the path, read before any answer has begun."""
     return service.job(job_id)
 
 
@@ -274,17 +210,7 @@ ExistingJob = Annotated[Job, Depends(existing_job)]
 
 
 def check_length(settings: Settings, seconds: float, *, logged: bool, field: str) -> None:
-    """Refuse walks that last too long together.
-
-    Args:
-        settings: with the limits.
-        seconds: simulated time of all walks of a request [s].
-        logged: whether the request asks for logs, which has a limit of its own.
-        field: the request's field to blame.
-
-    Raises:
-        InvalidRequest: they last longer than the settings allow.
-    """
+    """Refuse walks that last too long together."""
     limit = settings.api_max_logged_seconds if logged else settings.api_max_simulated_seconds
     if seconds > limit:
         raise InvalidRequest(
@@ -295,15 +221,7 @@ def check_length(settings: Settings, seconds: float, *, logged: bool, field: str
 
 
 def check_sampled_length(settings: Settings, seconds: float) -> None:
-    """Refuse a sample of designs whose walks last too long together.
-
-    Args:
-        settings: with the limit.
-        seconds: simulated time of all walks of all designs [s].
-
-    Raises:
-        InvalidRequest: they last longer than the settings allow.
-    """
+    """Refuse a sample of designs whose walks last too long together."""
     limit = settings.api_max_sampled_seconds
     if seconds > limit:
         raise InvalidRequest(

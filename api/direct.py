@@ -51,9 +51,6 @@ class DirectAnswers:
 
     The routes of the same paths answer the same, and say in the documentation what it is. What is
     asked for in another way than usual is left to them, as is all that they would refuse.
-
-    Args:
-        app: Answers everything else.
     """
 
     def __init__(self, app: ASGIApp) -> None:

@@ -88,16 +88,7 @@ Responses = dict[int | str, dict[str, Any]]
 
 
 def problems(*statuses: int, asks: bool = True) -> Responses:
-    """Document a route's problems.
-
-    Args:
-        statuses: its HTTP statuses of problems; 500 and 503 go without saying.
-        asks: whether the route asks for a token where the server does, which can be 401; how often
-            it is asked is limited then, which can be 429.
-
-    Returns:
-        The route's `responses`.
-    """
+    """Document a route's problems."""
     # By name: as a `model`, each of some 150 answers would have a validator of its own.
     content = {MEDIA_TYPE: {"schema": {"$ref": f"{_SCHEMAS}{ProblemView.__name__}"}}}
     return {
@@ -107,26 +98,14 @@ def problems(*statuses: int, asks: bool = True) -> Responses:
 
 
 def binary(description: str, *media_types: str) -> Responses:
-    """Document a route that answers bytes.
-
-    Args:
-        description: what the bytes are.
-        media_types: that they may have; by default framed numbers alone.
-
-    Returns:
-        The route's `responses`.
-    """
+    """Document a route that answers bytes."""
     schema = {"type": "string", "format": "binary"}
     content = {media_type: {"schema": schema} for media_type in media_types or (BINARY,)}
     return {200: {"description": description, "content": content}}
 
 
 def add_documentation(app: FastAPI) -> None:
-    """Complete the OpenAPI document and serve /docs.
-
-    Args:
-        app: with all its routes, and the scripts of /docs under `ASSETS`.
-    """
+    """Complete the OpenAPI document and serve /docs."""
     derive = app.openapi
 
     def openapi() -> dict[str, Any]:
@@ -165,15 +144,7 @@ def _schemas(*models: type[BaseModel]) -> dict[str, Any]:
 
 
 def policy_of(page: bytes) -> str:
-    """The policy of a page that other projects' scripts make.
-
-    Args:
-        page: Its HTML, which has no content of users.
-
-    Returns:
-        A content security policy that allows the page's inline scripts by their hashes, and styles
-        that scripts write.
-    """
+    """The policy of a page that other projects' scripts make."""
     hashes = [
         f"'sha256-{base64.b64encode(hashlib.sha256(script).digest()).decode()}'"
         for script in _INLINE_SCRIPT.findall(page)

@@ -38,12 +38,7 @@ class EventStream(StreamingResponse):
     def __init__(
         self, events: AsyncGenerator[bytes, None], until_revoked: Callable[[], Awaitable[None]]
     ) -> None:
-        """Take on the events.
-
-        Args:
-            events: whole ones, as they are to be written; closed in any case when the answer ends.
-            until_revoked: returns when whoever asked may not be told any more.
-        """
+        """Take on the events."""
         self._texts = _kept_alive(events, until_revoked)
         super().__init__(self._texts, headers=_HEADERS)
 

@@ -22,44 +22,22 @@ class KnownTokens:
     """What was looked up of secrets. Of one event loop."""
 
     def __init__(self, tokens: Callable[[], Tokens]) -> None:
-        """Begin with none.
-
-        Args:
-            tokens: gives the memory; called only for a request with a token.
-        """
+        """Begin with none."""
         self._tokens = tokens
         # Until when each is as good as looked up now.
         self._remembered: dict[str, tuple[float, Token]] = {}
         self._watching = asyncio.Lock()
 
     def last(self, secret: str) -> Token | None:
-        """What a secret was good for when it was last looked up, however long ago.
-
-        Args:
-            secret: of a request.
-        """
+        """What a secret was good for when it was last looked up, however long ago."""
         return self._remembered.get(secret, (0.0, None))[1]
 
     def lately(self, secret: str) -> Token | None:
-        """The same, if that is at most `REMEMBERED_SECONDS` ago.
-
-        Args:
-            secret: of a request.
-        """
+        """The same, if that is at most `REMEMBERED_SECONDS` ago."""
         return self.last(secret) if self._seconds_left(secret) > 0.0 else None
 
     async def find(self, secret: str) -> Token | None:
-        """What a secret is good for, as it was at most `REMEMBERED_SECONDS` ago.
-
-        Args:
-            secret: of a request.
-
-        Returns:
-            Its token; None if it is unknown or was revoked.
-
-        Raises:
-            StoreUnavailable: the database does not answer, and it has to be asked.
-        """
+        """What a secret is good for, as it was at most `REMEMBERED_SECONDS` ago."""
         known = self.lately(secret)
         if known is not None:
             return known
@@ -76,9 +54,6 @@ class KnownTokens:
 
         However many wait for the same, the database is asked once for them all. While it is away,
         nothing is revoked.
-
-        Args:
-            secret: of a request that was answered.
         """
         while True:
             # One asks; the next then know.

@@ -32,11 +32,7 @@ _PARAMETER: Final = re.compile(r"\{(\w+)\}")
 
 
 def add_links(document: dict[str, Any]) -> None:
-    """Write the links into a document.
-
-    Args:
-        document: OpenAPI 3.1, which is changed.
-    """
+    """Write the links into a document."""
     for source, told in _SOURCES.items():
         _, operation = _operations(document)[source]
         links = dict(_links(document, source, told))

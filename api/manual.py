@@ -39,12 +39,7 @@ bring it.</p>
 
 
 def add_manual(app: FastAPI, folder: Path) -> None:
-    """Serve a built manual; nothing of it is read before it is asked for.
-
-    Args:
-        app: takes on the routes.
-        folder: of the HTML that Sphinx made; there need be none.
-    """
+    """Serve a built manual; nothing of it is read before it is asked for."""
     app.state.manual_folder = folder
 
     def first(request: Request) -> Response:

@@ -99,13 +99,7 @@ class HeaderLimitMiddleware:
 
 
 class BodyLimitMiddleware:
-    """Refuses bodies over a limit with a problem, whether their length was declared or not.
-
-    Args:
-        app: answers the others.
-        max_bytes: that a body may have [B].
-        larger: the same of paths whose bodies may be larger [B].
-    """
+    """Refuses bodies over a limit with a problem, whether their length was declared or not."""
 
     def __init__(
         self, app: ASGIApp, max_bytes: int, larger: Mapping[str, int] | None = None
@@ -153,15 +147,7 @@ class BodyLimitMiddleware:
 
 
 def security_policy(*, script_src: str = "'self'", style_src: str = "'self'") -> str:
-    """A content security policy: this server's own files and data, no frame around them.
-
-    Args:
-        script_src: sources of scripts, as the policy names them.
-        style_src: sources of styles.
-
-    Returns:
-        Value of the header Content-Security-Policy.
-    """
+    """A content security policy: this server's own files and data, no frame around them."""
     return (
         f"default-src 'none'; script-src {script_src}; style-src {style_src};"
         " img-src 'self' data: blob:; connect-src 'self'; font-src 'self'; base-uri 'none';"

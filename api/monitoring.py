@@ -47,12 +47,7 @@ class MetricsMiddleware:
 
 
 def add_metrics(app: FastAPI, metrics: Metrics) -> None:
-    """Answer GET /metrics to whomever `AccessMiddleware` lets through.
-
-    Args:
-        app: takes on the route.
-        metrics: of this process.
-    """
+    """Answer GET /metrics to whomever `AccessMiddleware` lets through."""
 
     def answer(request: Request) -> Response:
         text, media_type = metrics.exposition(request.headers.get("accept", ""))

@@ -45,12 +45,7 @@ class SameOriginMiddleware:
     """
 
     def __init__(self, app: ASGIApp, allowed: Sequence[str]) -> None:
-        """Take on the origins that are as good as the server's own.
-
-        Args:
-            app: answers what is not refused.
-            allowed: `name` or `name:port` of proxies that do not hand the header Host on.
-        """
+        """Take on the origins that are as good as the server's own."""
         self.app = app
         self.allowed = frozenset(name.lower() for name in allowed)
 

@@ -32,21 +32,12 @@ _MEDIA_TYPES: Final = {".js": "text/javascript", ".css": "text/css", ".svg": "im
 
 
 def is_built(folder: Path = FOLDER) -> bool:
-    """Whether there is a page to serve.
-
-    Args:
-        folder: of the built page.
-    """
+    """Whether there is a page to serve."""
     return (folder / "index.html").is_file()
 
 
 def add_page(app: FastAPI, folder: Path) -> None:
-    """Serve a built page; without one, `/` leads to /docs and a job's page to the job as JSON.
-
-    Args:
-        app: takes on the page's routes.
-        folder: index.html, and files named by a hash of their content in assets/.
-    """
+    """Serve a built page; without one, `/` leads to /docs and a job's page to the job as JSON."""
 
     def page(request: Request) -> Response:
         try:

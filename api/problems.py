@@ -135,19 +135,7 @@ def problem(
     errors: Sequence[FieldErrorView] = (),
     headers: Mapping[str, str] | None = None,
 ) -> Response:
-    """Make a problem.
-
-    Args:
-        request_path: path that was asked for.
-        kind: last part of the problem's type.
-        detail: what went wrong and what to do about it.
-        status: HTTP status, where the kind is none of `PROBLEMS`.
-        errors: every offending field.
-        headers: of the response, beside its media type.
-
-    Returns:
-        The response.
-    """
+    """Make a problem."""
     known, title = PROBLEMS.get(kind) or (status or 500, HTTPStatus(status or 500).phrase)
     view = ProblemView(
         type=f"urn:gaitswarm:problem:{kind}",
@@ -162,15 +150,7 @@ def problem(
 
 
 def unauthorized(request_path: str, detail: str) -> Response:
-    """Answer whoever has to say first who they are.
-
-    Args:
-        request_path: path that was asked for.
-        detail: what went wrong and what to do about it.
-
-    Returns:
-        The response, with the header that RFC 9110 asks for.
-    """
+    """Answer whoever has to say first who they are."""
     headers = {"WWW-Authenticate": "Bearer"}
     return problem(request_path, "unauthorized", detail, headers=headers)
 
@@ -182,32 +162,13 @@ def unavailable(
     *,
     errors: Sequence[FieldErrorView] = (),
 ) -> Response:
-    """Answer that something is not possible now, and when to ask again.
-
-    Args:
-        request_path: path that was asked for.
-        detail: what is not possible and what to do about it.
-        kind: last part of the problem's type.
-        errors: what is to blame.
-
-    Returns:
-        The response.
-    """
+    """Answer that something is not possible now, and when to ask again."""
     _log.error("%s: %s", request_path, detail)
     return problem(request_path, kind, detail, errors=errors, headers=_RETRY)
 
 
 def too_many_requests(request_path: str, seconds: float, detail: str | None = None) -> Response:
-    """Answer whoever asks too often.
-
-    Args:
-        request_path: path that was asked for.
-        seconds: after which it is worth asking again [s].
-        detail: what went wrong and what to do about it; None: too many requests.
-
-    Returns:
-        The response, which says in `Retry-After` when to come back.
-    """
+    """Answer whoever asks too often."""
     wait = max(1, math.ceil(seconds))
     text = (
         detail or f"there are too many requests with this token or from this address; wait {wait} s"
@@ -221,14 +182,7 @@ MOST_HEADERS: Final = 100
 
 
 def headers_too_large(most_bytes: int) -> Response:
-    """Answer a request whose head is too large, of which nothing is quoted.
-
-    Args:
-        most_bytes: that it may have [B].
-
-    Returns:
-        The response.
-    """
+    """Answer a request whose head is too large, of which nothing is quoted."""
     detail = (
         f"the head of the request has more than {MOST_HEADERS} headers or {most_bytes} bytes; send"
         " fewer, and what is long in the body"
@@ -237,15 +191,7 @@ def headers_too_large(most_bytes: int) -> Response:
 
 
 def internal_error(request_path: str, request_id: str) -> Response:
-    """Answer a bug: nothing of the inside is shown, but how to report it is.
-
-    Args:
-        request_path: path that was asked for.
-        request_id: by which the log names the cause.
-
-    Returns:
-        The response.
-    """
+    """Answer a bug: nothing of the inside is shown, but how to report it is."""
     return problem(
         request_path,
         "internal-error",
@@ -255,11 +201,7 @@ def internal_error(request_path: str, request_id: str) -> Response:
 
 
 def add_problem_handlers(app: FastAPI) -> None:
-    """Answer every error of the table above with a problem.
-
-    Args:
-        app: takes on the handlers.
-    """
+    """Answer every error of the table above with a problem."""
     app.add_exception_handler(RequestValidationError, _on_invalid)
     app.add_exception_handler(HTTPException, _on_http_error)
     for raised in DOMAIN_ERRORS:
@@ -272,18 +214,7 @@ def _client_text(error: Exception) -> str:
 
 
 async def domain_problem(request: Request, error: Exception) -> Response:
-    """Answer what the domain refuses.
-
-    Args:
-        request: under way.
-        error: that was raised.
-
-    Returns:
-        The response.
-
-    Raises:
-        Exception: the error itself, if it is none of the table above.
-    """
+    """Answer what the domain refuses."""
     if isinstance(error, TooManyRequests):
         return too_many_requests(request.url.path, error.retry_after, str(error))
     found = next((row for row in _KINDS if isinstance(error, row[0])), None)

@@ -39,13 +39,7 @@ class RequestRate:
     def __init__(
         self, per_second: float, burst: int, clock: Callable[[], float] = time.monotonic
     ) -> None:
-        """Begin with nobody remembered.
-
-        Args:
-            per_second: requests of one asker that are answered for ever [1/s].
-            burst: requests of one asker that are answered at once after a silence.
-            clock: seconds that only grow.
-        """
+        """Begin with nobody remembered."""
         self._interval = 1.0 / per_second
         self._ahead = burst * self._interval
         self._clock = clock
@@ -58,14 +52,7 @@ class RequestRate:
         return len(self._paid)
 
     def seconds_to_wait(self, asker: str) -> float:
-        """Count a request, unless it is one too many.
-
-        Args:
-            asker: who asks.
-
-        Returns:
-            0 if it may be answered; else the time after which the next one may be [s].
-        """
+        """Count a request, unless it is one too many."""
         now = self._clock()
         paid = max(now, self._paid.pop(asker, now)) + self._interval
         # Rounding must not take the last request of a burst away.
@@ -83,27 +70,13 @@ class OpenStreams:
     """Event streams that are open, by asker. Of one event loop."""
 
     def __init__(self, most: int) -> None:
-        """Begin with none.
-
-        Args:
-            most: that one asker may have open.
-        """
+        """Begin with none."""
         self._most = most
         self._open: Counter[str] = Counter()
 
     @contextmanager
     def one_of(self, asker: str) -> Iterator[None]:
-        """Count a stream while the block runs.
-
-        Args:
-            asker: who has it.
-
-        Yields:
-            Nothing.
-
-        Raises:
-            TooManyRequests: the asker has as many as may be.
-        """
+        """Count a stream while the block runs."""
         if self._open[asker] >= self._most:
             raise TooManyRequests(
                 f"{self._open[asker]} event streams are open already, which is as many as may be;"
@@ -120,14 +93,7 @@ class OpenStreams:
 
 
 def address_of(scope: Scope) -> str:
-    """The address that a request comes from, as far as it tells subscribers apart.
-
-    Args:
-        scope: of the request; behind a proxy that is trusted, its client is the proxy's client.
-
-    Returns:
-        An IPv4 address, or the network of an IPv6 address; "" where there is none.
-    """
+    """The address that a request comes from, as far as it tells subscribers apart."""
     client = scope.get("client")
     host = str(client[0]) if client else ""
     try:
@@ -143,9 +109,5 @@ def address_of(scope: Scope) -> str:
 
 
 def is_local(address: str) -> bool:
-    """Whether a request comes from this machine.
-
-    Args:
-        address: as `address_of` has it.
-    """
+    """Whether a request comes from this machine."""
     return not address or is_loopback(address)

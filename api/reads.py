@@ -25,30 +25,10 @@ class JobQuestion(Protocol):
     """What is asked of one job."""
 
     def known(self, answers: Answers, job: Job) -> Encoded | None:
-        """Look for the answer without reading or computing anything.
-
-        Args:
-            answers: That are remembered.
-            job: As it was read just now.
-
-        Returns:
-            The answer; None if it is not remembered.
-        """
+        """Look for the answer without reading or computing anything."""
 
     def answer(self, answers: Answers, service: JobService, job: Job) -> Encoded:
-        """Read what is asked for, unless it is known.
-
-        Args:
-            answers: That are remembered.
-            service: Where the job is.
-            job: As it was read just now.
-
-        Returns:
-            The answer.
-
-        Raises:
-            GaitswarmError: There is none; says why.
-        """
+        """Read what is asked for, unless it is known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,17 +150,7 @@ class JobList:
     limit: int = 50
 
     def read(self, service: JobService) -> Page[Job]:
-        """Read the page.
-
-        Args:
-            service: Where the jobs are.
-
-        Returns:
-            The page.
-
-        Raises:
-            InvalidRequest: `after` is no cursor of this order.
-        """
+        """Read the page."""
         return service.jobs(
             state=self.state,
             kind=self.kind,
@@ -194,24 +164,12 @@ class JobList:
         )
 
     def encoded(self, answers: Answers, page: Page[Job]) -> Encoded:
-        """Encode the page.
-
-        Args:
-            answers: That are remembered.
-            page: As it was read.
-
-        Returns:
-            The answer.
-        """
+        """Encode the page."""
         items = [answers.of_job("summary", job, partial(_summary, job)) for job in page.items]
         return answers.same(page_of((item.plain for item in items), page.next))
 
     def lasts(self, page: Page[Job]) -> bool:
-        """Whether the answer stays the same as long as nothing is committed.
-
-        Args:
-            page: As it was read.
-        """
+        """Whether the answer stays the same as long as nothing is committed."""
         # What is left of a job that runs depends on the time, and a plug-in may come that reads a
         # job which could not be read.
         return self.order is not JobOrder.TIME_LEFT and all(
@@ -224,14 +182,6 @@ def _summary(job: Job) -> bytes:
 
 
 def job_in_full(service: JobService, job: Job) -> JobView:
-    """Make the answer of every route that is about one job.
-
-    Args:
-        service: Where the job is.
-        job: As it was read.
-
-    Returns:
-        The job with its best design.
-    """
+    """Make the answer of every route that is about one job."""
     found = job.progress.best_fitness is not None
     return JobView.from_job_and_best(job, service.best(job.id) if found else None)

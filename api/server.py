@@ -37,21 +37,7 @@ class ApiServer:
         limits: ConnectionLimits = _USUAL,
         log_level: str = "warning",
     ) -> None:
-        """Begin to listen.
-
-        Args:
-            app: as `create_app` made it.
-            host: address to listen on.
-            port: 0 takes a free one.
-            shutdown_seconds: how long open requests may finish when the server stops [s].
-            drain: called in a thread when the server is told to end. Requests are answered until it
-                returns.
-            limits: of connections, and whose word is taken for who asks.
-            log_level: of uvicorn's own messages.
-
-        Raises:
-            OSError: the address cannot be bound.
-        """
+        """Begin to listen."""
         config = uvicorn.Config(
             app,
             lifespan="on",

@@ -43,13 +43,7 @@ class ComputingSlots:
     """
 
     def __init__(self, what: str, workers: int, queue: int) -> None:
-        """Start without any at work.
-
-        Args:
-            what: they compute, for messages.
-            workers: how many compute at the same time, each in a thread.
-            queue: how many more may wait.
-        """
+        """Start without any at work."""
         self._what = what
         self._threads = anyio.CapacityLimiter(workers)
         self._free = workers
@@ -67,18 +61,7 @@ class ComputingSlots:
 
     @asynccontextmanager
     async def one(self, asker: str) -> AsyncIterator[None]:
-        """Have a slot while the block runs, which may compute in any one thread.
-
-        Args:
-            asker: who asks.
-
-        Yields:
-            Nothing.
-
-        Raises:
-            EvaluatorUnavailable: too many are waiting already.
-            TooManyRequests: others came to wait, and the asker had more requests than they.
-        """
+        """Have a slot while the block runs, which may compute in any one thread."""
         await self._take(asker)
         try:
             yield
@@ -86,18 +69,7 @@ class ComputingSlots:
             self._give_back(asker)
 
     async def run(self, asker: str, work: Callable[[], T]) -> T:
-        """Compute in a thread, as soon as there is a slot.
-
-        Args:
-            asker: who asks.
-            work: called in the thread, without arguments.
-
-        Returns:
-            What `work` returns.
-
-        Raises:
-            EvaluatorUnavailable, TooManyRequests: as of `one`.
-        """
+        """Compute in a thread, as soon as there is a slot."""
         async with self.one(asker):
             return await run_sync(work, limiter=self._threads)
 
@@ -180,15 +152,5 @@ class AskersSlots:
     asker: str
 
     async def run(self, work: Callable[[], T]) -> T:
-        """Compute in a thread, when it is the asker's turn.
-
-        Args:
-            work: called in the thread, without arguments.
-
-        Returns:
-            What `work` returns.
-
-        Raises:
-            EvaluatorUnavailable, TooManyRequests: as of `ComputingSlots.one`.
-        """
+        """Compute in a thread, when it is the asker's turn."""
         return await self.slots.run(self.asker, work)

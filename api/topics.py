@@ -75,13 +75,7 @@ class Topic:
     """
 
     def __init__(self, service: JobService, job_id: str, poll_seconds: float) -> None:
-        """Begin to watch the job, at version 0.
-
-        Args:
-            service: where the job is.
-            job_id: of the job.
-            poll_seconds: how late a change may be known, where the database tells of none [s].
-        """
+        """Begin to watch the job, at version 0."""
         self.version = 0
         self.streams = 0
         self._service = service
@@ -130,18 +124,6 @@ class Topic:
 
         Streams that ask for the same at the same version share the answer. It is given to a few at
         a time, so that many streams of one job hold up nothing else.
-
-        Args:
-            after: only iterations with a greater index; None for all.
-            known: version of the news before, and this waits for another one; None: read now.
-
-        Returns:
-            The job, and the iterations in order: whatever the job counts as committed is among
-            them, or on the next pages. None once the server stops.
-
-        Raises:
-            NotFound: the job is gone.
-            StoreUnavailable: the database does not answer.
         """
         if self._ended:
             return None
@@ -211,16 +193,7 @@ class Topics:
 
     @contextmanager
     def follow(self, service: JobService, job_id: str, *, poll_seconds: float) -> Iterator[Topic]:
-        """Follow a job inside the block.
-
-        Args:
-            service: where the job is.
-            job_id: of the job.
-            poll_seconds: how late a change may be known, where the database tells of none [s].
-
-        Yields:
-            The job's topic, the same for all who follow the job.
-        """
+        """Follow a job inside the block."""
         # A topic keeps its service alive, so that no other one has that id.
         key = (id(service), job_id)
         topic = self._topics.get(key)
@@ -236,11 +209,7 @@ class Topics:
                 topic.close()
 
     async def end_with(self, stopping: asyncio.Event) -> None:
-        """Answer all streams when the server begins to stop.
-
-        Args:
-            stopping: set then.
-        """
+        """Answer all streams when the server begins to stop."""
         await stopping.wait()
         for topic in self._topics.values():
             topic.end()

@@ -68,20 +68,7 @@ class Embedded:
         self._evaluator: Evaluator | None = None
 
     def run(self, jobs: DatabaseJobs, store: Store, job: Job, claim: Claim | None = None) -> bool:
-        """Run a job, or follow it where another process runs it, until it ends or a signal comes.
-
-        Args:
-            jobs: The jobs of the store, for messages.
-            store: Where the job is kept.
-            job: The job.
-            claim: That of this process, if it has submitted the job for itself.
-
-        Returns:
-            Whether a signal came.
-
-        Raises:
-            GaitswarmError: With a note that says how to go on.
-        """
+        """Run a job, or follow it where another process runs it, until it ends or a signal comes"""
         stop = threading.Event()
         with (
             stop_on_signals(stop),

@@ -19,14 +19,7 @@ class JsonFormatter(logging.Formatter):
     """
 
     def format(self, record: logging.LogRecord) -> str:
-        """Write a message down.
-
-        Args:
-            record: The message.
-
-        Returns:
-            A JSON object without line breaks.
-        """
+        """Write a message down."""
         from gaitswarm.services.optimizer.log_context import log_fields
 
         document: dict[str, Any] = {
@@ -42,13 +35,7 @@ class JsonFormatter(logging.Formatter):
 
 
 def log_to_stderr(level: str, log_format: LogFormat = "console") -> None:
-    """Show what a long-running process logs.
-
-    Args:
-        level: Least severe one that is shown, such as "INFO".
-        log_format: `console`: lines for people; `json`: an object a line, Python's warnings and
-            remarks to the user among them.
-    """
+    """Show what a long-running process logs."""
     handler = logging.StreamHandler(sys.stderr)
     if log_format == "json":
         handler.setFormatter(JsonFormatter())

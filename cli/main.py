@@ -198,14 +198,7 @@ thread of a server for up to a tenth of a second (docs/decisions/0064-answers-fi
 
 @cache
 def commands(only: str | None = None) -> Callable[..., object]:
-    """Make commands with their options, which takes longer than most of them do.
-
-    Args:
-        only: The one that is wanted; None, or what is no command's name, for all.
-
-    Returns:
-        What runs them, given arguments.
-    """
+    """Make commands with their options, which takes longer than most of them do."""
     chosen = copy(app)
     chosen.registered_commands = [c for c in app.registered_commands if _name(c) == only]
     chosen.registered_groups = [g for g in app.registered_groups if g.name == only]

@@ -86,16 +86,7 @@ class Interrupted(KeyboardInterrupt):
 def invalid_request(
     error: ValidationError, document: Mapping[str, Any], model: Any = None
 ) -> InvalidRequest:
-    """What pydantic found wrong, in the words of the input.
-
-    Args:
-        error: Of validating the document.
-        document: What was validated.
-        model: What it was to be, so that an unknown key is answered with those that are known.
-
-    Returns:
-        An error that names every bad field; its `field` is the first.
-    """
+    """What pydantic found wrong, in the words of the input."""
     from gaitswarm.sim.input.wording import with_known_keys
     from gaitswarm.views import field_errors
 
@@ -107,15 +98,7 @@ def invalid_request(
 
 @contextmanager
 def simulation_errors(field: str) -> Iterator[None]:
-    """Errors of the simulator as errors of the library.
-
-    Args:
-        field: Argument that is to blame for input that cannot be simulated.
-
-    Raises:
-        InvalidRequest: For a SimulationInputError.
-        EvaluatorUnavailable: For any other SimulationError, such as that of the compiler.
-    """
+    """Errors of the simulator as errors of the library."""
     try:
         yield
     except SimulationInputError as error:

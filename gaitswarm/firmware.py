@@ -74,19 +74,7 @@ def write_firmware(
 
 
 def written_firmware(request: FirmwareRequest, output: str | os.PathLike[str]) -> FirmwareView:
-    """Write firmware that is asked for into a folder.
-
-    Args:
-        request: The design and its scenarios.
-        output: Folder to write; one that holds firmware is replaced, as a whole or not at all.
-
-    Returns:
-        Files, their sizes, and what they take of the thesis's microcontroller.
-
-    Raises:
-        InvalidRequest: The design cannot be written, or the folder cannot; names the field.
-        EvaluatorUnavailable: The compiler does not compile the robot's kernel.
-    """
+    """Write firmware that is asked for into a folder."""
     check_replaceable(output)
     firmware = run_firmware(request)
     write_folder(output, firmware.files)
@@ -94,14 +82,7 @@ def written_firmware(request: FirmwareRequest, output: str | os.PathLike[str]) -
 
 
 def check_replaceable(output: str | os.PathLike[str]) -> None:
-    """Check that a folder is not there, is empty, or holds firmware and what was built of it.
-
-    Args:
-        output: The folder.
-
-    Raises:
-        InvalidRequest: It holds anything else, or is a file; names one.
-    """
+    """Check that a folder is not there, is empty, or holds firmware and what was built of it."""
     folder = Path(output)
     if not folder.exists():
         return
@@ -121,15 +102,7 @@ def check_replaceable(output: str | os.PathLike[str]) -> None:
 
 
 def write_folder(output: str | os.PathLike[str], files: Mapping[str, bytes]) -> None:
-    """Write files into a folder of their own, in place of what is there.
-
-    Args:
-        output: The folder, as `check_replaceable` wants it; replaced as a whole or not at all.
-        files: Contents by path.
-
-    Raises:
-        InvalidRequest: It cannot be written.
-    """
+    """Write files into a folder of their own, in place of what is there."""
     with _replacing(Path(output)) as new:
         for name, content in files.items():
             path = new / name

@@ -67,21 +67,7 @@ def planned_gaits(
     name: str | None = None,
     duty_factor: float | None = None,
 ) -> GaitsView:
-    """Look at the gaits of a robot.
-
-    Args:
-        source: The robot.
-        scenario: Whose posture, stride, sway and `own` gait are planned.
-        name: Of the only gait to look at; default all.
-        duty_factor: Support's share of the cycle [1]; default: of `own` the scenario's, of others
-            the one that is usual for the gait.
-
-    Returns:
-        The scenario's own gait, then all that have a name.
-
-    Raises:
-        InvalidRequest: There is no such gait, or the robot cannot be read; names the field.
-    """
+    """Look at the gaits of a robot."""
     with simulation_errors("robot"):
         robot = load_robot(source)
     if name not in (None, "own"):

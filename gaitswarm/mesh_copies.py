@@ -33,18 +33,6 @@ def copy_meshes(urdf: str, folder: Path, output: Path, packages: Sequence[Path] 
     """Copy the meshes that a URDF names to where they are found beside its copy.
 
     No simulation needs them: one that is missing, no mesh or too large is left out.
-
-    Args:
-        urdf: Text of the file, which has been parsed before. It stays as it is.
-        folder: Of the file.
-        output: Folder that its copy goes to.
-        packages: Folders in which `package://` is looked for, before those of ROS_PACKAGE_PATH.
-
-    Returns:
-        What was copied, and what was left out.
-
-    Raises:
-        OSError: The output cannot be written.
     """
     sources: dict[Path, Path] = {}
     copied, left_out, size = [], [], 0

@@ -50,14 +50,7 @@ class FoundMesh:
 
 
 def urdf_digest(urdf: str) -> str:
-    """What a robot's meshes are asked for by.
-
-    Args:
-        urdf: Text of its robot.urdf.
-
-    Returns:
-        SHA-256 of it with line ends of Unix, 64 hexadecimal digits.
-    """
+    """What a robot's meshes are asked for by."""
     text = urdf.replace("\r\n", "\n").replace("\r", "\n")
     return hashlib.sha256(text.encode()).hexdigest()
 
@@ -70,40 +63,18 @@ class MeshLibrary:
     """
 
     def __init__(self, folders: Sequence[Path]) -> None:
-        """Remember the folders; they are read when something is asked.
-
-        Args:
-            folders: Each a robot's own, or of such folders.
-        """
+        """Remember the folders; they are read when something is asked."""
         self._folders = tuple(folders)
 
     def of(self, digest: str) -> tuple[FoundMesh, ...]:
-        """Meshes of a robot.
-
-        Args:
-            digest: `urdf_digest` of its robot.urdf.
-
-        Returns:
-            Each that it names, in its order; none if the robot is in no folder.
-        """
+        """Meshes of a robot."""
         for folder, text in self._robots():
             if urdf_digest(text) == digest:
                 return tuple(_found(name, folder) for name in mesh_names(text))
         return ()
 
     def content(self, digest: str, number: int) -> bytes:
-        """A mesh.
-
-        Args:
-            digest: Of its robot.
-            number: Its place in `of`.
-
-        Returns:
-            Its file.
-
-        Raises:
-            NotFound: There is none, or it is not given out; says why.
-        """
+        """A mesh."""
         meshes = self.of(digest)
         if number >= len(meshes):
             raise NotFound(f"the robot has no mesh {number}, but {len(meshes)} in all")

@@ -19,14 +19,7 @@ _LEAST_IN_PACKAGE: Final = 2
 
 
 def mesh_names(urdf: str) -> list[str]:
-    """Meshes that a URDF names.
-
-    Args:
-        urdf: Text of the file, which has been parsed before.
-
-    Returns:
-        What it calls them, each once, in its order.
-    """
+    """Meshes that a URDF names."""
     root = ET.fromstring(urdf)  # noqa: S314 - it was checked when it was parsed
     named = (element.get("filename", "") for element in root.iter("mesh"))
     return list(dict.fromkeys(name for name in named if name))
@@ -38,14 +31,6 @@ def find_mesh(name: str, folder: Path, packages: Sequence[Path] = ()) -> Path | 
     `package://NAME/PATH` is looked for in folders of that name: the URDF's own and those above it,
     those given, those of ROS_PACKAGE_PATH, and what lies in any of them. Another path is relative
     to the URDF's folder. What is found nowhere may be a copy at its `own_place`.
-
-    Args:
-        name: As the URDF has it.
-        folder: Of the URDF.
-        packages: Folders to look in, before those of ROS_PACKAGE_PATH.
-
-    Returns:
-        The file; None if there is none.
     """
     scheme, _, rest = name.partition("://")
     if scheme == "file":
@@ -57,17 +42,7 @@ def find_mesh(name: str, folder: Path, packages: Sequence[Path] = ()) -> Path | 
 def mesh_places(
     name: str, folder: Path, packages: Sequence[Path] = ()
 ) -> Iterator[tuple[Path, Path]]:
-    """Where `find_mesh` looks for a mesh that is beside the URDF or in a package.
-
-    Args:
-        name: As the URDF has it.
-        folder: Of the URDF.
-        packages: Folders to look in, before those of ROS_PACKAGE_PATH.
-
-    Yields:
-        The folder that the name is relative to, the robot's or a package's, and the path in it,
-        which may lead out of it.
-    """
+    """Where `find_mesh` looks for a mesh that is beside the URDF or in a package."""
     scheme, separator, rest = name.partition("://")
     if not separator:
         yield folder, folder / name
@@ -79,16 +54,7 @@ def mesh_places(
 
 
 def own_place(name: str) -> Path | None:
-    """Where a mesh lies in the folder of a robot that needs nothing outside of it.
-
-    Args:
-        name: As the URDF has it.
-
-    Returns:
-        Path in the folder: NAME/PATH of `package://NAME/PATH`, and a relative path without the
-        `..` that lead out of the folder; None for one that is absolute, or leads out of its
-        package.
-    """
+    """Where a mesh lies in the folder of a robot that needs nothing outside of it."""
     scheme, separator, rest = name.partition("://")
     path = PurePosixPath(rest if separator else name)
     if path.is_absolute() or (separator and scheme not in _PACKAGES):

@@ -15,31 +15,12 @@ from gaitswarm.services.optimizer.errors import InvalidRequest
 
 
 def place_of(iteration: int, particle: int) -> str:
-    """The place of a design as texts have it.
-
-    Args:
-        iteration: Its iteration, from 0.
-        particle: Its number in the iteration, from 0.
-
-    Returns:
-        Both with a point between.
-    """
+    """The place of a design as texts have it."""
     return f"{iteration}.{particle}"
 
 
 def read_place(text: str, *, field: str) -> tuple[int, int]:
-    """Read what `place_of` wrote, or a former version.
-
-    Args:
-        text: A place.
-        field: That is to blame if it is none.
-
-    Returns:
-        Iteration, and number of the design in it.
-
-    Raises:
-        InvalidRequest: It is no place.
-    """
+    """Read what `place_of` wrote, or a former version."""
     found = re.fullmatch(r"(\d{1,9})[./](\d{1,9})", text, re.ASCII)
     if found is None:
         raise InvalidRequest(

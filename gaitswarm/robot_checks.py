@@ -47,21 +47,7 @@ def check_robot(
     packages: Sequence[str | os.PathLike[str]] = (),
     field: str = "folder",
 ) -> RobotCheckView:
-    """Load a robot, let it stand, and look for what is unphysical.
-
-    Args:
-        files: Of the robot.
-        folder: Of its URDF, which paths of meshes are relative to; None looks for no meshes.
-        packages: Folders that `package://` is looked for in, before those of ROS_PACKAGE_PATH.
-        field: What an error names.
-
-    Returns:
-        What was seen.
-
-    Raises:
-        InvalidRequest: It cannot be simulated; names the file and the field.
-        EvaluatorUnavailable: The compiler does not compile its kernel.
-    """
+    """Load a robot, let it stand, and look for what is unphysical."""
     with simulation_errors(field):
         robot = load_robot(files)
         scenario = standing_scenario(robot)
@@ -111,18 +97,7 @@ def _meshes(urdf: str, folder: Path, packages: Iterable[Path]) -> list[MeshView]
 
 
 def standing_scenario(robot: Robot) -> Scenario:
-    """A second in the robot's stance, all feet on the ground.
-
-    Args:
-        robot: The robot.
-
-    Returns:
-        A walk of no stride to speak of, at the height and width of the stance, or of the thesis's
-        scenarios for legs without one.
-
-    Raises:
-        RobotFileError: It is larger than scenarios may be; names file and field.
-    """
+    """A second in the robot's stance, all feet on the ground."""
     radius, height = 0.16, 0.15
     stances = [leg for leg in robot.legs if isinstance(leg, ChainLeg)]
     if stances:
@@ -143,14 +118,7 @@ def standing_scenario(robot: Robot) -> Scenario:
 
 
 def standing_drive(robot: Robot) -> tuple[str, dict[str, float]]:
-    """A controller that holds all joints.
-
-    Args:
-        robot: The robot.
-
-    Returns:
-        Its name, and a design: stiff, and damped where motors do not brake by themselves.
-    """
+    """A controller that holds all joints."""
     if not robot.is_torque_controlled:
         return "p", {"P": 1.0}
     stiffness = min(_STIFF * float(np.median(robot.actuators().torque_limit)), LARGEST_GAIN)

@@ -43,11 +43,7 @@ class RobotDefaults:
 
     @property
     def own_scenarios(self) -> dict[str, str | dict[str, Any]]:
-        """The folder's walks by name, which may be a preset's number; empty if it has none.
-
-        Raises:
-            InvalidRequest: They are no list of names, numbers or objects.
-        """
+        """The folder's walks by name, which may be a preset's number; empty if it has none."""
         found = self.document.get("scenarios", [])
         if not isinstance(found, list) or not all(isinstance(e, str | int | dict) for e in found):
             raise InvalidRequest(
@@ -59,39 +55,18 @@ class RobotDefaults:
 
     @property
     def scenarios(self) -> list[str | dict[str, Any]]:
-        """All walks: the folder's, or the names of those of table 4.2.
-
-        Raises:
-            InvalidRequest: As for `own_scenarios`.
-        """
+        """All walks: the folder's, or the names of those of table 4.2."""
         return list(self.own_scenarios.values()) or [scenario.name for scenario in SCENARIOS]
 
     def of_controller(self, controller: object) -> dict[str, Any]:
-        """What a job of this controller has.
-
-        Args:
-            controller: That the job names; None if it names none.
-
-        Returns:
-            The document; variables of another controller are left out.
-        """
+        """What a job of this controller has."""
         if controller in (None, self.document.get("controller")):
             return dict(self.document)
         return {k: v for k, v in self.document.items() if k not in ("variables", "fixed")}
 
 
 def robot_defaults(folder: str | os.PathLike[str]) -> RobotDefaults:
-    """What the folder of a robot says that its jobs have.
-
-    Args:
-        folder: Of the robot.
-
-    Returns:
-        The defaults; those of any robot if there is no `job.json`.
-
-    Raises:
-        InvalidRequest: The file cannot be read, or is no JSON object.
-    """
+    """What the folder of a robot says that its jobs have."""
     path = Path(folder) / JOB_FILE
     if not path.is_file():
         return RobotDefaults()

@@ -64,25 +64,6 @@ def init_robot(
 
     The meshes that the URDF names are copied, so that the folder can be shown wherever it goes.
     What is missing, no STL, OBJ or DAE, or too large is left out: no simulation needs them.
-
-    Args:
-        urdf: File of the robot.
-        output: Folder to write, new or empty; as a whole or not at all.
-        name: Of the robot; default that which the URDF has, else the file's.
-        actuator: Kind of its actuators: DC motors, torque-controlled ones, or those that the limits
-            of the URDF's joints speak for.
-        up: Axis of the URDF's first link that points up; default z, and an error if the legs speak
-            against it.
-        forward: Axis that points ahead; default x, and a warning if the legs speak against it.
-        meshes: Whether to copy meshes.
-        packages: Folders in which `package://` is looked for, before those of ROS_PACKAGE_PATH.
-
-    Returns:
-        What was made.
-
-    Raises:
-        InvalidRequest: The file cannot be read or has no legs that can be simulated, or the folder
-            cannot be written; names the field.
     """
     source, folder = Path(urdf), Path(output)
     _check_free(folder)
@@ -108,15 +89,7 @@ def init_robot(
 
 
 def not_utf8(path: Path, error: UnicodeDecodeError) -> str:
-    """What to say of a file that cannot be decoded.
-
-    Args:
-        path: Of the file.
-        error: What Python says.
-
-    Returns:
-        A sentence with the way out.
-    """
+    """What to say of a file that cannot be decoded."""
     byte = error.object[error.start]
     return (
         f"cannot read {path}: it is not UTF-8 text (byte 0x{byte:02x} at {error.start}); save it as"
@@ -125,14 +98,7 @@ def not_utf8(path: Path, error: UnicodeDecodeError) -> str:
 
 
 def check_name(name: str) -> None:
-    """Check the name of a robot: firmware, exports and folders are named by it.
-
-    Args:
-        name: That is wanted.
-
-    Raises:
-        InvalidRequest: It cannot be one.
-    """
+    """Check the name of a robot: firmware, exports and folders are named by it."""
     if not _NAME.fullmatch(name) or not name.isprintable():
         raise InvalidRequest(
             f"{name[:100]!r} cannot name a robot; 1 to 100 printable characters can that begin with"
@@ -142,14 +108,7 @@ def check_name(name: str) -> None:
 
 
 def own_name(urdf: str) -> str | None:
-    """Name that a URDF gives its robot.
-
-    Args:
-        urdf: Text of the file, by anybody.
-
-    Returns:
-        The name; None if it cannot be one, or if the file cannot be read.
-    """
+    """Name that a URDF gives its robot."""
     try:
         check_urdf(urdf)
     except RobotFileError:
@@ -159,18 +118,7 @@ def own_name(urdf: str) -> str | None:
 
 
 def frame_of(up: Axis | None, forward: Axis | None) -> Frame:
-    """Axes of a URDF's first link.
-
-    Args:
-        up: That points up; None for z.
-        forward: That points ahead; None for x.
-
-    Returns:
-        Both.
-
-    Raises:
-        InvalidRequest: They are along the same line.
-    """
+    """Axes of a URDF's first link."""
     frame = Frame(up, forward)
     if not frame.right_angled:
         raise InvalidRequest(

@@ -302,27 +302,12 @@ class Settings(BaseSettings):
 
     @property
     def database(self) -> str:
-        """URL of the database of the jobs; the user's own unless another is named.
-
-        Raises:
-            StoreUnavailable: None is named, and there is no home directory.
-        """
+        """URL of the database of the jobs; the user's own unless another is named."""
         return self.db or str(default_database())
 
 
 def read_settings(**options: Any) -> Settings:
-    """The environment's settings with a command's options laid over them.
-
-    Args:
-        **options: Values by field; None leaves a setting to the environment.
-
-    Returns:
-        The settings, checked.
-
-    Raises:
-        InvalidRequest: A value makes no sense; names the variable that it comes from, or the
-            option.
-    """
+    """The environment's settings with a command's options laid over them."""
     given = {name: value for name, value in options.items() if value is not None}
     try:
         return Settings(**given)
@@ -337,11 +322,7 @@ def read_settings(**options: Any) -> Settings:
 
 
 def default_database() -> Path:
-    """The user's own database, the same for every process; its directory may not exist yet.
-
-    Raises:
-        StoreUnavailable: There is no home directory.
-    """
+    """The user's own database, the same for every process; its directory may not exist yet."""
     base = os.environ.get("XDG_DATA_HOME") or "~/.local/share"
     try:
         return Path(base).expanduser() / "gaitswarm" / "gaitswarm.db"
@@ -352,11 +333,7 @@ def default_database() -> Path:
 
 
 def is_loopback(host: str) -> bool:
-    """Whether a host is this machine and nothing else.
-
-    Args:
-        host: a name or an address.
-    """
+    """Whether a host is this machine and nothing else."""
     if host == "localhost":
         return True
     try:

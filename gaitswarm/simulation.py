@@ -165,11 +165,7 @@ def robustness(
 
 
 def simulate_request(request: SimulationRequest) -> SimulationResult:
-    """Let one design walk, as a server does.
-
-    Raises:
-        InvalidRequest: The design cannot be compiled, or a gait leaves the legs' reach.
-    """
+    """Let one design walk, as a server does."""
     request.check_walks()
     design = np.array([tuple(request.numbers.values())], dtype=np.float64)
     with simulation_errors("design"):

@@ -124,17 +124,7 @@ class ForkOptions(TypedDict, total=False):
 
 
 def laid_options(options: SpecOptions | ForkOptions) -> dict[str, Any]:
-    """Options by keyword as a document, with the files of a robot of one's own in it.
-
-    Args:
-        options: Keywords that the caller gave.
-
-    Returns:
-        The document, not checked yet.
-
-    Raises:
-        InvalidRequest: There is no such robot.
-    """
+    """Options by keyword as a document, with the files of a robot of one's own in it."""
     given: dict[str, Any] = dict(options)
     if "robot" in given:
         given["robot"] = robot_source(given["robot"])
@@ -144,18 +134,7 @@ def laid_options(options: SpecOptions | ForkOptions) -> dict[str, Any]:
 
 
 def chosen_spec(spec: SpecInput | None, options: SpecOptions) -> AnySpec:
-    """The spec that is meant by a spec and keywords laid over it.
-
-    Args:
-        spec: Object or document; None for the defaults.
-        options: Keywords that the caller gave.
-
-    Returns:
-        A valid spec; whether it can be simulated is not checked yet.
-
-    Raises:
-        InvalidRequest: It makes no sense; names every bad field.
-    """
+    """The spec that is meant by a spec and keywords laid over it."""
     if isinstance(spec, Spec) and not options:
         return cast(AnySpec, spec)
     document = dict(spec.model_dump() if isinstance(spec, Spec) else spec or {})
@@ -196,18 +175,7 @@ def scenario_entries(
 
 
 def robot_source(robot: RobotInput) -> str | RobotVariant | RobotFiles | dict[str, Any]:
-    """What a spec has under `robot`.
-
-    Args:
-        robot: A name of a shipped robot, a folder with robot.toml and robot.urdf, or what a spec
-            may have.
-
-    Returns:
-        The same; for a folder the text of its files, not checked yet.
-
-    Raises:
-        InvalidRequest: There is no such robot or folder, or its files cannot be read.
-    """
+    """What a spec has under `robot`."""
     if isinstance(robot, str | os.PathLike):
         if robot in SHIPPED:
             return str(robot)

@@ -59,14 +59,7 @@ class StartFile:
         return tuple(row.design for row in self.rows)
 
     def located(self, error: InvalidRequest) -> InvalidRequest:
-        """Say where in the file the cause of an error is.
-
-        Args:
-            error: Of validating a spec that starts from these designs.
-
-        Returns:
-            The same with line and column, if it is about one of the designs.
-        """
+        """Say where in the file the cause of an error is."""
         place = _PLACE.fullmatch(error.field)
         if place is None:
             return error
@@ -78,19 +71,7 @@ class StartFile:
 
 
 def start_from(source: str | os.PathLike[str], count: int | None = None) -> StartFile | Document:
-    """What is meant by a file, or by identifiers of jobs.
-
-    Args:
-        source: A file whose name ends in .csv, or identifiers separated by commas.
-        count: Designs in all, at most: of jobs the best, by default five; of a file the best if it
-            has a column `fitness`, else the first, by default all.
-
-    Returns:
-        The designs of a file, or the document of `EarlierJobs`.
-
-    Raises:
-        InvalidRequest: The file cannot be read, or has no designs; or `count` is less than 1.
-    """
+    """What is meant by a file, or by identifiers of jobs."""
     if count is not None and count < 1:
         raise InvalidRequest("must be at least 1", field="start_count")
     if Path(source).suffix.lower() == ".csv":
@@ -109,16 +90,6 @@ def read_designs(path: Path, count: int | None = None) -> StartFile:
 
     A file of `gaitswarm export` will do: of its columns, those that begin with `design.` are the
     variables. Rows without a fitness, where there is such a column, have failed and are left out.
-
-    Args:
-        path: The file, UTF-8.
-        count: Designs at most; None for all of them.
-
-    Returns:
-        Different designs, the best first where the file says what they are worth.
-
-    Raises:
-        InvalidRequest: It cannot be read, or has no designs.
     """
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:

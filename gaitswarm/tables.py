@@ -43,15 +43,7 @@ class Table:
     """
 
     def __init__(self, columns: Mapping[str, Column]) -> None:
-        """Make a table of arrays.
-
-        Args:
-            columns: One-dimensional arrays of one length r, by name: float64 (NaN where there is
-                no value), int64 or text. They are not copied.
-
-        Raises:
-            ValueError: The arrays differ in length.
-        """
+        """Make a table of arrays."""
         lengths = {len(column) for column in columns.values()}
         if len(lengths) > 1:
             raise ValueError(f"columns of a table have one length, not {sorted(lengths)}")
@@ -116,12 +108,7 @@ class EvaluationTable(Table):
     """
 
     def __init__(self, columns: Mapping[str, Column], spec: Spec) -> None:
-        """Make a table of a job's evaluations.
-
-        Args:
-            columns: All columns that the module's docstring names, arrays of one length r.
-            spec: Spec of the job.
-        """
+        """Make a table of a job's evaluations."""
         super().__init__(columns)
         self._known = spec.design_space().columns
         self.variables = tuple(variable.name for variable in self._known)
@@ -204,16 +191,7 @@ class EvaluationTable(Table):
 def encoded_table(
     file_format: TableFormat, spec: Spec, pieces: Iterable[EvaluationColumns]
 ) -> Iterator[bytes]:
-    """Evaluations of a job as a file, written as they are read.
-
-    Args:
-        file_format: csv or parquet.
-        spec: Spec of the job.
-        pieces: Its evaluations by pieces, in order.
-
-    Returns:
-        The file in parts: one for every piece, and its end.
-    """
+    """Evaluations of a job as a file, written as they are read."""
     import pyarrow as pa
 
     def batch(piece: EvaluationColumns) -> pa.RecordBatch:

@@ -33,14 +33,7 @@ class BadArchive(ValueError):
 
 
 def zipped(members: Mapping[str, bytes]) -> bytes:
-    """Write an archive.
-
-    Args:
-        members: Contents by name.
-
-    Returns:
-        The archive: the same bytes for the same members, whatever their order.
-    """
+    """Write an archive."""
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
         for name, content in sorted(members.items()):
@@ -52,18 +45,7 @@ def zipped(members: Mapping[str, bytes]) -> bytes:
 
 
 def unzipped(content: bytes) -> dict[str, bytes]:
-    """Read all members of an archive, after a look at whether that is safe; nothing is written.
-
-    Args:
-        content: The file.
-
-    Returns:
-        Contents by name.
-
-    Raises:
-        BadArchive: It is no such archive: truncated, compressed, encrypted, too large, or with
-            members whose names lead out of it or occur twice.
-    """
+    """Read all members of an archive, after a look at whether that is safe; nothing is written."""
     if len(content) > LARGEST_ARCHIVE:
         raise BadArchive(f"it is larger than {LARGEST_ARCHIVE >> 30} GiB")
     try:

@@ -72,20 +72,6 @@ def profile_job(
 
     Workers time their tasks, and in them kernels and tables; this process times evaluations and the
     store. The kernel times some of its rounds, and in them control ticks.
-
-    Args:
-        evaluator: Threads of this process; or a Ray cluster of its own, from the first task on.
-        precision: Of the physics' numbers.
-        particles: Of the swarm.
-        iterations: Of the job, 2 at least; the first one, with the start of all, is not counted.
-        cpus: Walks to compute at once; all cores by default.
-
-    Returns:
-        The profile.
-
-    Raises:
-        EvaluatorUnavailable: Ray cannot be started.
-        SimulationInputError: There is no compiled kernel on this machine.
     """
     kernel_of(load_robot(DEFAULT_ROBOT), "native", precision=precision)
     spec = JobSpec(

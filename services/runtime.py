@@ -48,26 +48,7 @@ def open_evaluator(
     patient: bool = False,
     niceness: int = 0,
 ) -> InProcessEvaluator | HybridEvaluator | RayEvaluator:
-    """Open workers for walks.
-
-    Args:
-        kind: Where walks run.
-        address: Of a Ray cluster: `host:port` of its head, of which this machine becomes a node, or
-            `auto` where it is one. Without an address, walks run in this process at once, and long
-            jobs on a cluster that is started for them and ends with this process.
-        cpus: Walks to compute at once on this machine; all of its cores by default.
-        should_stop: Polled several times a second while a cluster is connected.
-        patient: Whether a cluster that is away is waited for by whoever wants walks of it.
-        niceness: Of walks in threads of this process, as for `InProcessEvaluator`.
-
-    Returns:
-        The workers; whoever opens them closes them.
-
-    Raises:
-        InvalidRequest: The address is one of Ray Client (ray://).
-        EvaluatorUnavailable: They cannot be reached, and nobody is patient; says what to do.
-        EvaluationStopped: `should_stop` said so.
-    """
+    """Open workers for walks."""
     check_address(address)
     if kind == "in-process":
         return InProcessEvaluator(cpus, niceness=niceness)
@@ -82,14 +63,7 @@ def open_evaluator(
 
 
 def check_address(address: str | None) -> None:
-    """Check an address of a Ray cluster, before anything is begun with it.
-
-    Args:
-        address: As for `open_evaluator`.
-
-    Raises:
-        InvalidRequest: It is one of Ray Client (ray://).
-    """
+    """Check an address of a Ray cluster, before anything is begun with it."""
     if address is not None and "://" in address:
         raise InvalidRequest(
             f"{address!r} is no address of a cluster's head: Ray Client is not used, as it loses"
@@ -148,38 +122,7 @@ def open_runtime(
     webhook_secret: str | None = None,
     activity: Activity | None = None,
 ) -> Iterator[Runtime]:
-    """Open a database and run its queued jobs until the block is left; then close all.
-
-    Args:
-        database: URL for `open_store`.
-        evaluator: Where walks run; None for a process that runs no jobs.
-        ray_address: Of a Ray cluster, as for `open_evaluator`; jobs wait for one that is away.
-        cpus: Walks to compute at once on this machine; all of its cores by default.
-        concurrent_jobs: Jobs to run at once.
-        lease_seconds: After so long without a word from this process another one takes its jobs
-            over [s].
-        cache: Whether a design is walked only if no job has walked it before.
-        quarantine_after: A job with which so many runner processes in a row went down fails.
-        longest_job: Simulated time of all walks of all designs that a new job may have [s].
-        keeps_house: Whether rows of deleted jobs are removed, and jobs that ended long ago.
-        retention_days: After so long they did [d]; None: none is deleted.
-        audit_days: Older entries of the audit log are removed with them [d]; None: none is.
-        longest_fork: Time that bringing a search to where it was may take, for a fork [s].
-        should_stop: As for `open_evaluator`.
-        metrics: Are told what store, runner and workers do; None: nobody asks.
-        tracing: Is told of the jobs that are run, and closed; None: nobody follows them.
-        webhook_hosts: Hosts that may be told that jobs have ended; none: nobody is.
-        webhook_secret: Signs what they are told.
-        activity: Takes note of what happens to the jobs that are run; None: nobody looks at it.
-
-    Yields:
-        What was opened.
-
-    Raises:
-        InvalidRequest: As for `open_evaluator`.
-        StoreUnavailable: The database cannot be opened.
-        EvaluationStopped: `should_stop` said so.
-    """
+    """Open a database and run its queued jobs until the block is left; then close all."""
     with ExitStack() as stack:
         store: Store = open_store(database)
         stack.callback(store.close)
@@ -242,9 +185,6 @@ def _set_by_signals() -> Iterator[Callable[[threading.Event], None]]:
 
     A handler comes upon its thread anywhere, within `Event.wait` as well, which holds the lock
     that `Event.set` takes: the thread would wait for itself, for ever.
-
-    Yields:
-        What a handler calls with an event: another thread sets it, in the order of the calls.
     """
     asked: SimpleQueue[threading.Event | None] = SimpleQueue()
 
@@ -269,13 +209,6 @@ def stop_on_signals(
     """Let SIGINT and SIGTERM set events inside the block. The main thread's to use.
 
     A SIGINT when all of them are set raises KeyboardInterrupt, for those who cannot wait.
-
-    Args:
-        stop: Set by the first signal.
-        at_once: Set by the second.
-
-    Yields:
-        Nothing.
     """
     left = deque(event for event in (stop, at_once) if event is not None)
 

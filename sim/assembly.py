@@ -65,21 +65,7 @@ SHORTEST_WALK: Final = 1e-3
 def kernel_of(
     robot: Robot, backend: Backend = "auto", *, precision: Precision = "double"
 ) -> Kernel:
-    """The robot's kernel, built if there is none yet.
-
-    Args:
-        robot: The robot.
-        backend: Which kernel; with `auto` a warning says if it is the slow one.
-        precision: Of the physics' numbers; the interpreter has double alone.
-
-    Returns:
-        The kernel.
-
-    Raises:
-        SimulationInputError: The native kernel, or single precision, which it alone has, is asked
-            for on a machine without a C compiler; or single precision of the interpreter.
-        KernelBuildError: The compiler refused the source.
-    """
+    """The robot's kernel, built if there is none yet."""
     if backend == "reference" and precision != "double":
         raise SimulationInputError(
             f"precision: the reference kernel has double precision alone, not {precision}"
@@ -103,28 +89,12 @@ def kernel_of(
 
 
 def has_native_kernel(robot: Robot, precision: Precision = "double") -> bool:
-    """Whether a robot walks with a compiled kernel here; nothing is compiled for the answer.
-
-    Args:
-        robot: The robot.
-        precision: Of the physics' numbers.
-
-    Returns:
-        True with a C compiler, whatever it may say to the source, and for a kernel in the cache.
-    """
+    """Whether a robot walks with a compiled kernel here; nothing is compiled for the answer."""
     return find_compiler() is not None or native_kernel(robot, precision) is not None
 
 
 def check_precision(robot: Robot, precision: Precision) -> None:
-    """Check that a robot can walk in a precision on this machine.
-
-    Args:
-        robot: The robot.
-        precision: Of the physics' numbers.
-
-    Raises:
-        SimulationInputError: Single precision is asked for, and there is no compiled kernel.
-    """
+    """Check that a robot can walk in a precision on this machine."""
     if precision != "double" and not has_native_kernel(robot, precision):
         raise SimulationInputError(
             f"precision: {precision} needs the compiled kernel; {without_compiler()},"
@@ -136,8 +106,6 @@ def control_steps(robot: Robot, physics_rate: int = PHYSICS_RATE) -> tuple[Codin
     """How a control tick is divided.
 
     Args:
-        robot: With backlash, or with friction that jumps, it is simulated at a higher rate; at a
-            multiple of its actuators' inner rate.
         physics_rate: Physics steps a second [Hz].
 
     Returns:
@@ -155,15 +123,7 @@ def control_steps(robot: Robot, physics_rate: int = PHYSICS_RATE) -> tuple[Codin
 
 
 def check_stuck_leg(robot: Robot, scenario: Scenario) -> None:
-    """Check that the leg that a scenario jams is one of the robot's.
-
-    Args:
-        robot: That is to walk.
-        scenario: The walk.
-
-    Raises:
-        SimulationInputError: The robot has no such leg; names those that it has.
-    """
+    """Check that the leg that a scenario jams is one of the robot's."""
     legs = [leg.name for leg in robot.legs]
     if scenario.stuck_leg is not None and scenario.stuck_leg not in legs:
         raise SimulationInputError(
@@ -183,18 +143,7 @@ def plan_walk(
     """All of a walk but its control law, which designs of one gait share.
 
     Args:
-        robot: The robot that walks.
-        scenario: With the gait that it walks in.
         timestep: Of the physics [s].
-        noise: Torques on its links, or angles between gearheads and links.
-        trajectory: Desired angles, if they are not those for this robot's legs.
-
-    Returns:
-        From a control law to the walk; None for a gait out of the legs' reach.
-
-    Raises:
-        SimulationInputError: The scenario jams a leg that the robot does not have, or angles are to
-            be displaced in a robot without elastic shafts.
     """
     check_stuck_leg(robot, scenario)
     trajectory = trajectory or desired_angles(robot, scenario)
@@ -243,9 +192,6 @@ def judge(
     """What a walk is worth (table 4.1).
 
     Args:
-        setup: The walk.
-        result: What the kernel made of it.
-        substeps: Physics steps a control tick.
         timestep: Of the physics [s].
 
     Returns:
@@ -267,11 +213,6 @@ def judge(
 
 def measure(setup: WalkSetup, result: WalkResult, substeps: int) -> NDArray[np.float64]:
     """What a walk tells beside its objectives.
-
-    Args:
-        setup: The walk.
-        result: What the kernel made of it.
-        substeps: Physics steps a control tick.
 
     Returns:
         (5,) in the order of `gaitswarm.sim.outcome.MEASUREMENTS`, NaN for a walk that ended early.

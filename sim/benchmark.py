@@ -59,19 +59,6 @@ def measure(
 
     The walkers are the published optimum A; every scenario counts with its share of the job. All
     walks are computed in one call of the kernel, as in a worker's task.
-
-    Args:
-        repeats: Passes, of which the fastest counts: anything slower is the machine's other work.
-        walkers: Walks of every scenario; the reference kernel walks one, in one scenario.
-        backend: Which kernel.
-        robot: A shipped robot.
-        precision: Of the physics' numbers.
-
-    Returns:
-        The fastest pass.
-
-    Raises:
-        SimulationInputError: The backend or the precision cannot be had here.
     """
     kernel = kernel_of(load_robot(robot), backend, precision=precision)
     native = isinstance(kernel, NativeKernel)

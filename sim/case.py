@@ -66,14 +66,7 @@ class WalkingCase(Case, Protocol):
     """
 
     def walking(self, designs: NDArray[np.float64]) -> Walking[Outcome]:
-        """Put designs to the test, beside others.
-
-        Args:
-            designs: As for `run`.
-
-        Returns:
-            The computation, for `walk_together`; its result is that of `run`, to the bit.
-        """
+        """Put designs to the test, beside others."""
 
 
 @runtime_checkable
@@ -104,21 +97,7 @@ def run_together(
     kernel_time: KernelTime | None = None,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> tuple[Outcome, ...]:
-    """Put designs to several cases, whose walks share calls of kernels where they can.
-
-    Args:
-        cases: The cases.
-        designs: Those of each case, as for `Case.run`.
-        kernel_time: Is added to, by cases whose walks can be shared.
-        should_stop: Whether nobody waits for the outcomes any more; cases that take long may then
-            raise.
-
-    Returns:
-        The outcome of each case, with the bits that `Case.run` gives it.
-
-    Raises:
-        SimulationInputError: A design cannot be simulated.
-    """
+    """Put designs to several cases, whose walks share calls of kernels where they can."""
     pairs = list(zip(cases, designs, strict=True))
     walking = {
         index: case.walking(rows)
@@ -198,7 +177,11 @@ class Walk:
         return simulation.outcome
 
     def walking(self, designs: NDArray[np.float64]) -> Walking[Outcome]:
-        """Let every design walk, beside walks of other cases."""
+        """Simulate all designs together with those of other cases.
+
+        Args:
+            designs: As for `run`.
+        """
         walked = yield from self._simulating(designs)
         return walked.outcome
 

@@ -60,19 +60,7 @@ CASES: Final = Registry[CaseFamily]("case", {}, _accepted)
 
 
 def create_case(settings: CaseSettings, walk: Walk) -> Case:
-    """What evaluates designs in place of a walk.
-
-    Args:
-        settings: Of a known case.
-        walk: In the built-in simulator, of the same designs.
-
-    Returns:
-        The case.
-
-    Raises:
-        SimulationInputError: Its libraries are not installed, or what it evaluates are not the
-            objectives of a walk.
-    """
+    """What evaluates designs in place of a walk."""
     family = CASES[settings.name]
     if family.missing:
         needed = " ".join(family.missing)

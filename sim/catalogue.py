@@ -12,30 +12,14 @@ from gaitswarm.sim.variables import VariableCatalogue
 
 
 def design_catalogue(controller: str) -> VariableCatalogue:
-    """Everything that a design of a controller may give.
-
-    Args:
-        controller: Name of the controller.
-
-    Returns:
-        The controller's variables and conventions and the gait's variables, by name.
-    """
+    """Everything that a design of a controller may give."""
     family = CONTROLLERS[controller]
     known = (*family.variables, *family.conventions, *GAIT_VARIABLES)
     return VariableCatalogue(known)
 
 
 def check_design(controller: str, design: Mapping[str, float | str]) -> None:
-    """Check that a design gives all variables of a controller, and beside them only optional ones.
-
-    Args:
-        controller: Name of the controller.
-        design: Values by name.
-
-    Raises:
-        SimulationInputError: A variable is unknown or missing, or its value is none; the message
-            begins with `design`, or `design.` and the variable, and a colon.
-    """
+    """Check that a design gives all variables of a controller and otherwise optional ones only."""
     known = design_catalogue(controller)
     for name in design:
         if name not in known:
@@ -53,19 +37,7 @@ def check_design(controller: str, design: Mapping[str, float | str]) -> None:
 
 
 def design_numbers(controller: str, design: Mapping[str, float | str]) -> dict[str, float]:
-    """A design as the simulator takes it.
-
-    Args:
-        controller: Name of the controller.
-        design: Values by name; of a categorical variable a choice's name or index. Names that the
-            catalogue does not have are left as they are, for whoever checks names.
-
-    Returns:
-        Numbers by name.
-
-    Raises:
-        SimulationInputError: A value is no number, or none of the choices; names the variable.
-    """
+    """A design as the simulator takes it."""
     catalogue = design_catalogue(controller)
     numbers = {}
     for name, value in design.items():
@@ -78,15 +50,7 @@ def design_numbers(controller: str, design: Mapping[str, float | str]) -> dict[s
 
 
 def design_shown(controller: str, design: Mapping[str, float]) -> dict[str, float | str]:
-    """A design as people read it; the inverse of `design_numbers`.
-
-    Args:
-        controller: Name of the controller.
-        design: Numbers by name.
-
-    Returns:
-        Values by name; of a categorical variable the choice's name.
-    """
+    """A design as people read it; the inverse of `design_numbers`."""
     catalogue = design_catalogue(controller)
     return {
         name: catalogue[name].shown(value) if name in catalogue else value

@@ -9,7 +9,7 @@ SimulationError
 ├── ProcessEnded            work in a process of its own took too much, or ended it
 └── KernelBuildError        a kernel cannot be compiled, stored or loaded on this machine
 
-What a walk may legitimately end in (divergence, a fall) is a `gaitswarm.sim.outcome.Status`, never one of
+What a walk may legitimately end in (divergence, a fall) is a `sim.outcome.Status`, never one of
 these.
 """
 
@@ -28,8 +28,6 @@ class UnreachablePose(SimulationInputError):
     """A foot target lies outside the reach of its leg.
 
     Args:
-        scenario: Name of the walk.
-        leg: Name of the leg.
         miss: Distance between target and reach [m].
     """
 
@@ -51,9 +49,6 @@ class BeyondJointLimit(SimulationInputError):
     """A gait would turn a joint further than its URDF allows.
 
     Args:
-        scenario: Name of the walk.
-        leg: Name of the leg.
-        joint: Name of the joint.
         excess: Angle by which it leaves its limits [rad].
     """
 
@@ -74,13 +69,7 @@ class BeyondJointLimit(SimulationInputError):
 
 
 class MeasuredLogError(SimulationInputError):
-    """A measured log that cannot be read or compared.
-
-    Args:
-        problem: What is wrong.
-        line: Of the file, counted from 1 as editors do.
-        column: Heading with unit, as the file should have it.
-    """
+    """A measured log that cannot be read or compared."""
 
     def __init__(self, problem: str, *, line: int | None = None, column: str | None = None) -> None:
         self.line = line

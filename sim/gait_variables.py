@@ -132,33 +132,14 @@ GAIT_CATALOGUE: Final = VariableCatalogue(GAIT_VARIABLES)
 
 
 def orders_searched(searched: Iterable[Variable]) -> list[dict[str, float]]:
-    """Every order of footfalls that a search may choose.
-
-    Args:
-        searched: Variables of the search.
-
-    Returns:
-        Values of the variable `gait`, one each; a single empty one if it is not searched.
-    """
+    """Every order of footfalls that a search may choose."""
     known = GAIT_CATALOGUE["gait"]
     choices = [choice for v in searched if v.name == known.name for choice in v.choices]
     return [{known.name: known.number(choice)} for choice in choices] or [{}]
 
 
 def with_gait(scenario: Scenario, gait: Mapping[str, float]) -> Scenario:
-    """A scenario with other gait parameters.
-
-    Args:
-        scenario: The scenario.
-        gait: Values of some of `GAIT_CATALOGUE` by name; of a categorical one the index of a
-            choice.
-
-    Returns:
-        The scenario, or a copy of it if the gait changes anything.
-
-    Raises:
-        SimulationInputError: A value is none that a scenario can have; names the field.
-    """
+    """A scenario with other gait parameters."""
     if not gait:
         return scenario
     values: dict[str, Any] = {name: v for name, v in gait.items() if split_name(name)[1] is None}

@@ -35,12 +35,7 @@ class LimitedProcesses:
     They end with this process, as their stdin does.
 
     Args:
-        program: Module that is run.
-        count: Requests that are answered at once; others wait.
-        seconds: That a request may take, as a clock on the wall has it.
-        cpu_seconds: Of processors that a request may take.
         memory: Address space that a process may have [B].
-        kept: Whether a process waits for another request, or ends when it has answered one.
     """
 
     def __init__(
@@ -63,19 +58,7 @@ class LimitedProcesses:
         atexit.register(self.close)
 
     def ask(self, request: Document) -> dict[str, Any]:
-        """Have a request answered.
-
-        Args:
-            request: Of what JSON has.
-
-        Returns:
-            The answer.
-
-        Raises:
-            SimulationInputError: As the program raised it.
-            ProcessEnded: The request took too much, or ended the process; says which.
-            SimulationError: No process can be started.
-        """
+        """Have a request answered."""
         process = self._idle.get()
         try:
             if process is None or process.poll() is not None:
@@ -159,11 +142,7 @@ class LimitedProcesses:
 
 
 def serve(answer: Callable[[Document], Document]) -> None:
-    """Answer requests until stdin ends, each within the limits that the command line gives.
-
-    Args:
-        answer: From a request to its answer; raises SimulationInputError for what it refuses.
-    """
+    """Answer requests until stdin ends, each within the limits that the command line gives."""
     cpu_seconds, memory = map(int, sys.argv[1:3])
     # Libraries may print what they like; answers get a copy of stdout.
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")

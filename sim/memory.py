@@ -19,9 +19,6 @@ def require_room_for_scipy() -> None:
 
     Its OpenBLAS maps buffers while it is loaded and, where it gets none, tries again without end.
     That would stop all threads of the process, as the interpreter's lock is held.
-
-    Raises:
-        MemoryError: There is too little address space; says how much it takes.
     """
     if sys.platform == "win32" or any(name in sys.modules for name in _WITH_OPENBLAS):
         return

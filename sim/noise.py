@@ -18,7 +18,7 @@ class LinkNoise(BaseModel):
     """White noise between gearhead and link of all links of one kind, new at every control tick.
 
     An angle displaces the link against its gearhead, so the robot needs elastic shafts between the
-    two (`gaitswarm.sim.robot.robot.with_shafts`); `gaitswarm.sim.simulate.simulate` gives them to a robot without.
+    two (`sim.robot.robot.with_shafts`); `sim.simulate.simulate` gives them to a robot without.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -44,10 +44,6 @@ class LinkNoise(BaseModel):
 
     def samples(self, ticks: int, joints: int) -> NDArray[np.float64]:
         """Noise of a whole walk; a longer one has the same noise as a shorter one, and more.
-
-        Args:
-            ticks: Control ticks.
-            joints: Number of joints.
 
         Returns:
             (ticks, joints) [N m], of an angle [rad].

@@ -174,9 +174,6 @@ class Measurements:
 
         Args:
             rows: (n, 5), columns as in `MEASUREMENTS`.
-
-        Returns:
-            The measurements.
         """
         return cls(**dict(zip(MEASUREMENT_NAMES, rows.T.copy(), strict=True)))
 

@@ -82,14 +82,7 @@ class Provenance(BaseModel):
     )
 
     def changes(self, now: Provenance) -> tuple[str, ...]:
-        """What is different now, in words for people.
-
-        Args:
-            now: the provenance that is compared with this earlier one.
-
-        Returns:
-            One phrase for every field that differs; none if the two are equal.
-        """
+        """What is different now, in words for people."""
         found: list[str] = []
         if now.robot != self.robot:
             found.append(f"the robot {now.robot} instead of {self.robot}")
@@ -107,15 +100,7 @@ class Provenance(BaseModel):
 
 
 def version_changes(before: Mapping[str, str], now: Mapping[str, str]) -> list[str]:
-    """What is different of libraries, in words for people.
-
-    Args:
-        before: Their versions, by name.
-        now: The versions that are compared with the earlier ones.
-
-    Returns:
-        One phrase for each library that has another version, or that only one of the two has.
-    """
+    """What is different of libraries, in words for people."""
     return [
         f"{name} {now.get(name, MISSING)} instead of {before.get(name, MISSING)}"
         for name in sorted(before.keys() | now.keys())
@@ -129,20 +114,7 @@ def provenance_of(
     precision: Precision = "double",
     libraries: tuple[str, ...] = LIBRARIES,
 ) -> Provenance:
-    """The provenance of what this process computes of robots; nothing is compiled for it.
-
-    Args:
-        robots: the robots as cases name them, none where nothing walks. They are looked at once:
-            later calls give the same answer.
-        precision: of the physics' numbers.
-        libraries: distributions that compute; a case in another engine needs that one's, too.
-
-    Returns:
-        The provenance of its cases in this process.
-
-    Raises:
-        SimulationInputError: the robot's description cannot be used.
-    """
+    """The provenance of what this process computes of robots; nothing is compiled for it."""
     machines = [load_robot(robot) for robot in robots]
     content = "".join(m.description.model_dump_json() + m.urdf.text for m in machines)
     # With a compiler, a kernel is compiled or an error is raised: never replaced by the reference.

@@ -65,13 +65,8 @@ def replay(robot: Robot, log: WalkLog, *, rate: float, load: float = 0.0) -> Rep
     """The ticks of a walk nearest to a rate.
 
     Args:
-        robot: That walked.
-        log: Of the walk.
         rate: Frames a second, `CONTROL_RATE` at most [Hz].
         load: Mass carried on the body, to be seen [kg].
-
-    Returns:
-        The walk up to its end.
     """
     walked = log.until_end()
     ticks = ticks_at(rate, len(walked.time))
@@ -112,7 +107,6 @@ def ticks_at(rate: float, ticks: int) -> NDArray[np.int64]:
 
     Args:
         rate: [Hz].
-        ticks: Number of ticks that there are.
 
     Returns:
         (F,), all less than `ticks`.

@@ -75,27 +75,8 @@ def simulate(
     """Let every design walk through a scenario.
 
     Args:
-        scenario: Gait, posture, load and ground.
-        controller: Name of the motor controller, one of `CONTROLLERS`.
-        variables: Columns of the designs: all variables of the controller, any of its conventions,
-            and any of `GAIT_CATALOGUE`, which replace the scenario's values.
         designs: (n, len(variables)), in the variables' units.
-        robot: A shipped robot by name, a variant of one, or a `Robot` of your own; with backlash
-            it is simulated at `BACKLASH_PHYSICS_RATE` at least.
-        planner: The robot that the desired angles are for, if its legs differ from the robot's.
-        noise: On the robot's links. Noise on angles has it simulated with elastic shafts between
-            motors and links, and so at `BACKLASH_PHYSICS_RATE`.
-        log: Whether to keep every walk's log.
-        backend: Which kernel; with `auto` a warning says if it is the slow one.
         physics_rate: Physics steps a second [Hz], a multiple of the control rate.
-        precision: Of the physics' numbers.
-
-    Returns:
-        Outcomes, measurements and logs. A design's bits do not depend on the designs beside it.
-
-    Raises:
-        SimulationInputError: A design cannot be simulated, and the variable is named; or single
-            precision is asked for without a compiled kernel.
     """
     (simulation,) = walk_together(
         [
@@ -132,18 +113,8 @@ def simulating(
     """What `simulate` does, for `walk_together` to run beside others.
 
     Args:
-        scenario: Gait, posture, load and ground.
-        controller: Name of the motor controller.
-        variables: Columns of the designs.
         designs: (n, len(variables)), in the variables' units.
-        robot: A shipped robot by name, a variant of one, or a `Robot` of your own.
-        backend: Which kernel.
         physics_rate: Physics steps a second [Hz].
-        precision: Of the physics' numbers.
-        kernel: In place of that of `backend` and `precision`.
-
-    Returns:
-        The computation, which wants its walks once, and results in what `simulate` returns.
     """
     return _simulating(
         scenario,
@@ -233,18 +204,7 @@ def check_reach(
     *,
     robot: RobotChoice,
 ) -> None:
-    """Check that a robot can begin a walk: it has the leg that is jammed, and its legs reach all.
-
-    Args:
-        scenario: The walk.
-        variables: Names of the design's values.
-        design: Values, of which those of `GAIT_CATALOGUE` replace the scenario's.
-        robot: The robot that is to walk.
-
-    Raises:
-        UnreachablePose: A foot's target lies outside its leg's reach.
-        SimulationInputError: The scenario jams a leg that the robot does not have.
-    """
+    """Check that a robot can begin a walk: it has the leg that is jammed, and its legs reach all"""
     machine = load_robot(robot)
     check_stuck_leg(machine, scenario)
     gait = {
@@ -256,34 +216,13 @@ def check_reach(
 def check_gait(
     scenario: Scenario, design: Mapping[str, float], *, robot: RobotChoice
 ) -> tuple[LegGait, ...]:
-    """Check that a gait is one for a robot's legs, whether or not they reach it.
-
-    Args:
-        scenario: The walk.
-        design: Values by name, of which those of `GAIT_CATALOGUE` replace the scenario's.
-        robot: The robot that is to walk.
-
-    Returns:
-        What every leg does.
-
-    Raises:
-        SimulationInputError: It is not one for its number of legs, or names a group of legs that it
-            does not have.
-    """
+    """Check that a gait is one for a robot's legs, whether or not they reach it."""
     gait = {name: value for name, value in design.items() if name in GAIT_CATALOGUE}
     return leg_gaits(load_robot(robot), with_gait(scenario, gait))
 
 
 def check_drives(law: ControlLaw, robot: RobotChoice) -> None:
-    """Check that a control law can drive a robot's actuators.
-
-    Args:
-        law: Of any design of a controller.
-        robot: The robot that is to walk.
-
-    Raises:
-        SimulationInputError: The law has a joint PD, and the robot has DC motors.
-    """
+    """Check that a control law can drive a robot's actuators."""
     if law.joint_pd is not None and not load_robot(robot).is_torque_controlled:
         raise SimulationInputError(NO_JOINT_PD)
 
@@ -294,31 +233,12 @@ def prepare(
     backend: Backend = "auto",
     precision: Precision = "double",
 ) -> str:
-    """Build a robot's kernel, or find it in the cache.
-
-    Args:
-        robot: The robot that is going to walk.
-        backend: Which kernel.
-        precision: Of the physics' numbers.
-
-    Returns:
-        The backend in use, `native` or `reference`.
-
-    Raises:
-        SimulationInputError: Single precision is asked for without a compiled kernel.
-    """
+    """Build a robot's kernel, or find it in the cache."""
     return kernel_of(load_robot(robot), backend, precision=precision).backend
 
 
 def lanes(precision: Precision = "double") -> int:
-    """How many walkers the compiled kernel steps together.
-
-    Args:
-        precision: Of the physics' numbers; of single ones twice as many fit into a register.
-
-    Returns:
-        Their number; chunks of a batch should be multiples of it.
-    """
+    """How many walkers the compiled kernel steps together."""
     return target().lanes * (2 if precision == "single" else 1)
 
 

@@ -214,14 +214,7 @@ class Variable(BaseModel):
 
 
 def split_name(name: str) -> tuple[str, str | None]:
-    """A variable's name and the group of legs that it is for: `stride[front]` is `stride`, `front`.
-
-    Args:
-        name: Of a variable.
-
-    Returns:
-        The name without the group; and the group, None where the name has none.
-    """
+    """Split a variable's name from its group of legs: `stride[front]` is `stride`, `front`."""
     base, bracket, group = name.partition("[")
     return (base, group[:-1]) if bracket and group.endswith("]") else (name, None)
 
@@ -230,9 +223,6 @@ class VariableCatalogue(Mapping[str, Variable]):
     """Variables by name. Those that groups of legs may have are found under `NAME[GROUP]`, too.
 
     Iterates over the names without groups. Which groups there are only a robot tells.
-
-    Args:
-        variables: In the catalogue's order.
     """
 
     def __init__(self, variables: Iterable[Variable]) -> None:

@@ -24,21 +24,7 @@ _PLAIN: Final = ("worlds", "seed", "preference", "precision", "engines", "name")
 
 
 def certificate_spec(design: str, db: str | None, given: Mapping[str, Any]) -> CertificateSpec:
-    """The job that a command asks for.
-
-    Args:
-        design: As the command names it.
-        db: The database to look for a job in, as `--db` names it.
-        given: Options that were given: controller, worlds, seed, scenarios, ranges, fixed, only,
-            robot, preference, precision, engines, name.
-
-    Returns:
-        The spec, checked.
-
-    Raises:
-        InvalidRequest: Something makes no sense; names the option or field.
-        NotFound: No such job or database, or a job without a design.
-    """
+    """The job that a command asks for."""
     options = {name: value for name, value in given.items() if value is not None}
     document = _earlier(design, db, options) or _new(design, db, options)
     document |= {name: options[name] for name in _PLAIN if name in options}

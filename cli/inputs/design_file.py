@@ -42,14 +42,7 @@ class GivenDesign:
     spec: JobSpec | None = None
 
     def robot(self, option: str | None) -> str | RobotVariant | RobotFiles:
-        """The robot to walk on: that of the option, else the job's, else the default.
-
-        Args:
-            option: as for `chosen_robot`.
-
-        Returns:
-            As `chosen_robot`, which raises the errors as well.
-        """
+        """The robot to walk on: that of the option, else the job's, else the default."""
         if option is None and self.spec is not None:
             return self.spec.robot
         return chosen_robot(option)
@@ -64,26 +57,7 @@ def given_design(
     server: str | None,
     db: str | None,
 ) -> GivenDesign:
-    """The design that an argument DESIGN|ID names.
-
-    Args:
-        given: a JSON object, `published:NAME`, a file, `-` for standard input, or the id of a job
-            that tunes a drive; `job:ID` is always a job, whatever files there are.
-        controller: of the design; None for the job's, else that of the robot's folder, else
-            fuzzy-pi.
-        trajectory: as for `read_design`.
-        robot: as the option names it.
-        server: URL of the server to ask for the job, or None.
-        db: database to look for it, or None.
-
-    Returns:
-        The design, its numbers not checked yet.
-
-    Raises:
-        InvalidRequest: it is no design of the controller, or the job tunes no drive; names the
-            field.
-        NotFound: no such job, or none of its designs has walked in every scenario.
-    """
+    """The design that an argument DESIGN|ID names."""
     if not may_be_file(given):
         best = _best_of_job(given.removeprefix(_JOB), controller, server, db)
         return replace(best, values=_in_gait(best.values, trajectory))

@@ -14,18 +14,7 @@ _LENGTH: Final = 12
 
 
 def full_id(jobs: Jobs, given: str) -> str:
-    """The id of the only job whose id begins so.
-
-    Args:
-        jobs: Where the job is.
-        given: An id, or its beginning.
-
-    Returns:
-        The id; what was given where no job's id begins so, for it to be refused as any other.
-
-    Raises:
-        InvalidRequest: Several jobs' ids do; names them.
-    """
+    """The id of the only job whose id begins so."""
     from gaitswarm.services.optimizer.errors import InvalidRequest
 
     if not 0 < len(given) < _LENGTH:
@@ -38,15 +27,7 @@ def full_id(jobs: Jobs, given: str) -> str:
 
 
 def completed_all(context: typer.Context, given: list[str]) -> list[str]:
-    """Ids of the command line, in full.
-
-    Args:
-        context: Of the command; its options --server and --db are read already.
-        given: Each as for `full_id`.
-
-    Returns:
-        As `full_id`, which raises the errors as well.
-    """
+    """Ids of the command line, in full."""
     if context.resilient_parsing or all(len(one) >= _LENGTH for one in given):
         return given
     from gaitswarm.jobs.open import open_jobs
@@ -57,28 +38,12 @@ def completed_all(context: typer.Context, given: list[str]) -> list[str]:
 
 
 def completed(context: typer.Context, given: str | None) -> str | None:
-    """An id of the command line, in full.
-
-    Args:
-        context: As for `completed_all`.
-        given: As for `full_id`; None stays None.
-
-    Returns:
-        As `full_id`, which raises the errors as well.
-    """
+    """An id of the command line, in full."""
     return None if given is None else completed_all(context, [given])[0]
 
 
 def completed_start(context: typer.Context, given: str | None) -> str | None:
-    """What a job begins with: ids of jobs in full, or the name of a file as it is.
-
-    Args:
-        context: As for `completed`.
-        given: Ids that are separated by commas, or a file whose name ends in .csv.
-
-    Returns:
-        The same, the ids in full.
-    """
+    """What a job begins with: ids of jobs in full, or the name of a file as it is."""
     if given is None or given.lower().endswith(".csv"):
         return given
     from gaitswarm.services.optimizer.errors import NotFound

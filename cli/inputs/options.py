@@ -261,14 +261,7 @@ class RunnerOptions(WorkerOptions):
 
 
 def with_groups(command: Callable[..., None]) -> Callable[..., None]:
-    """A command as Typer, which knows no groups of options, takes it.
-
-    Args:
-        command: A function; each of its arguments that is annotated with a dataclass is a group.
-
-    Returns:
-        The same with the fields of its groups in their place, all to be given by name.
-    """
+    """A command as Typer, which knows no groups of options, takes it."""
     annotations = get_type_hints(command, include_extras=True)
     groups: dict[str, type[Any]] = {
         name: kind

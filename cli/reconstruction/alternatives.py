@@ -82,18 +82,7 @@ class Alternative:
 def alternatives(
     spec: CalibrationSpec, names: Sequence[str] | None = None
 ) -> tuple[Alternative, ...]:
-    """Every other choice of categorical conventions, and some values of the others.
-
-    Args:
-        spec: Of the calibrations.
-        names: Of the conventions to change; None for all of the spec's.
-
-    Returns:
-        Them in the order of the spec's variables, without what is the default.
-
-    Raises:
-        InvalidRequest: A name is none of the spec's variables.
-    """
+    """Every other choice of categorical conventions, and some values of the others."""
     variables = {variable.name: variable for variable in spec.design_space().variables}
     for name in names or ():
         if name not in variables:
@@ -111,15 +100,7 @@ def alternatives(
 
 
 def default_choice(spec: CalibrationSpec, controller: ControllerName) -> dict[str, float]:
-    """Values of the spec's variables in the model as it is shipped.
-
-    Args:
-        spec: Of the calibrations.
-        controller: Whose conventions' defaults are meant; they may have different ones.
-
-    Returns:
-        Numbers by name; of categorical variables the index of the choice.
-    """
+    """Values of the spec's variables in the model as it is shipped."""
     robot = load_robot(spec.robot).description
     known: dict[str, Any] = SCENARIOS[0].model_dump() | {
         ROBOT: str(spec.robot),
@@ -138,16 +119,7 @@ def default_choice(spec: CalibrationSpec, controller: ControllerName) -> dict[st
 def simulated_targets(
     spec: CalibrationSpec, choices: Sequence[Mapping[str, float]], workers: Executor
 ) -> tuple[Floats, Floats]:
-    """What choices of conventions come to.
-
-    Args:
-        spec: Of the calibrations.
-        choices: Each gives some of the spec's variables; the others are the default's.
-        workers: What the walks run on.
-
-    Returns:
-        Values of the spec's targets, (n, T), and fitness, (n,).
-    """
+    """What choices of conventions come to."""
     cases = spec.layout().cases
     outcomes = list(
         workers.map(lambda case: _outcome(spec, case[0], case[1], case[2], choices), cases)
@@ -176,16 +148,7 @@ def _outcome(
 def predicted(
     spec: CalibrationSpec, choices: Sequence[Mapping[str, float]]
 ) -> list[dict[str, dict[str, float | None]]]:
-    """What published optima come to of which no value was a target.
-
-    Args:
-        spec: Of the calibrations.
-        choices: Each gives some of the spec's variables; the others are the default's.
-
-    Returns:
-        For each choice, results of the straight walk by name of the optimum and of the result; None
-        for no value.
-    """
+    """What published optima come to of which no value was a target."""
     found: list[dict[str, dict[str, float | None]]] = [{} for _ in choices]
     for name, controller in KEPT.items():
         design = dict(CONTROLLERS[controller].published[name])

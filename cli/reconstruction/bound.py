@@ -18,14 +18,6 @@ def greatest_product(preference: Preference, fitness: float, known: Mapping[int,
 
     The logarithm of the product is linear and the constraint convex, so the stationary point is the
     greatest: all e_m g_m / (b_m + g_m) of what is not known are equal.
-
-    Args:
-        preference: Biases and exponents of f1 to f5, all greater than 0.
-        fitness: By that preference, at most [1].
-        known: Geometric means of some objectives, by index.
-
-    Returns:
-        The product; 0 if what is known leaves no room.
     """
     terms = list(zip(preference.bias, preference.exponent, strict=True))
     free = [term for m, term in enumerate(terms) if m not in known]

@@ -93,11 +93,7 @@ class Found:
     walked: Walked
 
     def product_bound(self) -> float | None:
-        """Greatest f_C that f_A within 10 % of the printed one leaves A, with its torque and speed.
-
-        Returns:
-            The bound; None if A fails.
-        """
+        """Greatest f_C of A's torque and speed if f_A is within 10 % of the printed one."""
         means = self.walked.means.get("A")
         if means is None:
             return None
@@ -143,13 +139,6 @@ class Evidence:
         """Choices of a categorical convention that the evidence leaves.
 
         A search may leave early what would do as well, so the default and its changes count, too.
-
-        Args:
-            parameter: The convention.
-
-        Returns:
-            Names of choices that a calibration has among designs as good as its best, or that the
-            default, or one change of it, reaches as good a misfit as the best of all with.
         """
         name, limit = parameter.variable.name, self.spec.as_good_as(self.winner.fitness)
         near = {choice.name for choice in parameter.choices if choice.remains}
@@ -177,24 +166,7 @@ def gather(
     change: Sequence[str] | None = None,
     on_choice: Callable[[int, int, str], None] = lambda _k, _n, _label: None,
 ) -> Evidence:
-    """Compute what the calibrations do not tell, and analyse what they do.
-
-    Args:
-        spec: Of the calibrations.
-        runs: All evaluations of each.
-        size: Of the reconstruction.
-        folder: Where results of random designs are kept.
-        workers: What walks run on, threads.
-        change: Conventions that are changed one at a time; None for all.
-        on_choice: Called before a choice is walked: its index, how many there are, its label.
-
-    Returns:
-        All evidence.
-
-    Raises:
-        ValueError: A calibration has no design that did not fail.
-        InvalidRequest: The folder cannot be written, or `change` names what is none.
-    """
+    """Compute what the calibrations do not tell, and analyse what they do."""
     default, others = default_choice(spec, "fuzzy-pi"), alternatives(spec, change)
     named: list[tuple[str, dict[str, float], int]] = [("default", {}, size.samples)]
     for number, run in enumerate(runs, start=1):
@@ -228,12 +200,7 @@ def gather(
 
 
 class Kept:
-    """Results of random designs in a file, by all that they depend on.
-
-    Args:
-        folder: That the file lies in.
-        spec: Of the calibrations, for its robots.
-    """
+    """Results of random designs in a file, by all that they depend on."""
 
     def __init__(self, folder: Path, spec: CalibrationSpec) -> None:
         self._path = folder / RESULTS_FILE
@@ -244,19 +211,7 @@ class Kept:
         self._results = self._read()
 
     def get_or_walk(self, choice: Mapping[str, float], samples: int, workers: Executor) -> Walked:
-        """What was computed before, or is now.
-
-        Args:
-            choice: Conventions as walks take them.
-            samples: Number of random designs.
-            workers: What walks run on.
-
-        Returns:
-            The result, which is in the file.
-
-        Raises:
-            InvalidRequest: The file cannot be written.
-        """
+        """What was computed before, or is now."""
         asked = {"choice": dict(choice), "samples": samples, "seed": _SEED, **self._common}
         text = json.dumps(asked, sort_keys=True)
         key = hashlib.sha256(text.encode()).hexdigest()

@@ -47,14 +47,7 @@ class Optimality(BaseModel):
     beaten: dict[str, float] = Field(default_factory=dict)
 
     def place(self, preference: str) -> int | None:
-        """Place of an optimum among the three under its own preference.
-
-        Args:
-            preference: A, B or C.
-
-        Returns:
-            1 for the best; None if it fails.
-        """
+        """Place of an optimum among the three under its own preference."""
         row = self.fitness[preference]
         own = row[preference]
         if own is None:
@@ -63,15 +56,7 @@ class Optimality(BaseModel):
 
 
 def random_designs(samples: int, seed: int) -> Floats:
-    """Designs of chapter 4's controller, uniform in the bounds of table 4.4.
-
-    Args:
-        samples: Their number.
-        seed: Of the random numbers.
-
-    Returns:
-        (n, 9) in the order of the controller's variables.
-    """
+    """Designs of chapter 4's controller, uniform in the bounds of table 4.4."""
     space = DesignSpace.build(
         required=CONTROLLERS[_CONTROLLER].variables, optional=(), chosen=None, fixed={}
     )
@@ -81,11 +66,7 @@ def random_designs(samples: int, seed: int) -> Floats:
 
 
 def published_designs() -> Floats:
-    """A, B and C.
-
-    Returns:
-        (3, 9) in the order of `OPTIMA` and of the controller's variables.
-    """
+    """A, B and C."""
     controller = CONTROLLERS[_CONTROLLER]
     rows = [[controller.published[o][v.name] for v in controller.variables] for o in OPTIMA]
     return np.array(rows)
@@ -98,17 +79,7 @@ def walk_all(
     robots: Sequence[RobotSource],
     workers: Executor,
 ) -> tuple[Floats, NDArray[np.bool_]]:
-    """Let designs walk through the six scenarios of table 4.2 under a choice of conventions.
-
-    Args:
-        choice: Conventions of robot, gait and controller by name; of a categorical one the index.
-        designs: (n, 9), as `random_designs`.
-        robots: Those that `robot` chooses among.
-        workers: What the walks run on, threads.
-
-    Returns:
-        Objectives (n, 6, 6), and (n, 6) whether a walk has none.
-    """
+    """Let designs walk through the six scenarios of table 4.2 under a choice of conventions."""
     of_robot = {variable.name for variable in robot_variables(robots)}
     values = {name: value for name, value in choice.items() if name in of_robot}
     planner, robot = varied_robot(robots, values)
@@ -133,15 +104,7 @@ def walk_all(
 
 
 def optimality(objectives: Floats, failed: NDArray[np.bool_]) -> Optimality:
-    """Judge the optima among random designs.
-
-    Args:
-        objectives: (3 + n, K, 6) of A, B, C and n random designs in K scenarios.
-        failed: (3 + n, K) whether a walk has none.
-
-    Returns:
-        Their place.
-    """
+    """Judge the optima among random designs."""
     fitness, beaten = {}, {}
     for index, name in enumerate(OPTIMA):
         found = judge(objectives, failed, PREFERENCES[name]).fitness

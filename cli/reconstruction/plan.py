@@ -64,17 +64,7 @@ class Size:
 
 
 def calibrations(size: Size) -> tuple[CalibrationSpec, ...]:
-    """The jobs, one for each seed.
-
-    Args:
-        size: Of the reconstruction.
-
-    Returns:
-        Their specs, whose names are theirs alone.
-
-    Raises:
-        InvalidRequest: The size is none that a job can have.
-    """
+    """The jobs, one for each seed."""
     document: dict[str, Any] = {
         "kind": "calibration",
         "robots": ROBOTS,

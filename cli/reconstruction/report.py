@@ -28,18 +28,7 @@ _BEST_SHARE: Final = 0.05
 
 
 def write_report(folder: Path, found: Evidence) -> Path:
-    """Write `report.md` and its pictures.
-
-    Args:
-        folder: That exists.
-        found: What is reported.
-
-    Returns:
-        Path of the report.
-
-    Raises:
-        InvalidRequest: A file cannot be written.
-    """
+    """Write `report.md` and its pictures."""
     from gaitswarm.cli.pictures.plots import save
     from gaitswarm.cli.reconstruction.pictures import draw_choices, draw_exclusion, draw_targets
 

@@ -119,16 +119,7 @@ class Comparison:
 def comparisons(
     chapters: Iterable[int], robots: Mapping[str, Any], budget: Budget
 ) -> list[Comparison]:
-    """The study's jobs, none of them run yet.
-
-    Args:
-        chapters: keys of `CHAPTERS`.
-        robots: by name, as specs have them.
-        budget: of every job.
-
-    Returns:
-        One comparison for each chapter and robot.
-    """
+    """The study's jobs, none of them run yet."""
     return [
         Comparison(chapter, name, *(_runs(chapter, c, name, robot, budget) for c in controllers))
         for chapter in chapters
@@ -168,11 +159,7 @@ def _runs(chapter: int, controller: str, name: str, robot: object, budget: Budge
 
 
 def study_document(found: Sequence[Comparison]) -> dict[str, Any]:
-    """The study as JSON has it.
-
-    Args:
-        found: comparisons whose jobs have been run.
-    """
+    """The study as JSON has it."""
     return {
         "thesis": THESIS,
         "comparisons": [
@@ -199,11 +186,7 @@ def _runs_document(runs: Runs) -> dict[str, Any]:
 
 
 def study_table(found: Sequence[Comparison]) -> Table:
-    """Three rows for every chapter and robot: both controllers' medians, and the gain.
-
-    Args:
-        found: comparisons whose jobs have been run.
-    """
+    """Three rows for every chapter and robot: both controllers' medians, and the gain."""
     from gaitswarm.cli.tables.fitted import Table
     from gaitswarm.cli.tables.views import interval_cells, number, relative_change
 

@@ -108,18 +108,7 @@ class Agreement:
 def variants(
     robot: RobotName, *, designs: int, with_backlash: int, long: int
 ) -> tuple[Variant, ...]:
-    """What the study compares.
-
-    Args:
-        robot: a shipped one.
-        designs: number of random designs for each law of friction.
-        with_backlash: number of them with backlash, whose walks cost eight times as much.
-        long: number of them for walks of `LONG`.
-
-    Returns:
-        Every law of friction as it is, with backlash, and over long walks; those without designs
-        are left out.
-    """
+    """What the study compares."""
     tight = [RobotVariant(name=robot, contact_law=law) for law in LAWS]
     loose = [RobotVariant(name=robot, contact_law=law, backlash=BACKLASH) for law in LAWS]
     lasting = tuple(
@@ -140,16 +129,7 @@ def variants(
 
 
 def compare(variant: Variant, *, seed: int, cpus: int | None) -> Agreement:
-    """Let random designs of the main Fuzzy-PI walk in both precisions.
-
-    Args:
-        variant: what they are put to.
-        seed: of the designs, drawn evenly from all of the search's box.
-        cpus: walks to compute at once; None for all processors.
-
-    Returns:
-        How far the precisions agree.
-    """
+    """Let random designs of the main Fuzzy-PI walk in both precisions."""
     space = JobSpec().design_space()
     share = np.random.default_rng(seed).random((variant.designs, len(space.low)))
     rows = space.simulated(space.designs(space.low + share * (space.high - space.low)))
@@ -168,20 +148,7 @@ def compare(variant: Variant, *, seed: int, cpus: int | None) -> Agreement:
 def agreement(
     name: str, double: SimulationResult, single: SimulationResult, heavier: SimulationResult
 ) -> Agreement:
-    """How far two results of the same designs agree.
-
-    Args:
-        name: of what was walked.
-        double: in double precision.
-        single: in single precision.
-        heavier: in double precision, with a milligram more.
-
-    Returns:
-        Deviations, relative to double precision, and what they do to the ranking.
-
-    Raises:
-        InvalidRequest: No design walks to the end in both.
-    """
+    """How far two results of the same designs agree."""
     both = (double.statuses == Status.OK) & (single.statuses == Status.OK)
     ratio = single.objectives[both] / double.objectives[both]
     deviations = np.abs(ratio[:, : len(_RATIOS)] - 1.0)
@@ -231,20 +198,12 @@ def _spread(deviations: Floats, of_fitness: Floats, of_load: Floats, quantile: f
 
 
 def study_document(found: Iterable[Agreement]) -> list[dict[str, Any]]:
-    """The study as JSON has it.
-
-    Args:
-        found: one for each variant.
-    """
+    """The study as JSON has it."""
     return [asdict(agreed) for agreed in found]
 
 
 def study_tables(found: Sequence[Agreement]) -> tuple[Table, Table]:
-    """Deviations, and what they do to statuses and ranking.
-
-    Args:
-        found: one for each variant.
-    """
+    """Deviations, and what they do to statuses and ranking."""
     from gaitswarm.cli.tables.fitted import Table
 
     deviations, ranking = (

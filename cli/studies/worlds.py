@@ -104,21 +104,7 @@ def contestants(
     level: float,
     seeds: int,
 ) -> list[Contestant]:
-    """The study's searches, none of them run yet.
-
-    Args:
-        common: Fields of every job: robot, preference, optimizer, particles, iterations, precision.
-        counts: Of worlds in which a search judges each design.
-        aggregates: What a scenario's utilities in these come to; each is tried with each count.
-        level: Of a quantile or of the value at risk [1].
-        seeds: Number of runs, whose seeds count from 1.
-
-    Returns:
-        The search without worlds, then those with.
-
-    Raises:
-        InvalidRequest: A field makes no sense; names it.
-    """
+    """The study's searches, none of them run yet."""
     found = [_contestant("without worlds", None, common, seeds)]
     for count in counts:
         for aggregate in aggregates:
@@ -149,15 +135,7 @@ def _contestant(
 
 
 def check_held_out(held_out: HeldOut, seeds: int) -> None:
-    """Check that no search sees the worlds on which it is judged.
-
-    Args:
-        held_out: The worlds.
-        seeds: Number of runs, whose seeds count from 1.
-
-    Raises:
-        InvalidRequest: Their seed is that of a search's worlds.
-    """
+    """Check that no search sees the worlds on which it is judged."""
     if 1 <= held_out.seed <= seeds:
         raise InvalidRequest(
             f"{held_out.seed} is the seed of a search's worlds; take 0, or one above {seeds}",
@@ -168,16 +146,7 @@ def check_held_out(held_out: HeldOut, seeds: int) -> None:
 def certificate_of(
     spec: JobSpec, design: Mapping[str, float | str], held_out: HeldOut
 ) -> CertificateSpec:
-    """The certificate of a job's best design.
-
-    Args:
-        spec: Of the job.
-        design: The best that it found.
-        held_out: Worlds of the certificate.
-
-    Returns:
-        Its spec, in double precision.
-    """
+    """The certificate of a job's best design."""
     return CertificateSpec(
         kind="certificate",
         name=f"certificate of {spec.name}",
@@ -194,12 +163,7 @@ def certificate_of(
 
 
 def study_document(found: Sequence[Contestant], held_out: HeldOut) -> dict[str, Any]:
-    """The study as JSON has it.
-
-    Args:
-        found: Contestants whose jobs have been run, the search without worlds first.
-        held_out: Worlds on which they were judged.
-    """
+    """The study as JSON has it."""
     return {
         "held_out": asdict(held_out),
         "searches": [
@@ -250,11 +214,7 @@ def _ratio(contestant: Contestant, plain: Contestant, quantity: str) -> MedianIn
 
 
 def study_table(found: Sequence[Contestant]) -> Table:
-    """A row for every search and quantity: the runs' median, and how it differs from the first's.
-
-    Args:
-        found: Contestants whose jobs have been run, the search without worlds first.
-    """
+    """A row for every search and quantity: the runs' median, and how it differs from the first's"""
     from gaitswarm.cli.tables.fitted import Table
     from gaitswarm.cli.tables.views import interval_cells, number, relative_change
 
@@ -280,11 +240,7 @@ def study_table(found: Sequence[Contestant]) -> Table:
 
 
 def runs_table(found: Sequence[Contestant]) -> Table:
-    """A row for every run, with the exact intervals of how often it fails.
-
-    Args:
-        found: Contestants whose jobs have been run.
-    """
+    """A row for every run, with the exact intervals of how often it fails."""
     from gaitswarm.cli.tables.fitted import Table
     from gaitswarm.cli.tables.views import number
 

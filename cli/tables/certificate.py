@@ -26,12 +26,7 @@ _STRONGEST = 5
 
 
 def show_certificate(view: CertificateView, place: str) -> None:
-    """Print what a design came to in many worlds.
-
-    Args:
-        view: The certificate.
-        place: Options by which a command finds its job.
-    """
+    """Print what a design came to in many worlds."""
     console = stdout_console()
     console.print(_by_scenario(view))
     console.print(
@@ -50,17 +45,7 @@ def show_certificate(view: CertificateView, place: str) -> None:
 
 
 def show_world(spec: CertificateSpec, world: int, log: Path | None, *, as_json: bool) -> None:
-    """Let a certificate's design walk in one world, and print its results.
-
-    Args:
-        spec: Of the certificate, which need not have been run.
-        world: Number of the world, from 0.
-        log: File for the walks' logs, if they are wanted.
-        as_json: Whether to print JSON.
-
-    Raises:
-        InvalidRequest: The file cannot be written.
-    """
+    """Let a certificate's design walk in one world, and print its results."""
     from gaitswarm.cli.tables.views import results_table, worth
     from gaitswarm.cli.walk_log import write_walk_logs
     from gaitswarm.requests.walk import SimulationRequest, run_simulation

@@ -18,15 +18,7 @@ if TYPE_CHECKING:
 
 
 def engine_table(name: str, engine: ComparedEngineView) -> Table:
-    """Three rows a scenario: by our engine, by the other one, and by how much the latter is more.
-
-    Args:
-        name: Of the other engine.
-        engine: What it makes of the nominal world.
-
-    Returns:
-        The table; its last rows are the fitness.
-    """
+    """Three rows a scenario: by our engine, by the other one, and by how much the latter is more"""
     table = Table(
         title=f"The nominal world in {name}: {engine.description}",
         title_justify="left",

@@ -23,15 +23,7 @@ _NEAR: Final = 5.0
 
 
 def draw_problem(name: str, by_method: Mapping[str, Runs]) -> Figure:
-    """Median and quartiles of the best so far; and the cloud of figs. 3.1 to 3.3.
-
-    Args:
-        name: Of the problem.
-        by_method: Runs of each method.
-
-    Returns:
-        The picture. A point of the cloud is a run: its best, and when that was found.
-    """
+    """Median and quartiles of the best so far; and the cloud of figs. 3.1 to 3.3."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11.0, 4.2), layout="constrained")
@@ -62,14 +54,7 @@ def draw_problem(name: str, by_method: Mapping[str, Runs]) -> Figure:
 
 
 def draw_profiles(profiles: Sequence[Profile]) -> Figure:
-    """Data profiles: share of runs that are solved, over the budget in simplex gradients.
-
-    Args:
-        profiles: Of all methods, by precision.
-
-    Returns:
-        The picture, a panel for each precision.
-    """
+    """Data profiles: share of runs that are solved, over the budget in simplex gradients."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11.0, 4.0), layout="constrained")
@@ -97,14 +82,7 @@ def draw_profiles(profiles: Sequence[Profile]) -> Figure:
 
 
 def draw_ranks(ranks: Mapping[str, Interval]) -> Figure:
-    """Mean ranks with their intervals, best on top.
-
-    Args:
-        ranks: Of each method.
-
-    Returns:
-        The picture.
-    """
+    """Mean ranks with their intervals, best on top."""
     from matplotlib.figure import Figure
 
     ordered = sorted(ranks.items(), key=lambda item: item[1].value)

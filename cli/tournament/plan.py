@@ -115,18 +115,7 @@ PRESETS: Final[dict[PresetName, Preset]] = {
 
 
 def chosen_problems(preset: Preset, names: str | None) -> list[str]:
-    """Names of the problems.
-
-    Args:
-        preset: Whose problems they are by default.
-        names: Separated by commas; None for those of the preset.
-
-    Returns:
-        The names, in order.
-
-    Raises:
-        InvalidRequest: One is unknown or named twice.
-    """
+    """Names of the problems."""
     chosen = list(preset.problems) if names is None else _names(names)
     _check(chosen, PROBLEMS, "problems")
     return chosen
@@ -135,19 +124,7 @@ def chosen_problems(preset: Preset, names: str | None) -> list[str]:
 def chosen_methods(
     preset: Preset, names: str | None, document: Mapping[str, Any] | None
 ) -> dict[str, Any]:
-    """Methods by label, each as a spec names it.
-
-    Args:
-        preset: Whose methods they are by default, as far as their libraries are installed.
-        names: Separated by commas; None for those of the preset.
-        document: Further ones by label: names, or objects with settings of your own.
-
-    Returns:
-        Label -> name or settings.
-
-    Raises:
-        InvalidRequest: One is unknown or named twice.
-    """
+    """Methods by label, each as a spec names it."""
     if names is None:
         chosen = [] if document else [m for m in preset.methods if _is_installed(m)]
     else:
@@ -165,20 +142,7 @@ def chosen_methods(
 def tournament_jobs(
     methods: Mapping[str, Any], problems: Sequence[str], size: Size, precision: str
 ) -> dict[str, TournamentSpec]:
-    """The job of every method.
-
-    Args:
-        methods: By label, each as a spec names it.
-        problems: Names of the problems.
-        size: How much is run.
-        precision: Of the walks of a search.
-
-    Returns:
-        Specs by label.
-
-    Raises:
-        InvalidRequest: Something cannot be run; names the field.
-    """
+    """The job of every method."""
     documents = [_problem(name, precision) for name in problems]
     found = {}
     for label, method in methods.items():

@@ -35,20 +35,7 @@ code { background: #f3f3f3; padding: 0 0.2rem; }
 def write_report(
     folder: Path, found: Standings, entries: Mapping[str, Entry], facts: Mapping[str, str]
 ) -> Path:
-    """Write `report.html`, which needs nothing beside it.
-
-    Args:
-        folder: That exists.
-        found: What is reported.
-        entries: Jobs of the methods, by label.
-        facts: What was run, by heading.
-
-    Returns:
-        Path of the report.
-
-    Raises:
-        InvalidRequest: It cannot be written.
-    """
+    """Write `report.html`, which needs nothing beside it."""
     body = "\n".join(_lines(found, entries, facts))
     page = (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'

@@ -61,17 +61,6 @@ def run_jobs(specs: Mapping[str, TournamentSpec], workers: WorkerOptions) -> dic
     """Run the jobs that have not been run before, and go on with those that were stopped.
 
     One more than there are workers at a time, so that none of these waits for a job's last run.
-
-    Args:
-        specs: By method.
-        workers: Where they run.
-
-    Returns:
-        What every job came to, by method.
-
-    Raises:
-        KeyboardInterrupt: A signal came; the same command goes on.
-        JobEnded: A job has failed, or was cancelled.
     """
     settings = read_settings(**asdict(workers))
     with closing(open_store(database_to_write(settings))) as store:
@@ -170,34 +159,14 @@ def _cpus() -> int:
 
 
 def results_of(entries: Mapping[str, Entry], repetitions: int) -> dict[str, dict[str, Runs]]:
-    """Runs by problem, then by method.
-
-    Args:
-        entries: By method, of the same problems.
-        repetitions: To take of each.
-
-    Returns:
-        The runs, problems and methods in order.
-    """
+    """Runs by problem, then by method."""
     return by_problem(
         {label: runs_of(entry.spec, entry.columns, repetitions) for label, entry in entries.items()}
     )
 
 
 def write_runs(folder: Path, entries: Mapping[str, Entry], results: Results) -> Path:
-    """Write every run as a row of `runs.parquet`.
-
-    Args:
-        folder: That exists.
-        entries: By method.
-        results: Their runs.
-
-    Returns:
-        Path of the file.
-
-    Raises:
-        InvalidRequest: It cannot be written.
-    """
+    """Write every run as a row of `runs.parquet`."""
     import pyarrow.parquet as pq
 
     rows = [
@@ -232,18 +201,7 @@ def _row(problem: str, label: str, entry: Entry, runs: Runs, index: int) -> dict
 
 
 def read_runs(folder: Path, option: str) -> dict[str, dict[str, Runs]]:
-    """Read the runs of an earlier tournament.
-
-    Args:
-        folder: Of its report.
-        option: That names the folder, for messages.
-
-    Returns:
-        Runs by problem, then by method.
-
-    Raises:
-        InvalidRequest: There is no such file.
-    """
+    """Read the runs of an earlier tournament."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 

@@ -23,14 +23,7 @@ LARGEST_TEXT: Final = 64 << 20
 
 
 def archived(members: Mapping[str, bytes]) -> bytes:
-    """Write an archive.
-
-    Args:
-        members: Contents by name, the manifest left out.
-
-    Returns:
-        The archive: the same bytes for the same members, whatever their order.
-    """
+    """Write an archive."""
     hashes = {
         name: {"sha256": _hash(content), "bytes": len(content)}
         for name, content in sorted(members.items())
@@ -41,17 +34,7 @@ def archived(members: Mapping[str, bytes]) -> bytes:
 
 
 def check_hashes(members: Mapping[str, bytes]) -> list[str]:
-    """Compare an archive with its manifest.
-
-    Args:
-        members: Contents by name.
-
-    Returns:
-        A sentence for every member that differs, is missing or is not in the manifest.
-
-    Raises:
-        BadArchive: There is no manifest, or it is none of this format and version.
-    """
+    """Compare an archive with its manifest."""
     if MANIFEST not in members:
         raise BadArchive(f"it has no {MANIFEST}")
     manifest = parsed_json(members[MANIFEST], MANIFEST)
@@ -79,16 +62,6 @@ def parsed_json(content: bytes, name: str) -> Any:
 
     The parser takes none of Python's stack. The standard library's goes to its end before it
     refuses deep nesting, and finalizers that run at that moment fail.
-
-    Args:
-        content: Its bytes.
-        name: Of the member, for messages.
-
-    Returns:
-        The document.
-
-    Raises:
-        BadArchive: It is none, or too long.
     """
     if len(content) > LARGEST_TEXT:
         raise BadArchive(f"{name} is larger than {LARGEST_TEXT >> 20} MiB")

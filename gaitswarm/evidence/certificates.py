@@ -52,17 +52,7 @@ class Certified:
 def certificates_of(
     service: JobService, job: Job, columns: EvaluationColumns, best: tuple[int, int] | None
 ) -> list[Certified]:
-    """Find the finished certificates of a job's designs.
-
-    Args:
-        service: Where the jobs are.
-        job: That tried the designs.
-        columns: Its evaluations.
-        best: Iteration and particle of its best design; None while there is none.
-
-    Returns:
-        Those of its best first, then by age; none for a job that tunes no drive.
-    """
+    """Find the finished certificates of a job's designs."""
     if not isinstance(job.spec, JobSpec):
         return []
     found = []
@@ -76,16 +66,7 @@ def certificates_of(
 def certified_at(
     spec: JobSpec, columns: EvaluationColumns, certificate_spec: AnySpec
 ) -> tuple[int, int] | None:
-    """Say which design of a job a certificate is of.
-
-    Args:
-        spec: Of the job.
-        columns: Its evaluations.
-        certificate_spec: Of the certificate.
-
-    Returns:
-        Iteration and particle of the first that is the same; None if the job has not tried it.
-    """
+    """Say which design of a job a certificate is of."""
     if not isinstance(certificate_spec, CertificateSpec):
         return None
     space, numbers = spec.design_space(), certificate_spec.numbers
@@ -99,44 +80,18 @@ def certified_at(
 
 
 def how_to_make_one(job_id: str) -> str:
-    """Say how a job comes to have a certificate in its evidence.
-
-    Args:
-        job_id: Identifier of the job.
-
-    Returns:
-        A sentence without its full stop.
-    """
+    """Say how a job comes to have a certificate in its evidence."""
     return f"`gaitswarm certify {job_id}` makes one, and evidence written after that holds it"
 
 
 def summary(job_id: str, spec: CertificateSpec, columns: EvaluationColumns) -> CertificateView:
-    """Say what a certificate comes to.
-
-    Args:
-        job_id: Its identifier.
-        spec: What it was asked to do.
-        columns: Its evaluations.
-
-    Returns:
-        The summary.
-
-    Raises:
-        Conflict: No drawn world has walked yet.
-    """
+    """Say what a certificate comes to."""
     found = certificate(spec, columns, most=WORST)
     return CertificateView.from_certificate(job_id, spec, found)
 
 
 def by_certificate(members: Mapping[str, bytes]) -> dict[str, dict[str, bytes]]:
-    """Sort members of an archive by the certificate that they belong to.
-
-    Args:
-        members: Contents by name.
-
-    Returns:
-        Contents by name within the certificate's folder, by the certificate's id.
-    """
+    """Sort members of an archive by the certificate that they belong to."""
     found: dict[str, dict[str, bytes]] = {}
     for name, content in members.items():
         folder, _, rest = name.partition("/")
@@ -149,21 +104,7 @@ def by_certificate(members: Mapping[str, bytes]) -> dict[str, dict[str, bytes]]:
 def summary_differs(
     job_id: str, spec: CertificateSpec, columns: EvaluationColumns, content: bytes
 ) -> str | None:
-    """Compare a certificate's summary with its evaluations.
-
-    Args:
-        job_id: Identifier of the certificate.
-        spec: What it was asked to do.
-        columns: Its evaluations.
-        content: The summary's document.
-
-    Returns:
-        Where it says something else, None if it does not.
-
-    Raises:
-        BadArchive: It is no JSON.
-        Conflict: No drawn world has walked yet.
-    """
+    """Compare a certificate's summary with its evaluations."""
     here = json.loads(summary(job_id, spec, columns).model_dump_json())
     return next(_differences(here, parsed_json(content, SUMMARY), ""), None)
 

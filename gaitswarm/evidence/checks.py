@@ -40,15 +40,7 @@ Answer = tuple[bool | None, str]
 
 
 def checks_of(evidence: Evidence, members: Mapping[str, bytes]) -> dict[str, Callable[[], Answer]]:
-    """List what can be checked of a run without a walk.
-
-    Args:
-        evidence: Of the run, as it was read.
-        members: That it was read from.
-
-    Returns:
-        Checks by name, in their order; each may raise whatever comes of numbers that make no sense.
-    """
+    """List what can be checked of a run without a walk."""
     found: dict[str, Callable[[], Answer]] = {
         "robot": lambda: _robot(evidence, members),
         "fitness": lambda: _fitness(evidence),
@@ -115,15 +107,7 @@ def _best(evidence: Evidence, members: Mapping[str, bytes]) -> Answer:
 
 
 def best_row(evidence: Evidence) -> tuple[int | None, EvaluationColumns]:
-    """Find the best evaluation.
-
-    Args:
-        evidence: Of the run.
-
-    Returns:
-        Its row, None where no design has walked in every case, in the table of what was judged in
-        double; and that table.
-    """
+    """Find the best evaluation."""
     judged = evidence.columns if evidence.reevaluated is None else evidence.reevaluated
     return (best_particle(judged.fitness) if len(judged) else None), judged
 
@@ -218,14 +202,7 @@ def _summary(evidence: Evidence, members: Mapping[str, bytes]) -> Answer:
 
 
 def changes_of_provenance(evidence: Evidence) -> Iterator[str]:
-    """Say what numbers depend on that is different here, and what that means.
-
-    Args:
-        evidence: Of the run.
-
-    Returns:
-        Sentences; none if all is as it was.
-    """
+    """Say what numbers depend on that is different here, and what that means."""
     spec, here = evidence.spec, job_provenance(evidence.spec)
     found: list[str] = []
     for record in evidence.provenance.records:

@@ -51,19 +51,7 @@ _PIECE: Final = 1000
 
 
 def evidence(service: JobService, job_id: str) -> bytes:
-    """Write the evidence of a job, with the finished certificates of its designs.
-
-    Args:
-        service: Where the job is.
-        job_id: Its id.
-
-    Returns:
-        The archive: the same bytes for the same stored jobs and the same gaitswarm.
-
-    Raises:
-        NotFound: There is no such job.
-        Conflict: It has committed nothing yet, cannot be read, or is too large for this.
-    """
+    """Write the evidence of a job, with the finished certificates of its designs."""
     job = service.job(job_id)
     if not job.progress.iterations:
         raise Conflict(f"job {job_id} has committed no iteration yet, so there is no evidence")
@@ -142,14 +130,7 @@ def _run(service: JobService, job: Job) -> _Run:
 
 
 def provenance_document(job: Job) -> dict[str, Any]:
-    """What a job's numbers depend on, and by what this file was written.
-
-    Args:
-        job: As it was read.
-
-    Returns:
-        The document.
-    """
+    """What a job's numbers depend on, and by what this file was written."""
     here = job_provenance(job.spec)
     kernels = [
         kernel_identity(load_robot(robot), job.spec.precision).hex() for robot in job.spec.described
@@ -162,15 +143,7 @@ def provenance_document(job: Job) -> dict[str, Any]:
 
 
 def chain_document(service: JobService, job: Job) -> dict[str, Any]:
-    """What the chain of a job's history depends on beside its tables, as it is stored.
-
-    Args:
-        service: Where the job is.
-        job: As it was read.
-
-    Returns:
-        The document; digests are those that are stored, and null where there is none.
-    """
+    """What the chain of a job's history depends on beside its tables, as it is stored."""
     stored = service.store.chain_documents(job.id)
     links = [link for piece in _links(service, job) for link in piece]
     return {
@@ -191,15 +164,7 @@ def _links(service: JobService, job: Job) -> Iterator[list[Link]]:
 
 
 def best_of(columns: EvaluationColumns, anew: EvaluationColumns | None) -> Evaluation | None:
-    """Find the best design, as the store would.
-
-    Args:
-        columns: All evaluations.
-        anew: Those that were evaluated anew in double; None of a search in double.
-
-    Returns:
-        The earliest of least fitness in double precision; None while every design has failed.
-    """
+    """Find the best design, as the store would."""
     judged = columns if anew is None else anew
     row = best_particle(judged.fitness)
     if row is None:
@@ -213,19 +178,7 @@ def best_of(columns: EvaluationColumns, anew: EvaluationColumns | None) -> Evalu
 
 
 def row_of(columns: EvaluationColumns, iteration: int, particle: int) -> int:
-    """Find an evaluation.
-
-    Args:
-        columns: Evaluations.
-        iteration: Index of the iteration.
-        particle: Its place there.
-
-    Returns:
-        Its row.
-
-    Raises:
-        ValueError: There is none.
-    """
+    """Find an evaluation."""
     (row,) = np.flatnonzero((columns.iteration == iteration) & (columns.particle == particle))
     return int(row)
 

@@ -44,23 +44,7 @@ def run_verification(
     *,
     check: Callable[[float], None] = lambda _seconds: None,
 ) -> HistoryVerificationView:
-    """Compute a job's chain again from what is stored, and simulate some evaluations anew.
-
-    Args:
-        service: Where the job is.
-        job_id: Identifier of the job.
-        request: How thoroughly.
-        check: Called with the simulated time of all walks [s] before the first; what it raises is
-            passed on.
-
-    Returns:
-        What was checked, and what differs.
-
-    Raises:
-        NotFound: There is no such job.
-        Conflict: Walks are asked for of a job whose spec cannot be read.
-        EvaluatorUnavailable: Walks cannot be run here.
-    """
+    """Compute a job's chain again from what is stored, and simulate some evaluations anew."""
     # It brings in the database.
     from gaitswarm.services.optimizer.analysis.verification import check_history
 
@@ -96,16 +80,7 @@ def _chain(history: HistoryCheck) -> CheckView:
 
 
 def chain_check(iterations: int, chained_from: int | None, head: str | None) -> CheckView:
-    """Say that a chain is whole.
-
-    Args:
-        iterations: How many there are.
-        chained_from: Index of the first that has a digest; None if none has.
-        head: Digest of the last; None if none has one.
-
-    Returns:
-        The check: passed, but for a history that is not chained.
-    """
+    """Say that a chain is whole."""
     if chained_from is None:
         what = "no iteration is committed yet"
         if iterations:
@@ -117,16 +92,7 @@ def chain_check(iterations: int, chained_from: int | None, head: str | None) -> 
 
 
 def head_check(head: str, at: int | None, iterations: int) -> CheckView:
-    """Say whether a history is the one of which a digest was noted down.
-
-    Args:
-        head: The digest.
-        at: Index of the iteration that has it; None if none has.
-        iterations: How many there are.
-
-    Returns:
-        The check.
-    """
+    """Say whether a history is the one of which a digest was noted down."""
     if at is None:
         detail = f"no iteration has the digest {head}: this is another history"
     elif at == iterations - 1:

@@ -53,19 +53,7 @@ def page(
     certificates: Sequence[CertificateOnPage],
     files: Sequence[str],
 ) -> str:
-    """Write the page.
-
-    Args:
-        job: As it was read.
-        best: Its best design; None while there is none.
-        provenance: As `provenance_document` has it.
-        pictures: SVG by name, "convergence" among them.
-        certificates: Of the job's designs, or the job itself.
-        files: Names of the other members of the archive.
-
-    Returns:
-        HTML.
-    """
+    """Write the page."""
     title = job.spec.name or job.id
     body = "\n".join(
         [

@@ -32,14 +32,7 @@ Scale = Callable[[float], float]
 
 
 def convergence(iterations: Sequence[IterationView]) -> str:
-    """Draw fitness over iterations: best so far, median, and the band from best to worst.
-
-    Args:
-        iterations: Committed ones, at least one.
-
-    Returns:
-        The picture.
-    """
+    """Draw fitness over iterations: best so far, median, and the band from best to worst."""
     height, index = 340.0, [float(i.index) for i in iterations]
     drawn = [v for i in iterations for v in (i.best_so_far, i.best, i.median) if v is not None]
     if not drawn:
@@ -73,17 +66,7 @@ def convergence(iterations: Sequence[IterationView]) -> str:
 
 
 def bars(names: Sequence[str], values: Sequence[float | None], *, label: str, title: str) -> str:
-    """Draw one bar a name.
-
-    Args:
-        names: Of the bars, from the top.
-        values: Their lengths, not negative; None for one that has none.
-        label: Of the axis, with its unit.
-        title: Of the picture.
-
-    Returns:
-        The picture.
-    """
+    """Draw one bar a name."""
     left, row = 170.0, 30.0
     height = _TOP + row * len(names) + _BOTTOM
     most = max([v for v in values if v is not None], default=1.0) or 1.0
@@ -106,17 +89,7 @@ def bars(names: Sequence[str], values: Sequence[float | None], *, label: str, ti
 
 
 def heat_map(values: Floats, *, across: str, up: str, title: str) -> str:
-    """Draw a table of numbers as colours, red above zero and blue below.
-
-    Args:
-        values: (n, m), n columns of m cells each, from the left and from below.
-        across: Label of the n columns.
-        up: Label of the m rows.
-        title: Of the picture.
-
-    Returns:
-        The picture.
-    """
+    """Draw a table of numbers as colours, red above zero and blue below."""
     height = 380.0
     n, m = values.shape
     largest = float(np.abs(values).max()) or 1.0

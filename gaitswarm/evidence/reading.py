@@ -119,17 +119,7 @@ class Evidence:
 
 
 def read_evidence(members: Mapping[str, bytes]) -> Evidence:
-    """Read the members of an archive.
-
-    Args:
-        members: Contents by name.
-
-    Returns:
-        What they say; rows are in order, complete, and as the spec has them.
-
-    Raises:
-        BadArchive: One is missing or makes no sense; names it.
-    """
+    """Read the members of an archive."""
     spec = _spec(_member(members, SPEC))
     job = _parsed(JobDocument, members, JOB)
     columns = _evaluations(members, EVALUATIONS, spec)
@@ -154,14 +144,7 @@ def read_evidence(members: Mapping[str, bytes]) -> Evidence:
 
 
 def check_robots(members: Mapping[str, bytes]) -> None:
-    """Check the robots of all documents of an archive, in a process that may be ended.
-
-    Args:
-        members: Contents by name, those of certificates among them.
-
-    Raises:
-        BadArchive: There are too many of them, or one cannot be used; names the document.
-    """
+    """Check the robots of all documents of an archive, in a process that may be ended."""
     robots: dict[tuple[str, str], str] = {}
     for name, content in members.items():
         if name.endswith(_WITH_ROBOTS):
@@ -298,13 +281,5 @@ def _checked_table(content: bytes, name: str) -> pa.Table:
 
 
 def by_iteration(evidence: Evidence, column: Floats) -> Sequence[Floats]:
-    """Cut a column.
-
-    Args:
-        evidence: Whose iterations count.
-        column: (r, ...) of every evaluation.
-
-    Returns:
-        (n, ...) of each iteration.
-    """
+    """Cut a column."""
     return np.split(column, np.cumsum([len(positions) for positions in evidence.asked])[:-1])

@@ -24,14 +24,7 @@ Table = tuple[AnySpec, EvaluationColumns]
 
 
 def why_no_replay(spec: AnySpec) -> tuple[bool | None, str] | None:
-    """Say whether evaluations of a job can be compared here.
-
-    Args:
-        spec: Of the job.
-
-    Returns:
-        None if they can; else None or false, as the job or this machine rules it out, and why.
-    """
+    """Say whether evaluations of a job can be compared here."""
     if spec.unwalked is None:
         return None, "what a run of a tournament comes to depends on more than what is simulated"
     if isinstance(spec, JobSpec) and spec.case is not None:
@@ -45,16 +38,7 @@ def why_no_replay(spec: AnySpec) -> tuple[bool | None, str] | None:
 
 
 def has_same_bits_anywhere(spec: AnySpec, columns: EvaluationColumns) -> NDArray[np.bool_]:
-    """Say which evaluations have the same bits on any machine.
-
-    Args:
-        spec: Of the job.
-        columns: Its evaluations.
-
-    Returns:
-        (r,): all but those of a certificate's other engines, which compute with libraries that suit
-        the processor.
-    """
+    """Say which evaluations have the same bits on any machine."""
     if not isinstance(spec, CertificateSpec) or not spec.engines:
         return np.ones(len(columns), dtype=np.bool_)
     return np.asarray(columns.designs[:, spec.design_space().names.index(ENGINE)] == 0.0)
@@ -65,19 +49,7 @@ def simulated_differences(
     recordings: Recordings,
     certificate: str | None = None,
 ) -> list[DifferenceView]:
-    """Simulate evaluations, and list what is not the same to the bit.
-
-    Args:
-        tables: What is compared.
-        recordings: Recorded walks that the cases need.
-        certificate: Id of the one that they are of; None for the job itself.
-
-    Returns:
-        Every objective and status that differs, in the order of the tables and their cases.
-
-    Raises:
-        SimulationInputError: A design cannot be simulated.
-    """
+    """Simulate evaluations, and list what is not the same to the bit."""
     found: list[DifferenceView] = []
     # What only reads need not wait for a database's packages.
     from gaitswarm.services.runtime import open_evaluator
@@ -99,17 +71,7 @@ def simulated_differences(
 def replay_answer(
     count: int, with_best: bool, spec: AnySpec, differences: Sequence[DifferenceView]
 ) -> tuple[bool, str]:
-    """Say what came of a replay.
-
-    Args:
-        count: Evaluations that were simulated.
-        with_best: Whether the best one is among them.
-        spec: Of the job.
-        differences: What is not the same.
-
-    Returns:
-        Whether nothing differs, and a sentence about it.
-    """
+    """Say what came of a replay."""
     among = ", the best among them," if with_best else ""
     what = f"{count} evaluations{among} in {len(spec.case_names)} cases"
     if not differences:

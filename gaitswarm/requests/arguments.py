@@ -37,62 +37,22 @@ M = TypeVar("M", bound=BaseModel)
 
 
 def state(text: JobState | str | None) -> JobState | None:
-    """A job's state by name.
-
-    Args:
-        text: The name; None for any state.
-
-    Returns:
-        The state, None for any.
-
-    Raises:
-        InvalidRequest: There is none of this name.
-    """
+    """A job's state by name."""
     return None if text is None else _one_of(JobState, text, "state")
 
 
 def order(text: JobOrder | str) -> JobOrder:
-    """An order of the job list by name.
-
-    Args:
-        text: The name.
-
-    Returns:
-        The order.
-
-    Raises:
-        InvalidRequest: There is none of this name.
-    """
+    """An order of the job list by name."""
     return _one_of(JobOrder, text, "order")
 
 
 def command(text: Command | str) -> Command:
-    """A command to a job by name.
-
-    Args:
-        text: The name.
-
-    Returns:
-        The command.
-
-    Raises:
-        InvalidRequest: There is none of this name.
-    """
+    """A command to a job by name."""
     return _one_of(Command, text, "command")
 
 
 def priority(value: int) -> int:
-    """A job's priority.
-
-    Args:
-        value: The higher, the sooner.
-
-    Returns:
-        The same.
-
-    Raises:
-        InvalidRequest: It is no integer, or out of bounds.
-    """
+    """A job's priority."""
     if type(value) is not int:
         raise InvalidRequest(f"must be an integer, it is {value!r}", field="priority")
     check_priority(value)
@@ -100,17 +60,7 @@ def priority(value: int) -> int:
 
 
 def notify_url(url: str) -> str:
-    """Where the end of a job is told.
-
-    Args:
-        url: The URL.
-
-    Returns:
-        The same; whether its host is allowed is the matter of whoever sends.
-
-    Raises:
-        InvalidRequest: It is none to which anything could be sent.
-    """
+    """Where the end of a job is told."""
     reason = unusable_url(url)
     if reason is not None:
         raise InvalidRequest(reason, field="notify_url")
@@ -118,34 +68,14 @@ def notify_url(url: str) -> str:
 
 
 def controller(name: str) -> ControllerName:
-    """A controller by name.
-
-    Args:
-        name: The name.
-
-    Returns:
-        The same.
-
-    Raises:
-        NotFound: There is none of this name.
-    """
+    """A controller by name."""
     if name not in CONTROLLERS:
         raise NotFound(CONTROLLERS.unknown(name))
     return name
 
 
 def table_format(text: str) -> TableFormat:
-    """A file's format by name.
-
-    Args:
-        text: The name.
-
-    Returns:
-        The format.
-
-    Raises:
-        InvalidRequest: There is none of this name; its field is `file_format`.
-    """
+    """A file's format by name."""
     if text not in get_args(TableFormat):
         known = ", ".join(get_args(TableFormat))
         raise InvalidRequest(f"{text!r} is none of {known}", field="file_format")
@@ -153,34 +83,14 @@ def table_format(text: str) -> TableFormat:
 
 
 def runs(job_ids: Sequence[str]) -> Sequence[str]:
-    """Ids of jobs.
-
-    Args:
-        job_ids: At least one.
-
-    Returns:
-        The same.
-
-    Raises:
-        InvalidRequest: There is none, or it is a single text.
-    """
+    """Ids of jobs."""
     if isinstance(job_ids, str) or not job_ids:
         raise InvalidRequest("must be a list of at least one id", field="job_ids")
     return job_ids
 
 
 def leave_out(text: str | None) -> LeaveOut | None:
-    """What a calibration leaves out, by name.
-
-    Args:
-        text: "target" or "walk"; None for nothing.
-
-    Returns:
-        The same.
-
-    Raises:
-        InvalidRequest: It is something else.
-    """
+    """What a calibration leaves out, by name."""
     if text is not None and text not in get_args(LeaveOut):
         known = ", ".join(get_args(LeaveOut))
         raise InvalidRequest(f"{text!r} is none of {known}", field="leave_out")
@@ -188,15 +98,7 @@ def leave_out(text: str | None) -> LeaveOut | None:
 
 
 def certificate(worlds: int | None, most: int) -> None:
-    """Check what is asked of a certificate.
-
-    Args:
-        worlds: Worlds to take; None for all.
-        most: Worst worlds to name.
-
-    Raises:
-        InvalidRequest: A number is out of range; names it.
-    """
+    """Check what is asked of a certificate."""
     if worlds is not None and worlds < 1:
         raise InvalidRequest("must be at least 1", field="worlds")
     if not 0 <= most <= MOST_WORST:
@@ -204,39 +106,14 @@ def certificate(worlds: int | None, most: int) -> None:
 
 
 def ranking(preference: PreferenceInput, top: int) -> RankingRequest:
-    """By what to judge the designs of a job anew.
-
-    Args:
-        preference: How objectives are weighed: A, B, C of table 4.5, `chapter-3` (eq. 3.1), or
-            `Preference`.
-        top: How many of the best designs to list.
-
-    Returns:
-        The request, checked.
-
-    Raises:
-        InvalidRequest: An argument makes no sense; names it.
-    """
+    """By what to judge the designs of a job anew."""
     return checked(RankingRequest, {"preference": preference, "top": top})
 
 
 def labels(
     name: str | None, note: str | None, tags: Iterable[str] | None, archived: bool | None
 ) -> LabelsChange:
-    """What to write on a job.
-
-    Args:
-        name: Shown in place of its spec's; None leaves it, as it does with the others.
-        note: Text of any kind.
-        tags: Words to find it by.
-        archived: Whether it is out of the way in lists.
-
-    Returns:
-        The change, checked.
-
-    Raises:
-        InvalidRequest: A label is too long; names it.
-    """
+    """What to write on a job."""
     words = None if tags is None else tuple(tags)
     return checked(LabelsChange, {"name": name, "note": note, "tags": words, "archived": archived})
 
@@ -250,22 +127,7 @@ def preferences(
     seed: int,
     precision: Precision,
 ) -> PreferencesRequest:
-    """Under which preferences to rank the designs of a job, and how to compare the winners.
-
-    Args:
-        drawn: How many preferences to draw.
-        candidates: Winners to compare.
-        samples: Designs that walk beside each; 0 for no walk.
-        radius: How far they are from it at most, as a share of each variable's bounds.
-        seed: Of preferences and samples.
-        precision: Of the physics' numbers.
-
-    Returns:
-        The request, checked.
-
-    Raises:
-        InvalidRequest: An argument makes no sense; names it.
-    """
+    """Under which preferences to rank the designs of a job, and how to compare the winners."""
     document = {
         "drawn": drawn,
         "candidates": candidates,
@@ -278,35 +140,12 @@ def preferences(
 
 
 def verification(replay: int, seed: int | None, head: str | None) -> VerificationRequest:
-    """How thoroughly to verify the history of a job.
-
-    Args:
-        replay: Evaluations to simulate anew.
-        seed: By which they are drawn.
-        head: Digest to look for.
-
-    Returns:
-        The request, checked.
-
-    Raises:
-        InvalidRequest: An argument makes no sense; names it.
-    """
+    """How thoroughly to verify the history of a job."""
     return checked(VerificationRequest, {"replay": replay, "seed": seed, "head": head})
 
 
 def fork(from_iteration: int, options: ForkOptions) -> ForkRequest:
-    """From where to fork a job, and what is to be different.
-
-    Args:
-        from_iteration: First iteration that is the fork's own, counted from 0.
-        options: Keywords that the caller gave.
-
-    Returns:
-        The request, checked.
-
-    Raises:
-        InvalidRequest: An argument makes no sense; names it.
-    """
+    """From where to fork a job, and what is to be different."""
     return checked(ForkRequest, {"from_iteration": from_iteration, **laid_options(options)})
 
 
@@ -318,18 +157,7 @@ def _one_of(kind: type[E], text: str, field: str) -> E:
 
 
 def checked(kind: type[M], document: dict[str, Any]) -> M:
-    """A request as a model.
-
-    Args:
-        kind: The model.
-        document: Its fields, as the caller gave them.
-
-    Returns:
-        The request.
-
-    Raises:
-        InvalidRequest: It makes no sense; names every bad field.
-    """
+    """A request as a model."""
     try:
         return kind.model_validate(document)
     except ValidationError as error:

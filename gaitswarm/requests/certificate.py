@@ -12,21 +12,7 @@ from gaitswarm.views.certificate import CertificateView
 def run_certificate(
     histories: Histories, job_id: str, *, worlds: int | None = None, most: int = 5
 ) -> CertificateView:
-    """Say what a certificate comes to.
-
-    Args:
-        histories: Where the job is.
-        job_id: Identifier of the job.
-        worlds: Worlds to take, the first ones; None for all that have walked.
-        most: Worst worlds to name.
-
-    Returns:
-        The summary.
-
-    Raises:
-        InvalidRequest: A job of another kind.
-        Conflict: No drawn world has walked yet, or the job is too large to be held in memory.
-    """
+    """Say what a certificate comes to."""
     job = histories.job(job_id)
     spec = job.spec
     if not isinstance(spec, CertificateSpec):

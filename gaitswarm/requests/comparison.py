@@ -38,21 +38,7 @@ _MEASURE: Final = ("kind", "robot", "scenarios", "preference", "worlds", "record
 
 
 def run_comparison(service: JobService, job_ids: Sequence[str]) -> JobComparisonView:
-    """Set jobs beside each other.
-
-    Args:
-        service: Where the jobs are.
-        job_ids: Identifiers of one job at least, each once.
-
-    Returns:
-        How they converged, how their designs are spread, and how their specs differ.
-
-    Raises:
-        InvalidRequest: There are too many, or one is named twice.
-        NotFound: No job of one of the ids.
-        Unreadable: A spec cannot be read.
-        Conflict: A job is too large to be held in memory.
-    """
+    """Set jobs beside each other."""
     if len(set(job_ids)) < len(job_ids) or len(job_ids) > MOST_JOBS:
         raise InvalidRequest(f"must be at most {MOST_JOBS} jobs, each once", field="job_ids")
     jobs = [service.job(job_id) for job_id in job_ids]
@@ -67,16 +53,7 @@ def run_comparison(service: JobService, job_ids: Sequence[str]) -> JobComparison
 
 
 def run_convergences(service: JobService, job_ids: Sequence[str], points: int) -> ConvergencesView:
-    """List how jobs came to their best, shortly.
-
-    Args:
-        service: Where the jobs are.
-        job_ids: Their identifiers.
-        points: Iterations of each to list, at most.
-
-    Returns:
-        One item for each job that there is.
-    """
+    """List how jobs came to their best, shortly."""
     found = []
     for job_id in job_ids:
         try:

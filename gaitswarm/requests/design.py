@@ -54,14 +54,7 @@ class DesignRequest(BaseModel):
         return design_numbers(self.controller, self.design)
 
     def simulated_seconds(self, scenarios: Sequence[Scenario]) -> float:
-        """How long the robot walks, the measure of what the request costs.
-
-        Args:
-            scenarios: The walks of the request, in full.
-
-        Returns:
-            Length of all walks together [s]; a cycle time of the design goes before a scenario's.
-        """
+        """How long the robot walks, the measure of what the request costs."""
         cycle_time = self.numbers.get("cycle_time")
         return sum(
             scenario.cycles * (scenario.cycle_time if cycle_time is None else cycle_time)
@@ -69,11 +62,7 @@ class DesignRequest(BaseModel):
         )
 
     def check_design(self) -> None:
-        """Check that the controller can have the design's values, and drives the robot.
-
-        Raises:
-            InvalidRequest: It cannot; its field is `design`, or `controller`.
-        """
+        """Check that the controller can have the design's values, and drives the robot."""
         try:
             law = CONTROLLERS[self.controller].compile(self.numbers)
         except SimulationInputError as error:
@@ -82,30 +71,12 @@ class DesignRequest(BaseModel):
             check_drives(law, self.robot)
 
     def walked(self, scenario: Scenario) -> Scenario:
-        """A scenario as the design walks through it.
-
-        Args:
-            scenario: The walk, in full.
-
-        Returns:
-            The scenario, with the gait of the design.
-
-        Raises:
-            SimulationInputError: The design gives a value that no scenario can have.
-        """
+        """A scenario as the design walks through it."""
         gait = {name: value for name, value in self.numbers.items() if name in GAIT_CATALOGUE}
         return with_gait(scenario, gait)
 
     def check_reach(self, scenario: Scenario, *, field: str) -> None:
-        """Check that the legs reach the gait's trajectory.
-
-        Args:
-            scenario: The walk, in full.
-            field: Field of the request that is to blame if they do not.
-
-        Raises:
-            InvalidRequest: They do not; names scenario, leg and distance.
-        """
+        """Check that the legs reach the gait's trajectory."""
         names, values = tuple(self.design), tuple(self.numbers.values())
         try:
             check_reach(scenario, names, values, robot=self.robot)
@@ -137,22 +108,11 @@ class ScenariosRequest(DesignRequest):
         return tuple(map(resolved, self.scenarios))
 
     def check_gaits(self) -> None:
-        """Check every scenario's gait.
-
-        Raises:
-            InvalidRequest: One leaves the legs' reach; names the field.
-        """
+        """Check every scenario's gait."""
         for index, scenario in enumerate(self.resolved_scenarios()):
             self.check_reach(scenario, field=f"scenarios.{index}")
 
 
 def resolved(entry: str | Scenario) -> Scenario:
-    """A scenario in full.
-
-    Args:
-        entry: The scenario, or name or number of a preset.
-
-    Returns:
-        The scenario itself, a preset looked up.
-    """
+    """A scenario in full."""
     return find_scenario(entry) if isinstance(entry, str) else entry

@@ -43,25 +43,7 @@ def simulation(
     world: Mapping[str, float] | None,
     log: bool,
 ) -> SimulationRequest:
-    """One design and the walks in which to try it.
-
-    Args:
-        design: Value by variable, in the variables' units.
-        scenarios: Names or numbers of presets, or `Scenario`; None for the six of table 4.2.
-        controller: Motor controller that drives the robot.
-        robot: A shipped robot by name, a `RobotVariant`, or the folder of another.
-        preference: How objectives are weighed: A, B, C of table 4.5, `chapter-3` (eq. 3.1), or
-            `Preference`.
-        precision: Of the physics' numbers.
-        world: Values of perturbations by name; None for the model itself.
-        log: Whether to record every walk at 500 Hz.
-
-    Returns:
-        The request, checked.
-
-    Raises:
-        InvalidRequest: An argument makes no sense; names it.
-    """
+    """One design and the walks in which to try it."""
     document: dict[str, Any] = {
         "robot": robot_source(robot),
         "controller": controller,
@@ -77,54 +59,19 @@ def simulation(
 
 
 def robustness(design: Mapping[str, float | str], options: RobustnessOptions) -> RobustnessRequest:
-    """One design, its walks, and the sample around it.
-
-    Args:
-        design: Value by variable, in the variables' units.
-        options: What is not to have its default.
-
-    Returns:
-        The request, checked.
-
-    Raises:
-        InvalidRequest: An argument makes no sense; names it.
-    """
+    """One design, its walks, and the sample around it."""
     return checked(RobustnessRequest, {**_laid(options), "design": _design(design)})
 
 
 def firmware(design: Mapping[str, float | str], options: FirmwareOptions) -> FirmwareRequest:
-    """One design, and the scenarios that are written with it.
-
-    Args:
-        design: Value by variable, in the variables' units.
-        options: What is not to have its default.
-
-    Returns:
-        The request, checked.
-
-    Raises:
-        InvalidRequest: An argument makes no sense; names it.
-    """
+    """One design, and the scenarios that are written with it."""
     return checked(FirmwareRequest, {**_laid(options), "design": _design(design)})
 
 
 def firmware_of_best(
     job_id: str, spec: AnySpec, best: BestView, options: FirmwareOptions
 ) -> FirmwareRequest:
-    """A job's best design, and the scenarios that are written with it.
-
-    Args:
-        job_id: Identifier of the job.
-        spec: Of the job.
-        best: Its best design.
-        options: What is not to be as in the job.
-
-    Returns:
-        The request, checked.
-
-    Raises:
-        InvalidRequest: The job tunes no drive, or an argument makes no sense; names it.
-    """
+    """A job's best design, and the scenarios that are written with it."""
     return firmware_request_of_best(job_id, spec, best, _laid(options))
 
 
@@ -137,22 +84,7 @@ def replay(
     world: Mapping[str, float] | None,
     rate: float,
 ) -> ReplayRequest:
-    """One design and the walk in which to look at it.
-
-    Args:
-        design: Value by variable, in the variables' units.
-        scenario: Name or number of a preset, or `Scenario`.
-        controller: Motor controller that drives the robot.
-        robot: A shipped robot by name, a `RobotVariant`, or the folder of another.
-        world: Values of perturbations by name; None for the model itself.
-        rate: Frames a second [Hz].
-
-    Returns:
-        The request, checked.
-
-    Raises:
-        InvalidRequest: An argument makes no sense; names it.
-    """
+    """One design and the walk in which to look at it."""
     document: dict[str, Any] = {
         "robot": robot_source(robot),
         "controller": controller,
@@ -171,20 +103,7 @@ def surface(
     current_points: int,
     velocity_error: float,
 ) -> SurfaceRequest:
-    """One design of a fuzzy controller, and how finely to look at it.
-
-    Args:
-        design: Value by variable, in the variables' units.
-        error_points: Points of the grid over the error's range.
-        current_points: Points of the grid over the current's range.
-        velocity_error: At which the surfaces of fuzzy-pi-3 are taken [counts/s].
-
-    Returns:
-        The request, checked.
-
-    Raises:
-        InvalidRequest: An argument makes no sense; names it.
-    """
+    """One design of a fuzzy controller, and how finely to look at it."""
     document: dict[str, Any] = {
         "design": _design(design),
         "error_points": error_points,

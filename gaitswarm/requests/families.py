@@ -20,21 +20,7 @@ TOLERANCE: Final = 0.01
 def run_scenario_families(
     histories: Histories, job_id: str, tolerance: float
 ) -> ScenarioFamiliesView:
-    """Judge a job's designs by fewer scenarios, from what is stored.
-
-    Args:
-        histories: Where the job is.
-        job_id: Identifier of a job that tunes a drive.
-        tolerance: Largest regret of a smallest family, as a share.
-
-    Returns:
-        What the job would have taken for its best with fewer scenarios.
-
-    Raises:
-        InvalidRequest: A job of another kind, or a tolerance below 0.
-        Conflict: No design of the job walks in all scenarios, or the job is too large to be held in
-            memory.
-    """
+    """Judge a job's designs by fewer scenarios, from what is stored."""
     if not 0.0 <= tolerance < np.inf:
         raise InvalidRequest("must be at least 0", field="tolerance")
     job = histories.job(job_id)

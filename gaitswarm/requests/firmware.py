@@ -60,11 +60,7 @@ class FirmwareRequest(ScenariosRequest):
         return seconds if self.table_bits is None else 2.0 * seconds
 
     def check(self) -> None:
-        """Check the design, its gaits and its table before anything walks.
-
-        Raises:
-            InvalidRequest: Something cannot be; names the field.
-        """
+        """Check the design, its gaits and its table before anything walks."""
         with simulation_errors("robot"):
             check_drives_by_pwm(self.robot)
         self.check_design()
@@ -77,21 +73,7 @@ class FirmwareRequest(ScenariosRequest):
 def firmware_request_of_best(
     job_id: str, spec: AnySpec, best: BestView | None, options: dict[str, Any]
 ) -> FirmwareRequest:
-    """Ask for firmware of a job's best design, by default with its robot and in its scenarios.
-
-    Args:
-        job_id: Identifier of the job.
-        spec: Of the job.
-        best: Its best design; None while there is none.
-        options: Fields of the request that are not to be the job's.
-
-    Returns:
-        The request, checked.
-
-    Raises:
-        InvalidRequest: The job tunes no drive, or another controller is asked for; names the field.
-        NotFound: No design has walked in every scenario yet.
-    """
+    """Ask for firmware of a job's best design, by default with its robot and in its scenarios."""
     if not isinstance(spec, JobSpec):
         raise InvalidRequest(
             f"job {job_id} is of kind {spec.kind}, which tunes no drive", field="job_id"
@@ -117,20 +99,7 @@ def firmware_request_of_best(
 
 
 def run_firmware(request: FirmwareRequest) -> Firmware:
-    """Write a design as C, and let it walk for the test of it.
-
-    Args:
-        request: The design and its scenarios.
-
-    Returns:
-        The files, and what they take.
-
-    Raises:
-        InvalidRequest: The design cannot be compiled or needs integers that the robot does not
-            have, a gait leaves the legs' reach, or the controller has no such table; names the
-            field.
-        EvaluatorUnavailable: The compiler does not compile the robot's kernel.
-    """
+    """Write a design as C, and let it walk for the test of it."""
     request.check()
     with simulation_errors("scenarios"):
         return firmware_of(
@@ -146,16 +115,7 @@ def run_firmware(request: FirmwareRequest) -> Firmware:
 def firmware_view(
     request: FirmwareRequest, firmware: Firmware, folder: str | None = None
 ) -> FirmwareView:
-    """Say what firmware holds and takes.
-
-    Args:
-        request: That it was written for.
-        firmware: The files.
-        folder: Where they are; None for nowhere yet.
-
-    Returns:
-        Files, their sizes, and what they take of the thesis's microcontroller.
-    """
+    """Say what firmware holds and takes."""
     return FirmwareView.from_firmware(
         firmware,
         folder=folder,

@@ -43,20 +43,7 @@ Indices = Sequence[Interval | None]
 
 
 def run_importance(histories: Histories, job_id: str) -> ImportanceView:
-    """Say which variables of a job matter, from what is stored.
-
-    Args:
-        histories: Where the job is.
-        job_id: Identifier of a job that searches a design.
-
-    Returns:
-        First-order Sobol' indices of every variable with intervals, and whether the winner lies at
-        a bound.
-
-    Raises:
-        InvalidRequest: A job of another kind.
-        Conflict: The job has no design yet, or is too large to be held in memory.
-    """
+    """Say which variables of a job matter, from what is stored."""
     job = histories.job(job_id)
     if job.spec.kind not in _KINDS:
         raise InvalidRequest(

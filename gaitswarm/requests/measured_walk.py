@@ -55,20 +55,7 @@ class ReadWalk:
 
 
 def read_measured_walk(request: MeasuredWalkRequest) -> ReadWalk:
-    """Read a log, let the design walk, and find the lag between the two.
-
-    Args:
-        request: The log and its walk.
-
-    Returns:
-        The log, the two walks on one time axis, and the measured currents for fits.
-
-    Raises:
-        InvalidRequest: The design cannot be compiled, the gait leaves the legs' reach, the
-            simulated walk fails, or the log cannot be read or compared; names the field, and of a
-            log line, column and unit.
-        EvaluatorUnavailable: The walk cannot be simulated on this machine now.
-    """
+    """Read a log, let the design walk, and find the lag between the two."""
     request.check_design()
     scenario, design = request.walk_scenario, request.numbers
     robot = load_robot(request.robot)

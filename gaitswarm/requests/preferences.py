@@ -72,41 +72,14 @@ def run_preferences(
     *,
     check: Callable[[float], None] = lambda _seconds: None,
 ) -> RobustPreferencesView:
-    """Find the preference whose winner among a job's designs is the most robust.
-
-    Args:
-        histories: Where the job is.
-        job_id: Identifier of a job that tunes a drive.
-        request: Preferences, and walks around their winners.
-        check: Called with the simulated time of all walks [s] before the first; what it raises is
-            passed on.
-
-    Returns:
-        The candidates, the most robust first; without walks those of most preferences first.
-
-    Raises:
-        InvalidRequest: The job tunes no drive, or a number makes no sense; names the field.
-        Conflict: No design of the job walks in all scenarios, or it is too large to be held in
-            memory.
-    """
+    """Find the preference whose winner among a job's designs is the most robust."""
     job = histories.job(job_id)
     tuning_spec(job_id, job.spec)
     return ranked_preferences(job_id, job.spec, histories.columns(job), request, check=check)
 
 
 def tuning_spec(job_id: str, spec: AnySpec) -> JobSpec:
-    """The spec of a job that has a preference.
-
-    Args:
-        job_id: Identifier of the job.
-        spec: Of the job.
-
-    Returns:
-        The same.
-
-    Raises:
-        InvalidRequest: It is of another kind; its field is `job_id`.
-    """
+    """The spec of a job that has a preference."""
     if not isinstance(spec, JobSpec):
         raise InvalidRequest(
             f"job {job_id} is of kind {spec.kind}; only a job that tunes a drive has a preference",
@@ -124,23 +97,7 @@ def ranked_preferences(
     progress: Callable[[int, int], None] | None = None,
     check: Callable[[float], None] = lambda _seconds: None,
 ) -> RobustPreferencesView:
-    """Rank a job's designs under many preferences, and compare the winners.
-
-    Args:
-        job_id: Identifier of the job.
-        spec: Of the job.
-        columns: Its evaluations.
-        request: Preferences, and walks around their winners.
-        progress: Called with how many of how many walks are done.
-        check: As for `run_preferences`.
-
-    Returns:
-        As `run_preferences`.
-
-    Raises:
-        InvalidRequest: As `run_preferences`.
-        Conflict: As `run_preferences`.
-    """
+    """Rank a job's designs under many preferences, and compare the winners."""
     tuning = tuning_spec(job_id, spec)
     if not np.isfinite(columns.fitness).any():
         raise Conflict(f"job {job_id} has no design yet that walks in all scenarios")

@@ -37,18 +37,7 @@ class ReplayRequest(WorldRequest):
 
 
 def run_replay(request: ReplayRequest) -> bytes:
-    """Let the design walk, to be looked at.
-
-    Args:
-        request: The design and its walk.
-
-    Returns:
-        The walk as `encoded_replay` writes it; one that failed is shown up to its end.
-
-    Raises:
-        InvalidRequest: The design cannot be compiled, the gait leaves the legs' reach, or there
-            would be too many poses; names the field.
-    """
+    """Let the design walk, to be looked at."""
     scenario = resolved(request.scenario)
     request.check_design()
     request.check_reach(scenario, field="scenario")

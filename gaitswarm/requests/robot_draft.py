@@ -49,19 +49,7 @@ class RobotDraftRequest(BaseModel):
 
 
 def run_robot_draft(request: RobotDraftRequest) -> RobotDraftView:
-    """Find legs, choose a stance, propose actuators and two walks.
-
-    Args:
-        request: The URDF, by anybody.
-
-    Returns:
-        The robot's files, each guess with its reason.
-
-    Raises:
-        InvalidRequest: The URDF cannot be read, has no legs that can be simulated, or takes too
-            much; names the field.
-        EvaluatorUnavailable: No process can be started.
-    """
+    """Find legs, choose a stance, propose actuators and two walks."""
     name = request.name or own_name(request.urdf) or "robot"
     check_name(name)
     frame = frame_of(request.up, request.forward)

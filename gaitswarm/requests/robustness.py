@@ -84,15 +84,7 @@ class RobustnessRequest(WalksRequest):
     seed: int = Field(default=1, ge=0, lt=2**63, description="Of the sample.")
 
     def sample(self) -> LocalSample:
-        """The designs that walk.
-
-        Returns:
-            The design and those around it.
-
-        Raises:
-            InvalidRequest: A variable is unknown, named twice or not in the design, none can vary,
-                or the samples are too few; names the field.
-        """
+        """The designs that walk."""
         try:
             return local_sample(
                 self.numbers,
@@ -126,20 +118,7 @@ class RobustnessRequest(WalksRequest):
 def run_robustness(
     request: RobustnessRequest, *, cpus: int | None = None, progress: Progress | None = None
 ) -> RobustnessView:
-    """Let a design and others around it walk, and estimate how robust it is.
-
-    Args:
-        request: The design, its walks and the sample.
-        cpus: Walks to compute at once; default all processors.
-        progress: Told how many of how many walks are done, from time to time.
-
-    Returns:
-        The index by scenario, objective and variable.
-
-    Raises:
-        InvalidRequest: The design cannot be compiled, a gait leaves the legs' reach, or the sample
-            makes no sense; names the field.
-    """
+    """Let a design and others around it walk, and estimate how robust it is."""
     request.check_walks()
     sample = request.sample()
     outcomes = _walked(request, sample, cpus, progress)

@@ -39,18 +39,7 @@ class SurfaceRequest(BaseModel):
 
 
 def run_surface(controller: ControllerName, request: SurfaceRequest) -> SurfaceView:
-    """Compute the surface of every output.
-
-    Args:
-        controller: Name of the controller.
-        request: The design, and how finely to look at it.
-
-    Returns:
-        Sets, rules and surfaces of every output.
-
-    Raises:
-        InvalidRequest: The controller is not fuzzy, or cannot have the design; names the field.
-    """
+    """Compute the surface of every output."""
     surfaces = [
         surface(
             inference,

@@ -19,44 +19,19 @@ class Histories(Protocol):
     """Where jobs and their evaluations are."""
 
     def job(self, job_id: str) -> Job:
-        """A job.
-
-        Args:
-            job_id: identifier of the job.
-        """
+        """A job."""
 
     def columns(self, job: Job) -> EvaluationColumns:
-        """All evaluations of a job.
-
-        Args:
-            job: as it was read.
-        """
+        """All evaluations of a job."""
 
     def best(self, job_id: str) -> Evaluation | None:
-        """The best design of a job.
-
-        Args:
-            job_id: identifier of the job.
-        """
+        """The best design of a job."""
 
 
 def run_targets(
     histories: Histories, job_ids: Sequence[str], leave_out: LeaveOut | None
 ) -> TargetsView:
-    """Compare the best design of several runs with their targets, from what is stored.
-
-    Args:
-        histories: Where the runs are.
-        job_ids: Identifiers of the runs, at least one.
-        leave_out: What to leave out and predict, each in its turn; None for nothing.
-
-    Returns:
-        What the best design comes to in every target.
-
-    Raises:
-        InvalidRequest: A job of another kind, jobs of different problems, or two of one seed.
-        Conflict: A job has no design yet that did not fail, or is too large to be held in memory.
-    """
+    """Compare the best design of several runs with their targets, from what is stored."""
     jobs = [histories.job(job_id) for job_id in job_ids]
     first, spec = jobs[0], jobs[0].spec
     if not isinstance(spec, CalibrationSpec):

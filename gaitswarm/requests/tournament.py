@@ -25,59 +25,24 @@ class Histories(Protocol):
     """Where jobs and their evaluations are."""
 
     def job(self, job_id: str) -> Job:
-        """A job.
-
-        Args:
-            job_id: identifier of the job.
-        """
+        """A job."""
 
     def jobs(self, *, kind: str, after: str | None, limit: int) -> Page[Job]:
-        """Jobs of a kind, page by page.
-
-        Args:
-            kind: as their specs have it.
-            after: `next` of the page before; None for the first.
-            limit: most jobs on a page.
-        """
+        """Jobs of a kind, page by page."""
 
     def columns(self, job: Job) -> EvaluationColumns:
-        """All evaluations of a job.
-
-        Args:
-            job: as it was read.
-        """
+        """All evaluations of a job."""
 
 
 def run_tournaments(histories: Histories) -> list[TournamentView]:
-    """List all tournaments.
-
-    Args:
-        histories: Where their jobs are.
-
-    Returns:
-        The tournaments, newest first.
-    """
+    """List all tournaments."""
     return [TournamentView.from_tournament(found) for found in _tournaments(histories)]
 
 
 def run_standings(
     histories: Histories, job_id: str, compare_with: str | None = None
 ) -> TournamentStandingsView:
-    """Judge a tournament by all of its runs that have ended.
-
-    Args:
-        histories: Where its jobs are.
-        job_id: One of its jobs.
-        compare_with: A job of another tournament, whose mean ranks are compared; None for none.
-
-    Returns:
-        Ranks, running times, medians and data profiles.
-
-    Raises:
-        NotFound: There is no such job.
-        InvalidRequest: A job of another kind, or one that was cancelled; names the argument.
-        Conflict: No run has ended yet.
-    """
+    """Judge a tournament by all of its runs that have ended."""
     tournament = _tournament(histories, job_id, "job_id")
     compared = None
     if compare_with is not None:
@@ -89,21 +54,7 @@ def run_standings(
 
 
 def run_problem(histories: Histories, job_id: str, problem: str) -> ProblemRunsView:
-    """Show all runs of a tournament on a problem.
-
-    Args:
-        histories: Where its jobs are.
-        job_id: One of its jobs.
-        problem: Name of the problem.
-
-    Returns:
-        Convergence of every method, and every run.
-
-    Raises:
-        NotFound: There is no such job, or the tournament has no such problem.
-        InvalidRequest: A job of another kind, or one that was cancelled.
-        Conflict: No run has ended yet.
-    """
+    """Show all runs of a tournament on a problem."""
     tournament = _tournament(histories, job_id, "job_id")
     names = tournament.spec.case_names
     if problem not in names:

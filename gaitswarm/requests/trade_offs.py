@@ -24,21 +24,7 @@ MOST_DESIGNS: Final = 10_000
 
 
 def run_front(histories: Histories, job_id: str, *, most: int) -> FrontView:
-    """Find the Pareto front of a job, from what is stored.
-
-    Args:
-        histories: Where the job is.
-        job_id: Identifier of a job that tunes a drive.
-        most: Designs to list, 1 to 10 000.
-
-    Returns:
-        The front, its knees, extremes and winners, and its hypervolume over the iterations.
-
-    Raises:
-        InvalidRequest: A job of another kind, or a number out of range.
-        Conflict: No design of the job walks in all scenarios, or the job is too large to be held in
-            memory.
-    """
+    """Find the Pareto front of a job, from what is stored."""
     if not 1 <= most <= MOST_DESIGNS:
         raise InvalidRequest(f"must be 1 to {MOST_DESIGNS}", field="most")
     spec, columns = _tuning(histories, job_id)
@@ -52,22 +38,7 @@ def run_front(histories: Histories, job_id: str, *, most: int) -> FrontView:
 def run_preference_for(
     histories: Histories, job_id: str, iteration: int, particle: int
 ) -> PreferenceForView:
-    """Find the preference under which a design wins its job, from what is stored.
-
-    Args:
-        histories: Where the job is.
-        job_id: Identifier of a job that tunes a drive.
-        iteration: Iteration of the design, from 0.
-        particle: Number of the design in its iteration, from 0.
-
-    Returns:
-        The preferences that suit it, the best first, and whether it wins.
-
-    Raises:
-        InvalidRequest: A job of another kind, or a number below 0.
-        NotFound: The job has no such design.
-        Conflict: The design fails in a scenario, or the job is too large to be held in memory.
-    """
+    """Find the preference under which a design wins its job, from what is stored."""
     for field, number in (("iteration", iteration), ("particle", particle)):
         if number < 0:
             raise InvalidRequest("must be at least 0", field=field)

@@ -54,18 +54,7 @@ class WorldRequest(DesignRequest):
         backend: Backend = "auto",
         precision: Precision = "double",
     ) -> Simulation:
-        """Let the design walk through a scenario of its world.
-
-        Args:
-            scenario: The walk, in full.
-            log: Whether to keep its log.
-            backend: Which kernel; of another world than the nominal one always the first that
-                works on this machine.
-            precision: Of the physics' numbers.
-
-        Returns:
-            The walk.
-        """
+        """Let the design walk through a scenario of its world."""
         names, values = tuple(self.design), tuple(self.numbers.values())
         if self.world:
             design, known = tuple(self.numbers.items()), tuple(self.world)
@@ -93,12 +82,7 @@ class WalksRequest(ScenariosRequest):
     )
 
     def check_walks(self) -> None:
-        """Check every walk before the first is run.
-
-        Raises:
-            InvalidRequest: The design cannot be compiled, a gait leaves the legs' reach, or this
-                machine has not the precision; names the field.
-        """
+        """Check every walk before the first is run."""
         self.check_design()
         try:
             check_precision(load_robot(self.robot), self.precision)
@@ -126,20 +110,7 @@ class SimulationRequest(WalksRequest, WorldRequest):
 
 
 def run_simulation(request: SimulationRequest, *, backend: Backend = "auto") -> SimulationView:
-    """Let the design walk in every scenario.
-
-    Args:
-        request: The design and its walks.
-        backend: `native` is the compiled kernel, `reference` the CasADi interpreter, `auto` the
-            first that works on this machine.
-
-    Returns:
-        Status and objectives of every walk, with logs if the request asks for them.
-
-    Raises:
-        InvalidRequest: The design cannot be compiled, or a gait leaves the legs' reach; names the
-            field.
-    """
+    """Let the design walk in every scenario."""
     request.check_walks()
     scenarios = request.resolved_scenarios()
     walks = [

@@ -36,11 +36,7 @@ class IterationSpanView(View):
 
     @classmethod
     def from_span(cls, span: IterationSpan) -> IterationSpanView:
-        """Make a view of an iteration.
-
-        Args:
-            span: As it was kept.
-        """
+        """Make a view of an iteration."""
         return cls(
             iteration=span.iteration,
             begun_at=_time(span.begun),
@@ -69,11 +65,7 @@ class TaskSpanView(View):
 
     @classmethod
     def from_span(cls, span: TaskSpan) -> TaskSpanView:
-        """Make a view of a task.
-
-        Args:
-            span: As it was kept.
-        """
+        """Make a view of a task."""
         return cls(
             iteration=span.iteration,
             worker=span.worker,
@@ -103,11 +95,7 @@ class WorkerHealthView(View):
 
     @classmethod
     def from_health(cls, health: WorkerHealth) -> WorkerHealthView:
-        """Make a view of a worker.
-
-        Args:
-            health: As it was kept.
-        """
+        """Make a view of a worker."""
         return cls(
             name=health.name,
             tasks=health.tasks,
@@ -131,11 +119,7 @@ class MessageView(View):
 
     @classmethod
     def from_message(cls, message: Message) -> MessageView:
-        """Make a view of a message.
-
-        Args:
-            message: As it was kept.
-        """
+        """Make a view of a message."""
         return cls(
             at=_time(message.at),
             level=message.level,
@@ -164,14 +148,7 @@ class ActivityView(View):
     def from_activity(
         cls, job_id: str, known: JobActivity | None, level: Level, *, runs_jobs: bool
     ) -> ActivityView:
-        """Make a view of a job's run.
-
-        Args:
-            job_id: Of the job.
-            known: What is known of it here.
-            level: Messages that are less grave are left out.
-            runs_jobs: Whether this process runs jobs.
-        """
+        """Make a view of a job's run."""
         found = known or JobActivity()
         grave = _LEVELS[_LEVELS.index(level) :]
         return cls(

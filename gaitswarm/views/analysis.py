@@ -48,12 +48,7 @@ class DistributionView(View):
 
     @classmethod
     def from_distribution(cls, found: Distribution, *, more: bool) -> DistributionView:
-        """Make a page of a distribution.
-
-        Args:
-            found: the page's iterations.
-            more: whether further ones follow.
-        """
+        """Make a page of a distribution."""
         rows = zip(
             found.index.tolist(),
             found.fitness.tolist(),

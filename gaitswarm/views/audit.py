@@ -34,14 +34,7 @@ class AuditEntryView(View):
 
     @classmethod
     def from_entry(cls, entry: AuditEntry) -> AuditEntryView:
-        """Make the view of an entry.
-
-        Args:
-            entry: As it is stored.
-
-        Returns:
-            The view.
-        """
+        """Make the view of an entry."""
         return cls(
             index=entry.index,
             at=entry.at,

@@ -24,15 +24,7 @@ class View(BaseModel):
 
 
 def listing_name(params: tuple[type[Any], ...], kind: str) -> str:
-    """Name the schema of a list of views: (JobSummaryView,), "Page" -> JobSummaryPage.
-
-    Args:
-        params: types of the items, as pydantic gives them.
-        kind: of list.
-
-    Returns:
-        The name, as clients see it.
-    """
+    """Name the schema of a list of views: (JobSummaryView,), "Page" -> JobSummaryPage."""
     return "".join(param.__name__.removesuffix("View") for param in params) + kind
 
 
@@ -54,26 +46,12 @@ class PageView(View, Generic[T]):
 
     @classmethod
     def model_parametrized_name(cls, params: tuple[Any, ...]) -> str:
-        """Name the schema of a page.
-
-        Args:
-            params: type of the items, as pydantic gives it.
-
-        Returns:
-            The name, as clients see it.
-        """
+        """Name the schema of a page."""
         return listing_name(params, "Page")
 
 
 def finite(value: float | None) -> float | None:
-    """Make a number one that JSON has.
-
-    Args:
-        value: any number, or None.
-
-    Returns:
-        The number, None where it is missing, infinite or undefined.
-    """
+    """Make a number one that JSON has."""
     return None if value is None or not math.isfinite(value) else float(value)
 
 
@@ -84,14 +62,6 @@ def framed(header: BaseModel, numbers: NDArray[np.floating]) -> bytes:
     """Frame numbers behind a header that explains them; all little-endian.
 
     The numbers begin at a multiple of four bytes, as typed arrays want them.
-
-    Args:
-        header: what the numbers mean.
-        numbers: of any shape; those beyond float32 become infinite.
-
-    Returns:
-        Length of the header (uint32), the header (JSON, padded with spaces), the numbers (float32,
-        the last axis the fastest).
     """
     text = header.model_dump_json().encode()
     text += b" " * (-len(text) % 4)
@@ -100,17 +70,7 @@ def framed(header: BaseModel, numbers: NDArray[np.floating]) -> bytes:
 
 
 def unframed(content: bytes) -> tuple[bytes, NDArray[np.float32]]:
-    """Header and numbers of what `framed` made.
-
-    Args:
-        content: All of its bytes.
-
-    Returns:
-        The header as JSON, and the numbers (k,), read-only.
-
-    Raises:
-        ValueError: The content ends before its numbers begin, or within one.
-    """
+    """Header and numbers of what `framed` made."""
     if len(content) < struct.calcsize("<I"):
         raise ValueError("there is no header")
     (length,) = struct.unpack_from("<I", content)

@@ -38,18 +38,7 @@ def budget_spent(
     iterations_planned: int,
     evaluations_planned: int,
 ) -> Spent:
-    """Say how much of a job's budget is spent.
-
-    Args:
-        iterations: Committed ones.
-        evaluations: Designs judged in them.
-        particles: Designs of one iteration, at most; 0 if that is not known.
-        iterations_planned: Of the budget, of `particles` designs each.
-        evaluations_planned: Designs of the budget.
-
-    Returns:
-        The count in iterations, if all so far were whole ones, else in designs.
-    """
+    """Say how much of a job's budget is spent."""
     whole = iterations <= iterations_planned and evaluations == iterations * particles
     if particles == 0 or whole:
         return Spent(iterations, iterations_planned, "iterations")
@@ -77,11 +66,7 @@ class EstimateView(View):
 
     @classmethod
     def from_estimate(cls, estimate: Estimate) -> EstimateView:
-        """Make a view of an estimate.
-
-        Args:
-            estimate: as the service makes it.
-        """
+        """Make a view of an estimate."""
         return cls(
             evaluations=estimate.evaluations,
             walks=estimate.walks,

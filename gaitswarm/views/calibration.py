@@ -23,11 +23,7 @@ class ReachedView(View):
 
     @classmethod
     def from_reached(cls, reached: Reached) -> ReachedView:
-        """Make a view of a value.
-
-        Args:
-            reached: NaN and +inf for a walk that failed.
-        """
+        """Make a view of a value."""
         return cls(simulated=finite(reached.simulated), difference=finite(reached.difference))
 
 
@@ -53,11 +49,7 @@ class TargetResultView(ReachedView):
 
     @classmethod
     def from_result(cls, result: TargetResult) -> TargetResultView:
-        """Make a view of a target.
-
-        Args:
-            result: of the target over all runs.
-        """
+        """Make a view of a target."""
         target, left_out = result.target, result.left_out
         return cls(
             simulated=finite(result.best.simulated),

@@ -38,14 +38,7 @@ class CatalogueView(View, Generic[T]):
 
     @classmethod
     def model_parametrized_name(cls, params: tuple[Any, ...]) -> str:
-        """Name the schema of a list.
-
-        Args:
-            params: type of the items, as pydantic gives it.
-
-        Returns:
-            The name, as clients see it.
-        """
+        """Name the schema of a list."""
         return listing_name(params, "List")
 
 

@@ -41,11 +41,7 @@ class ProportionView(View):
 
     @classmethod
     def from_proportion(cls, found: Proportion) -> ProportionView:
-        """Make a view of a proportion.
-
-        Args:
-            found: of the worlds.
-        """
+        """Make a view of a proportion."""
         return cls(count=found.count, share=found.share, low=found.low, high=found.high)
 
 
@@ -71,11 +67,7 @@ class SpreadView(View):
 
     @classmethod
     def from_spread(cls, spread: Spread) -> SpreadView:
-        """Make a view of a spread.
-
-        Args:
-            spread: over the worlds.
-        """
+        """Make a view of a spread."""
         return cls(
             quantiles=[finite(value) for value in spread.quantiles],
             worst=finite(spread.worst),
@@ -109,13 +101,7 @@ class CertifiedScenarioView(View):
     def from_case(
         cls, case: CaseResult, names: list[str], *, held_out: bool
     ) -> CertifiedScenarioView:
-        """Make a view of a scenario.
-
-        Args:
-            case: of the certificate.
-            names: of its objectives.
-            held_out: whether the design was not tuned in it.
-        """
+        """Make a view of a scenario."""
         return cls(
             held_out=held_out,
             statuses={status.label: count for status, count in case.statuses.items()},
@@ -157,12 +143,7 @@ class WorldView(View):
 
     @classmethod
     def from_world(cls, found: WorldOutcome, job_id: str) -> WorldView:
-        """Make a view of a world.
-
-        Args:
-            found: what it came to.
-            job_id: identifier of the job.
-        """
+        """Make a view of a world."""
         return cls(
             world=found.index,
             iteration=found.iteration,
@@ -190,11 +171,7 @@ class InfluenceView(View):
 
     @classmethod
     def from_influence(cls, found: Influence) -> InfluenceView:
-        """Make a view of an influence.
-
-        Args:
-            found: of one perturbation.
-        """
+        """Make a view of an influence."""
         return cls(name=found.name, correlation=found.correlation, low=found.low, high=found.high)
 
 
@@ -215,11 +192,7 @@ class ComparedView(View):
 
     @classmethod
     def from_compared(cls, found: Compared) -> ComparedView:
-        """Make a view of a comparison.
-
-        Args:
-            found: of one quantity.
-        """
+        """Make a view of a comparison."""
         return cls(
             ours=finite(found.ours),
             theirs=finite(found.theirs),
@@ -241,12 +214,7 @@ class ComparedScenarioView(View):
 
     @classmethod
     def from_case(cls, case: ComparedCase, names: list[str]) -> ComparedScenarioView:
-        """Make a view of a scenario.
-
-        Args:
-            case: of an engine.
-            names: of its objectives.
-        """
+        """Make a view of a scenario."""
         return cls(
             ours=case.ours.label,
             theirs=case.theirs.label,
@@ -269,12 +237,7 @@ class ComparedEngineView(View):
 
     @classmethod
     def from_engine(cls, engine: ComparedEngine, names: list[str]) -> ComparedEngineView:
-        """Make a view of an engine.
-
-        Args:
-            engine: of the certificate.
-            names: of the objectives.
-        """
+        """Make a view of an engine."""
         return cls(
             description=ENGINES[engine.name],
             fitness=ComparedView.from_compared(engine.fitness),

@@ -41,11 +41,7 @@ class ObjectiveView(View):
 
     @classmethod
     def from_objective(cls, objective: Objective) -> ObjectiveView:
-        """Make a view of an objective.
-
-        Args:
-            objective: as the simulator declares it.
-        """
+        """Make a view of an objective."""
         return cls(name=objective.name, unit=objective.unit, description=objective.description)
 
 
@@ -159,29 +155,13 @@ _EVALUATIONS: Final = TypeAdapter(list[EvaluationView])
 
 
 def evaluation_views(evaluations: Sequence[Evaluation], spec: Spec) -> list[EvaluationView]:
-    """Make views of evaluations of one job.
-
-    Args:
-        evaluations: n of them.
-        spec: of their job, from which utilities are derived.
-
-    Returns:
-        n views, in the same order.
-    """
+    """Make views of evaluations of one job."""
     # Validated at once: a call for each result takes longer than all else.
     return _EVALUATIONS.validate_python(_documents(evaluations, spec))
 
 
 def encoded_evaluations(evaluations: Sequence[Evaluation], spec: Spec) -> bytes:
-    """Encode views of evaluations of one job, of which none is made.
-
-    Args:
-        evaluations: n of them.
-        spec: of their job.
-
-    Returns:
-        The JSON of a `CatalogueView` of `evaluation_views`, byte for byte.
-    """
+    """Encode views of evaluations of one job, of which none is made."""
     return to_json({"items": _documents(evaluations, spec)})
 
 
@@ -216,18 +196,7 @@ def case_results(
     values: NDArray[np.float64],
     log_utilities: NDArray[np.float64],
 ) -> dict[str, ScenarioResultView]:
-    """Make views of one design in K cases.
-
-    Args:
-        names: K names of the cases.
-        objectives: m, columns of `values`.
-        statuses: (K,) values of `gaitswarm.sim.outcome.Status`.
-        values: (K, m) raw objectives, in their units, NaN where there is none.
-        log_utilities: (K,) logarithms of the utilities, +inf for a failed case.
-
-    Returns:
-        K views by name, in the same order.
-    """
+    """Make views of one design in K cases."""
     columns = [objective.name for objective in objectives]
     found = _results(names, columns, statuses, values, log_utilities)
     return {name: ScenarioResultView.model_validate(result) for name, result in found.items()}
@@ -261,12 +230,5 @@ def _finite_all(row: Sequence[float]) -> list[float | None]:
 
 
 def utility(log_utility: float) -> float | None:
-    """Make a utility of its logarithm.
-
-    Args:
-        log_utility: +inf for a failed case.
-
-    Returns:
-        The utility, None where it is not finite.
-    """
+    """Make a utility of its logarithm."""
     return finite(exponential(log_utility))

@@ -27,11 +27,7 @@ class LossView(View):
 
     @classmethod
     def from_loss(cls, loss: Interval) -> LossView:
-        """Make a view of a loss.
-
-        Args:
-            loss: +inf where the design fails.
-        """
+        """Make a view of a loss."""
         return cls(value=finite(loss.value), low=finite(loss.low), high=finite(loss.high))
 
 
@@ -59,13 +55,7 @@ class FamilyView(View):
     def from_family(
         cls, family: Family, names: Sequence[str], columns: EvaluationColumns
     ) -> FamilyView:
-        """Make a view of a family.
-
-        Args:
-            family: some scenarios.
-            names: of all scenarios, in order.
-            columns: the evaluations that were judged.
-        """
+        """Make a view of a family."""
         return cls(
             scenarios=[names[index] for index in family.scenarios],
             correlation=family.correlation,
@@ -96,13 +86,7 @@ class LeftOutView(View):
     def from_left_out(
         cls, left: LeftOut, names: Sequence[str], columns: EvaluationColumns
     ) -> LeftOutView:
-        """Make a view of one scenario's absence.
-
-        Args:
-            left: the scenario and the others.
-            names: of all scenarios, in order.
-            columns: the evaluations that were judged.
-        """
+        """Make a view of one scenario's absence."""
         return cls(
             scenario=names[left.scenario],
             family=FamilyView.from_family(left.family, names, columns),

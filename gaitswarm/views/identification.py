@@ -49,11 +49,7 @@ class ChoiceView(View):
 
     @classmethod
     def from_evidence(cls, choice: ChoiceEvidence) -> ChoiceView:
-        """Make a view of one choice.
-
-        Args:
-            choice: what the runs say of it.
-        """
+        """Make a view of one choice."""
         return cls(
             name=choice.name,
             fitness=finite(min(choice.fitness)),
@@ -96,11 +92,7 @@ class ParameterView(View):
 
     @classmethod
     def from_parameter(cls, found: ParameterIdentifiability) -> ParameterView:
-        """Make a view of one parameter.
-
-        Args:
-            found: what the runs say of it.
-        """
+        """Make a view of one parameter."""
         shown = found.variable.shown
         return cls(
             name=found.variable.name,
@@ -176,12 +168,7 @@ class RecordingView(View):
 
     @classmethod
     def from_walk(cls, recording_id: str, walk: RecordedWalk) -> RecordingView:
-        """Make a view of a recording.
-
-        Args:
-            recording_id: as the store gave it.
-            walk: the recording.
-        """
+        """Make a view of a recording."""
         return cls(
             id=recording_id,
             scenario=walk.scenario.name,
@@ -222,11 +209,7 @@ class RecordingEntryView(View):
 
     @classmethod
     def from_entry(cls, entry: RecordingEntry) -> RecordingEntryView:
-        """Make a view of a recording in a list.
-
-        Args:
-            entry: as the store has it.
-        """
+        """Make a view of a recording in a list."""
         return cls(
             id=entry.id,
             created_at=entry.created_at,
@@ -280,13 +263,7 @@ class MeasuredWalkView(View):
     def from_log(
         cls, recording: RecordingView, log: MeasuredLog, pair: Synchronised
     ) -> MeasuredWalkView:
-        """Make a view of what was read.
-
-        Args:
-            recording: that was made of it.
-            log: all of it.
-            pair: its whole cycles beside the simulated ones.
-        """
+        """Make a view of what was read."""
         return cls(
             recording=recording,
             rows=len(log.time),

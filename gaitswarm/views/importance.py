@@ -23,11 +23,7 @@ class IndexIntervalView(View):
 
     @classmethod
     def from_interval(cls, interval: Interval) -> IndexIntervalView:
-        """Make a view of an index.
-
-        Args:
-            interval: The index as it was estimated.
-        """
+        """Make a view of an index."""
         return cls(value=interval.value, low=interval.low, high=interval.high)
 
 

@@ -77,14 +77,7 @@ class HistoryIterationView(IterationView):
 
 
 def encoded_iterations(iterations: Sequence[Iteration]) -> Iterator[bytes]:
-    """Encode views of iterations, of which none is made.
-
-    Args:
-        iterations: as the store lists them.
-
-    Yields:
-        The JSON of each one's `IterationView`, byte for byte.
-    """
+    """Encode views of iterations, of which none is made."""
     return (to_json(_at_a_glance(iteration)) for iteration in iterations)
 
 

@@ -20,11 +20,7 @@ class JobFacetsView(View):
 
     @classmethod
     def from_counts(cls, counts: FacetCounts) -> JobFacetsView:
-        """Make a view of counts.
-
-        Args:
-            counts: As they were counted.
-        """
+        """Make a view of counts."""
         return cls(
             total=counts.total,
             states=counts.states,

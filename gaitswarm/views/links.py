@@ -24,14 +24,7 @@ _COMMANDS: Final = {
 
 
 def job_links(job: Job) -> dict[str, str]:
-    """Say where a client goes on from a job.
-
-    Args:
-        job: as it was read.
-
-    Returns:
-        Paths of its resources, and of the commands that its state allows, by name.
-    """
+    """Say where a client goes on from a job."""
     here = f"{PREFIX}/jobs/{job.id}"
     names = [*_RESOURCES, *(_RESOURCES_BY_SPEC if job.readable else ())]
     if isinstance(job.stored_spec, JobSpec):

@@ -31,11 +31,7 @@ class LinkMeshView(View):
 
     @classmethod
     def from_mesh(cls, mesh: VisualMesh) -> LinkMeshView:
-        """Make a view of a mesh.
-
-        Args:
-            mesh: as the simulator has it.
-        """
+        """Make a view of a mesh."""
         return cls(name=mesh.name, origin=mesh.origin, scale=mesh.scale, colour=mesh.colour)
 
 
@@ -57,12 +53,6 @@ class MeshFileView(View):
 
     @classmethod
     def from_mesh(cls, digest: str, number: int, mesh: FoundMesh) -> MeshFileView:
-        """Make a view of a mesh.
-
-        Args:
-            digest: of its robot's URDF.
-            number: its place in the URDF.
-            mesh: as it was looked for.
-        """
+        """Make a view of a mesh."""
         url = None if mesh.path is None else f"{PREFIX}/robots/{digest}/meshes/{number}"
         return cls(name=mesh.name, format=mesh.form, url=url, problem=mesh.problem)

@@ -41,14 +41,7 @@ class NotificationView(View):
 
     @classmethod
     def from_notification(cls, found: Notification) -> NotificationView:
-        """Make the view of a notification.
-
-        Args:
-            found: As it is stored.
-
-        Returns:
-            The view.
-        """
+        """Make the view of a notification."""
         waits = found.next_attempt_at is not None
         return cls(
             id=found.id,

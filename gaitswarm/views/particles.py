@@ -62,20 +62,7 @@ def encoded_particles(
     most: int,
     objectives: bool = False,
 ) -> bytes:
-    """Encode evaluations for pictures of the whole search.
-
-    Args:
-        job: as it was read.
-        columns: its evaluations, all of them.
-        after: only iterations with a greater index; None for all.
-        most: rows at most, at least 1; more are thinned evenly in iterations, and the best of them
-            is always there.
-        objectives: whether f1 to f5 over all scenarios are to follow, as a front weighs them; only
-            a job that tunes a drive has them.
-
-    Returns:
-        `framed` ParticlesHeaderView and columns, one after another; NaN for what does not exist.
-    """
+    """Encode evaluations for pictures of the whole search."""
     wanted = columns.after(after)
     chosen = wanted.rows(thinned(wanted, most))
     rows = len(chosen)

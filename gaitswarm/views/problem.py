@@ -30,16 +30,7 @@ class FieldErrorView(View):
 
     @classmethod
     def from_message(cls, field: str, message: str) -> FieldErrorView:
-        """An error whose message may name its field.
-
-        Args:
-            field: path of the field; empty for the whole document.
-            message: what is wrong; about a whole document it may begin with the path of the field
-                that is to blame and a colon.
-
-        Returns:
-            The error, of that field if no other is known.
-        """
+        """An error whose message may name its field."""
         match = _LEADING_FIELD.match(message)
         if not field and match:
             field, message = match.groups()
@@ -68,16 +59,7 @@ class ProblemView(View):
 def field_errors(
     errors: Iterable[Mapping[str, Any]], document: Any, *, prefix: str = ""
 ) -> list[FieldErrorView]:
-    """Errors of pydantic with the paths of the document, without repeats.
-
-    Args:
-        errors: as `ValidationError.errors()`, with locations from the document's root.
-        document: what was validated, as it was read.
-        prefix: path of the document itself, if it is part of another.
-
-    Returns:
-        One error for every field and message, in the order in which they were found.
-    """
+    """Errors of pydantic with the paths of the document, without repeats."""
     found = []
     for error in errors:
         if _follows_from_others(error):

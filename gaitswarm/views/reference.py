@@ -30,14 +30,7 @@ class ReferenceView(View):
 
     @classmethod
     def from_reference(cls, reference: Reference | None) -> ReferenceView | None:
-        """Make a view of a reference.
-
-        Args:
-            reference: As it is known of a job.
-
-        Returns:
-            The view; None where nothing is known, or nothing was published.
-        """
+        """Make a view of a reference."""
         if reference is None or reference.name is None:
             return None
         return cls(name=reference.name, kind=reference.kind, fitness=finite(reference.fitness))
@@ -65,12 +58,7 @@ class JobReferenceView(View):
 
     @classmethod
     def from_comparison(cls, job: Job, reason: str | None) -> JobReferenceView:
-        """Make a view of a job with its reference.
-
-        Args:
-            job: With what is known of its reference.
-            reason: Why there is no gain, if there is none.
-        """
+        """Make a view of a job with its reference."""
         return cls(
             id=job.id,
             reference=ReferenceView.from_reference(job.reference),

@@ -68,11 +68,7 @@ class ShapeView(View):
 
     @classmethod
     def from_shape(cls, shape: Shape) -> ShapeView:
-        """Make a view of a solid.
-
-        Args:
-            shape: as the simulator has it.
-        """
+        """Make a view of a solid."""
         return cls(type=shape.type, size=shape.size, origin=shape.origin, role=shape.role)
 
 
@@ -90,11 +86,7 @@ class LinkView(View):
 
     @classmethod
     def from_link(cls, link: VisibleLink) -> LinkView:
-        """Make a view of a link.
-
-        Args:
-            link: as the simulator has it.
-        """
+        """Make a view of a link."""
         shapes = [ShapeView.from_shape(shape) for shape in link.shapes]
         meshes = [LinkMeshView.from_mesh(mesh) for mesh in link.meshes]
         return cls(name=link.name, parent=link.parent, shapes=shapes, meshes=meshes)
@@ -191,20 +183,7 @@ def encoded_replay(
     objectives: NDArray[np.float64],
     urdf: str | None = None,
 ) -> bytes:
-    """Encode a walk to be looked at.
-
-    Args:
-        walk: its frames; it ends before the first one that float32 cannot hold.
-        robot: that walked.
-        scenario: as it was walked, with what the design says of the gait.
-        rate: frames a second, as asked for [Hz].
-        status: how the walk ended.
-        objectives: (6,) raw objectives f1..f6, in their units, NaN where there is none.
-        urdf: digest of the robot's URDF, if its meshes may be asked for.
-
-    Returns:
-        `framed` ReplayHeaderView and numbers by frame.
-    """
+    """Encode a walk to be looked at."""
     legs = [leg.name for leg in robot.legs]
     channels = _channels(walk, robot.joint_names, legs)
     frames = _frames([getattr(walk, channel.name) for channel in channels])
@@ -248,17 +227,7 @@ class WalkReplay:
 
 
 def decoded_replay(content: bytes) -> WalkReplay:
-    """The walk in the bytes of `encoded_replay`.
-
-    Args:
-        content: All of them.
-
-    Returns:
-        Its header, and its frames by channel.
-
-    Raises:
-        ValueError: They are not those of a replay, or are cut off.
-    """
+    """The walk in the bytes of `encoded_replay`."""
     text, numbers = unframed(content)
     header = ReplayHeaderView.model_validate_json(text)
     frames = numbers.reshape(header.frames, -1)

@@ -34,11 +34,7 @@ class IndexView(View):
 
     @classmethod
     def from_interval(cls, interval: Interval | None) -> IndexView | None:
-        """Make a view of an estimate.
-
-        Args:
-            interval: the estimate, or None.
-        """
+        """Make a view of an estimate."""
         if interval is None:
             return None
         return cls(value=interval.value, low=interval.low, high=interval.high)
@@ -97,12 +93,7 @@ class ScenarioRobustnessView(View):
     def from_sensitivity(
         cls, found: Sensitivity, variables: Sequence[Variable]
     ) -> ScenarioRobustnessView:
-        """Make a view of one scenario's part.
-
-        Args:
-            found: what was estimated.
-            variables: those that were changed.
-        """
+        """Make a view of one scenario's part."""
         names = [variable.name for variable in variables]
         return cls(
             index=IndexView.from_interval(found.index),

@@ -66,11 +66,7 @@ class WalkLogView(View):
 
     @classmethod
     def from_log(cls, log: WalkLog) -> WalkLogView:
-        """Make a view of all arrays of a log; what is not finite is null.
-
-        Args:
-            log: of one walk.
-        """
+        """Make a view of all arrays of a log; what is not finite is null."""
         # model_construct: hundreds of thousands of numbers that need no checking again.
         return cls.model_construct(
             rate=LOG_RATE,
@@ -112,11 +108,7 @@ class MeasurementsView(View):
 
     @classmethod
     def from_row(cls, row: NDArray[np.float64]) -> MeasurementsView:
-        """Make a view of one walk's measurements.
-
-        Args:
-            row: (5,) in the order of `gaitswarm.sim.outcome.MEASUREMENTS`, NaN where there is none.
-        """
+        """Make a view of one walk's measurements."""
         return cls(**dict(zip(MEASUREMENT_NAMES, map(finite, row.tolist()), strict=True)))
 
 
@@ -137,11 +129,7 @@ class PlannedGaitView(View):
 
     @classmethod
     def from_stability(cls, stability: Stability) -> PlannedGaitView:
-        """Make a view of a planned gait.
-
-        Args:
-            stability: of it.
-        """
+        """Make a view of a planned gait."""
         return cls(
             duty_factor=stability.duty_factor,
             fewest_feet=stability.fewest_feet,
@@ -210,21 +198,7 @@ class SimulationView(View):
         logs: Sequence[WalkLog | None],
         gaits: Sequence[Stability] = (),
     ) -> SimulationView:
-        """Make a view of one design's walks, one in each of K scenarios.
-
-        Args:
-            robot: that walked, as it was asked for.
-            controller: that drove it.
-            design: value of every variable by name.
-            preference: by which to judge.
-            precision: of the physics' numbers.
-            names: K names of the scenarios.
-            statuses: (K,) values of `gaitswarm.sim.outcome.Status`.
-            objectives: (K, 6) raw objectives f1..f6, in their units, NaN where there is none.
-            measurements: (K, 5) as in `MEASUREMENTS`, NaN where there is none.
-            logs: K, or none if they were not asked for; None for a robot that never moved.
-            gaits: K planned gaits, or none to leave them out.
-        """
+        """Make a view of one design's walks, one in each of K scenarios."""
         judged = judge(objectives[None], (statuses != Status.OK)[None], preference)
         results = case_results(names, OBJECTIVES, statuses, objectives, judged.log_utilities[0])
         recorded = [None if log is None else WalkLogView.from_log(log) for log in logs]

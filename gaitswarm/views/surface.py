@@ -57,11 +57,7 @@ class RuleView(View):
 
     @classmethod
     def from_rule(cls, rule: Rule) -> RuleView:
-        """Make a view of a rule.
-
-        Args:
-            rule: as the inference has it.
-        """
+        """Make a view of a rule."""
         return cls(antecedents=dict(rule.antecedents), then=rule.consequent, weight=rule.weight)
 
 
@@ -108,11 +104,7 @@ class FuzzyOutputView(UniverseView):
 
     @classmethod
     def from_surface(cls, surface: Surface) -> FuzzyOutputView:
-        """Make a view of one output.
-
-        Args:
-            surface: of the inference and of its table, over one grid.
-        """
+        """Make a view of one output."""
         axes = surface.source.axes
         velocity = axes.get("velocity")
         return cls.model_construct(

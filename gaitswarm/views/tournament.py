@@ -36,11 +36,7 @@ class EntrantView(View):
 
     @classmethod
     def from_entrant(cls, entrant: Entrant) -> EntrantView:
-        """Make a view of a method's part.
-
-        Args:
-            entrant: with its job, as it was read.
-        """
+        """Make a view of a method's part."""
         spec, job = entrant.spec, entrant.job
         variables = spec.design_space().variables
         return cls(
@@ -104,11 +100,7 @@ class ResampledView(View):
 
     @classmethod
     def from_interval(cls, interval: Interval) -> ResampledView:
-        """Make a view of an estimate.
-
-        Args:
-            interval: with its bounds.
-        """
+        """Make a view of an estimate."""
         return cls(
             value=finite(interval.value), low=finite(interval.low), high=finite(interval.high)
         )
@@ -145,12 +137,7 @@ class StandingView(View):
 
     @classmethod
     def from_standing(cls, standing: Standing, looked_at: tuple[int, ...]) -> StandingView:
-        """Make a view of a standing.
-
-        Args:
-            standing: of a method.
-            looked_at: evaluations of its medians.
-        """
+        """Make a view of a standing."""
         medians = zip(looked_at, standing.medians, strict=True)
         return cls(
             rank=standing.rank,
@@ -214,11 +201,7 @@ class ProfileView(View):
 
     @classmethod
     def from_profile(cls, profile: Profile) -> ProfileView:
-        """Make a view of a profile.
-
-        Args:
-            profile: of all methods.
-        """
+        """Make a view of a profile."""
         return cls(
             precision=profile.precision,
             budgets=profile.budgets.tolist(),
@@ -279,11 +262,7 @@ class MethodRunsView(View):
 
     @classmethod
     def from_runs(cls, runs: Runs) -> MethodRunsView:
-        """Make a view of runs.
-
-        Args:
-            runs: of a method on a problem.
-        """
+        """Make a view of runs."""
         lower, median, upper = ([finite(value) for value in row] for row in runs.quartiles())
         return cls(
             lower=lower,

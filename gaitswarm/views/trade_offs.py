@@ -56,14 +56,7 @@ class TradeOffDesignView(View):
     def from_row(
         cls, row: int, vectors: NDArray[np.float64], columns: EvaluationColumns, spec: JobSpec
     ) -> TradeOffDesignView:
-        """Make a view of one evaluation.
-
-        Args:
-            row: of the columns.
-            vectors: (r, 5) objectives over all scenarios.
-            columns: evaluations of the job.
-            spec: of the job.
-        """
+        """Make a view of one evaluation."""
         return TradeOffDesignView(**_fields(row, vectors, columns, spec))
 
 
@@ -309,14 +302,7 @@ class PreferenceForView(View):
 
 
 def by_objective(values: NDArray[np.float64]) -> dict[str, float]:
-    """Name numbers by their objectives.
-
-    Args:
-        values: (5,) one for each of f1 to f5.
-
-    Returns:
-        The numbers by the objectives' names.
-    """
+    """Name numbers by their objectives."""
     return dict(zip(OBJECTIVE_NAMES, values.tolist(), strict=True))
 
 

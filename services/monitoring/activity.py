@@ -111,14 +111,7 @@ class WorkerHealth:
     error: str | None = None
 
     def after(self, task: TaskSpan) -> WorkerHealth:
-        """With another task.
-
-        Args:
-            task: That has ended.
-
-        Returns:
-            The worker as it is then.
-        """
+        """With another task."""
         failed = task.error is not None
         return replace(
             self,
@@ -157,11 +150,7 @@ class _Kept:
 
 
 class Activity:
-    """The last of what happened to the jobs that were heard of last. Thread-safe.
-
-    Args:
-        clock: Seconds since 1970 [s]; replaced in tests.
-    """
+    """The last of what happened to the jobs that were heard of last. Thread-safe."""
 
     def __init__(self, clock: Callable[[], float] = time.time) -> None:
         self._clock = clock
@@ -169,14 +158,7 @@ class Activity:
         self._jobs: OrderedDict[str, _Kept] = OrderedDict()
 
     def of(self, job_id: str) -> JobActivity | None:
-        """What is known of a job.
-
-        Args:
-            job_id: Of the job.
-
-        Returns:
-            It; None for a job that did not run here lately.
-        """
+        """What is known of a job."""
         with self._lock:
             kept = self._jobs.get(job_id)
             if kept is None:
@@ -187,23 +169,12 @@ class Activity:
             )
 
     def watched_evaluator(self, inner: Evaluator) -> Evaluator:
-        """Wrap an evaluator, so that what it is asked for is taken note of.
-
-        Args:
-            inner: Runs the walks; its owner's to close.
-
-        Returns:
-            An evaluator that answers and raises as the other one does.
-        """
+        """Wrap an evaluator, so that what it is asked for is taken note of."""
         return cast(Evaluator, _WatchedEvaluator(inner, self))
 
     @contextmanager
     def log_kept(self) -> Iterator[None]:
-        """Take note of messages that belong to a job, as far as the log has them, in the block.
-
-        Yields:
-            Nothing.
-        """
+        """Take note of messages that belong to a job, as far as the log has them, in the block."""
         handler = _Keeper(self)
         root = logging.getLogger()
         root.addHandler(handler)
@@ -213,22 +184,13 @@ class Activity:
             root.removeHandler(handler)
 
     def begun(self, request: EvaluationRequest) -> None:
-        """Note that an iteration is evaluated.
-
-        Args:
-            request: Of the iteration.
-        """
+        """Note that an iteration is evaluated."""
         span = IterationSpan(request.iteration, self._clock(), len(request.designs))
         with self._lock:
             self._of(request.job_id).iterations.append(span)
 
     def ended(self, request: EvaluationRequest, error: str | None) -> None:
-        """Note what came of it.
-
-        Args:
-            request: Of the iteration.
-            error: Why it has no result; None if it has one.
-        """
+        """Note what came of it."""
         now = self._clock()
         with self._lock:
             spans = self._of(request.job_id).iterations
@@ -237,12 +199,7 @@ class Activity:
                 spans.append(replace(span, seconds=now - span.begun, error=error))
 
     def task(self, request: EvaluationRequest, report: TaskReport) -> None:
-        """Note a task that has ended.
-
-        Args:
-            request: Of the iteration to which it belongs.
-            report: What it was.
-        """
+        """Note a task that has ended."""
         span = TaskSpan(
             request.iteration,
             report.host,
@@ -259,12 +216,7 @@ class Activity:
             kept.workers[span.worker] = known.after(span)
 
     def message(self, job_id: str, message: Message) -> None:
-        """Note a line of the log.
-
-        Args:
-            job_id: To which it belongs.
-            message: The line.
-        """
+        """Note a line of the log."""
         with self._lock:
             self._of(job_id).messages.append(message)
 

@@ -18,28 +18,17 @@ class QueueCollector(Collector):
     """Jobs of a database, counted anew whenever metrics are asked for.
 
     While the database is away, the counts are missing and `gaitswarm_database_up` is 0.
-
-    Args:
-        store: Gives the store; called for every answer.
     """
 
     def __init__(self, store: Callable[[], Store]) -> None:
         self._store = store
 
     def describe(self) -> list[Metric]:
-        """Nothing: to register a collector needs no database.
-
-        Returns:
-            No metric.
-        """
+        """Nothing: to register a collector needs no database."""
         return []
 
     def collect(self) -> Iterator[Metric]:
-        """Count the jobs.
-
-        Yields:
-            The metrics.
-        """
+        """Count the jobs."""
         up = GaugeMetricFamily("gaitswarm_database_up", "Whether the database answers: 1 or 0")
         try:
             queue = self._store().queue()
@@ -91,21 +80,13 @@ class WorkerLoad(Protocol):
 
 
 class WorkersCollector(Collector):
-    """Slots and queues of the workers, as they are when metrics are asked for.
-
-    Args:
-        loads: Gives the load by kind of workers: `threads`, `ray`.
-    """
+    """Slots and queues of the workers, as they are when metrics are asked for."""
 
     def __init__(self, loads: Callable[[], Mapping[str, WorkerLoad]]) -> None:
         self._loads = loads
 
     def collect(self) -> Iterator[Metric]:
-        """Look at the workers.
-
-        Yields:
-            The metrics.
-        """
+        """Look at the workers."""
         slots = GaugeMetricFamily(
             "gaitswarm_worker_slots", "Tasks that can run at the same time", labels=["workers"]
         )

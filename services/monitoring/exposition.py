@@ -34,11 +34,6 @@ class MetricsAccess:
 
     While the database is away, a token that was valid when it was last looked up still is: metrics
     are needed most then.
-
-    Args:
-        tokens: Gives the memory of tokens; called only for a request with a token.
-        required: Whether requests without a token are refused.
-        clock: Monotonic time [s].
     """
 
     def __init__(
@@ -54,17 +49,7 @@ class MetricsAccess:
         self._looked_up: dict[str, float] = {}
 
     def allows(self, authorization: str) -> bool:
-        """Look a request's token up. Every token may read.
-
-        Args:
-            authorization: The header of the request, "" where it has none.
-
-        Returns:
-            False for a token that is unknown or was revoked, and for none where one is required.
-
-        Raises:
-            StoreUnavailable: The token cannot be looked up, and was not known before.
-        """
+        """Look a request's token up. Every token may read."""
         scheme, _, secret = authorization.partition(" ")
         if scheme.lower() != "bearer":
             return not self._required
@@ -96,23 +81,7 @@ def metrics_server(
     host: str,
     port: int,
 ) -> Iterator[str]:
-    """Serve metrics and a probe of liveness on a port of their own inside the block.
-
-    Args:
-        metrics: What is served, on the path /metrics.
-        access: Who may read them.
-        names: That the port goes by; requests for another one are refused.
-        trouble: Why this process has to be started anew, None while it works: for /healthz, which
-            everybody may ask, and which asks no database.
-        host: Address to listen on.
-        port: 0 takes a free one.
-
-    Yields:
-        URL of the metrics.
-
-    Raises:
-        EvaluatorUnavailable: The address cannot be bound.
-    """
+    """Serve metrics and a probe of liveness on a port of their own inside the block."""
 
     def answer(environ: dict[str, Any], start: Callable[..., Any]) -> Iterable[bytes]:
         def plain(status: HTTPStatus, text: str, *headers: tuple[str, str]) -> Iterable[bytes]:

@@ -13,27 +13,14 @@ from ipaddress import ip_address
 
 
 class HostNames:
-    """Names of one server, beside its addresses.
-
-    Args:
-        host: That it listens on.
-        allowed: Further ones, as its owner gives them: `name` or `name:port`. Beside both, it goes
-            by this machine's own name and localhost.
-    """
+    """Names of one server, beside its addresses."""
 
     def __init__(self, host: str, allowed: Iterable[str]) -> None:
         own = ("localhost", host, socket.gethostname())
         self._names = frozenset(name.lower() for name in (*own, *allowed))
 
     def refusal(self, host: str | None) -> str | None:
-        """Why a request is not answered.
-
-        Args:
-            host: Its header Host; None if it has none.
-
-        Returns:
-            None if it is to be answered; else what is to be done about it.
-        """
+        """Why a request is not answered."""
         if host is None or self._knows(host.lower()):
             return None
         return (

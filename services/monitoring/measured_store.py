@@ -23,15 +23,7 @@ _LOSSES_KEPT: Final = 256
 
 
 def measured(store: Store, metrics: Metrics) -> Store:
-    """Wrap a store, so that what passes through it is measured.
-
-    Args:
-        store: Does the work; its owner's to close.
-        metrics: Are told.
-
-    Returns:
-        A store that answers and raises as the other one does.
-    """
+    """Wrap a store, so that what passes through it is measured."""
     return cast(Store, _MeasuredStore(store, metrics))
 
 

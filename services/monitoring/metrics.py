@@ -153,11 +153,7 @@ class Metrics:
 
     @contextmanager
     def open_stream(self) -> Iterator[OpenStream]:
-        """Count an event stream as open inside the block.
-
-        Yields:
-            What is told of the events that are sent.
-        """
+        """Count an event stream as open inside the block."""
         self.streams.inc()
         try:
             yield OpenStream(self.stream_lag, datetime.now(UTC))
@@ -165,49 +161,26 @@ class Metrics:
             self.streams.dec()
 
     def exposition(self, accept: str) -> tuple[bytes, str]:
-        """Write down all metrics as they are now.
-
-        Args:
-            accept: Header of the request, which may ask for OpenMetrics.
-
-        Returns:
-            The text and its media type.
-        """
+        """Write down all metrics as they are now."""
         encode, media_type = choose_encoder(accept)
         return encode(_Exposed(self.registry)), media_type
 
 
 class OpenStream:
-    """An event stream under way; see `Metrics.open_stream`.
-
-    Args:
-        lag: Is told how late events are.
-        opened: When the stream was opened, aware.
-    """
+    """An event stream under way; see `Metrics.open_stream`."""
 
     def __init__(self, lag: Histogram, opened: datetime) -> None:
         self._lag = lag
         self._opened = opened
 
     def sent(self, committed_at: datetime) -> None:
-        """Note the event of an iteration, unless it was committed before the stream was opened.
-
-        Args:
-            committed_at: When the iteration was committed, by the database's clock.
-        """
+        """Note the event of an iteration, unless it was committed before the stream was opened."""
         if committed_at >= self._opened:
             self._lag.observe(max(0.0, (datetime.now(UTC) - committed_at).total_seconds()))
 
 
 def failure_cause(error: str | None) -> str:
-    """Find what a job's failure is counted under.
-
-    Args:
-        error: With which it failed, for people.
-
-    Returns:
-        One of `FAILURE_CAUSES`; `other` for what is none of the known causes.
-    """
+    """Find what a job's failure is counted under."""
     return next((cause for words, cause in _CAUSES if words in (error or "")), _OTHER)
 
 

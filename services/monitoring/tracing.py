@@ -25,11 +25,7 @@ from gaitswarm.sim.outcome import Outcome
 
 
 def exporting_tracing() -> Tracing:
-    """Tracing that sends its spans by OTLP over HTTP, as OpenTelemetry's variables say.
-
-    Returns:
-        The tracing; whoever opens it closes it.
-    """
+    """Tracing that sends its spans by OTLP over HTTP, as OpenTelemetry's variables say."""
     from opentelemetry.exporter.otlp.proto.http.trace_exporter import (  # noqa: PLC0415
         OTLPSpanExporter,
     )
@@ -43,9 +39,6 @@ class Tracing:
 
     A job's span is from its claim to its release or end; an iteration's from its evaluation to its
     commit; a task's as long as workers had it.
-
-    Args:
-        processor: Takes the spans when they end.
     """
 
     def __init__(self, processor: SpanProcessor) -> None:
@@ -59,25 +52,11 @@ class Tracing:
         self._iterations: dict[str, tuple[int, Span]] = {}
 
     def traced_store(self, store: Store) -> Store:
-        """Wrap a store, so that claims, commits and releases begin and end spans.
-
-        Args:
-            store: Does the work.
-
-        Returns:
-            A store that answers and raises as the other one does.
-        """
+        """Wrap a store, so that claims, commits and releases begin and end spans."""
         return cast(Store, _TracedStore(store, self))
 
     def traced_evaluator(self, evaluator: Evaluator) -> Evaluator:
-        """Wrap an evaluator, so that evaluations and tasks have spans.
-
-        Args:
-            evaluator: Does the work.
-
-        Returns:
-            An evaluator that answers and raises as the other one does.
-        """
+        """Wrap an evaluator, so that evaluations and tasks have spans."""
         return _TracedEvaluator(evaluator, self)
 
     def close(self) -> None:
@@ -85,11 +64,7 @@ class Tracing:
         self._provider.shutdown()
 
     def job_begins(self, claim: Claim) -> None:
-        """Begin the span of a job's run.
-
-        Args:
-            claim: On the job.
-        """
+        """Begin the span of a job's run."""
         job = claim.job
         attributes: dict[str, str | int] = {
             "gaitswarm.job.id": job.id,
@@ -101,13 +76,7 @@ class Tracing:
             self._jobs[job.id] = self._tracer.start_span("job", attributes=attributes)
 
     def job_ends(self, job_id: str, state: str, error: str | None = None) -> None:
-        """End the span of a job's run, and of an iteration that is under way.
-
-        Args:
-            job_id: Of the job; nothing happens if it has no span.
-            state: How this process leaves it.
-            error: Why it failed, or was lost.
-        """
+        """End the span of a job's run, and of an iteration that is under way."""
         with self._lock:
             job = self._jobs.pop(job_id, None)
             _, iteration = self._iterations.pop(job_id, (0, None))
@@ -119,14 +88,7 @@ class Tracing:
                 span.end()
 
     def iteration(self, request: EvaluationRequest) -> Span | None:
-        """Find the span of an iteration, which begins with its first evaluation.
-
-        Args:
-            request: Of the evaluation.
-
-        Returns:
-            The span; None for a job that has none.
-        """
+        """Find the span of an iteration, which begins with its first evaluation."""
         with self._lock:
             job = self._jobs.get(request.job_id)
             if job is None:
@@ -146,12 +108,7 @@ class Tracing:
             return span
 
     def iteration_ends(self, job_id: str, done: CompletedIteration) -> None:
-        """End the span of an iteration that is committed.
-
-        Args:
-            job_id: Of the job.
-            done: What it came to.
-        """
+        """End the span of an iteration that is committed."""
         with self._lock:
             _, span = self._iterations.pop(job_id, (0, None))
         if span is not None:
@@ -159,12 +116,7 @@ class Tracing:
             span.end()
 
     def task(self, parent: Span, report: TaskReport) -> None:
-        """Make the span of a task that has ended.
-
-        Args:
-            parent: Of the iteration.
-            report: What the task was, and how long it took.
-        """
+        """Make the span of a task that has ended."""
         ended = time.time_ns()
         span = self._tracer.start_span(
             "task",

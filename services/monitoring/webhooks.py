@@ -37,17 +37,7 @@ _log = logging.getLogger(__name__)
 
 
 def signature(secret: str, message_id: str, timestamp: int, body: bytes) -> str:
-    """Sign a notification.
-
-    Args:
-        secret: Shared with the receivers; `whsec_` and base64, or any text.
-        message_id: Of the notification.
-        timestamp: Of the attempt, in seconds since 1970.
-        body: As it is sent.
-
-    Returns:
-        Value of the header `webhook-signature`.
-    """
+    """Sign a notification."""
     signed = b".".join((message_id.encode(), str(timestamp).encode(), body))
     digest = hmac.new(_key(secret), signed, hashlib.sha256).digest()
     return f"v1,{base64.b64encode(digest).decode()}"
@@ -67,11 +57,6 @@ class Notifier:
 
     Any number of processes may have one: each notification is one's at a time. A notification is
     delivered at least once; a receiver knows by `webhook-id` what it has had.
-
-    Args:
-        store: Where the notifications are.
-        hosts: That may be sent to, each with or without a port.
-        secret: Signs what is sent; None: nothing is signed.
     """
 
     def __init__(self, store: Store, hosts: Collection[str], secret: str | None) -> None:

@@ -27,11 +27,7 @@ class Scope(StrEnum):
     """To command every job."""
 
     def allows(self, needed: Scope) -> bool:
-        """Whether a token of this scope may do what needs another one.
-
-        Args:
-            needed: by what is asked for.
-        """
+        """Whether a token of this scope may do what needs another one."""
         order = tuple(Scope)
         return order.index(self) >= order.index(needed)
 
@@ -53,32 +49,17 @@ class Token:
     revoked_at: datetime | None = None
 
     def may_command(self, owner: str | None) -> bool:
-        """Whether jobs of an owner may be paused, resumed, extended or cancelled with it.
-
-        Args:
-            owner: of the job, None where it was submitted without a token.
-        """
+        """Whether jobs of an owner may be paused, resumed, extended or cancelled with it."""
         return self.scope is Scope.ADMIN or (self.scope.allows(Scope.SUBMIT) and owner == self.name)
 
 
 def new_secret() -> str:
-    """Make the secret of a new token.
-
-    Returns:
-        ASCII letters, digits, `_` and `-`; it is shown once and never stored.
-    """
+    """Make the secret of a new token."""
     return _PREFIX + secrets.token_urlsafe(_BYTES)
 
 
 def secret_digest(secret: str) -> str:
-    """What is stored of a secret.
-
-    Args:
-        secret: as `new_secret` made it, or as somebody claims.
-
-    Returns:
-        64 hexadecimal digits of its SHA-256.
-    """
+    """What is stored of a secret."""
     return hashlib.sha256(secret.encode("utf-8", "surrogateescape")).hexdigest()
 
 
@@ -86,52 +67,16 @@ class Tokens(Protocol):
     """The port of the memory of tokens. Thread-safe; every method is one transaction."""
 
     def create(self, name: str, scope: Scope) -> tuple[Token, str]:
-        """Make a token.
-
-        Args:
-            name: 1 to 64 letters, digits, `_`, `.` and `-`, of no other token, valid or revoked.
-            scope: what it is to allow.
-
-        Returns:
-            The token and its secret, which is stored nowhere.
-
-        Raises:
-            InvalidRequest: the name cannot be one, or is taken.
-        """
+        """Make a token."""
 
     def create_first(self) -> str | None:
-        """Make a token `first` that allows everything, if there has never been any token.
-
-        Returns:
-            Its secret; None if there was a token before.
-        """
+        """Make a token `first` that allows everything, if there has never been any token."""
 
     def all(self) -> tuple[Token, ...]:
-        """Read all tokens.
-
-        Returns:
-            Valid and revoked ones, the oldest first.
-        """
+        """Read all tokens."""
 
     def revoke(self, name: str) -> Token:
-        """Let a token allow nothing from now on. Repeated, it changes nothing.
-
-        Args:
-            name: of the token.
-
-        Returns:
-            The token as it is then.
-
-        Raises:
-            NotFound: there is none of that name.
-        """
+        """Let a token allow nothing from now on. Repeated, it changes nothing."""
 
     def find(self, secret: str) -> Token | None:
-        """Find the valid token of a secret.
-
-        Args:
-            secret: as whoever asks gave it.
-
-        Returns:
-            The token; None where there is none, or it was revoked.
-        """
+        """Find the valid token of a secret."""

@@ -26,19 +26,7 @@ class Deletion:
     store: Store
 
     def keep(self, job_id: str, kept: bool, *, actor: str = LOCAL) -> Job:
-        """Protect a job from deletion, or release it.
-
-        Args:
-            job_id: id of the job.
-            kept: whether it is protected.
-            actor: name of the token that the request came with, if any; for the audit log.
-
-        Returns:
-            The job as it is then.
-
-        Raises:
-            NotFound: no job of that id.
-        """
+        """Protect a job from deletion, or release it."""
         return self.store.keep(job_id, kept, actor=actor)
 
     def delete(self, job_id: str, *, actor: str = LOCAL) -> None:
@@ -46,26 +34,12 @@ class Deletion:
 
         It is gone for everybody when this returns. `Store.purge_deleted`, which housekeeping calls,
         removes what is left of the rows of a long one.
-
-        Args:
-            job_id: id of the job.
-            actor: name of the token that the request came with, if any; for the audit log.
-
-        Raises:
-            NotFound: no job of that id.
-            Conflict: it has not ended and is not paused, or is kept; says what to do first.
         """
         self.store.delete_job(job_id, actor=actor)
 
 
 class Housekeeping:
-    """Removes rows of deleted jobs, and what is older than it is kept, in a thread of its own.
-
-    Args:
-        store: Where the jobs are.
-        retention_days: Jobs that ended longer ago than this are deleted [d]; None: none is.
-        audit_days: Entries of the audit log that are older are removed [d]; None: none is.
-    """
+    """Removes rows of deleted jobs, and what is older than it is kept, in a thread of its own."""
 
     def __init__(
         self,
@@ -90,14 +64,7 @@ class Housekeeping:
             self._thread.join()
 
     def round(self, *, retention: bool = True) -> None:
-        """Do what is to be done now.
-
-        Args:
-            retention: Whether it is looked for jobs and entries of the audit log that are too old.
-
-        Raises:
-            StoreUnavailable: The rest is left for the next round.
-        """
+        """Do what is to be done now."""
         if retention and self._retention is not None:
             deleted = self._store.delete_ended_before(datetime.now(UTC) - self._retention)
             for job_id in deleted:

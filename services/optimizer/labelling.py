@@ -29,25 +29,7 @@ class Labelling:
         limit: int = 50,
         reverse: bool = False,
     ) -> Page[Job]:
-        """List jobs, page by page. Jobs submitted meanwhile do not shift later pages.
-
-        Args:
-            state: only jobs in it; None for any.
-            kind: only jobs whose specs say that they are of this kind; None for any.
-            parent: only jobs that were forked from the job of this id; None for any.
-            search: only jobs whose name, id, note or tags contain this, whatever its case.
-            where: only jobs that this admits.
-            order: how they are sorted.
-            after: `next` of the page before, of the same order.
-            limit: most jobs on a page.
-            reverse: whether the order is reversed; jobs without what they are sorted by stay last.
-
-        Returns:
-            A page; `next` is None on the last one.
-
-        Raises:
-            InvalidRequest: `after` is no cursor of that order.
-        """
+        """List jobs, page by page. Jobs submitted meanwhile do not shift later pages."""
         return self.store.jobs(
             state=state,
             kind=kind,
@@ -61,28 +43,9 @@ class Labelling:
         )
 
     def facets(self, *, archived: bool | None = None) -> FacetCounts:
-        """Count jobs by what they are found by.
-
-        Args:
-            archived: only jobs that are archived, or that are not; None for both.
-
-        Returns:
-            The counts.
-        """
+        """Count jobs by what they are found by."""
         return self.store.facets(archived=archived)
 
     def label(self, job_id: str, change: LabelsChange, *, actor: str = LOCAL) -> Job:
-        """Change what is written on a job; nothing that determines results.
-
-        Args:
-            job_id: id of the job.
-            change: what is to be different.
-            actor: name of the token that the request came with, if any; for the audit log.
-
-        Returns:
-            The job as it is then.
-
-        Raises:
-            NotFound: no job of that id.
-        """
+        """Change what is written on a job; nothing that determines results."""
         return self.store.label(job_id, change, actor=actor)

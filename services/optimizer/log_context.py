@@ -19,12 +19,6 @@ def log_context(**fields: str | int | None) -> Iterator[None]:
 
     It holds for the thread or the asynchronous task that enters the block, and for threads that
     anyio runs for it; a thread that is started inside enters a block of its own.
-
-    Args:
-        **fields: Values by name: `job`, `iteration`, `request`. None leaves a name as it is.
-
-    Yields:
-        Nothing.
     """
     known = {name: value for name, value in fields.items() if value is not None}
     token = _fields.set({**_fields.get(), **known})
@@ -35,9 +29,5 @@ def log_context(**fields: str | int | None) -> Iterator[None]:
 
 
 def log_fields() -> Mapping[str, str | int]:
-    """What a message that is logged now belongs to.
-
-    Returns:
-        Values by name, of all blocks around the caller.
-    """
+    """What a message that is logged now belongs to."""
     return _fields.get()

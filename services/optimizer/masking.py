@@ -23,15 +23,7 @@ _ADDRESS: Final = re.compile(rf"{_HOST}(?:,{_HOST})*(?:/[^:@]*)?")
 
 
 def masked_url(url: str) -> str:
-    """Return a URL that messages can show.
-
-    Args:
-        url: Of a database or a server; a file name or an SQLite URL is returned as it is.
-
-    Returns:
-        The URL with `***` in place of its password and of all parameters that are not known to be
-        harmless; of a URL that cannot be split reliably the scheme alone.
-    """
+    """Return a URL that messages can show."""
     scheme, separator, rest = url.partition("://")
     if not separator or scheme.startswith("sqlite"):
         return url

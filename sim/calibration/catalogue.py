@@ -25,17 +25,7 @@ _PLANNED: Final = "planned_soles"
 
 
 def robot_variables(robots: Sequence[RobotSource]) -> tuple[Variable, ...]:
-    """Everything of the robot that may be varied.
-
-    Args:
-        robots: One, or several shipped ones by name, among which `robot` chooses.
-
-    Returns:
-        `robot` if there are several, `CONVENTIONAL_VARIABLES`, `identifiable_variables`.
-
-    Raises:
-        SimulationInputError: A robot cannot be used, or two have other parameters.
-    """
+    """Everything of the robot that may be varied."""
     first, *others = map(load_robot, robots)
     parameters = identifiable_variables(first)
     for other in others:
@@ -56,17 +46,7 @@ def robot_variables(robots: Sequence[RobotSource]) -> tuple[Variable, ...]:
 
 
 def walk_variables(controllers: Iterable[ControllerName]) -> tuple[Variable, ...]:
-    """Everything of walks that may be varied beside the robot.
-
-    Args:
-        controllers: Those that drive the walks. Their variables are fixed by the walks' designs.
-
-    Returns:
-        Their conventions and the gait's variables, each once.
-
-    Raises:
-        SimulationInputError: Two controllers have different conventions of one name.
-    """
+    """Everything of walks that may be varied beside the robot."""
     found: dict[str, Variable] = {}
     for controller in dict.fromkeys(controllers):
         fixed = {variable.name for variable in CONTROLLERS[controller].variables}
@@ -79,18 +59,7 @@ def walk_variables(controllers: Iterable[ControllerName]) -> tuple[Variable, ...
 
 
 def varied_robot(robots: Sequence[RobotSource], values: Mapping[str, float]) -> tuple[Robot, Robot]:
-    """The robot that a design stands for.
-
-    Args:
-        robots: As for `robot_variables`.
-        values: Values of some of `robot_variables`, by name.
-
-    Returns:
-        The robot as described, for which gaits are planned, and the one that walks.
-
-    Raises:
-        SimulationInputError: No robot can have a value; names it.
-    """
+    """The robot that a design stands for."""
     parameters = dict(values)
     source = robots[round(parameters.pop(ROBOT, 0.0))]
     planner = _planner(source, parameters.get(_PLANNED))

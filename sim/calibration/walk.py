@@ -98,14 +98,7 @@ class CalibrationWalk:
         return Outcome(objectives, statuses)
 
     def drive(self, values: Mapping[str, float]) -> dict[str, float]:
-        """The drive with what is varied of it.
-
-        Args:
-            values: Of a design, by variable.
-
-        Returns:
-            The drive's own values, and those of its other variables that the design gives.
-        """
+        """The drive with what is varied of it."""
         known = design_catalogue(self.controller)
         own = dict(self.design)
         return {name: value for name, value in values.items() if name in known} | own

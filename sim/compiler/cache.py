@@ -42,15 +42,7 @@ _OWN_FILE: Final = re.compile(r"(?P<stem>.+-[0-9a-f]{24})(-.+\.(so|sha256|tmp)|\
 
 
 def find(pattern: str, directory: Path | None = None) -> tuple[Path | None, tuple[Path, ...]]:
-    """Look for a library in the usual directory, then in this user's private one.
-
-    Args:
-        pattern: File name, or a glob of file names.
-        directory: The only one to look into, in place of these two.
-
-    Returns:
-        The first library that is intact, or None; and the damaged ones that were met on the way.
-    """
+    """Look for a library in the usual directory, then in this user's private one."""
     damaged: list[Path] = []
     for place in _directories() if directory is None else (directory,):
         try:
@@ -67,14 +59,7 @@ def find(pattern: str, directory: Path | None = None) -> tuple[Path | None, tupl
 
 
 def is_intact(library: Path) -> bool:
-    """Whether a file can be read and matches the checksum beside it.
-
-    Args:
-        library: The file.
-
-    Returns:
-        False if either is missing or cannot be read.
-    """
+    """Whether a file can be read and matches the checksum beside it."""
     try:
         recorded = _checksum_of(library).read_text(encoding="ascii", errors="replace").split()
         return recorded[:1] == [hashlib.sha256(library.read_bytes()).hexdigest()]
@@ -90,20 +75,6 @@ def build(
     Processes that want the same library wait for the one that builds it. Whatever happens, and
     even if the power fails, a file under the library's name is whole or does not match its
     checksum.
-
-    Args:
-        stem: Begins the names of all files of this library, whatever compiler makes it.
-        file: The library's name; begins with `stem`.
-        make: Writes the library to the path that it is given, in a directory of its own.
-        directory: Where it is to be.
-
-    Returns:
-        Where the library is: in that directory, else in the usual one, or where that cannot be
-        written in the private one.
-
-    Raises:
-        KernelBuildError: No directory can be written, the disk is full, or `SIZE_VARIABLE` is no
-            number; and what `make` raises.
     """
     size = _size_limit()
     place = directory or _writable_directory()

@@ -1,7 +1,7 @@
 """C source -> shared library, compiled once and kept in the user's cache directory.
 
 A library is named by a hash of all that went into it, so a stale one is never loaded; see
-`gaitswarm.sim.compiler.cache` on damaged ones. One that was built beforehand and installed with the package
+`sim.compiler.cache` on damaged ones. One that was built beforehand and installed with the package
 saves the compilation, or the compiler.
 """
 
@@ -40,11 +40,7 @@ PREBUILT: Final = Path(__file__).with_name("prebuilt")
 
 
 def vector_header() -> str:
-    """The vector type that kernels are written in.
-
-    Returns:
-        C text that defines `vec` of as many reals as a register holds, and its operations.
-    """
+    """The vector type that kernels are written in."""
     folder = resources.files("gaitswarm.sim.compiler")
     vectors = (folder / "vec.h").read_text(encoding="utf-8")
     for name in ("instructions.h", "fma.h"):
@@ -62,22 +58,7 @@ def load_library(
     extra_flags: Sequence[str] = (),
     time_limit: float = TIME_LIMIT,
 ) -> ctypes.CDLL | None:
-    """Load a library from the cache, or compile it now.
-
-    Args:
-        name: What people see of it in the cache; any text.
-        identity: All that the source depends on.
-        source: Gives the C text; called only if it must be compiled.
-        wanted: What it is compiled for; this machine's `target` if left out.
-        extra_flags: For the compiler, after its usual ones.
-        time_limit: Seconds that the compiler may take.
-
-    Returns:
-        The library; None on a machine without a compiler whose cache has none.
-
-    Raises:
-        KernelBuildError: As for `build_library`, or the library cannot be loaded.
-    """
+    """Load a library from the cache, or compile it now."""
     for _ in range(_ATTEMPTS):
         library = build_library(
             name, identity, source, wanted=wanted, extra_flags=extra_flags, time_limit=time_limit
@@ -112,22 +93,6 @@ def build_library(
     """Find a library in the cache or among the prebuilt ones, or compile it; without loading it.
 
     Who sets $CC wants that compiler's: then no prebuilt one is taken.
-
-    Args:
-        name: As for `load_library`, and so all the others.
-        identity: All that the source depends on.
-        source: Gives the C text.
-        wanted: What it is compiled for, which may be another architecture.
-        extra_flags: For the compiler.
-        time_limit: Seconds that the compiler may take.
-        directory: Where it is to be, in place of the user's cache.
-
-    Returns:
-        Where it is; None if there is none, and no compiler for that architecture.
-
-    Raises:
-        KernelBuildError: The compiler refuses the source or takes too long, the library cannot be
-            stored, or it is damaged and there is no compiler to build it again.
     """
     aim = (wanted or target()).resolved()
     hashed = hashlib.sha256(

@@ -18,12 +18,7 @@ _SPELLINGS: Final[Mapping[str, str]] = {"amd64": X86, "x64": X86, "arm64": ARM}
 
 
 def host_architecture() -> str:
-    """The architecture of this machine.
-
-    Returns:
-        As the Linux kernel spells it, `x86_64` or `aarch64`, whatever the system; others as the
-        system does.
-    """
+    """The architecture of this machine."""
     machine = platform.machine().lower()
     return _SPELLINGS.get(machine, machine)
 
@@ -44,11 +39,7 @@ class Target:
     architecture: str = ""
 
     def resolved(self) -> Target:
-        """This target, with the architecture named.
-
-        Returns:
-            A target that means the same on every machine.
-        """
+        """This target, with the architecture named."""
         return Target(self.lanes, self.level, self.architecture or host_architecture())
 
 
@@ -71,11 +62,7 @@ ARM_TARGET: Final = Target(2, "", ARM)
 
 @lru_cache(maxsize=1)
 def target() -> Target:
-    """The widest target that this machine runs.
-
-    Returns:
-        On x86-64 8 lanes (AVX-512), 4 (AVX2) or 2; everywhere else 2, which on aarch64 is NEON.
-    """
+    """The widest target that this machine runs."""
     if host_architecture() == X86:
         flags = cpu_flags()
         for candidate, needed in X86_TARGETS.items():
@@ -85,11 +72,7 @@ def target() -> Target:
 
 
 def cpu_flags() -> frozenset[str]:
-    """What this machine's x86-64 CPU can do, as far as the system says so.
-
-    Returns:
-        Flags as Linux names them; none where they are not known, which asks for plain code.
-    """
+    """What this machine's x86-64 CPU can do, as far as the system says so."""
     try:
         if platform.system() == "Darwin":
             return _flags_of_macos(subprocess.check_output(_SYSCTL, text=True, timeout=10.0))

@@ -73,14 +73,7 @@ class Compiler:
     version: str
 
     def flags(self, aim: Target) -> tuple[str, ...]:
-        """Flags for a target, whose level zig spells in its own way.
-
-        Args:
-            aim: What it is to compile for.
-
-        Returns:
-            What goes between the command and the source.
-        """
+        """Flags for a target, whose level zig spells in its own way."""
         flags = FLAGS if self._is_clang else (*FLAGS, *SCHEDULING)
         if not aim.level:
             return flags
@@ -94,16 +87,7 @@ class Compiler:
 
 
 def find_compiler(architecture: str = "") -> Compiler | None:
-    """Look for a C compiler, once a process.
-
-    Args:
-        architecture: Of the code that it is to make; this machine's if empty.
-
-    Returns:
-        For this machine $CC, cc, gcc, clang, or the `ziglang` wheel's, the first that says its
-        version; for another architecture ARCHITECTURE-linux-gnu-gcc, or zig's compiler. None if
-        this machine has none, or runs Windows, for which nothing is compiled.
-    """
+    """Look for a C compiler, once a process."""
     wanted = architecture or host_architecture()
     return _find(wanted, wanted == host_architecture())
 
@@ -120,11 +104,7 @@ def _find(architecture: str, native: bool) -> Compiler | None:
 
 
 def without_compiler() -> str:
-    """What is missing where nothing can be compiled.
-
-    Returns:
-        Half a sentence for people: that there is no compiler, and the way out on this system.
-    """
+    """What is missing where nothing can be compiled."""
     system = platform.system()
     advice = _ADVICE.get(system, "install gcc or clang, or `pip install gaitswarm[compiler]`")
     return f"no C compiler found: {advice}"
@@ -133,19 +113,7 @@ def without_compiler() -> str:
 def run_compiler(
     compiler: Compiler, arguments: Sequence[str], scratch: Path, purpose: str, time_limit: float
 ) -> None:
-    """Run a compiler to its end.
-
-    Args:
-        compiler: Which one.
-        arguments: Its command line.
-        scratch: A directory for what it keeps for itself meanwhile.
-        purpose: What it is to do, for messages; follows "did not".
-        time_limit: Seconds that it may take. It is ended then, with all that it started. No process
-            of it may take more of a processor, nor more than `COMPILER_MEMORY`.
-
-    Raises:
-        KernelBuildError: It cannot be run, takes too long or refuses; with what it says.
-    """
+    """Run a compiler to its end."""
     command = shlex.join(compiler.command)
     # What the compiler keeps for itself goes with the directory, even if it is killed.
     environment = {**os.environ, "TMPDIR": str(scratch)}

@@ -38,18 +38,7 @@ ControllerName: TypeAlias = Annotated[str, KnownName(CONTROLLERS)]
 
 @lru_cache(maxsize=192)
 def control_law(controller: ControllerName, gains: tuple[tuple[str, float], ...]) -> ControlLaw:
-    """A design as it runs on the robot, made once for all that it walks through.
-
-    Args:
-        controller: Name of the motor controller.
-        gains: Names and values of the design's variables and conventions.
-
-    Returns:
-        Integers for the kernel.
-
-    Raises:
-        SimulationInputError: A value is missing or cannot be represented; names the variable.
-    """
+    """A design as it runs on the robot, made once for all that it walks through."""
     return CONTROLLERS[controller].compile(dict(gains))
 
 

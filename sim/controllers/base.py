@@ -167,14 +167,7 @@ class Inference:
 
 
 def names_of(controller: Controller) -> frozenset[str]:
-    """All that a design may give a controller.
-
-    Args:
-        controller: The controller.
-
-    Returns:
-        Names of its variables and conventions.
-    """
+    """All that a design may give a controller."""
     return frozenset(v.name for v in (*controller.variables, *controller.conventions))
 
 

@@ -86,20 +86,7 @@ def required(design: Mapping[str, float], name: str, *, low: float, high: float)
 
 
 def required_integer(design: Mapping[str, float], name: str, *, low: int, high: int) -> int:
-    """A design's whole value.
-
-    Args:
-        design: Values by name.
-        name: Of the value.
-        low: Least value.
-        high: Largest value.
-
-    Returns:
-        The value.
-
-    Raises:
-        SimulationInputError: It is missing, not whole, or out of bounds.
-    """
+    """A design's whole value."""
     value = required(design, name, low=low, high=high)
     if not value.is_integer():
         raise SimulationInputError(f"{name}: {value:g} is not a whole number {low} to {high}")
@@ -109,20 +96,7 @@ def required_integer(design: Mapping[str, float], name: str, *, low: int, high: 
 def given_or_default(
     design: Mapping[str, float], variable: Variable, low: float, high: float
 ) -> float:
-    """A convention's value, checked against what the controller can represent.
-
-    Args:
-        design: Values by name.
-        variable: The convention; its default serves where the design does not give it.
-        low: Least value.
-        high: Largest value.
-
-    Returns:
-        The value.
-
-    Raises:
-        SimulationInputError: It is no number, or out of bounds.
-    """
+    """A convention's value, checked against what the controller can represent."""
     if variable.name not in design and variable.default is not None:
         return variable.default
     return required(design, variable.name, low=low, high=high)
@@ -142,15 +116,7 @@ def to_fixed(value: float, fraction_bits: int) -> int:
 
 
 def descale(value: NDArray[np.int64], bits: int) -> NDArray[np.int64]:
-    """Fixed point to integer, halves up.
-
-    Args:
-        value: Fixed-point numbers, of any shape.
-        bits: Their fraction bits.
-
-    Returns:
-        Integers of the same shape.
-    """
+    """Fixed point to integer, halves up."""
     integer: NDArray[np.int64] = (value + (1 << (bits - 1))) >> bits
     return integer
 

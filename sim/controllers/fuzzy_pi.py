@@ -74,19 +74,7 @@ def inference_system(
     shape: Shape,
     sets: MembershipSets = DEFAULT_SETS,
 ) -> Mamdani:
-    """The rules of table 4.3, over normalised error, current and output.
-
-    Args:
-        fw1: Weight of rule 1.
-        fw23: Weight of rules 2 and 3.
-        fw4: Weight of rule 4.
-        fw56: Weight of rules 5 and 6.
-        shape: Of the output's sets.
-        sets: Of current and output.
-
-    Returns:
-        The inference.
-    """
+    """The rules of table 4.3, over normalised error, current and output."""
     rules = (
         Rule({"error": "zero"}, "null", fw1),
         Rule({"error": "positive"}, "positive", fw23),
@@ -111,16 +99,6 @@ def quantised_table(
     current: Axis = CURRENT,
 ) -> Quantised:
     """The inference of `inference_system` on the axes' grid.
-
-    Args:
-        fw1: Weight of rule 1.
-        fw23: Weight of rules 2 and 3.
-        fw4: Weight of rule 4.
-        fw56: Weight of rules 5 and 6.
-        shape: Of the output's sets.
-        sets: Of current and output.
-        error: Axis of the angle error.
-        current: Axis of the current.
 
     Returns:
         (n_error, n_current) in 8 bits.
@@ -202,19 +180,7 @@ class FuzzyPi:
         return self.compile_with(design, ERROR, CURRENT)
 
     def compile_with(self, design: Mapping[str, float], error: Axis, current: Axis) -> ControlLaw:
-        """The same controller with a table of other resolution.
-
-        Args:
-            design: Value of every variable by name.
-            error: Axis of the angle error.
-            current: Axis of the current.
-
-        Returns:
-            Its control law.
-
-        Raises:
-            SimulationInputError: A value is missing or cannot be represented; names the variable.
-        """
+        """The same controller with a table of other resolution."""
         p = _Parameters.of(design)
         return ControlLaw(integral_gain=p.integral, direct=p.table(error, current))
 
@@ -234,17 +200,7 @@ class FuzzyPi:
         return (fuzzy_p,)
 
     def without_table(self, design: Mapping[str, float]) -> ControlLaw:
-        """The same controller by full inference, for comparison (reference kernel only).
-
-        Args:
-            design: Value of every variable by name.
-
-        Returns:
-            Its control law.
-
-        Raises:
-            SimulationInputError: A value is missing or cannot be represented; names the variable.
-        """
+        """The same controller by full inference, for comparison (reference kernel only)."""
         p = _Parameters.of(design)
         system = inference_system(*p.weights, p.shape, p.sets)
         exact = ExactInference(system, p.error_range, p.current_range, p.output_range)

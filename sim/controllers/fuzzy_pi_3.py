@@ -106,18 +106,7 @@ DEFAULT_SETS: Final = MembershipSets.of({}, _CONVENTIONS)
 def voltage_system(
     w1: float, w34: float, w56: float, shape: Shape, sets: MembershipSets = DEFAULT_SETS
 ) -> Mamdani:
-    """FzzP of angle error and current: rules 1 and 3 to 6.
-
-    Args:
-        w1: Weight of rule 1.
-        w34: Weight of rules 3 and 4.
-        w56: Weight of rules 5 and 6.
-        shape: Of the output's sets.
-        sets: Of current and output.
-
-    Returns:
-        The inference.
-    """
+    """FzzP of angle error and current: rules 1 and 3 to 6."""
     rules = (
         Rule({"error": "zero"}, "null", w1),
         Rule({"error": "positive"}, "positive", w34),
@@ -132,18 +121,7 @@ def voltage_system(
 def integral_system(
     w1: float, w2: float, w78: float, shape: Shape, sets: MembershipSets = DEFAULT_SETS
 ) -> Mamdani:
-    """FzzI of angle error, current and velocity error: rules 1, 2, 7 and 8.
-
-    Args:
-        w1: Weight of rule 1.
-        w2: Weight of rule 2.
-        w78: Weight of rules 7 and 8.
-        shape: Of the output's sets.
-        sets: Of current and output.
-
-    Returns:
-        The inference.
-    """
+    """FzzI of angle error, current and velocity error: rules 1, 2, 7 and 8."""
     rules = (
         Rule({"error": "zero"}, "null", w1),
         Rule({"velocity": "zero"}, "null", w2),
@@ -272,19 +250,7 @@ class FuzzyPi3:
         return self.compile_with(design, ERROR, CURRENT)
 
     def compile_with(self, design: Mapping[str, float], error: Axis, current: Axis) -> ControlLaw:
-        """The same controller with a table of the voltage of other resolution.
-
-        Args:
-            design: Value of every variable by name.
-            error: Axis of the angle error.
-            current: Axis of the current.
-
-        Returns:
-            Its control law.
-
-        Raises:
-            SimulationInputError: A value is missing or cannot be represented; names the variable.
-        """
+        """The same controller with a table of the voltage of other resolution."""
         voltage, rate = _inferences(design, error, current)
         return ControlLaw(direct=voltage.table, integrated=rate.table)
 

@@ -96,18 +96,7 @@ class MembershipSets:
 
     @classmethod
     def of(cls, design: Mapping[str, float], conventions: Iterable[Variable]) -> MembershipSets:
-        """The sets that a design asks for.
-
-        Args:
-            design: Values by name; what it does not have is taken from the conventions' defaults.
-            conventions: Those of `LARGE_BEGINS` to `UNIVERSE` that the controller has, and others.
-
-        Returns:
-            The sets.
-
-        Raises:
-            SimulationInputError: A value cannot be inferred with; names it.
-        """
+        """The sets that a design asks for."""
         return cls(
             **{
                 variable.name: given_or_default(design, variable, *_LIMITS[variable.name])

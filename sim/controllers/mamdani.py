@@ -48,7 +48,6 @@ class FuzzySet:
 
         Args:
             x: Points of the universe, (n,).
-            shape: Of the function.
 
         Returns:
             (n,) in [0, 1].
@@ -191,9 +190,6 @@ def centroid(levels: Floats, memberships: Floats, points: Floats) -> Floats:
         levels: At which the sets are clipped, (n_sets, ...).
         memberships: Of the points of the output universe, (n_sets, n_points).
         points: Of the output universe, (n_points,).
-
-    Returns:
-        (...), 0 where nothing fires.
     """
     flat = levels.reshape(len(levels), -1)
     moment = np.zeros(flat.shape[1])

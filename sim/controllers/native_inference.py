@@ -23,18 +23,13 @@ def compiled_table(
     """An inference in 8 bits, with the bits of `quantisation.reference_table`.
 
     Args:
-        system: An inference system of two inputs or more.
         grid: By input, in the order of the system's, the values (n_i,), inside the range.
-        library: `inference_source` compiled; the usual one if left out.
 
     Returns:
         Values in 1/127ths of the largest output over the product of the inputs' values,
         (n_1, n_2, ...), and that output, absolute, as a share of the output's range. None for a
         system that is too large, or a grid that is not of whole blocks, and on a machine without a
         C compiler.
-
-    Raises:
-        KernelBuildError: The library cannot be compiled, stored or loaded.
     """
     *firsts, inner = system.degrees(grid)
     memberships, points = system.output_memberships(), system.output_points()
@@ -80,11 +75,7 @@ def _both_hold(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.flo
 
 
 def inference_source() -> str:
-    """The compiled inference's source.
-
-    Returns:
-        C text that lacks the definition of DOUBLES only.
-    """
+    """The compiled inference's source."""
     here = resources.files("gaitswarm.sim.controllers")
     parts = [(here / name).read_text(encoding="utf-8") for name in ("estimate.c", "inference.c")]
     return "\n".join([vector_header(), *parts])

@@ -44,14 +44,7 @@ class Axis:
         return np.arange(n) / (n - 1)
 
     def gain(self, full_range: float) -> int:
-        """Fixed-point index per unit of an input.
-
-        Args:
-            full_range: Of the input, in its unit.
-
-        Returns:
-            The gain, with 16 fraction bits.
-        """
+        """Fixed-point index per unit of an input."""
         n = 1 << self.bits
         return to_fixed((n // 2 - 1 if self.centred else n - 1) / full_range, FRACTION_BITS)
 
@@ -90,11 +83,6 @@ class ExactInference:
 
 def table_bytes(input_bits: tuple[int, ...], output_bits: int, outputs: int = 1) -> int:
     """Memory of a lookup table, eq. 5.1: N_O * R_O / 8 * 2^(sum of input bits).
-
-    Args:
-        input_bits: By input.
-        output_bits: Of an output.
-        outputs: How many there are.
 
     Returns:
         [B].
@@ -138,11 +126,7 @@ _table_time: Final[ContextVar[TableTime | None]] = ContextVar("table_time", defa
 
 @contextmanager
 def timing_tables() -> Iterator[TableTime]:
-    """Time the tables that this thread makes inside the block.
-
-    Yields:
-        What is added to.
-    """
+    """Time the tables that this thread makes inside the block."""
     spent = TableTime()
     before = _table_time.set(spent)
     try:
@@ -156,13 +140,6 @@ def quantised(system: Mamdani, axes: Mapping[str, Axis]) -> Quantised:
 
     An output that reaches beyond its range is covered, and none loses resolution to a universe that
     the centroid never comes near the ends of.
-
-    Args:
-        system: The inference.
-        axes: By input of the system, in its order.
-
-    Returns:
-        Its values, and the largest output, which they are shares of.
     """
     begun = time.perf_counter()
     grid = {name: axis.grid() for name, axis in axes.items()}
@@ -181,7 +158,6 @@ def reference_table(
     """The oracle of the compiled table, and its replacement where there is no compiler.
 
     Args:
-        system: The inference.
         grid: By input of the system, in its order, the values (n_i,), inside the range.
 
     Returns:

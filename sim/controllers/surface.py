@@ -78,13 +78,7 @@ def surface(
     """An output on an even grid of whole counts.
 
     Args:
-        source: The inference, and the table in its place.
-        error_points: Points along the error.
-        current_points: Points along the current.
         velocity: At which an input of that name is held, rounded to whole counts a tick [counts/s].
-
-    Returns:
-        The surface.
     """
     points = {"error": error_points, "current": current_points, "velocity": error_points}
     inputs = {

@@ -22,39 +22,17 @@ _WIDTH: Final = 24
 
 
 def own_file(path: str) -> str:
-    """A file that every folder of firmware has.
-
-    Args:
-        path: Below `sim/firmware/code`.
-
-    Returns:
-        Its text.
-    """
+    """A file that every folder of firmware has."""
     return (resources.files("gaitswarm.sim.firmware") / "code" / path).read_text(encoding="utf-8")
 
 
 def filled(path: str, **values: object) -> str:
-    """A file of which some words are filled in.
-
-    Args:
-        path: Below `sim/firmware/code`.
-        **values: By the words' names.
-
-    Returns:
-        Its text.
-    """
+    """A file of which some words are filled in."""
     return Template(own_file(path)).substitute(values)
 
 
 def law_header(law: LawIntegers) -> str:
-    """`law.h`: the control law's numbers.
-
-    Args:
-        law: The law.
-
-    Returns:
-        C text that refuses to compile where an integer would be too narrow.
-    """
+    """`law.h`: the control law's numbers."""
     numbers: dict[str, int] = {
         "FINE_BITS": law.fine_bits,
         "PROPORTIONAL_GAIN": law.law.proportional_gain,
@@ -93,16 +71,7 @@ def _table_numbers(part: str, table: LookupTable | None) -> dict[str, int]:
 
 
 def controller_header(robot: Robot, controller: str, label: str) -> str:
-    """`controller.h`: what a leg's firmware calls, with units and scales.
-
-    Args:
-        robot: Whose sensors and bridges the codes are of.
-        controller: Name of the controller.
-        label: What people call the design.
-
-    Returns:
-        C text.
-    """
+    """`controller.h`: what a leg's firmware calls, with units and scales."""
     sensors, pwm = robot.description.sensors, robot.description.pwm
     assert pwm is not None  # noqa: S101 - only DC motors get firmware
     return filled(
@@ -124,14 +93,7 @@ def controller_header(robot: Robot, controller: str, label: str) -> str:
 
 
 def tables_source(law: LawIntegers) -> str:
-    """`tables.c`: the fuzzy tables.
-
-    Args:
-        law: With the tables.
-
-    Returns:
-        C text.
-    """
+    """`tables.c`: the fuzzy tables."""
     lines = ['#include "tables.h"', ""]
     for name, table in _tables(law).items():
         head = f"const int8_t {name}_table[{name.upper()}_CELLS] = {{"
@@ -140,14 +102,7 @@ def tables_source(law: LawIntegers) -> str:
 
 
 def trajectories_source(tables: Sequence[TrajectoryTable]) -> str:
-    """`trajectories.c`: desired angles.
-
-    Args:
-        tables: By scenario.
-
-    Returns:
-        C text.
-    """
+    """`trajectories.c`: desired angles."""
     lines = ['#include "trajectory.h"', ""]
     entries = []
     for number, table in enumerate(tables):
@@ -171,29 +126,12 @@ def trajectories_source(tables: Sequence[TrajectoryTable]) -> str:
 
 
 def expected_header(law: LawIntegers, logs: Sequence[ControlLog], legs: int) -> str:
-    """`test/expected.h`: how many walks and tables are compared.
-
-    Args:
-        law: With the tables.
-        logs: Of the walks.
-        legs: Of the robot.
-
-    Returns:
-        C text.
-    """
+    """`test/expected.h`: how many walks and tables are compared."""
     return filled("test/expected.h", legs=legs, walks=len(logs), tables=len(_tables(law)))
 
 
 def expected_source(law: LawIntegers, walks: Mapping[str, int]) -> str:
-    """`test/expected.c`: files of walks, and hashes of tables.
-
-    Args:
-        law: With the tables.
-        walks: Ticks by file.
-
-    Returns:
-        C text.
-    """
+    """`test/expected.c`: files of walks, and hashes of tables."""
     tables = [
         f'    {{"{name} table", {name}_table, {table.values.size}u, {fnv(table.values)}u}},'
         for name, table in _tables(law).items()
@@ -218,14 +156,7 @@ def expected_source(law: LawIntegers, walks: Mapping[str, int]) -> str:
 
 
 def fnv(values: NDArray[np.int8]) -> int:
-    """FNV-1a hash of 32 bits.
-
-    Args:
-        values: Of a table, in the order in which it is written.
-
-    Returns:
-        The hash.
-    """
+    """FNV-1a hash of 32 bits."""
     hashed = 2166136261
     for byte in values.tobytes():
         hashed = (hashed ^ byte) * 16777619 & 0xFFFFFFFF

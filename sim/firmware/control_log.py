@@ -56,21 +56,7 @@ def control_logs(
     law: ControlLaw,
     gait: Mapping[str, float],
 ) -> tuple[ControlLog, ...]:
-    """Let a control law walk, and keep what it read and gave.
-
-    Args:
-        robot: The robot that walks.
-        scenarios: The walks.
-        law: That drives every joint.
-        gait: Gait parameters of the design, which replace the scenarios'.
-
-    Returns:
-        A log of each scenario, up to where the walk ended.
-
-    Raises:
-        UnreachablePose: A foot's target lies outside its leg's reach.
-        SimulationInputError: A code does not fit 16 bits; names scenario and joint.
-    """
+    """Let a control law walk, and keep what it read and gave."""
     kernel = kernel_of(robot)
     coding, timestep = control_steps(robot)
     walked = [with_gait(scenario, gait) for scenario in scenarios]

@@ -98,25 +98,7 @@ def firmware_of(
     label: str,
     table_bits: tuple[int, int] | None = None,
 ) -> Firmware:
-    """Write a design as C, and let it walk for the test of it.
-
-    Args:
-        robot: That is to walk.
-        controller: Name of the motor controller.
-        design: Values of its variables, and of any conventions and gait parameters.
-        scenarios: Whose trajectories are written, and whose walks are logged.
-        label: What people call the design.
-        table_bits: Of the direct table's indices, error and current, in place of the usual 10 and
-            6; the walks are by this table. `check_table_bits` has passed them.
-
-    Returns:
-        The files.
-
-    Raises:
-        UnreachablePose: A gait is out of the legs' reach.
-        SimulationInputError: The design cannot be simulated, or needs integers that the robot does
-            not have; names the variable, or scenario and joint.
-    """
+    """Write a design as C, and let it walk for the test of it."""
     gait = {name: value for name, value in design.items() if name in GAIT_CATALOGUE}
     gains = {name: value for name, value in design.items() if name not in gait}
     check_drives_by_pwm(robot)
@@ -169,17 +151,7 @@ def firmware_of(
 
 
 def parsed_table_bits(text: str) -> tuple[int, int]:
-    """Read the resolution of a table.
-
-    Args:
-        text: Bits of the indices of angle error and current, such as 8x6.
-
-    Returns:
-        The same as numbers.
-
-    Raises:
-        SimulationInputError: It is not like that.
-    """
+    """Read the resolution of a table."""
     error, _, current = text.partition("x")
     if not (error.isascii() and error.isdigit() and current.isascii() and current.isdigit()):
         raise SimulationInputError(f"{text!r} is not like 8x6")
@@ -187,14 +159,7 @@ def parsed_table_bits(text: str) -> tuple[int, int]:
 
 
 def check_drives_by_pwm(robot: RobotChoice) -> None:
-    """Check that firmware is what drives a robot.
-
-    Args:
-        robot: The robot.
-
-    Raises:
-        SimulationInputError: Its actuators have controllers of their own.
-    """
+    """Check that firmware is what drives a robot."""
     machine = load_robot(robot)
     if machine.is_torque_controlled:
         raise SimulationInputError(
@@ -204,15 +169,7 @@ def check_drives_by_pwm(robot: RobotChoice) -> None:
 
 
 def check_table_bits(controller: ControllerName, bits: tuple[int, int]) -> None:
-    """Check that a controller can have a table of other resolution.
-
-    Args:
-        controller: Its name.
-        bits: Of the indices of angle error and current.
-
-    Raises:
-        SimulationInputError: It has no table, or such a one makes no sense.
-    """
+    """Check that a controller can have a table of other resolution."""
     _tabulated(controller)
     for name, own, most in zip(("angle error", "current"), bits, MOST_BITS, strict=True):
         if not 2 <= own <= most:

@@ -70,19 +70,7 @@ class LawIntegers:
 
 
 def law_integers(law: ControlLaw, coding: Coding) -> LawIntegers:
-    """Bound every number of the control tick, for readings of any size.
-
-    Args:
-        law: The control law.
-        coding: Of sensors and PWM.
-
-    Returns:
-        The law with the widths of its integers.
-
-    Raises:
-        SimulationInputError: It asks for an inference, which no table stands for, or a gain is
-            beyond the controllers' integers.
-    """
+    """Bound every number of the control tick, for readings of any size."""
     check_gains(law, torque=False)
     direct, integrated = as_table(law.direct), as_table(law.integrated)
     half = 1 << (FRACTION_BITS - 1)
@@ -120,17 +108,7 @@ def law_integers(law: ControlLaw, coding: Coding) -> LawIntegers:
 
 
 def as_table(response: Response | None) -> LookupTable | None:
-    """A part of a control law as a table.
-
-    Args:
-        response: The part, or None.
-
-    Returns:
-        The table, or None if the law has no such part.
-
-    Raises:
-        SimulationInputError: It is an inference.
-    """
+    """A part of a control law as a table."""
     if response is None or isinstance(response, LookupTable):
         return response
     raise SimulationInputError("firmware looks up tables; an inference has none")
@@ -143,15 +121,6 @@ def in_16_bits(
 
     Args:
         codes: (T, J) [counts].
-        kind: Of the robot's integers.
-        what: They are, for messages.
-        joints: J names.
-
-    Returns:
-        The same numbers.
-
-    Raises:
-        SimulationInputError: One does not fit; names the joint.
     """
     limits = np.iinfo(kind)
     beyond = (codes < limits.min) | (codes > limits.max)

@@ -53,15 +53,7 @@ class Memory:
 
     @classmethod
     def of(cls, law: LawIntegers, trajectories: Sequence[TrajectoryTable]) -> Memory:
-        """Add up what is written.
-
-        Args:
-            law: With its tables.
-            trajectories: That are written.
-
-        Returns:
-            The bytes.
-        """
+        """Add up what is written."""
         tables = (table for table in (law.direct, law.integrated) if table is not None)
         # An integral of 64 bits and an error of 32 a joint, and a flag.
         return cls(
@@ -87,11 +79,7 @@ class Memory:
         return self.flash + self.trajectories_of_a_leg <= BUDGET.flash
 
     def remarks(self) -> tuple[str, ...]:
-        """What does not fit, and the way out.
-
-        Returns:
-            A sentence each; none where all fits.
-        """
+        """What does not fit, and the way out."""
         remarks = []
         if not self.fits:
             remarks.append(

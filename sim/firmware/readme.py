@@ -18,19 +18,7 @@ def readme(
     scenarios: Sequence[str],
     robot: str,
 ) -> str:
-    """`README.md` of a folder of firmware.
-
-    Args:
-        label: What people call the design.
-        controller: Name of the controller.
-        memory: That it takes.
-        trajectories: By scenario.
-        scenarios: What the command line calls them.
-        robot: What it calls the robot; empty for the default.
-
-    Returns:
-        Markdown.
-    """
+    """`README.md` of a folder of firmware."""
     rows = [
         f"| {t.name} | {len(t.rows)} | {t.rows.shape[1]} |"
         f" {t.repeats_from if t.repeats else 'none'} | {t.bytes} | {t.bytes_of_a_leg} |"

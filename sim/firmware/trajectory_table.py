@@ -54,19 +54,7 @@ class TrajectoryTable:
 
 
 def trajectory_table(robot: Robot, scenario: Scenario) -> TrajectoryTable:
-    """Fold a gait's desired angles, to the bit, where they repeat.
-
-    Args:
-        robot: Whose legs are planned for.
-        scenario: Gait and posture, which the legs reach.
-
-    Returns:
-        The table: what precedes the first cycle that repeats, and that cycle, or as many as make a
-        whole number of ticks; all of the walk where not even four cycles do.
-
-    Raises:
-        SimulationInputError: An angle does not fit 16 bits; names scenario and joint.
-    """
+    """Fold a gait's desired angles, to the bit, where they repeat."""
     cycle = scenario.cycle_time / CONTROL_PERIOD
     for cycles in range(1, _MOST_CYCLES + 1):
         period = round(cycles * cycle)

@@ -18,7 +18,6 @@ def cycloid(
     """Foot position in its leg's frame.
 
     Args:
-        phase: Share of the cycle since the start of support, in [0, 1), (...).
         stride: Length of the support [m].
         height: Of the swing [m].
         duty_factor: Support's share of the cycle [1].

@@ -18,15 +18,7 @@ _CYCLE_TIMES_SPEED: Final = 25.2
 
 
 def driven_as_in_2011(scenario: Scenario) -> Scenario:
-    """A scenario with the trajectory of 2011, in its own cycle time.
-
-    Args:
-        scenario: Whose cycle, stride, height, posture, load and ground are kept.
-
-    Returns:
-        A copy: spline, duty factor 0.5, `UPDATES_PER_CYCLE` targets a cycle without a filter, legs
-        1, 4, 5 swing first, and turns lengthen the outer legs' stride, too.
-    """
+    """A scenario with the trajectory of 2011, in its own cycle time."""
     fields = {
         "curve": "quadratic_spline",
         "duty_factor": 0.5,
@@ -43,16 +35,8 @@ def scenario_2011(w_s: float, w_d: float = 0.0) -> Scenario:
     """A level walk as the robot of 2011 was told to walk.
 
     Args:
-        w_s: Speed, one of `SPEEDS`; a cycle lasts 25.2 / w_s seconds, so that targets follow one
-            another at 12.5 to 33 Hz.
         w_d: Share by which the stride is shortened on one side and lengthened on the other, -1 to
             1, right turns positive [1].
-
-    Returns:
-        The scenario.
-
-    Raises:
-        SimulationInputError: Another speed, or a share out of its bounds.
     """
     if w_s not in SPEEDS:
         raise SimulationInputError(

@@ -35,8 +35,6 @@ def carrying_torques(robot: Robot, trajectory: Trajectory, gravity: float) -> Fl
     level; loads, which a robot does not know of, are left out.
 
     Args:
-        robot: The robot.
-        trajectory: Of the walk.
         gravity: [m/s2].
 
     Returns:

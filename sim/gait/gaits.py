@@ -155,17 +155,7 @@ GAITS: Final[Mapping[GaitName, Gait]] = MappingProxyType({gait.name: gait for ga
 
 
 def find_gait(name: str) -> Gait:
-    """A gait that has a name.
-
-    Args:
-        name: One of `GAITS`.
-
-    Returns:
-        The gait.
-
-    Raises:
-        SimulationInputError: There is none; names those that there are.
-    """
+    """A gait that has a name."""
     for gait in _GAITS:
         if gait.name == name:
             return gait
@@ -173,32 +163,13 @@ def find_gait(name: str) -> Gait:
 
 
 def suits(gait: Gait, legs: Sequence[LegKinematics]) -> bool:
-    """Whether a gait is defined for a robot's legs.
-
-    Args:
-        gait: The gait.
-        legs: Of the robot.
-
-    Returns:
-        Whether it is.
-    """
+    """Whether a gait is defined for a robot's legs."""
     left, right = rows_of(legs)
     return not gait.legs or (len(legs) in gait.legs and len(left) == len(right))
 
 
 def lags_of(gait: Gait, legs: Sequence[LegKinematics]) -> tuple[float, ...]:
-    """When each leg of a robot comes down.
-
-    Args:
-        gait: The gait.
-        legs: Of the robot.
-
-    Returns:
-        By leg the share of the cycle after the first footfall, 0 <= lag < 1.
-
-    Raises:
-        SimulationInputError: The gait is not defined for so many legs; names those that are.
-    """
+    """When each leg of a robot comes down."""
     if not suits(gait, legs):
         fitting = ", ".join(name for name, other in GAITS.items() if suits(other, legs))
         left, right = rows_of(legs)
@@ -212,19 +183,7 @@ def lags_of(gait: Gait, legs: Sequence[LegKinematics]) -> tuple[float, ...]:
 
 
 def phases_of(robot: Robot, scenario: Scenario) -> tuple[float, ...]:
-    """Where each leg is in its cycle when the gait begins, before `start_phase`.
-
-    Args:
-        robot: Whose legs are planned for.
-        scenario: The walk.
-
-    Returns:
-        By leg the share of the cycle since the start of its support, 0 <= phase < 1.
-
-    Raises:
-        SimulationInputError: The gait is not defined for the robot's number of legs, or phases are
-            given for other legs than the robot's; names the field.
-    """
+    """Where each leg is in its cycle when the gait begins, before `start_phase`."""
     if scenario.phases is not None:
         names = [leg.name for leg in robot.legs]
         if scenario.phases.keys() != set(names):

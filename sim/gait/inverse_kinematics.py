@@ -66,7 +66,6 @@ def chain_angles(leg: ChainLeg, targets: Floats) -> tuple[Floats, Floats]:
     does not turn over.
 
     Args:
-        leg: The leg.
         targets: Of its foot in the body's frame, (T, 3) [m].
 
     Returns:

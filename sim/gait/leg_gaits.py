@@ -55,14 +55,7 @@ class Sway:
 
     @classmethod
     def of(cls, scenario: Scenario) -> Sway | None:
-        """The sway of a scenario's body.
-
-        Args:
-            scenario: The walk.
-
-        Returns:
-            The sway, None if it does not sway.
-        """
+        """The sway of a scenario's body."""
         if not scenario.sway_lateral and not scenario.sway_longitudinal:
             return None
         begin = scenario.start_phase - scenario.sway_phase
@@ -83,19 +76,7 @@ class Sway:
 
 
 def leg_gaits(robot: Robot, scenario: Scenario) -> tuple[LegGait, ...]:
-    """What every leg of a robot does in a scenario.
-
-    Args:
-        robot: The robot.
-        scenario: The walk.
-
-    Returns:
-        In the order of the robot's legs.
-
-    Raises:
-        SimulationInputError: The gait is not one for its legs, or a group of legs is not one of its
-            groups; names the field.
-    """
+    """What every leg of a robot does in a scenario."""
     own = _by_parameter(robot, scenario)
     strides, heights = own.get("stride", _NONE), own.get("height", _NONE)
     duties, begins = own.get("duty_factor", _NONE), own.get("start_phase", _NONE)
@@ -129,7 +110,6 @@ def supporting(gaits: Sequence[LegGait], cycles: Floats) -> NDArray[np.bool_]:
     """Which feet stand by plan.
 
     Args:
-        gaits: Of the legs.
         cycles: Time since the start in cycles, (T,).
 
     Returns:

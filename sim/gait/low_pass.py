@@ -51,7 +51,6 @@ def low_pass(angles: Floats, fir_ms: int, window: FirWindow = "moving_average") 
     Args:
         angles: At the control rate, (T, J).
         fir_ms: Length of the filter [ms].
-        window: Which filter, see `fir_gains`.
 
     Returns:
         (T, J).

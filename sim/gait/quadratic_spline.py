@@ -20,7 +20,6 @@ def quadratic_spline(
     The spline's middle point lies at twice the height, so that the foot reaches the height.
 
     Args:
-        phase: Share of the cycle since the start of support, in [0, 1), (...).
         stride: Length of the support [m].
         height: Of the swing [m].
         duty_factor: Support's share of the cycle [1].

@@ -48,20 +48,7 @@ class Stability:
 
 @lru_cache(maxsize=64)
 def static_stability(robot: Robot, scenario: Scenario) -> Stability:
-    """Look at all moments of a cycle as it is planned, without any simulation.
-
-    Args:
-        robot: Whose legs are planned for.
-        scenario: Gait, posture, load and slope.
-
-    Returns:
-        The least stable of them.
-
-    Raises:
-        UnreachablePose: A foot's target lies outside its leg's reach.
-        BeyondJointLimit: A joint would leave its limits.
-        SimulationInputError: The gait is not one for the robot's legs; names the field.
-    """
+    """Look at all moments of a cycle as it is planned, without any simulation."""
     require_reachable(robot, scenario)
     plan = scenario.model_copy(update={"cycles": 1.0, "fir_ms": 0, "trajectory_rate": 500.0})
     angles = desired_angles(robot, plan).angles

@@ -175,27 +175,12 @@ class _Gait:
 
 
 def n_ticks(scenario: Scenario) -> int:
-    """Control ticks of a whole walk.
-
-    Args:
-        scenario: The walk.
-
-    Returns:
-        At least one.
-    """
+    """Control ticks of a whole walk."""
     return max(1, round(scenario.duration / CONTROL_PERIOD))
 
 
 def desired_angles(robot: Robot, scenario: Scenario) -> Trajectory:
-    """A whole walk's desired angles, filtered as the robot's controller receives them.
-
-    Args:
-        robot: Whose legs are planned for.
-        scenario: Gait and posture.
-
-    Returns:
-        The angles, and by how much the legs miss.
-    """
+    """A whole walk's desired angles, filtered as the robot's controller receives them."""
     feet, gait = _feet(robot, scenario), _Gait.of(scenario)
     return _kept(feet, gait) if gait.ticks <= _LONGEST_KEPT else _trajectory(feet, gait)
 
@@ -277,15 +262,6 @@ def require_reachable(robot: Robot, scenario: Scenario) -> None:
 
     Of a walk of more than 20 s the beginning is looked at, which has all of the foot's path; later
     cycles may meet it a fraction of a control tick earlier or later.
-
-    Args:
-        robot: The robot.
-        scenario: The walk.
-
-    Raises:
-        UnreachablePose: A foot's target lies outside its leg's reach; names the leg that misses by
-            most.
-        BeyondJointLimit: A joint would leave its limits; names the one that does by most.
     """
     _check_reach(robot, scenario)
 

@@ -112,10 +112,6 @@ class CurrentFit:
 def recorded_currents(robot: Robot, states: Floats) -> Floats:
     """What a walk's log has as its motor currents, by the kernel's formula on whole columns.
 
-    Args:
-        robot: That walked.
-        states: What the kernel kept, as in `WalkResult`.
-
     Returns:
         Absolute, behind the current sensors' low-pass, at every control tick, (T, J) [A].
     """

@@ -142,20 +142,7 @@ def record(
     controller: str,
     design: Mapping[str, float],
 ) -> RecordedWalk:
-    """The measured currents of two synchronised logs, on the simulated one's time axis.
-
-    Args:
-        pair: The measured and the simulated log.
-        scenario: Of the walk that was simulated.
-        controller: Of the walk that was simulated.
-        design: Of the walk that was simulated, by variable.
-
-    Returns:
-        What a fit needs of the measured walk.
-
-    Raises:
-        MeasuredLogError: The log is too long for a recording, or has currents that no motor draws.
-    """
+    """The measured currents of two synchronised logs, on the simulated one's time axis."""
     try:
         return RecordedWalk(
             scenario=scenario,

@@ -22,16 +22,7 @@ _KEY: Final = "[key]"
 def alternatives(
     expected: str, *, among_own: Callable[[Any], str] = lambda _: OWN
 ) -> Discriminator:
-    """A discriminator between a name and objects.
-
-    Args:
-        expected: what is said to a value that is neither, "must be ...".
-        among_own: object or model -> its tag, for a union that has several kinds of them. A tag is
-            in angle brackets.
-
-    Returns:
-        The discriminator; the name's alternative is tagged `NAME`.
-    """
+    """A discriminator between a name and objects."""
 
     def tag(value: Any) -> str | None:
         if isinstance(value, str):
@@ -42,21 +33,10 @@ def alternatives(
 
 
 def without_tags(location: Location) -> tuple[str | int, ...]:
-    """The part of a location of a validation error that is in the document.
-
-    Args:
-        location: `loc` of a pydantic error.
-
-    Returns:
-        Keys and indices from the document's root.
-    """
+    """The part of a location of a validation error that is in the document."""
     return tuple(part for part in location if not is_tag(part))
 
 
 def is_tag(part: str | int) -> bool:
-    """Whether a part of a location says which alternative was validated.
-
-    Args:
-        part: of `loc` of a pydantic error.
-    """
+    """Whether a part of a location says which alternative was validated."""
     return isinstance(part, str) and (part == _KEY or (part[:1] == "<" and part[-1:] == ">"))

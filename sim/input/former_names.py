@@ -33,18 +33,7 @@ _FORMER: Final[Mapping[str, str]] = MappingProxyType(
 
 
 def current_names(document: Any, former_names: Mapping[str, str]) -> Any:
-    """A document with current names in place of former ones.
-
-    Args:
-        document: what a model is to be validated from; anything but a mapping is left as it is.
-        former_names: former name -> current name of fields of the document itself.
-
-    Returns:
-        The document, or a copy of it if it has a former name.
-
-    Raises:
-        ValueError: a field is there under both names.
-    """
+    """A document with current names in place of former ones."""
     if not isinstance(document, Mapping) or former_names.keys().isdisjoint(document):
         return document
     for former, current in former_names.items():
@@ -56,16 +45,7 @@ def current_names(document: Any, former_names: Mapping[str, str]) -> Any:
 
 
 def as_written(document: Any, location: Sequence[str | int]) -> tuple[str | int, ...]:
-    """A location by the names that the document itself uses, so that an error can quote it.
-
-    Args:
-        document: mappings and sequences, as read.
-        location: keys and indices from its root by current names, as pydantic gives them. Parts
-            that the document does not have are kept.
-
-    Returns:
-        The location, with a former name wherever the document has that in place of the current.
-    """
+    """A location by the names that the document itself uses, so that an error can quote it."""
     written: list[str | int] = []
     for part in location:
         name = part

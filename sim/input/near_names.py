@@ -14,15 +14,7 @@ _ALIKE: Final = 0.7
 
 
 def nearest(name: str, known: Iterable[str]) -> str | None:
-    """The name that may have been meant.
-
-    Args:
-        name: That was given, and is none.
-        known: Those that there are.
-
-    Returns:
-        The one that is most like it, whatever its case; None where none is, and of a number.
-    """
+    """The name that may have been meant."""
     if len(name) > _LONGEST_NAME or name.isdigit():
         return None
     plain = {one.lower(): one for one in known}
@@ -31,16 +23,7 @@ def nearest(name: str, known: Iterable[str]) -> str | None:
 
 
 def instead_of(name: str, known: Iterable[str], listed: Iterable[str] | None = None) -> str:
-    """What to write in place of a name that is none.
-
-    Args:
-        name: That was given.
-        known: Names that there are.
-        listed: How they are listed; None for as they are.
-
-    Returns:
-        The nearest one, or all: to follow what is wrong and a semicolon.
-    """
+    """What to write in place of a name that is none."""
     names = list(known)
     near = nearest(name, names)
     if near is not None:

@@ -53,14 +53,7 @@ _PLAIN: Final = {
 
 
 def message_of(error: Mapping[str, Any]) -> str:
-    """What is wrong with a value, and what it must be.
-
-    Args:
-        error: One of `ValidationError.errors()`.
-
-    Returns:
-        A sentence that follows the name of the field and a colon.
-    """
+    """What is wrong with a value, and what it must be."""
     kind, context = error["type"], error.get("ctx", {})
     if kind == "extra_forbidden" and "known" in context:
         key, inner = str(error["loc"][-1]), context["inner"]
@@ -81,15 +74,7 @@ def message_of(error: Mapping[str, Any]) -> str:
 def with_known_keys(
     errors: Sequence[Mapping[str, Any]], model: Any
 ) -> tuple[Mapping[str, Any], ...]:
-    """Errors that tell, where a key is unknown, which ones are known there.
-
-    Args:
-        errors: As `ValidationError.errors()`, with locations from the model on.
-        model: What was validated against: a model, or a union of some.
-
-    Returns:
-        The errors, in their order, for `message_of`.
-    """
+    """Errors that tell, where a key is unknown, which ones are known there."""
     return tuple(
         {**error, "ctx": {"known": [*known], "inner": _inner_keys(known)}}
         if error["type"] == "extra_forbidden" and (known := _known_keys(model, error["loc"]))

@@ -60,16 +60,6 @@ def walk_together(
     a yields x1, x2; b yields y1    kernel.walk(x1, x2, y1)
     a returns; b yields y2          kernel.walk(y2)
     b returns                       -
-
-    Args:
-        walkings: The computations, none of which was begun.
-        kernel_time: Is added to.
-
-    Returns:
-        Their results, in order; a walk has the same bits in any company.
-
-    Raises:
-        Exception: What one of them raises.
     """
     results: dict[int, T] = {}
     answers: dict[int, Sequence[WalkResult] | None] = dict.fromkeys(range(len(walkings)))

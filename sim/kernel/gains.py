@@ -19,16 +19,7 @@ _LARGEST_TERM = 2**51
 
 
 def check_gains(law: ControlLaw, *, torque: bool) -> None:
-    """Refuse gains with which the compiled kernel's arithmetic is not exact, or leaves a table.
-
-    Args:
-        law: That is to run.
-        torque: Whether the robot's actuators are torque-controlled.
-
-    Raises:
-        SimulationInputError: A gain leads beyond the controllers' integers; the message names it.
-            Or the law has a joint PD, and the robot DC motors.
-    """
+    """Refuse gains with which the compiled kernel's arithmetic is not exact, or leaves a table."""
     if law.joint_pd is not None and not torque:
         raise SimulationInputError(NO_JOINT_PD)
     largest = {

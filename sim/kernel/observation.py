@@ -91,15 +91,7 @@ class States(NamedTuple):
 
 
 def split_states(robot: Robot, states: NDArray[np.float64]) -> States:
-    """Name what a kernel kept.
-
-    Args:
-        robot: That walked.
-        states: As in `WalkResult`.
-
-    Returns:
-        Its columns, as views.
-    """
+    """Name what a kernel kept."""
     n = robot.n_joints
     widths = [3, 4, n, 6, n, internal_state_size(robot), n]
     return States(*np.split(states, np.cumsum(widths), axis=1))
@@ -107,10 +99,6 @@ def split_states(robot: Robot, states: NDArray[np.float64]) -> States:
 
 def encoder_angles(robot: Robot, states: States) -> NDArray[np.float64]:
     """What the encoders see: the motors, which backlash parts from the links.
-
-    Args:
-        robot: That walked.
-        states: Of the walk.
 
     Returns:
         (T, J) [rad].
@@ -121,16 +109,7 @@ def encoder_angles(robot: Robot, states: States) -> NDArray[np.float64]:
 
 
 def walk_log(robot: Robot, setup: WalkSetup, states: NDArray[np.float64]) -> WalkLog:
-    """Currents, torques, forces and supply of every tick, from its state and duty.
-
-    Args:
-        robot: That walked.
-        setup: Its walk.
-        states: What the kernel kept, as in `WalkResult`.
-
-    Returns:
-        The log; rows after an early end stay NaN.
-    """
+    """Currents, torques, forces and supply of every tick, from its state and duty."""
     feet, ticks = len(robot.legs), len(states)
     kept = split_states(robot, states)
     position, orientation, angle, twist, rate, internal_state, _, duty = kept
@@ -185,7 +164,6 @@ def sensed_currents(
     constant there, so the line ends where the next tick's jump of the voltage begins.
 
     Args:
-        robot: That walked.
         current: Of the motors at every control tick, (T, J) [A].
         voltage: Of the motors at every control tick, (T, J) [V].
 

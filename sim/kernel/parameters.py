@@ -67,9 +67,6 @@ def internal_state_size(robot: Robot) -> int:
     Args:
         robot: With backlash, angles [rad] and rates [rad/s] of its motors come first; then what
             the law of contact carries, foot by foot.
-
-    Returns:
-        I.
     """
     motors = 2 * robot.n_joints if robot.has_backlash else 0
     law = CONTACT_LAWS[robot.description.contact_law]
@@ -95,9 +92,6 @@ class Layout:
     backlash (J, if the robot has any) and displaced (1, likewise: whether disturbances are angles),
     static_friction (J, if the robot has any), and by foot (L each) the parameters of the contact
     law.
-
-    Args:
-        robot: The robot.
 
     Attributes:
         slices: by field.
@@ -143,23 +137,14 @@ class Layout:
 
         Args:
             packed: (size,).
-
-        Returns:
-            By field, views.
         """
         return {name: packed[where] for name, where in self.slices.items()}
 
     def pack(self, **values: float | Floats) -> Floats:
         """The vector.
 
-        Args:
-            values: All fields by name, each a number or of the field's length.
-
         Returns:
             (size,).
-
-        Raises:
-            KeyError: A field is missing, or there is no such field.
         """
         if values.keys() != self.slices.keys():
             raise KeyError(sorted(values.keys() ^ self.slices.keys()))
@@ -209,18 +194,10 @@ def pack_parameters(
     A load is a point mass at `load_height` over the body's centre.
 
     Args:
-        robot: The robot.
-        scenario: Its load, slope and shove count.
         timestep: Of the physics [s].
         start: Angles at which the walk begins, where a jammed leg is held, (J,) [rad]; zero if
             left out.
         displaced: Whether disturbances are angles between gearheads and links [rad], not torques.
-
-    Returns:
-        (Layout.size,).
-
-    Raises:
-        SimulationInputError: Angles are to be displaced in a robot without shafts that yield.
     """
     if displaced and not robot.has_backlash:
         raise SimulationInputError(

@@ -86,7 +86,6 @@ def philox(counter: Words, key: tuple[Words, Words]) -> Words:
 
     Args:
         counter: (..., 4) words of 32 bits.
-        key: Two words of 32 bits, each of the counters' leading shape, or one for all.
 
     Returns:
         (..., 4) words of 32 bits.
@@ -105,9 +104,6 @@ def byte_sums(seeds: Words, tick: int, joints: int, stream: int = 0) -> Integers
 
     Args:
         seeds: (n,), of 64 bits.
-        tick: Of the walk.
-        joints: J.
-        stream: Keeps apart what is random for other reasons; that of sensors is 0.
 
     Returns:
         (n, J, 2) sums of eight bytes, less their mean; the standard deviation is `DEVIATION`.
@@ -121,11 +117,7 @@ def byte_sums(seeds: Words, tick: int, joints: int, stream: int = 0) -> Integers
 
 
 class Sensors:
-    """Sensors of one walk, tick by tick.
-
-    Args:
-        errors: Theirs.
-    """
+    """Sensors of one walk, tick by tick."""
 
     def __init__(self, errors: SensorErrors) -> None:
         self._errors = errors

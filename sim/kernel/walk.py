@@ -98,16 +98,7 @@ class Coding:
 
     @classmethod
     def of(cls, robot: Robot, substeps: int, refinement: int = 1) -> Coding:
-        """Resolutions of a robot's sensors and bridges.
-
-        Args:
-            robot: The robot.
-            substeps: Physics steps a control tick.
-            refinement: How many times as many where a foot may come down.
-
-        Returns:
-            The coding.
-        """
+        """Resolutions of a robot's sensors and bridges."""
         d = robot.description
         counts, step, per_count = d.output
         return cls(
@@ -160,15 +151,7 @@ class Coding:
 
 
 def coarsen(code: Ints, step: int) -> Ints:
-    """Nearest multiple of a resolution, halves up.
-
-    Args:
-        code: Whole numbers.
-        step: The resolution.
-
-    Returns:
-        As many multiples.
-    """
+    """Nearest multiple of a resolution, halves up."""
     coarse: Ints = (code + step // 2) // step * step
     return coarse
 
@@ -237,9 +220,6 @@ class WalkSetup:
     def smoothing(self, refinement: int) -> float:
         """The analog low-pass over a shorter step.
 
-        Args:
-            refinement: How many of them are a physics step.
-
         Returns:
             `current_smoothing` of such a step [1].
         """
@@ -253,16 +233,7 @@ class WalkSetup:
         return len(self.desired)
 
     def check(self, *, joints: int, internal_state: int, parameters: int) -> None:
-        """Refuse arrays that a kernel of these sizes would read beyond their ends.
-
-        Args:
-            joints: J, the robot's driven joints.
-            internal_state: X, numbers that a walk carries beside q and v.
-            parameters: P, length of the parameter vector.
-
-        Raises:
-            SimulationInputError: An array has another shape; the message names it.
-        """
+        """Refuse arrays that a kernel of these sizes would read beyond their ends."""
         ticks = max(self.ticks, 1)
         wanted: dict[str, tuple[NDArray[Any], tuple[int, ...]]] = {
             "start": (self.start, (7 + joints,)),
@@ -350,8 +321,6 @@ class WalkResults(Sequence[WalkResult]):
     """What became of all walks of one call, in their order.
 
     Args:
-        results: Of the walks.
-        lane_use: Of the lanes of the thread that made the call, whosever walks they had.
         waited: How long the thread waited for walks that others had taken over [s].
     """
 

@@ -44,20 +44,7 @@ _HEADING: Final = re.compile(r"^(?P<name>[^\[\]]*?)\s*(?:\[(?P<unit>[^\[\]]*)\])
 
 
 def parse_measured_log(text: str, robot: Robot) -> MeasuredLog:
-    """The log of a robot from the text of its file.
-
-    Args:
-        text: Of the file.
-        robot: That was measured.
-
-    Returns:
-        The log.
-
-    Raises:
-        MeasuredLogError: A heading is missing, unknown, double or of another unit, a value is not a
-            finite number (or a negative absolute current), times are not 2 ms apart, or the log is
-            shorter than 0.2 s; names line, column and unit.
-    """
+    """The log of a robot from the text of its file."""
     lines = enumerate(text.removeprefix("\ufeff").splitlines(), start=1)
     metadata, head_line, headings = _head(lines)
     expected = _expected(robot)
@@ -95,17 +82,7 @@ def parse_measured_log(text: str, robot: Robot) -> MeasuredLog:
 
 
 def format_measured_log(log: MeasuredLog) -> str:
-    """The text of a log; parsing it gives the same numbers to the bit.
-
-    Args:
-        log: The log.
-
-    Returns:
-        Text of a file.
-
-    Raises:
-        MeasuredLogError: Metadata does not fit on a line of its own.
-    """
+    """The text of a log; parsing it gives the same numbers to the bit."""
     for key, value in log.metadata.items():
         if not _is_remark(key, value):
             raise MeasuredLogError(f"metadata {key!r}: {value!r} does not fit on a line of its own")
@@ -127,15 +104,7 @@ def format_measured_log(log: MeasuredLog) -> str:
 
 
 def heading(quantity: Quantity, channel: str) -> str:
-    """A column's heading as in the file: `I_M.left_rear_tibia [A]`.
-
-    Args:
-        quantity: That the column holds.
-        channel: Joint, leg or axis.
-
-    Returns:
-        The heading.
-    """
+    """A column's heading as in the file: `I_M.left_rear_tibia [A]`."""
     return f"{quantity}.{channel} [{quantity.unit}]"
 
 

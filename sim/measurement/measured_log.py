@@ -125,14 +125,7 @@ class MeasuredLog:
         return self.metadata.get(ORIGIN) == SYNTHETIC
 
     def channels(self, quantity: Quantity) -> tuple[str, ...]:
-        """Names of a quantity's columns.
-
-        Args:
-            quantity: Of table 2.2.
-
-        Returns:
-            Joints, legs or axes; none for a quantity that was not measured.
-        """
+        """Names of a quantity's columns."""
         if quantity is Quantity.POTENTIOMETER:
             return self.potentiometer_joints
         if quantity is Quantity.BODY_ACCELERATION and self.body_acceleration is None:
@@ -141,9 +134,6 @@ class MeasuredLog:
 
     def values(self, quantity: Quantity) -> Floats:
         """A quantity's columns.
-
-        Args:
-            quantity: Of table 2.2.
 
         Returns:
             (T, channels), in the quantity's unit.
@@ -160,26 +150,11 @@ class MeasuredLog:
         return np.empty((len(self.time), 0)) if columns is None else columns
 
     def link_of(self, joint: str) -> int:
-        """Which link of its leg a joint moves.
-
-        Args:
-            joint: One of `joints`.
-
-        Returns:
-            1, 2 or 3: coxa, femur or tibia.
-        """
+        """Which link of its leg a joint moves."""
         return self.joints.index(joint) % JOINTS_PER_LEG + 1
 
     def rows(self, start: int, stop: int) -> MeasuredLog:
-        """A part of the log.
-
-        Args:
-            start: First row.
-            stop: Row after the last.
-
-        Returns:
-            The part; its arrays are views.
-        """
+        """A part of the log."""
         part = slice(start, stop)
         return replace(
             self,
@@ -201,16 +176,6 @@ def simulated_log(robot: Robot, walk: WalkLog) -> MeasuredLog:
 
     Encoders see the motors' angles, potentiometers, which every joint has, the links'; currents are
     those of `sensed_currents`; every leg's board sees the one battery.
-
-    Args:
-        robot: That walked.
-        walk: Log of a walk that did not end early.
-
-    Returns:
-        The quantities of table 2.2.
-
-    Raises:
-        SimulationInputError: The walk ended early.
     """
     if not np.isfinite(walk.current).all():
         raise SimulationInputError("a walk that ended early cannot be compared")

@@ -49,16 +49,7 @@ def synchronise(measured: MeasuredLog, simulated: MeasuredLog, cycle_time: float
     """Find the lag between two logs and trim both to the whole cycles that they share.
 
     Args:
-        measured: Log of the walk.
-        simulated: Log of the same walk.
         cycle_time: Of a walking cycle [s].
-
-    Returns:
-        The two on a common time axis.
-
-    Raises:
-        MeasuredLogError: They are not of the same joints, the desired angles stand still, or they
-            share less than one cycle.
     """
     if measured.joints != simulated.joints:
         raise MeasuredLogError("the two logs are not of the same joints")
@@ -95,13 +86,9 @@ def find_lag(measured: Floats, simulated: Floats, cycle: int) -> tuple[int, floa
     Args:
         measured: Desired angles, (T1, J).
         simulated: Desired angles of the same joints, (T2, J).
-        cycle: Rows of a walking cycle, which the two share at least.
 
     Returns:
         Lag k [rows] at which measured[t + k] is simulated[t], and their correlation there.
-
-    Raises:
-        MeasuredLogError: The desired angles stand still.
     """
     mean = simulated.mean(axis=0)
     x, y = measured - mean, simulated - mean

@@ -66,14 +66,7 @@ class Perturbation(BaseModel):
 
     @classmethod
     def of(cls, parameters: Mapping[str, float]) -> Perturbation:
-        """A twin that differs in single parameters alone, and has no backlash.
-
-        Args:
-            parameters: Values of some of `identifiable_variables`, by name.
-
-        Returns:
-            The perturbation.
-        """
+        """A twin that differs in single parameters alone, and has no backlash."""
         return cls(
             supply_voltage=1.0,
             supply_resistance=1.0,
@@ -118,21 +111,6 @@ def synthetic_log(
     """A log of the perturbed twin of a robot, marked as synthetic in its metadata.
 
     The same arguments give the same bits; each quantity has a random stream of its own, by seed.
-
-    Args:
-        robot: As described.
-        scenario: Of the walk.
-        controller: Name of the motor controller.
-        design: The controller's variables and any gait variables, by name.
-        seed: Of the instruments' noise, 64 bits.
-        perturbation: How the twin differs; the default if left out.
-        instruments: Their errors; the default if left out.
-
-    Returns:
-        The log.
-
-    Raises:
-        SimulationInputError: The twin does not walk to the end, or the seed is none.
     """
     if not 0 <= seed < 1 << 64:
         raise SimulationInputError(f"seed: {seed} is not a whole number from 0 of 64 bits")
@@ -162,18 +140,7 @@ def synthetic_log(
 
 
 def perturbed(robot: Robot, change: Perturbation) -> Robot:
-    """The twin: the same robot with other friction, losses, backlash, battery and soles.
-
-    Args:
-        robot: As described.
-        change: How the twin differs.
-
-    Returns:
-        The twin.
-
-    Raises:
-        SimulationInputError: No robot can have one of the values.
-    """
+    """The twin: the same robot with other friction, losses, backlash, battery and soles."""
     d = robot.description
 
     def contact(own: Contact) -> Contact:

@@ -38,29 +38,14 @@ class MeasuredWalk:
     def of(
         cls, robot: Robot, scenario: Scenario, controller: str, design: Mapping[str, float]
     ) -> MeasuredWalk:
-        """The walk, once it is known that the legs reach all of it.
-
-        Args:
-            robot: That walked.
-            scenario: In full.
-            controller: Name of the motor controller.
-            design: Value of each of its variables, and of any gait variable.
-
-        Raises:
-            SimulationInputError: The legs do not reach it, or a gait variable has a value that no
-                scenario can have; names scenario and leg, or the field.
-        """
+        """The walk, once it is known that the legs reach all of it."""
         gait = {name: value for name, value in design.items() if name in GAIT_CATALOGUE}
         walked = with_gait(scenario, gait)
         check_reach(walked, [], [], robot=robot)
         return cls(robot, scenario, controller, design, walked.cycle_time)
 
     def simulated(self) -> MeasuredLog:
-        """What the robot's instruments would have logged of it, without their errors.
-
-        Raises:
-            SimulationInputError: The simulated robot falls, or the design cannot be compiled.
-        """
+        """What the robot's instruments would have logged of it, without their errors."""
         designs = np.array([list(self.design.values())], dtype=np.float64)
         result = simulate(
             self.scenario, self.controller, list(self.design), designs, robot=self.robot, log=True

@@ -34,14 +34,7 @@ _MODULE: Final = "mujoco"
 
 
 def engine_variable(engines: Sequence[EngineName] = tuple(ENGINES)) -> Variable:
-    """Which engine computes a walk, as a column of worlds.
-
-    Args:
-        engines: Those that can be chosen beside ours.
-
-    Returns:
-        A categorical variable; ours is its first choice and its default.
-    """
+    """Which engine computes a walk, as a column of worlds."""
     return Variable(
         name=ENGINE,
         kind="categorical",
@@ -52,11 +45,7 @@ def engine_variable(engines: Sequence[EngineName] = tuple(ENGINES)) -> Variable:
 
 
 def check_installed() -> None:
-    """Check that the library of the engines is there; it is not imported.
-
-    Raises:
-        SimulationInputError: It is not; says how to install it.
-    """
+    """Check that the library of the engines is there; it is not imported."""
     if find_spec(_MODULE) is None:
         raise SimulationInputError(
             f"mujoco needs {LIBRARY}, not installed here: pip install 'gaitswarm[mujoco]'"

@@ -22,20 +22,6 @@ def exported(robot: Robot, scenario: Scenario, *, contacts: bool = True) -> str:
     torques [N m] where these are controlled, shapes to be seen, and a keyframe `start`, the pose in
     which a walk through the scenario begins. Backlash, limits of torque by speed, the battery's sag
     and static friction are not in it.
-
-    Args:
-        robot: The robot.
-        scenario: The walk.
-        contacts: Whether soles meet the ground: springs, dampers and friction of the robot's, as
-            far as MuJoCo's own contacts can be made so. Without, it falls freely.
-
-    Returns:
-        The text, which MuJoCo has compiled once.
-
-    Raises:
-        UnreachablePose: The walk is out of the legs' reach.
-        BeyondJointLimit: A joint would leave its limits in it.
-        RobotFileError: The URDF's tree is not one that can be simulated.
     """
     require_reachable(robot, scenario)
     surroundings = Surroundings.of(robot, scenario)

@@ -43,16 +43,12 @@ class Motors(Protocol):
         Args:
             duty: Motor voltage per supply voltage, or torque per torque limit, (J,) [1].
             rates: Of the motors at the joints, (J,) [rad/s].
-
-        Returns:
-            Voltages, currents and torques.
         """
 
     def current_after(self, drive: Drive, faster: Floats) -> Floats:
         """Currents under the same command when the rates have grown.
 
         Args:
-            drive: Before.
             faster: By which the rates have grown, (J,) [rad/s].
 
         Returns:
@@ -76,12 +72,7 @@ class _Friction:
 
 
 class TorqueMotors:
-    """Torque-controlled actuators: what is commanded, within what the speed leaves of it.
-
-    Args:
-        actuators: Of the robot.
-        numbers: As for `DcMotors`.
-    """
+    """Torque-controlled actuators: what is commanded, within what the speed leaves of it."""
 
     def __init__(self, actuators: JointActuators, numbers: Mapping[str, Floats]) -> None:
         self._a, self._friction = actuators, _Friction(numbers)
@@ -115,9 +106,8 @@ class DcMotors:
     """Quasi-static currents on a battery of finite resistance (thesis 2.2.5).
 
     Args:
-        actuators: Of the robot.
         numbers: `viscous` and, of a robot that has it, `static_friction` (J,), and the battery's
-            `supply_voltage` and `supply_resistance` (1,), as `gaitswarm.sim.kernel.parameters.Layout` has
+            `supply_voltage` and `supply_resistance` (1,), as `sim.kernel.parameters.Layout` has
             them.
     """
 
@@ -136,9 +126,6 @@ class DcMotors:
         Args:
             duty: Motor voltage per supply voltage, (J,) [1].
             rates: Of the gearheads' outputs, (J,) [rad/s].
-
-        Returns:
-            Voltages, currents and torques.
         """
         back = self._k * rates
         share = duty / self._r
@@ -154,7 +141,6 @@ class DcMotors:
         """Currents at the same voltages when the rates have grown.
 
         Args:
-            drive: Before.
             faster: By which the rates have grown, (J,) [rad/s].
 
         Returns:
@@ -212,19 +198,13 @@ class Gears(Protocol):
             angles: Of the links, (J,) [rad].
             rates: Of the links, (J,) [rad/s].
             ahead: By which gearheads are turned further, (J,) [rad].
-
-        Returns:
-            Drive and torques.
         """
 
     def kick(self, actuation: Actuation, timestep: float, implicit: float = 0.0) -> Floats | None:
         """Step the rates of rotors of their own.
 
         Args:
-            actuation: At the beginning of the step.
             timestep: [s].
-            implicit: Share of the step by whose end the motors' damping is taken: 0 for its
-                beginning, 0.5 for its middle.
 
         Returns:
             Accelerations of these rotors, (J,) [rad/s2]; None where they turn with the links.
@@ -239,12 +219,7 @@ class Gears(Protocol):
 
 
 class FirmGears:
-    """Rotors that turn with the links.
-
-    Args:
-        robot: The robot.
-        motors: Its motors.
-    """
+    """Rotors that turn with the links."""
 
     def __init__(self, robot: Robot, motors: Motors) -> None:
         self.motors, self.armature = motors, robot.actuators().armature
@@ -279,8 +254,6 @@ class LooseGears:
     """Rotors of their own that touch the links at either end of a play, through damped shafts.
 
     Args:
-        robot: The robot.
-        motors: Its motors.
         play: Of all joints, end to end, (J,) [rad].
         angles: At which rotors and links begin, at rest, (J,) [rad].
 
@@ -341,12 +314,8 @@ def gears_of(robot: Robot, numbers: Mapping[str, Floats], angles: Floats) -> Gea
     """The gears of a robot, motors and links at the same angles and at rest.
 
     Args:
-        robot: The robot.
         numbers: As for `DcMotors`; of a robot with backlash `backlash` (J,), too.
         angles: (J,) [rad].
-
-    Returns:
-        Its gears.
     """
     kind = TorqueMotors if robot.is_torque_controlled else DcMotors
     motors = kind(robot.actuators(), numbers)

@@ -55,9 +55,6 @@ class Ground(ABC):
             position: Of the feet, (L, 3) [m].
             velocity: Of the feet, (L, 3) [m/s].
             time: [s].
-
-        Returns:
-            True if one is.
         """
         depth = self._sole - position[:, 2]
         return bool(((depth <= 0.0) & (depth > velocity[:, 2] * time)).any())

@@ -80,11 +80,8 @@ class MujocoKernel:
     """Walks in MuJoCo.
 
     Args:
-        robot: That walks.
-        soles: What meets the ground by MuJoCo's own contacts; `none` for our laws of contact.
         rate: MuJoCo's steps a second [Hz], all of one length, of a multiple of the control rate;
             None for `RATE`, or `BACKLASH_RATE`, and shorter ones where a foot may come down.
-        should_stop: Polled on the way.
     """
 
     backend: Final = "mujoco"
@@ -105,20 +102,7 @@ class MujocoKernel:
         self._layout = Layout(robot)
 
     def walk(self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool) -> WalkResults:
-        """All walks, one after the other.
-
-        Args:
-            setups: As of any kernel.
-            coding: As of any kernel.
-            log: Whether to keep states.
-
-        Returns:
-            Results, in order; sums are over steps of the setup's own length.
-
-        Raises:
-            SimulationInputError: A setup has arrays of other sizes.
-            WalkStopped: `should_stop` has said so.
-        """
+        """All walks, one after the other."""
         for setup in setups:
             check_gains(setup.control_law, torque=self._robot.is_torque_controlled)
             setup.check(

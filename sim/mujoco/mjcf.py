@@ -66,15 +66,7 @@ class Surroundings:
 
     @classmethod
     def of(cls, robot: Robot, scenario: Scenario | None = None) -> Surroundings:
-        """Of a scenario: its load as a point mass, its slope as level ground in tilted gravity.
-
-        Args:
-            robot: The robot.
-            scenario: None for level ground and no load.
-
-        Returns:
-            What the scenario changes.
-        """
+        """Of a scenario: its load as a point mass, its slope as level ground in tilted gravity."""
         if scenario is None:
             return cls(robot.body, gravity_on(0.0), robot.contacts())
         at = np.array([0.0, 0.0, robot.description.load_height])
@@ -112,20 +104,7 @@ class Rig:
 
 
 def mjcf(robot: Robot, surroundings: Surroundings, rig: Rig) -> str:
-    """Write a robot on a free joint as MJCF.
-
-    Args:
-        robot: The robot.
-        surroundings: Of its walk.
-        rig: What the model has beside rigid bodies.
-
-    Returns:
-        Text that MuJoCo reads.
-
-    Raises:
-        RobotFileError: The URDF's tree is not one that can be simulated.
-        ValueError: Point soles are asked for, but soles have several lengths.
-    """
+    """Write a robot on a free joint as MJCF."""
     limbs_of(robot)  # Refuses what cannot be simulated, with the reason.
     root = ET.Element("mujoco", model=robot.description.name)
     ET.SubElement(root, "compiler", angle="radian", autolimits="false")

@@ -55,14 +55,7 @@ def model(
     """The compiled model of a robot in a scenario.
 
     Args:
-        robot: The robot.
-        scenario: Its load and slope count; None for level ground and no load.
         timestep: Of MuJoCo's steps [s].
-        feet: Of MuJoCo's own contact; None for forces from outside.
-        voltage_motors: Whether joints have actuators that take a motor's voltage.
-
-    Returns:
-        The model.
     """
     rig = Rig(timestep, voltage_motors=voltage_motors)
     surroundings = Surroundings.of(robot, scenario)
@@ -72,17 +65,7 @@ def model(
 
 
 def with_contacts(robot: Robot, surroundings: Surroundings, rig: Rig, feet: Feet) -> Rig:
-    """Let MuJoCo compute the contacts: every pair's soft constraint is the robot's spring, damper.
-
-    Args:
-        robot: The robot.
-        surroundings: Of its walk.
-        rig: Of the model.
-        feet: How contacts are to be.
-
-    Returns:
-        The rig with soles and contact pairs.
-    """
+    """Let MuJoCo compute the contacts, with the robot's spring and damper for each pair."""
     rig = replace(rig, soles="points" if feet.points else "spheres")
     free = mujoco.MjModel.from_xml_string(mjcf(robot, surroundings, rig))
     return replace(
@@ -105,8 +88,6 @@ def even_drags(
     A law's drag follows the normal force; MuJoCo's is one number for all loads.
 
     Args:
-        robot: The robot.
-        surroundings: Of its walk.
         standing: Feet that carry the weight evenly [1]; None for half of them.
 
     Returns:

@@ -50,14 +50,7 @@ class Plugin:
         return f"{self.kind} {self.name!r} of {self.distribution} {self.version}"
 
     def load(self) -> object:
-        """Import what it brings.
-
-        Returns:
-            The object, not checked yet.
-
-        Raises:
-            PluginError: It cannot be imported, for whatever reason.
-        """
+        """Import what it brings."""
         try:
             return metadata.EntryPoint(self.name, self.place, GROUPS[self.kind]).load()
         except (Exception, SystemExit) as error:
@@ -68,11 +61,7 @@ class Plugin:
 
 @lru_cache(maxsize=1)
 def find_plugins() -> tuple[Plugin, ...]:
-    """All entry points for gaitswarm that are installed, as they are at the first call.
-
-    Returns:
-        By kind, name and distribution.
-    """
+    """All entry points for gaitswarm that are installed, as they are at the first call."""
     # Asked for at once: each question reads the metadata of all distributions.
     points = metadata.entry_points()
     found = {

@@ -24,12 +24,6 @@ class Registry(MutableMapping[str, T]):
     A name of gaitswarm's is answered without a look at what is installed. A plug-in that is broken,
     or whose name is taken, is logged and left out: to its users it is an unknown name, with the
     reason beside it.
-
-    Args:
-        kind: Of the things.
-        built_in: Those of gaitswarm, by name.
-        accept: Makes of what an entry point brings what the registry holds; raises PluginError,
-            or any other error, for what is none.
     """
 
     def __init__(
@@ -77,14 +71,7 @@ class Registry(MutableMapping[str, T]):
         return tuple(plugin for plugin in find_plugins() if plugin.kind == self._kind)
 
     def problem(self, plugin: Plugin) -> str | None:
-        """Why a plug-in cannot be used; it is imported to find out, once.
-
-        Args:
-            plugin: One of `plugins`.
-
-        Returns:
-            For people, with its distribution; None if it can be used.
-        """
+        """Why a plug-in cannot be used; it is imported to find out, once."""
         if plugin not in self._loaded and plugin not in self._broken:
             try:
                 self._check_name(plugin)
@@ -95,14 +82,7 @@ class Registry(MutableMapping[str, T]):
         return self._broken.get(plugin)
 
     def distribution(self, name: str) -> tuple[str, ...]:
-        """The distribution that a name's plug-in is of.
-
-        Args:
-            name: A known name.
-
-        Returns:
-            One distribution; none for a name of gaitswarm's.
-        """
+        """The distribution that a name's plug-in is of."""
         if name in self._built_in:
             return ()
         return tuple(
@@ -110,26 +90,11 @@ class Registry(MutableMapping[str, T]):
         )
 
     def unknown(self, name: str) -> str:
-        """Say that a name is none.
-
-        Args:
-            name: That was given.
-
-        Returns:
-            For people: the names that there are, and what is known of a plug-in of that name.
-        """
+        """Say that a name is none."""
         return f"unknown {self._kind} {name!r}; {self.instead_of(name, self)}"
 
     def instead_of(self, name: str, known: Iterable[str]) -> str:
-        """What may help whoever gave a name that is none.
-
-        Args:
-            name: That was given.
-            known: Names that there are, of the registry and others.
-
-        Returns:
-            The nearest or all of these, and why plug-ins of that name cannot be used.
-        """
+        """What may help whoever gave a name that is none."""
         known = list(known)
         found = [self.problem(plugin) for plugin in self.plugins() if plugin.name == name]
         reasons = [reason for reason in found if reason is not None]
@@ -168,22 +133,11 @@ class Names(Protocol):
     def __iter__(self) -> Iterator[str]: ...
 
     def unknown(self, name: str) -> str:
-        """Say that a name is none.
-
-        Args:
-            name: That was given.
-
-        Returns:
-            For people, with those that there are.
-        """
+        """Say that a name is none."""
 
 
 class KnownName:
-    """Annotation of a `str` that is to be a known name, a plug-in's among them.
-
-    Args:
-        names: Those that there are.
-    """
+    """Annotation of a `str` that is to be a known name, a plug-in's among them."""
 
     def __init__(self, names: Names) -> None:
         self._names = names
@@ -207,19 +161,7 @@ class KnownName:
 
 
 def check_is(plugin: Plugin, brought: object, wanted: type[T]) -> T:
-    """Check the type of what a plug-in brings, and that its own name is the entry point's.
-
-    Args:
-        plugin: The plug-in.
-        brought: What its entry point names.
-        wanted: What it is to be: a class, or a protocol that can be checked at run time.
-
-    Returns:
-        The same object.
-
-    Raises:
-        PluginError: It is something else.
-    """
+    """Check the type of what a plug-in brings, and that its own name is the entry point's."""
     if isinstance(brought, type) or not isinstance(brought, wanted):
         raise PluginError(
             f"{plugin} cannot be used: {plugin.place} is a {type(brought).__name__},"
@@ -229,14 +171,6 @@ def check_is(plugin: Plugin, brought: object, wanted: type[T]) -> T:
 
 
 def check_name(plugin: Plugin, own: object) -> None:
-    """Check that a thing has the name that its entry point gives it.
-
-    Args:
-        plugin: The plug-in.
-        own: What it calls itself.
-
-    Raises:
-        PluginError: Another one: jobs would be stored with a name by which nothing is found.
-    """
+    """Check that a thing has the name that its entry point gives it."""
     if own != plugin.name:
         raise PluginError(f"{plugin} cannot be used: it calls itself {own!r}")

@@ -15,13 +15,7 @@ T = TypeVar("T")
 
 
 class PluginSettings(Generic[T]):
-    """Annotation of settings that may be a plug-in's: what is annotated is read if they are not.
-
-    Args:
-        registry: Of what is set.
-        model: From what the registry holds to the model of its settings, which have a `name`.
-        seen: Where people see what can be set, for the schema.
-    """
+    """Annotation of settings that may be a plug-in's: what is annotated is read if they are not."""
 
     def __init__(
         self, registry: Registry[T], model: Callable[[T], type[BaseModel]], seen: str

@@ -26,15 +26,7 @@ _SUFFIXES: Final = (".py", ".c", ".h", ".so")
 
 
 def source_digest(root: Path, files: Iterable[Path]) -> str:
-    """Digest of source files.
-
-    Args:
-        root: folder that the files lie under; only their places below it count.
-        files: the files, in the order in which they enter.
-
-    Returns:
-        Hexadecimal digits that change with any name or byte of them.
-    """
+    """Digest of source files."""
     digest = hashlib.sha256()
     for file in files:
         content = file.read_bytes()
@@ -44,15 +36,7 @@ def source_digest(root: Path, files: Iterable[Path]) -> str:
 
 
 def version_of(distribution: str) -> str:
-    """The version of a distribution here.
-
-    Args:
-        distribution: Its name.
-
-    Returns:
-        The version, of one with plug-ins with a digest of their code, as `1.0 (code 3f0c...)`, so
-        that an edit without a new version is noticed; `MISSING` if it is not installed.
-    """
+    """The version of a distribution here."""
     known = plugin_versions()
     if distribution in known:
         return known[distribution]
@@ -70,11 +54,7 @@ def _installed(distribution: str) -> str:
 
 @lru_cache(maxsize=1)
 def plugin_versions() -> dict[str, str]:
-    """Versions of all distributions with plug-ins, by name, as they are at the first call.
-
-    Returns:
-        As of `version_of`.
-    """
+    """Versions of all distributions with plug-ins, by name, as they are at the first call."""
     by_name: dict[str, list[Plugin]] = {}
     for plugin in find_plugins():
         by_name.setdefault(plugin.distribution, []).append(plugin)

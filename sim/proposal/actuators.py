@@ -38,15 +38,7 @@ _STIFFNESS, _DAMPING = (0.5, 10.0), (0.005, 0.1)
 
 
 def actuator_tables(kind: ActuatorKind, drives: Sequence[Sequence[DriveNumbers]]) -> list[str]:
-    """Lines of robot.toml: actuators, battery, command and sensors.
-
-    Args:
-        kind: Of the actuators.
-        drives: By leg and joint.
-
-    Returns:
-        The lines.
-    """
+    """Lines of robot.toml: actuators, battery, command and sensors."""
     if kind == "torque":
         return [*_torque_actuators(drives), *_torque_electronics(drives)]
     return [*_dc_motors(drives), *_dc_electronics(drives)]
@@ -55,15 +47,7 @@ def actuator_tables(kind: ActuatorKind, drives: Sequence[Sequence[DriveNumbers]]
 def proposed_control(
     kind: ActuatorKind, drives: Sequence[Sequence[DriveNumbers]]
 ) -> dict[str, Any]:
-    """A controller, and bounds of its variables that follow from the torques.
-
-    Args:
-        kind: Of the actuators.
-        drives: By leg and joint.
-
-    Returns:
-        Fields of a job's spec.
-    """
+    """A controller, and bounds of its variables that follow from the torques."""
     if kind == "dc":
         return {"controller": "pid"}
     limit = float(np.median([drive.torque for of_leg in drives for drive in of_leg]))
@@ -83,14 +67,7 @@ def proposed_control(
 
 
 def drive_names(drives: Sequence[Sequence[DriveNumbers]]) -> dict[DriveNumbers, str]:
-    """A name for every drive that differs.
-
-    Args:
-        drives: By leg and joint.
-
-    Returns:
-        By drive.
-    """
+    """A name for every drive that differs."""
     kinds = dict.fromkeys(drive for of_leg in drives for drive in of_leg)
     return {drive: f"drive{number}" for number, drive in enumerate(kinds, start=1)}
 
@@ -196,12 +173,5 @@ def _sensors(largest: float) -> list[str]:
 
 
 def quoted(text: str) -> str:
-    """Text as a string of TOML.
-
-    Args:
-        text: The text.
-
-    Returns:
-        In quotes.
-    """
+    """Text as a string of TOML."""
     return json.dumps(text, ensure_ascii=False)

@@ -36,22 +36,7 @@ def walking_proposal(
     frame: Frame = AS_IT_IS,
     bounds: MeshBounds = no_meshes,
 ) -> Proposal:
-    """Propose a robot, and make sure that it can be used and that its legs reach.
-
-    Args:
-        urdf: Text of the file.
-        name: Of the robot.
-        actuator: Kind of its actuators.
-        frame: Which axes of its first link point up and ahead.
-        bounds: Of meshes, where feet may be known by nothing else.
-
-    Returns:
-        Its files.
-
-    Raises:
-        RobotFileError: The URDF cannot be read, no legs are found that can be simulated, or these
-            have no room for steps.
-    """
+    """Propose a robot, and make sure that it can be used and that its legs reach."""
     proposal = propose_robot(urdf, name, actuator, frame, bounds)
     robot = parse_robot(proposal.toml, proposal.urdf)
     with by_line(urdf):
@@ -65,20 +50,7 @@ def walking_proposal(
 def propose_apart(
     urdf: str, name: str, actuator: ActuatorChoice = "auto", frame: Frame = AS_IT_IS
 ) -> Proposal:
-    """The same, in another process with limits of time, processor and memory.
-
-    Args:
-        urdf: Text of the file, by anybody.
-        name: Of the robot.
-        actuator: Kind of its actuators.
-        frame: Which axes of its first link point up and ahead.
-
-    Returns:
-        Its files.
-
-    Raises:
-        RobotFileError: As for `walking_proposal`; or it took too much, or ended its process.
-    """
+    """The same, in another process with limits of time, processor and memory."""
     bounds.check_urdf(urdf)
     try:
         made = PROCESSES.ask(

@@ -82,15 +82,7 @@ class Proposal:
         return (*self.guesses, *(f"warning: {problem}" for problem in self.problems))
 
     def with_guesses(self, more: Sequence[str], **changed: Any) -> Proposal:
-        """The same robot with more guesses, in robot.toml too.
-
-        Args:
-            more: One sentence each.
-            changed: Other attributes.
-
-        Returns:
-            The robot.
-        """
+        """The same robot with more guesses, in robot.toml too."""
         guesses = tuple(dict.fromkeys([*self.guesses, *more]))
         toml = self.toml.replace(_guesses(self.guesses), _guesses(guesses), 1)
         return replace(self, toml=toml, guesses=guesses, **changed)
@@ -103,21 +95,7 @@ def propose_robot(
     frame: Frame = AS_IT_IS,
     bounds: MeshBounds = no_meshes,
 ) -> Proposal:
-    """Make a robot of a URDF.
-
-    Args:
-        urdf: Text of the file.
-        name: Of the robot.
-        actuator: Kind of its actuators.
-        frame: Which axes of its first link point up and ahead.
-        bounds: Of meshes, where feet may be known by nothing else.
-
-    Returns:
-        Its files.
-
-    Raises:
-        RobotFileError: The URDF cannot be read, or no legs are found that can be simulated.
-    """
+    """Make a robot of a URDF."""
     with by_line(urdf):
         urdf, found, moved = stood_up(urdf, frame, bounds)
     text, feet = with_feet(urdf, found.legs)

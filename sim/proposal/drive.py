@@ -92,15 +92,6 @@ def propose_drives(
     Torque and rate are the limits that the URDF gives (`effort`, `velocity`), where these could be
     meant: a torque of 1000 N m stands in many files for "unknown". Else they are a multiple of what
     the joint needs to stand on half the legs.
-
-    Args:
-        urdf: Of the robot.
-        names: Of each leg's joints, from the body on.
-        legs: Their kinematics.
-        stance: Of the robot.
-
-    Returns:
-        By leg its joints' drives.
     """
     joints = {joint.name: joint for joint in urdf.joints}
     force = urdf.total_mass * GRAVITY / (len(legs) / 2.0)
@@ -121,16 +112,7 @@ def propose_drives(
 
 
 def chosen_kind(choice: ActuatorChoice, drives: Sequence[Sequence[DriveNumbers]]) -> ActuatorKind:
-    """The kind of actuators to propose.
-
-    Args:
-        choice: What is asked for.
-        drives: By leg and joint.
-
-    Returns:
-        With `auto`, torque-controlled ones for a robot whose URDF has torques and rates of every
-        joint that can be meant, and whose rates are those of quasi-direct drives; else DC motors.
-    """
+    """The kind of actuators to propose."""
     if choice != "auto":
         return choice
     of_joints = [drive for of_leg in drives for drive in of_leg]
@@ -160,13 +142,7 @@ def propose_sole(
     """Propose the soles' spring and damper.
 
     Args:
-        urdf: Of the robot.
-        legs: Its legs.
-        stance: Of the robot.
         spheres: Radius of each foot's sphere [m], None for none.
-
-    Returns:
-        The numbers, and where they come from.
     """
     known = [radius for radius in spheres if radius is not None]
     length = float(np.median(known)) if known else _SOLE * sum(legs[0].lengths)

@@ -24,11 +24,7 @@ None where it is not found or cannot be read."""
 
 
 def no_meshes(_name: str) -> None:
-    """Find no mesh: of a URDF that came alone.
-
-    Args:
-        _name: Of the mesh, as the URDF has it.
-    """
+    """Find no mesh: of a URDF that came alone."""
 
 
 _FOOT_NAME: Final = re.compile(r"foot|toe|sole|ankle|tip|contact", re.IGNORECASE)
@@ -54,19 +50,7 @@ class LegEnd:
 
 
 def end_of(urdf: Urdf, link: str, bounds: MeshBounds = no_meshes) -> LegEnd:
-    """Where a leg ends: at a frame that is fixed to its last link, a sphere, or the link's end.
-
-    Args:
-        urdf: Of the robot.
-        link: The leg's last one.
-        bounds: Of meshes, which are looked at where there is nothing else.
-
-    Returns:
-        The end: of shapes and meshes that which is farthest from the last joint.
-
-    Raises:
-        RobotFileError: The link has neither; says what to add.
-    """
+    """Where a leg ends: at a frame that is fixed to its last link, a sphere, or the link's end."""
     parts = [name for name, place in urdf.places.items() if place.body == link]
     spheres = [(at, s.size[0]) for part in parts for at, s in _solids(urdf, part, "sphere")]
     others = [name for name in parts if name != link]

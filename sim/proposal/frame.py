@@ -62,14 +62,7 @@ def turned(urdf: str, root: str, links: Sequence[str], frame: Frame, level: floa
     """A URDF with z up and x ahead: a first link is added whose frame has them so.
 
     Args:
-        urdf: Text of the file, which has been parsed before.
-        root: Its first link.
-        links: Names of all.
-        frame: Its axes, at right angles.
         level: Of the new origin above the first link's [m].
-
-    Returns:
-        The text; the same if it needs no other frame.
     """
     up, ahead = _vector(frame.up or "z"), _vector(frame.forward or "x")
     turn = np.array([ahead, np.cross(up, ahead), up])
@@ -85,13 +78,9 @@ def check_upright(urdf: Urdf, hips: Floats, feet: Floats) -> None:
     """Check that z can point up: hips lie about level, and feet are below more than above.
 
     Args:
-        urdf: Of the robot.
         hips: Of the legs, (n_legs, 3) [m].
         feet: From each hip, the mean over all angles of the joints, in units of the leg's length,
             (n_legs, 3).
-
-    Raises:
-        RobotFileError: Another axis points up, it seems; names it.
     """
     spread, mean = np.ptp(hips, axis=0), feet.mean(axis=0)
     across = int(spread.argmin())
@@ -114,11 +103,7 @@ def sideways(legs: Sequence[ChainLeg], stance: Sequence[Sequence[float]]) -> boo
     stand beside the body. Legs all round speak for nothing.
 
     Args:
-        legs: Of the robot.
         stance: Angles of each leg's joints [rad].
-
-    Returns:
-        Whether it does.
     """
     beside, ahead = 0.0, 0.0
     for leg, angles in zip(legs, stance, strict=True):

@@ -40,14 +40,7 @@ _SAME: Final = 1e-4
 
 
 def alternating_phases(legs: Sequence[ChainLeg]) -> list[float]:
-    """Phases of a gait in which neighbours alternate: trot on four legs, tripod on six.
-
-    Args:
-        legs: Of the robot.
-
-    Returns:
-        By leg the start of its support, as a share of the cycle.
-    """
+    """Phases of a gait in which neighbours alternate: trot on four legs, tripod on six."""
     return [(1.0 - lag) % 1.0 for lag in lags_of(GAITS["alternating"], legs)]
 
 
@@ -55,12 +48,7 @@ def propose_scenarios(stance: Stance, sole: float, names: Sequence[str]) -> list
     """A slow and a fast walk on level ground.
 
     Args:
-        stance: Of the robot.
         sole: Length of the soles [m].
-        names: Of the legs.
-
-    Returns:
-        Scenarios, as a job has them.
     """
     height = stance.height + sole
     walks = _WALKS if len(names) // 2 >= 3 else _TIPPING_WALKS
@@ -87,19 +75,7 @@ def propose_scenarios(stance: Stance, sole: float, names: Sequence[str]) -> list
 
 
 def walk_within_reach(robot: Robot, values: Mapping[str, Any]) -> tuple[dict[str, Any], str]:
-    """A proposed walk with steps as long and high as the legs reach.
-
-    Args:
-        robot: The robot.
-        values: Of the scenario's fields.
-
-    Returns:
-        The fields; and what became of the steps, nothing if they stayed as they were.
-
-    Raises:
-        RobotFileError: The legs reach no steps of a quarter of the length and height either; names
-            leg and joint.
-    """
+    """A proposed walk with steps as long and high as the legs reach."""
     refused: UnreachablePose | BeyondJointLimit | None = None
     for share in _SHARES:
         steps = {name: round(share * values[name], 4) for name in ("stride", "height")}
@@ -127,19 +103,7 @@ def _no_room(robot: Robot, refused: UnreachablePose | BeyondJointLimit | None) -
 
 
 def walk_of_robot(values: Mapping[str, Any], file: str) -> Scenario:
-    """A scenario whose lengths are a robot's own.
-
-    Args:
-        values: Of the scenario's fields.
-        file: Of the robot, that the lengths come from.
-
-    Returns:
-        The scenario.
-
-    Raises:
-        RobotFileError: The robot is larger than scenarios may be, or its feet are over its hips;
-            names file and field.
-    """
+    """A scenario whose lengths are a robot's own."""
     try:
         return Scenario.model_validate(dict(values))
     except ValidationError as error:

@@ -68,20 +68,7 @@ class FoundLegs:
 
 
 def find_legs(urdf: Urdf, *, upright: bool = False, bounds: MeshBounds = no_meshes) -> FoundLegs:
-    """Find the legs: chains of three joints that turn, from the body to a foot that reaches down.
-
-    Args:
-        urdf: Of the robot, no joint held.
-        upright: Whether z is known to point up.
-        bounds: Of meshes, where feet may be known by nothing else.
-
-    Returns:
-        Legs and all other joints.
-
-    Raises:
-        RobotFileError: There are fewer than two, another axis than z points up, or a chain is built
-            as the legs are and is none; says what there is instead.
-    """
+    """Find the legs: chains of three joints that turn, from the body to a foot that reaches down"""
     chains = list(_chains(urdf))
     threes = [chain for chain in chains if _is_candidate(chain)]
     if len(threes) < 2:
@@ -116,12 +103,7 @@ def chain_leg(urdf: Urdf, joints: Sequence[str], end: Sequence[float] | Floats) 
     """Kinematics of three joints, at rest in the middle of their limits.
 
     Args:
-        urdf: Of the robot.
-        joints: Names, from the body on.
         end: Of the leg in the last link's frame, (3,) [m].
-
-    Returns:
-        The leg, named by its first joint.
     """
     last = next(joint.child for joint in urdf.joints if joint.name == joints[-1])
     first, second, third = joints
@@ -154,10 +136,6 @@ def _kinematics(name: str, chain: Chain, end: Floats) -> ChainLeg:
 def reach_below(robot: Robot, number: int) -> float:
     """How far a leg's foot gets below the highest hip.
 
-    Args:
-        robot: The robot.
-        number: Of the leg.
-
     Returns:
         The distance within the joints' limits [m].
     """
@@ -169,9 +147,6 @@ def reach_below(robot: Robot, number: int) -> float:
 
 def tried_angles(leg: ChainLeg) -> Floats:
     """A grid of a leg's angles within their limits and one turn.
-
-    Args:
-        leg: The leg.
 
     Returns:
         (n, 3) [rad].

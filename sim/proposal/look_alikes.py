@@ -24,13 +24,6 @@ def check_look_alikes(urdf: Urdf, legs: Sequence[str]) -> None:
     """Check that no chain of joints is built as a leg is and yet is none.
 
     A robot with one leg that is held falls, and nothing but its author's mistake makes it so.
-
-    Args:
-        urdf: Of the robot, no joint held.
-        legs: Last links of the legs that were found.
-
-    Raises:
-        RobotFileError: One is; names its joint that is another than the leg's.
     """
     paths = {name: _path(urdf, name) for name in urdf.links}
     of_legs = [paths[link] for link in legs]

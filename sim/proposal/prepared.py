@@ -27,17 +27,6 @@ def stood_up(urdf: str, frame: Frame, bounds: MeshBounds) -> tuple[str, FoundLeg
     """Find the legs of a URDF, which is given a frame with z up, x ahead and hips about level.
 
     What a body does is told by its origin, so one on the ground would always have fallen.
-
-    Args:
-        urdf: Text of the file.
-        frame: Which axes of its first link point up and ahead.
-        bounds: Of meshes, where feet may be known by nothing else.
-
-    Returns:
-        The text in that frame, the legs, and what was done.
-
-    Raises:
-        RobotFileError: The URDF cannot be read, or no legs are found that can be simulated.
     """
     root, *others = parse_urdf(urdf).links
     text = turned(urdf, root, [root, *others], frame)
@@ -72,15 +61,7 @@ def _at_their_lowest(urdf: str, found: FoundLegs) -> FoundLegs:
 
 
 def with_feet(urdf: str, legs: Sequence[FoundLeg]) -> tuple[str, list[str]]:
-    """Add a frame at the end of every leg that has none.
-
-    Args:
-        urdf: Text of the file, which has been parsed before.
-        legs: Its legs.
-
-    Returns:
-        The text, and the names of the feet.
-    """
+    """Add a frame at the end of every leg that has none."""
     feet = [leg.foot or f"{leg.link}_foot" for leg in legs]
     missing = [(leg, foot) for leg, foot in zip(legs, feet, strict=True) if leg.foot is None]
     if not missing:

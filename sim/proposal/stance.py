@@ -57,15 +57,6 @@ def choose_stance(legs: Sequence[ChainLeg]) -> Stance:
     with little torque, and away from the joints' limits. All feet are as far from the body's long
     axis, unless legs are mounted so that this would twist them: those of a round robot stay where
     they point.
-
-    Args:
-        legs: Of the robot.
-
-    Returns:
-        The stance.
-
-    Raises:
-        RobotFileError: No angles within the limits put the feet of all legs on one level.
     """
     tried = [(angles := tried_angles(leg), leg.ends(angles)) for leg in legs]
     hips = max(leg.hip[2] for leg in legs)

@@ -11,14 +11,8 @@ def fixed_joint(name: str, parent: str, child: str, xyz: str, rpy: str = "0 0 0"
     """A joint that never moves.
 
     Args:
-        name: Of the joint.
-        parent: Link that carries it.
-        child: Link that it carries.
         xyz: Where the child is in the parent's frame [m].
         rpy: How it is turned there [rad].
-
-    Returns:
-        Its lines.
     """
     return [
         f'  <joint name={quoteattr(name)} type="fixed">',
@@ -30,15 +24,7 @@ def fixed_joint(name: str, parent: str, child: str, xyz: str, rpy: str = "0 0 0"
 
 
 def with_elements(urdf: str, lines: Sequence[str]) -> str:
-    """Add elements at the end of a URDF, so that the lines of all others stay.
-
-    Args:
-        urdf: Text of the file, which has been parsed before.
-        lines: Of the elements.
-
-    Returns:
-        The text with them.
-    """
+    """Add elements at the end of a URDF, so that the lines of all others stay."""
     # Bytes as the parser counts them, whatever encoding the text says it once had.
     content, end = urdf.encode(), 0
     parser = expat.ParserCreate("utf-8")

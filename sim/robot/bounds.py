@@ -93,14 +93,7 @@ Sentence = Annotated[
 
 
 def check_toml(text: str) -> None:
-    """Check the size of a robot.toml.
-
-    Args:
-        text: Of the file.
-
-    Raises:
-        RobotFileError: It is too long, too deep, or has too many values; names line and bound.
-    """
+    """Check the size of a robot.toml."""
     _check_text("robot.toml", text, LONGEST_TOML)
     depth, parts, values = 0, 1, 0
     for token in _TOML.finditer(text):
@@ -122,14 +115,7 @@ def check_toml(text: str) -> None:
 
 
 def check_urdf(text: str) -> None:
-    """Check the size of a robot.urdf, and that it declares no document type, so no entities.
-
-    Args:
-        text: Of the file.
-
-    Raises:
-        RobotFileError: It is no XML, or breaks a bound; names line and bound.
-    """
+    """Check the size of a robot.urdf, and that it declares no document type, so no entities."""
     _check_text("robot.urdf", text, LONGEST_URDF)
     if not text.strip():
         raise RobotFileError("robot.urdf: is empty; it must hold the URDF of a robot")
@@ -189,15 +175,7 @@ class _UrdfScan:
 
 
 def shortened(text: str, longest: int = LONGEST_NAME) -> str:
-    """A text of any length, to be quoted in a message.
-
-    Args:
-        text: The text.
-        longest: Characters to keep.
-
-    Returns:
-        The text, or its beginning and an ellipsis.
-    """
+    """A text of any length, to be quoted in a message."""
     return text if len(text) <= longest else f"{text[:longest]}..."
 
 

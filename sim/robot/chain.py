@@ -58,19 +58,7 @@ class Chain:
 
 
 def chain_of(urdf: Urdf, leg: Leg) -> Chain:
-    """Find a leg in a URDF.
-
-    Args:
-        urdf: Of the robot.
-        leg: Its description.
-
-    Returns:
-        The leg's joints.
-
-    Raises:
-        RobotFileError: A joint or the foot is not there, a joint is not revolute follows another
-            one or has its limits in degrees, or they are not a chain from the body to the foot.
-    """
+    """Find a leg in a URDF."""
     named = {joint.name: joint for joint in urdf.joints}
     before, placements, limits = next(iter(urdf.links)), [], []
     for name in leg.joints:
@@ -145,14 +133,7 @@ def _check_limits(joint: Joint) -> None:
 
 
 def check_owners(legs: tuple[Leg, ...]) -> None:
-    """Check that no joint belongs to two legs.
-
-    Args:
-        legs: The robot's.
-
-    Raises:
-        RobotFileError: One does.
-    """
+    """Check that no joint belongs to two legs."""
     owned = [name for leg in legs for name in leg.joints]
     twice = sorted({name for name in owned if owned.count(name) > 1})
     if twice:
@@ -162,15 +143,7 @@ def check_owners(legs: tuple[Leg, ...]) -> None:
 
 
 def check_joints(urdf: Urdf, legs: tuple[Leg, ...]) -> None:
-    """Check that every movable joint belongs to a leg.
-
-    Args:
-        urdf: Of the robot, its held joints fixed.
-        legs: The robot's.
-
-    Raises:
-        RobotFileError: A joint belongs to none; says what to do with it.
-    """
+    """Check that every movable joint belongs to a leg."""
     owned = {name for leg in legs for name in leg.joints}
     others = [joint.name for joint in urdf.joints if not joint.fixed and joint.name not in owned]
     if others:

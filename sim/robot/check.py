@@ -32,16 +32,7 @@ PROCESSES: Final = LimitedProcesses(
 
 
 def check_files(toml: str, urdf: str) -> None:
-    """Check in another process that a robot's files can be used. Once a robot: it is remembered.
-
-    Args:
-        toml: Text of robot.toml.
-        urdf: Text of robot.urdf.
-
-    Raises:
-        RobotFileError: A file cannot be used; names file and field. Or the check took too much time
-            or memory, or ended its process.
-    """
+    """Check in another process that a robot's files can be used. Once a robot: it is remembered."""
     bounds.check_toml(toml)
     bounds.check_urdf(urdf)
     digest = digest_of(toml, urdf)
@@ -57,14 +48,7 @@ def check_files(toml: str, urdf: str) -> None:
 
 
 def objects_in(document: Any) -> Iterator[tuple[Location, dict[str, Any]]]:
-    """Walk through a document of JSON.
-
-    Args:
-        document: Of what JSON has.
-
-    Yields:
-        All objects in it, and where they are.
-    """
+    """Walk through a document of JSON."""
     waiting: list[tuple[Location, Any]] = [((), document)]
     while waiting:
         where, value = waiting.pop()
@@ -76,14 +60,7 @@ def objects_in(document: Any) -> Iterator[tuple[Location, dict[str, Any]]]:
 
 
 def files_of(part: dict[str, Any]) -> tuple[str, str] | None:
-    """A robot's files in an object of a document.
-
-    Args:
-        part: The object.
-
-    Returns:
-        Texts of robot.toml and robot.urdf; None for anything else.
-    """
+    """A robot's files in an object of a document."""
     toml, urdf = part.get("toml"), part.get("urdf")
     return (toml, urdf) if isinstance(toml, str) and isinstance(urdf, str) else None
 

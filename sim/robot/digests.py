@@ -11,15 +11,7 @@ _REMEMBERED: Final = 1024
 
 
 def digest_of(toml: str, urdf: str) -> bytes:
-    """What two files are told from others by.
-
-    Args:
-        toml: Text of robot.toml.
-        urdf: Text of robot.urdf.
-
-    Returns:
-        A digest of 32 bytes.
-    """
+    """What two files are told from others by."""
     # Texts that are no Unicode are refused later, by name.
     texts = (text.encode(errors="surrogatepass") for text in (toml, urdf))
     return hashlib.sha256(b"%d " % len(toml) + b"".join(texts)).digest()

@@ -52,18 +52,7 @@ class Origin:
 
 
 def origin_of(element: ET.Element, whose: str) -> Origin:
-    """Where an element's frame lies.
-
-    Args:
-        element: With an `<origin>`, or without: then the frame is the other one.
-        whose: Name of its owner, for messages.
-
-    Returns:
-        The frame.
-
-    Raises:
-        RobotFileError: A number cannot be read, or angles are more than two turns.
-    """
+    """Where an element's frame lies."""
     origin = element.find("origin")
     if origin is None:
         return Origin(np.zeros(3), np.zeros(3))
@@ -81,18 +70,8 @@ def numbers_of(
 ) -> Floats:
     """Numbers of an attribute: three of a vector, else one.
 
-    Args:
-        element: That has it.
-        attribute: Its name.
-        whose: Name of the element's owner, for messages.
-        default: Text where the element has no such attribute.
-        largest: Size of a number at most.
-
     Returns:
         (3,) of xyz, rpy and size, else (1,), in URDF's units.
-
-    Raises:
-        RobotFileError: It is no number, too few or too large; names owner and attribute.
     """
     text = element.get(attribute, default)
     count = 3 if attribute in ("xyz", "rpy", "size") else 1

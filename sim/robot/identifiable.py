@@ -120,15 +120,7 @@ CONVENTIONAL_VARIABLES: Final = (
 
 @lru_cache(maxsize=32)
 def identifiable_variables(robot: Robot) -> tuple[Variable, ...]:
-    """All parameters in the order of table 2.7, bounds around its trial values and intervals.
-
-    Args:
-        robot: Whose joints and legs name them: efficiency_<joint> for every joint with a gearhead;
-            stiffness_, damping_, sole_ and friction_<leg> for every leg.
-
-    Returns:
-        The variables.
-    """
+    """All parameters in the order of table 2.7, bounds around its trial values and intervals."""
     legs = robot.description.legs
     geared = () if robot.is_torque_controlled else robot.joint_names
     return (
@@ -139,19 +131,7 @@ def identifiable_variables(robot: Robot) -> tuple[Variable, ...]:
 
 
 def with_parameters(robot: Robot, values: Mapping[str, float | str]) -> Robot:
-    """The same robot with some of its parameters and conventions at other values.
-
-    Args:
-        robot: The robot.
-        values: By name, of `identifiable_variables` and `CONVENTIONAL_VARIABLES`; of categorical
-            variables a choice's name or its index. Names of neither are left alone.
-
-    Returns:
-        The changed robot.
-
-    Raises:
-        SimulationInputError: No robot can have a value; names it.
-    """
+    """The same robot with some of its parameters and conventions at other values."""
     conventions = _conventions(values)
     _check_gearheads(robot, values)
     numbers = _numbers({name: v for name, v in values.items() if name not in conventions})

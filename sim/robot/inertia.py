@@ -31,9 +31,6 @@ class BodyInertia:
         Args:
             rotation: from this frame to the other one, (3, 3).
             position: of this frame's origin in the other one, (3,) [m].
-
-        Returns:
-            Its inertia there.
         """
         # A ball's inertia turns into itself. Pinocchio sets it apart too, and so rounds alike.
         ball = self.rotational[2, 2] * np.eye(3)
@@ -41,14 +38,7 @@ class BodyInertia:
         return BodyInertia(self.mass, product(rotation, self.centre) + position, turned)
 
     def joined(self, other: BodyInertia) -> BodyInertia:
-        """Two bodies as one.
-
-        Args:
-            other: inertia of the second body in the same frame.
-
-        Returns:
-            Inertia of both.
-        """
+        """Two bodies as one."""
         mass = self.mass + other.mass
         per_mass = 1.0 / max(mass, float(np.finfo(np.float64).eps))
         reduced = self.mass * other.mass * per_mass
@@ -88,9 +78,6 @@ def product(rotation: Floats, other: Floats) -> Floats:
     Args:
         rotation: (3, 3).
         other: (3,) or (3, 3).
-
-    Returns:
-        Of the shape of `other`.
     """
     x, y, z = (np.multiply.outer(rotation[:, k], other[k]) for k in range(3))
     return np.asarray(x + y + z)

@@ -60,18 +60,7 @@ class Joint:
 
 
 def joint_of(element: ET.Element) -> Joint:
-    """Read a joint.
-
-    Args:
-        element: A `<joint>`.
-
-    Returns:
-        The joint.
-
-    Raises:
-        RobotFileError: A number cannot be read, the type is unknown, the axis has no direction, or
-            its limits are the wrong way round.
-    """
+    """Read a joint."""
     name = element.get("name", "")
     parent, child = (_linked(element, end) for end in ("parent", "child"))
     whose = f"joint {name!r}"
@@ -113,15 +102,7 @@ def standardise(root: ET.Element, held: Mapping[str, float]) -> bool:
     `world`, to it says just that.
 
     Args:
-        root: Of the URDF, which is changed.
         held: Joints that are held, by name at which angle [rad].
-
-    Returns:
-        Whether anything was changed.
-
-    Raises:
-        RobotFileError: A held joint is not there, or does not turn and is held at another position
-            than 0; or a joint that is not held lacks the limit that URDF asks for.
     """
     changed = _free_base(root)
     missing = set(held)

@@ -13,15 +13,7 @@ if TYPE_CHECKING:
 
 
 def rows_of(legs: Sequence[LegKinematics]) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Legs of both sides.
-
-    Args:
-        legs: Of a robot.
-
-    Returns:
-        Indices of those on the left and of those on the right, from the front; a leg in the middle
-        counts as one on the left.
-    """
+    """Legs of both sides."""
     of_sides: tuple[list[int], list[int]] = [], []
     for number, leg in enumerate(legs):
         of_sides[leg.side < 0.0].append(number)
@@ -30,16 +22,7 @@ def rows_of(legs: Sequence[LegKinematics]) -> tuple[tuple[int, ...], tuple[int, 
 
 
 def leg_groups(robot: Robot) -> dict[str, tuple[int, ...]]:
-    """The groups that a robot's legs are in.
-
-    Args:
-        robot: The robot.
-
-    Returns:
-        Indices of its legs by the group's name: `all`, `left`, `right`, `front`, `middle`, `hind`
-        as far as there are such legs, every leg by its own name, and what `leg_groups` of its
-        robot.toml names, which goes before the others.
-    """
+    """The groups that a robot's legs are in."""
     rows = rows_of(robot.legs)
     first = {row[0] for row in rows if row}
     last = {row[-1] for row in rows if row} - first
@@ -60,20 +43,7 @@ def leg_groups(robot: Robot) -> dict[str, tuple[int, ...]]:
 
 
 def values_by_leg(robot: Robot, values: Mapping[str, float], parameter: str) -> dict[int, float]:
-    """What single legs have of a parameter that groups have values of.
-
-    Args:
-        robot: The robot.
-        values: By group.
-        parameter: Name of what they are of, for messages.
-
-    Returns:
-        By the index of a leg that is in any group: the value of the smallest one.
-
-    Raises:
-        SimulationInputError: There is no such group, or of two groups of one size that share a leg
-            neither is the smaller; names them.
-    """
+    """What single legs have of a parameter that groups have values of."""
     groups = leg_groups(robot)
     for name in values:
         if name not in groups:

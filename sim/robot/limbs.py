@@ -87,18 +87,7 @@ class Limb:
 
 @lru_cache(maxsize=64)
 def limbs_of(robot: Robot) -> tuple[Limb, ...]:
-    """The legs of a robot, in its order.
-
-    Args:
-        robot: The robot.
-
-    Returns:
-        Its limbs.
-
-    Raises:
-        RobotFileError: Its URDF's movable joints are not the legs' joints, one is not revolute, or
-            a leg is not a chain from the body to its foot.
-    """
+    """The legs of a robot, in its order."""
     chains = [chain_of(robot.urdf, leg) for leg in robot.description.legs]
     check_joints(robot.urdf, robot.description.legs)
     return tuple(
@@ -110,13 +99,7 @@ def limb_of(robot: Robot, number: int, placements: Sequence[Placement], foot: Fl
     """A limb from its placements and its motors.
 
     Args:
-        robot: The robot.
-        number: Of the leg.
-        placements: Of its joints, from the body on.
         foot: In the last link's frame, (3,) [m].
-
-    Returns:
-        The limb; rounding noise of unit-sized numbers is gone.
     """
     actuators = robot.actuators()
     joints = []
@@ -161,23 +144,13 @@ def limb_of(robot: Robot, number: int, placements: Sequence[Placement], foot: Fl
 
 
 def is_torque_controlled(joint: LimbJoint) -> bool:
-    """Whether a joint, of numbers or symbols, is driven by a torque-controlled actuator.
-
-    Args:
-        joint: The joint.
-
-    Returns:
-        False for a DC motor.
-    """
+    """Whether a joint, of numbers or symbols, is driven by a torque-controlled actuator."""
     limit: object = joint.torque_limit
     return not (isinstance(limit, float) and limit == 0.0)
 
 
 def electrical_constants(joints: Sequence[LimbJoint]) -> list[float]:
     """What the battery's voltage needs of the actuators.
-
-    Args:
-        joints: Of a robot, all of one kind.
 
     Returns:
         By joint, of DC motors the conductance [1/ohm], of others R / k^2 [W/(N m)^2]; then by joint

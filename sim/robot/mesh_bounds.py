@@ -13,9 +13,6 @@ Floats = NDArray[np.float64]
 def mesh_bounds(path: Path) -> Floats | None:
     """Least and largest coordinates of a mesh's vertices.
 
-    Args:
-        path: Of a file of the robot's own author: STL, OBJ or DAE.
-
     Returns:
         (2, 3) in the file's units, which a URDF scales to metres; None if it is no mesh.
     """

@@ -19,7 +19,6 @@ def feet_in_body(robot: Robot, joints: Floats) -> Floats:
     """Where every foot is in the body's frame.
 
     Args:
-        robot: The robot.
         joints: Angles, (J,) [rad].
 
     Returns:
@@ -33,7 +32,6 @@ def feet_below_body(robot: Robot, joints: Floats) -> Floats:
     """Height of every foot in the body's frame.
 
     Args:
-        robot: The robot.
         joints: Angles, (J,) [rad].
 
     Returns:
@@ -46,7 +44,6 @@ def leg_points(robot: Robot, joints: Floats) -> Floats:
     """Where every leg's joints and its foot are in the body's frame.
 
     Args:
-        robot: The robot.
         joints: Angles, (J,) [rad].
 
     Returns:
@@ -68,7 +65,6 @@ def feet_and_centre_of_mass(robot: Robot, joints: Floats, load: float) -> tuple[
     """Where feet and centre of mass are in many postures.
 
     Args:
-        robot: The robot.
         joints: Angles, (T, J) [rad].
         load: Mass carried on the body [kg].
 
@@ -107,7 +103,6 @@ def resting_height(robot: Robot, joints: Floats, weight: float) -> float:
     """Height of a level body at which the feet's springs carry a weight.
 
     Args:
-        robot: The robot.
         joints: Angles, (J,) [rad].
         weight: To be carried [N].
 

@@ -214,14 +214,7 @@ def _torque_row(actuator: TorqueActuator) -> tuple[float, ...]:
 
 
 def with_shafts(robot: Robot) -> Robot:
-    """The same robot with elastic shafts between motors and links, also where there is no play.
-
-    Args:
-        robot: The robot.
-
-    Returns:
-        The robot itself if it has them.
-    """
+    """The same robot with elastic shafts between motors and links, also where there is no play."""
     if robot.has_backlash:
         return robot
     description = robot.description.model_copy(update={"elastic_shafts": True})
@@ -229,19 +222,7 @@ def with_shafts(robot: Robot) -> Robot:
 
 
 def parse_robot(toml: str, urdf: str) -> Robot:
-    """A robot from its two files.
-
-    Args:
-        toml: Text of robot.toml.
-        urdf: Text of robot.urdf.
-
-    Returns:
-        The robot.
-
-    Raises:
-        RobotFileError: A file breaks a bound of `gaitswarm.sim.robot.bounds` or cannot be used; names file
-            and field.
-    """
+    """A robot from its two files."""
     check_toml(toml)
     try:
         document = tomllib.loads(toml)
@@ -256,18 +237,7 @@ def parse_robot(toml: str, urdf: str) -> Robot:
 
 
 def assembled(description: RobotDescription, urdf: str) -> Robot:
-    """A robot from its description and the text of its URDF.
-
-    Args:
-        description: What robot.toml says.
-        urdf: Text of robot.urdf.
-
-    Returns:
-        The robot.
-
-    Raises:
-        RobotFileError: The URDF cannot be used, or has not the description's legs.
-    """
+    """A robot from its description and the text of its URDF."""
     check_owners(description.legs)
     tree = parse_urdf(urdf, description.held_joints)
     with by_line(urdf):

@@ -76,14 +76,7 @@ def visible_links(robot: Robot, load: float = 0.0) -> tuple[VisibleLink, ...]:
     a box that spans the hips.
 
     Args:
-        robot: The robot.
         load: Mass carried on the body [kg], drawn as a cube.
-
-    Returns:
-        The links.
-
-    Raises:
-        RobotFileError: Geometry of the URDF cannot be read.
     """
     carriers = {joint.child: joint.parent for joint in robot.urdf.joints}
     derived = _derived(robot)

@@ -27,15 +27,6 @@ def shipped_robot(name: str) -> Robot:
 
     Its folder holds robot.toml and robot.urdf; or parameters.toml, which names another shipped
     robot as its base and gives some of `identifiable_variables` other values.
-
-    Args:
-        name: One of `SHIPPED`.
-
-    Returns:
-        The robot.
-
-    Raises:
-        SimulationInputError: No robot of that name is shipped.
     """
     if name not in SHIPPED:
         raise SimulationInputError(f"robot: unknown {name!r}; known are {', '.join(SHIPPED)}")

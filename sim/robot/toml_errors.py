@@ -46,16 +46,7 @@ _PARTS: Final[tuple[type[BaseModel], ...]] = (
 
 
 def first_problem(error: ValidationError, text: str, document: Mapping[str, Any]) -> str:
-    """The first thing that is wrong.
-
-    Args:
-        error: what pydantic says of the document.
-        text: of the file.
-        document: the text, parsed.
-
-    Returns:
-        One line for people, which names the field as the file does.
-    """
+    """The first thing that is wrong."""
     first = with_known_keys(error.errors(), RobotDescription)[0]
     location = as_written(document, _without_kind(first["loc"]))
     where = shortened(".".join(str(part) for part in location))
@@ -73,18 +64,7 @@ def first_problem(error: ValidationError, text: str, document: Mapping[str, Any]
 
 @contextmanager
 def by_leg(text: str, legs: Sequence[str]) -> Iterator[None]:
-    """Add the line to errors that name a leg or the held joints of a robot.toml.
-
-    Args:
-        text: Of the file.
-        legs: Their names, in its order.
-
-    Yields:
-        Nothing.
-
-    Raises:
-        RobotFileError: The same, with the line.
-    """
+    """Add the line to errors that name a leg or the held joints of a robot.toml."""
     try:
         yield
     except RobotFileError as error:
@@ -107,14 +87,6 @@ def line_of(text: str, path: Sequence[str | int]) -> int | None:
 
     Follows tables, arrays of tables and dotted keys as robot files use them; inline tables count
     as one line.
-
-    Args:
-        text: Text of the file.
-        path: Keys and indices from the root.
-
-    Returns:
-        Line of the field, or of the innermost table on its way, from 1 on; None if there is
-        neither.
     """
     found, depth = None, 0
     table: list[str | int] = []

@@ -27,13 +27,6 @@ def unphysical(urdf: Urdf, text: str) -> Iterator[str]:
     Links that are fixed to one another are one body, and only that is simulated: a camera with
     filled-in moments is no matter on a trunk that has its own. Where the whole is wrong, those of
     its links are named that are.
-
-    Args:
-        urdf: Of the robot.
-        text: Of the file, as its author has it, for lines.
-
-    Yields:
-        A sentence for each, with line and way out.
     """
     parts: dict[str, list[str]] = {name: [] for name in urdf.bodies}
     for link, place in urdf.places.items():

@@ -66,17 +66,7 @@ class Link:
     element: ET.Element
 
     def solids(self, use: GeometryUse = "visual") -> tuple[Solid, ...]:
-        """Simple solids of its geometry; meshes are left out.
-
-        Args:
-            use: Geometry that is looked at first; the other one is where that has no solids.
-
-        Returns:
-            The solids.
-
-        Raises:
-            RobotFileError: A number of one cannot be read.
-        """
+        """Simple solids of its geometry; meshes are left out."""
         for part_use in (use, "collision" if use == "visual" else "visual"):
             solids = [
                 self._solid(part, element)
@@ -135,17 +125,7 @@ class Urdf:
         return next(iter(self.bodies.values()))
 
     def place(self, name: str) -> Place:
-        """Where a frame is.
-
-        Args:
-            name: Of a link, or of a fixed joint, which stands for the link that it carries.
-
-        Returns:
-            Its place.
-
-        Raises:
-            RobotFileError: There is no such frame.
-        """
+        """Where a frame is."""
         carried = {joint.name: joint.child for joint in self.joints if joint.fixed}
         link = name if name in self.places else carried.get(name)
         if link is None:
@@ -162,15 +142,7 @@ def parse_urdf(text: str, held: Mapping[str, float] = _NONE_HELD) -> Urdf:
     """Read a URDF.
 
     Args:
-        text: Text of the file, by anybody.
         held: Joints that are held and so are fixed, by name at which angle [rad].
-
-    Returns:
-        What it says.
-
-    Raises:
-        RobotFileError: It breaks a bound of `gaitswarm.sim.robot.bounds`, is no XML, a number cannot be
-            read, its links are not one tree, or a held joint is not there or does not turn.
     """
     return _read(text, tuple(held.items()))
 

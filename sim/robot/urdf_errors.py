@@ -18,17 +18,7 @@ _INNER: Final = re.compile(r"(?P<attribute>\w+)=(?P<value>'[^']*'|\"[^\"]*\") of
 
 @contextmanager
 def by_line(text: str) -> Iterator[None]:
-    """Add the line to errors that name a link or a joint of a URDF.
-
-    Args:
-        text: Of the file, which keeps the bounds of `gaitswarm.sim.robot.bounds`.
-
-    Yields:
-        Nothing.
-
-    Raises:
-        RobotFileError: The same, with the line.
-    """
+    """Add the line to errors that name a link or a joint of a URDF."""
     try:
         yield
     except RobotFileError as error:
@@ -39,15 +29,7 @@ def by_line(text: str) -> Iterator[None]:
 
 
 def with_line(text: str, said: str) -> str:
-    """Add the line to a sentence that begins with a link or a joint of a URDF.
-
-    Args:
-        text: Of the file, which keeps the bounds of `gaitswarm.sim.robot.bounds`.
-        said: The sentence.
-
-    Returns:
-        The same, with the line if that part is in the text.
-    """
+    """Add the line to a sentence that begins with a link or a joint of a URDF."""
     line = _line(text, said)
     if line is None:
         return said

@@ -36,14 +36,7 @@ class VisualMesh:
 
 
 def material_colours(urdf: str) -> Mapping[str, Colour]:
-    """Colours of a URDF's materials, which any link may name.
-
-    Args:
-        urdf: Text of the file, which has been parsed before.
-
-    Returns:
-        By the material's name; where one is given twice, the first.
-    """
+    """Colours of a URDF's materials, which any link may name."""
     root = ET.fromstring(urdf)  # noqa: S314 - it was checked when it was parsed
     found: dict[str, Colour] = {}
     for material in root.iter("material"):
@@ -57,13 +50,6 @@ def visual_meshes(link: Link, colours: Mapping[str, Colour]) -> tuple[VisualMesh
     """Meshes of a link's visual geometry.
 
     What cannot be read is left out, or has its default: no walk fails for a picture.
-
-    Args:
-        link: The link.
-        colours: Of materials, by name.
-
-    Returns:
-        The meshes, in the file's order.
     """
     meshes = []
     for part in link.element.findall("visual"):

@@ -35,7 +35,7 @@ ScenarioName = Annotated[
 GaitName = Literal[
     "own", "alternating", "tripod", "wave", "ripple", "trot", "pace", "bound", "crawl"
 ]
-"""Order of the legs' steps; `own` is that of the robot's description. See `gaitswarm.sim.gait.gaits`."""
+"""Order of the legs' steps; `own` is that of the robot's description. See `sim.gait.gaits`."""
 
 GAIT_NAMES: Final[tuple[GaitName, ...]] = get_args(GaitName)
 

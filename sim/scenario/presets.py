@@ -70,17 +70,7 @@ PRESETS: Final[tuple[Scenario, ...]] = (
 
 
 def find_scenario(name: str) -> Scenario:
-    """A preset.
-
-    Args:
-        name: Of the scenario, or its number in `PRESETS`; 1 to 6 are those of table 4.2.
-
-    Returns:
-        The scenario.
-
-    Raises:
-        SimulationInputError: There is none; names those that there are.
-    """
+    """A preset."""
     for number, scenario in enumerate(PRESETS, start=1):
         if name in (scenario.name, str(number)):
             return scenario

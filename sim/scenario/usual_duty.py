@@ -14,15 +14,7 @@ foot leaves the ground as soon as another one has come down."""
 
 
 def with_duty_factor(document: Any) -> Any:
-    """Add the duty factor that a scenario's gait has unless one is given.
-
-    Args:
-        document: Of a scenario, unchecked.
-
-    Returns:
-        The document; with a `duty_factor` if it has none and names one of `USUAL_SUPPORT`, so that
-        every copy says it.
-    """
+    """Add the duty factor that a scenario's gait has unless one is given."""
     if not isinstance(document, Mapping) or "duty_factor" in document:
         return document
     support = USUAL_SUPPORT.get(str(document.get("gait")))

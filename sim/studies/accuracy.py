@@ -74,14 +74,6 @@ def tables_against_inference(
     """A Fuzzy-PI's tables of several resolutions against 64-bit inference (section 5.3).
 
     All walk in the reference kernel, so that nothing but the table differs.
-
-    Args:
-        design: Of the Fuzzy-PI of chapter 4, by variable.
-        scenarios: Walks.
-        robot: That walks.
-
-    Returns:
-        By scenario and resolution.
     """
     controller = FuzzyPi()
     deviations = []
@@ -107,17 +99,7 @@ def step_halving(
     *,
     robot: RobotChoice = DEFAULT_ROBOT,
 ) -> tuple[Deviation, ...]:
-    """Physics at 2.5, 5, 10 and 20 kHz against 40 kHz.
-
-    Args:
-        controller: Name of the motor controller.
-        design: Values by variable.
-        scenarios: Walks.
-        robot: That walks.
-
-    Returns:
-        By scenario and rate.
-    """
+    """Physics at 2.5, 5, 10 and 20 kHz against 40 kHz."""
     deviations = []
     for scenario in scenarios:
         finest = _walk(scenario, controller, design, robot, physics_rate=2 * RATES[-1])
@@ -142,19 +124,7 @@ def noise_on_links(
     """Noise on link 1, 2 or 3 relative to the noiseless run of the same robot (table 2.9).
 
     Args:
-        controller: Name of the motor controller.
-        design: Values by variable.
-        scenarios: Walks.
-        robot: That walks; for noise on angles with elastic shafts between motors and links.
-        kind: On the angle between gearhead and link, as in the thesis, or on the link's torque.
         deviation: Standard deviation of the noise [rad], [N m]; that of `NOISE` if left out.
-        seed: Of the noise.
-
-    Returns:
-        By scenario and link.
-
-    Raises:
-        SimulationInputError: The deviation is not above zero, or too large.
     """
     machine = with_shafts(load_robot(robot)) if kind == "angle" else load_robot(robot)
     size = NOISE[kind] if deviation is None else deviation

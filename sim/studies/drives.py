@@ -103,17 +103,7 @@ DRIVES: Final[Mapping[str, NamedDrive]] = MappingProxyType(
 
 
 def find_drive(name: str) -> NamedDrive:
-    """A drive that the thesis compares.
-
-    Args:
-        name: One of `DRIVES`.
-
-    Returns:
-        The drive.
-
-    Raises:
-        SimulationInputError: There is none of that name; names those that there are.
-    """
+    """A drive that the thesis compares."""
     if name not in DRIVES:
         raise SimulationInputError(f"drive: unknown {name!r}; {instead_of(name, DRIVES)}")
     return DRIVES[name]
@@ -125,16 +115,7 @@ def compare(
     *,
     robot: RobotChoice = DEFAULT_ROBOT,
 ) -> tuple[WalkFigures, ...]:
-    """Every drive in every scenario.
-
-    Args:
-        drives: The drives.
-        scenarios: The walks.
-        robot: That walks.
-
-    Returns:
-        Scenario by scenario.
-    """
+    """Every drive in every scenario."""
     return tuple(
         walk_figures(drive, scenario, robot=robot) for scenario in scenarios for drive in drives
     )
@@ -143,16 +124,7 @@ def compare(
 def walk_figures(
     drive: NamedDrive, scenario: Scenario, *, robot: RobotChoice = DEFAULT_ROBOT
 ) -> WalkFigures:
-    """Let one drive walk. Power is energy per metre times speed.
-
-    Args:
-        drive: The drive.
-        scenario: The walk.
-        robot: That walks.
-
-    Returns:
-        Its figures.
-    """
+    """Let one drive walk. Power is energy per metre times speed."""
     gait = {name: v for name, v in drive.design.items() if name in GAIT_CATALOGUE}
     walked = drive.driven(with_gait(scenario, gait))
     names = list(drive.design)
@@ -183,19 +155,7 @@ def walk_figures(
 def drive_of_design(
     name: str, controller: ControllerName, design: Mapping[str, float]
 ) -> NamedDrive:
-    """A drive from a design file or a job's best.
-
-    Args:
-        name: For the drive.
-        controller: Name of the motor controller.
-        design: By variable, controller and gait alike.
-
-    Returns:
-        The drive.
-
-    Raises:
-        SimulationInputError: The controller cannot have these values.
-    """
+    """A drive from a design file or a job's best."""
     own = {k: v for k, v in design.items() if k not in GAIT_CATALOGUE}
     CONTROLLERS[controller].compile(own)
     return NamedDrive(name, f"{controller} as designed", controller, design)

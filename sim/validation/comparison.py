@@ -93,17 +93,7 @@ class Comparison(_Data):
     quantities: tuple[QuantityComparison, ...]
 
     def quantity(self, quantity: Quantity) -> QuantityComparison:
-        """The comparison of one quantity.
-
-        Args:
-            quantity: Of table 2.2.
-
-        Returns:
-            The comparison.
-
-        Raises:
-            KeyError: It was not measured.
-        """
+        """The comparison of one quantity."""
         for known in self.quantities:
             if known.quantity is quantity:
                 return known
@@ -120,16 +110,7 @@ def compare(
     """Synchronise two logs and judge all quantities that were measured.
 
     Args:
-        measured: Log of a walk.
-        simulated: Log of the same walk.
         cycle_time: Of a walking cycle [s].
-        repeats: Other measurements of the same walk.
-
-    Returns:
-        All measures.
-
-    Raises:
-        MeasuredLogError: The logs cannot be synchronised.
     """
     pair = synchronise(measured, simulated, cycle_time)
     others = [synchronise(repeat, simulated, cycle_time).measured for repeat in repeats]
@@ -137,15 +118,7 @@ def compare(
 
 
 def compare_synchronised(pair: Synchronised, repeats: Sequence[MeasuredLog] = ()) -> Comparison:
-    """Judge logs that have been synchronised.
-
-    Args:
-        pair: The measured and the simulated log.
-        repeats: Other measurements, trimmed to whole cycles too.
-
-    Returns:
-        All measures.
-    """
+    """Judge logs that have been synchronised."""
     return Comparison(
         lag=pair.lag_seconds,
         correlation=pair.correlation,
@@ -165,11 +138,6 @@ def compare_synchronised(pair: Synchronised, repeats: Sequence[MeasuredLog] = ()
 def columns_of(log: MeasuredLog, quantity: Quantity, channels: Sequence[str]) -> Floats:
     """Some columns of a log.
 
-    Args:
-        log: The log.
-        quantity: That the columns hold.
-        channels: Their names.
-
     Returns:
         (T, channels).
     """
@@ -178,16 +146,7 @@ def columns_of(log: MeasuredLog, quantity: Quantity, channels: Sequence[str]) ->
 
 
 def channels_of_link(log: MeasuredLog, quantity: Quantity, link: int) -> tuple[str, ...]:
-    """Joints at which a quantity of one link was measured.
-
-    Args:
-        log: The log.
-        quantity: By joint.
-        link: 1, 2 or 3: coxa, femur or tibia.
-
-    Returns:
-        Their names.
-    """
+    """Joints at which a quantity of one link was measured."""
     return tuple(joint for joint in log.channels(quantity) if log.link_of(joint) == link)
 
 

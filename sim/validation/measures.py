@@ -27,10 +27,6 @@ def root_mean_square_error(measured: Floats, simulated: Floats) -> float:
 
     Args:
         measured: X, (T,) or (T, C).
-        simulated: Y, of the same shape and unit.
-
-    Returns:
-        In the signal's unit.
     """
     return math.sqrt(float(np.mean(_error(measured, simulated) ** 2)))
 
@@ -40,10 +36,6 @@ def mean_absolute_error(measured: Floats, simulated: Floats) -> float:
 
     Args:
         measured: X, (T,) or (T, C).
-        simulated: Y, of the same shape and unit.
-
-    Returns:
-        In the signal's unit.
     """
     return mean_absolute(_error(measured, simulated))
 
@@ -53,7 +45,6 @@ def relative_mean_absolute_error(measured: Floats, simulated: Floats) -> float:
 
     Args:
         measured: X, (T,) or (T, C).
-        simulated: Y, of the same shape and unit.
 
     Returns:
         [1].
@@ -66,10 +57,6 @@ def difference_of_absolute_means(measured: Floats, simulated: Floats) -> float:
 
     Args:
         measured: X, (T,) or (T, C).
-        simulated: Y, of the same shape and unit.
-
-    Returns:
-        In the signal's unit.
     """
     _error(measured, simulated)
     return abs(mean_absolute(measured) - mean_absolute(simulated))
@@ -80,7 +67,6 @@ def relative_difference_of_absolute_means(measured: Floats, simulated: Floats) -
 
     Args:
         measured: X, (T,) or (T, C).
-        simulated: Y, of the same shape and unit.
 
     Returns:
         [1].
@@ -89,14 +75,7 @@ def relative_difference_of_absolute_means(measured: Floats, simulated: Floats) -
 
 
 def confidence_interval(repeats: Sequence[Floats]) -> tuple[float, float]:
-    """CONF, eq. 2.20: least and largest mean |X| of M measurements.
-
-    Args:
-        repeats: Measurements of one signal, which may differ in length.
-
-    Returns:
-        In the signal's unit.
-    """
+    """CONF, eq. 2.20: least and largest mean |X| of M measurements."""
     if not repeats:
         raise SimulationInputError("a confidence interval needs at least one measurement")
     means = [mean_absolute(repeat) for repeat in repeats]
@@ -111,9 +90,6 @@ def intensity(signal: Floats, timestep: float) -> float:
     Args:
         signal: X, (T,) or (T, C).
         timestep: Between rows [s].
-
-    Returns:
-        In unit^2 / sqrt(s); of several signals the mean over the C.
     """
     columns = _samples(signal).reshape(len(signal), -1)
     if len(columns) < 2:
@@ -129,9 +105,6 @@ def mean_absolute(signal: Floats) -> float:
 
     Args:
         signal: X, (T,) or (T, C).
-
-    Returns:
-        In the signal's unit.
     """
     return float(np.mean(np.abs(_samples(signal))))
 
@@ -165,7 +138,6 @@ def spectral_error(measured: Floats, simulated: Floats, timestep: float) -> floa
 
     Args:
         measured: (T,) or (T, C), whose spectrum is A.
-        simulated: Of the same shape and unit, whose spectrum is B.
         timestep: Between rows [s].
 
     Returns:
@@ -232,9 +204,6 @@ class Tolerance(StrEnum):
 
         Args:
             rmae: [1]; NaN is as bad as can be.
-
-        Returns:
-            The class.
         """
         return next((known for known in cls if rmae <= known.limit), cls.PURPLE)
 

@@ -66,14 +66,6 @@ class EngineWalk:
 
         Args:
             designs: (n, v) worlds, with the column of the engine.
-            should_stop: Polled on the way.
-
-        Returns:
-            Objectives and statuses. Those of our own engine have the bits that `WorldWalk` gives.
-
-        Raises:
-            SimulationInputError: A world cannot be simulated, or an engine is not installed.
-            WalkStopped: `should_stop` has said so.
         """
         engines = designs[:, self.engine_column].astype(np.intp)
         worlds = np.delete(designs, self.engine_column, axis=1)

@@ -229,12 +229,7 @@ def check_worlds(variables: Sequence[str], worlds: Floats) -> None:
     """Refuse worlds that cannot be simulated.
 
     Args:
-        variables: Columns of the worlds, names of `PERTURBATIONS`.
         worlds: (n, len(variables)), in the variables' units.
-
-    Raises:
-        SimulationInputError: There is no such perturbation, or a value lies beyond what can be
-            simulated or is not whole where it must be; names it.
     """
     for name in variables:
         if name not in LIMITS:
@@ -266,11 +261,6 @@ def sample_worlds(count: int, seed: int, choice: Sequence[Variable] = PERTURBATI
 
     Each variable has a Philox stream of its own, so a world has the same values however many are
     drawn and whatever else is varied, and bounds that are moved move its value alone.
-
-    Args:
-        count: Of the worlds.
-        seed: Of the streams, 0 to 2^64 - 1.
-        choice: What is varied, with its bounds.
 
     Returns:
         (count, len(choice)), columns in the order of the choice.

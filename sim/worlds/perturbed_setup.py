@@ -45,14 +45,7 @@ def perturbed_setups(
     """What walks in every world; the robot's controller and gait know nothing of it.
 
     Args:
-        robot: As described.
-        scenario: Of the walk, with the gait that is walked in.
-        nominal: The walk of the robot as described.
-        variables: Columns of the worlds.
         worlds: (n, len(variables)), as `check_worlds` wants them.
-
-    Returns:
-        One setup a world. That of a world in which all is nominal has the nominal one's bits.
     """
     columns = dict(zip(variables, worlds.T, strict=True))
     values = {

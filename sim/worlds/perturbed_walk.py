@@ -90,13 +90,6 @@ class PerturbedWalk:
 
         Args:
             designs: (n, len(variables)), in the variables' units.
-            log: Whether to keep every walk's log.
-
-        Returns:
-            Outcomes with the bits of `run`, measurements and logs.
-
-        Raises:
-            SimulationInputError: The world or a design cannot be simulated; names the variable.
         """
         (simulation,) = walk_together([self._simulating(designs, log=log)])
         return simulation

@@ -84,14 +84,7 @@ class WorldWalk:
         """Let the design walk in every world, by a kernel of one's choice.
 
         Args:
-            kernel: Of the robot; None for that of `run`.
             worlds: (n, len(variables)), in the variables' units.
-
-        Returns:
-            Objectives and statuses.
-
-        Raises:
-            SimulationInputError: A world or the design cannot be simulated; names the variable.
         """
         (simulation,) = walk_together([self._simulating(worlds, log=False, kernel=kernel)])
         return simulation.outcome
@@ -106,13 +99,6 @@ class WorldWalk:
 
         Args:
             worlds: (n, len(variables)), in the variables' units.
-            log: Whether to keep every walk's log.
-
-        Returns:
-            Outcomes with the bits of `run`, measurements and logs.
-
-        Raises:
-            SimulationInputError: A world or the design cannot be simulated; names the variable.
         """
         (simulation,) = walk_together([self._simulating(worlds, log=log)])
         return simulation

@@ -67,14 +67,7 @@ def _list(view: GaitsView) -> str:
 
 
 def diagram(item: GaitView) -> str:
-    """A gait's footfall diagram, as people read it.
-
-    Args:
-        item: The gait.
-
-    Returns:
-        Lines: a leg each with one cycle, and what the gait plans.
-    """
+    """A gait's footfall diagram, as people read it."""
     if not item.suits:
         return f"{item.name}: for {' or '.join(map(str, item.legs))} legs\n"
     lines = [f"{leg:14} {columns}" for leg, columns in item.support.items()]

@@ -19,16 +19,6 @@ def check_histories(store: Store) -> list[str]:
     """Compute the chain of every job again from its rows, by pieces, one job after the other.
 
     Jobs may run meanwhile: what they commit after they were read is left out.
-
-    Args:
-        store: Where the jobs are.
-
-    Returns:
-        A line for each job whose history is not what was committed, with the first iteration that
-        differs, at most 20; nothing if all are.
-
-    Raises:
-        StoreUnavailable: The database cannot be read.
     """
     return list(islice(_broken(store), _MOST))
 

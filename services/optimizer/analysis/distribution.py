@@ -38,15 +38,7 @@ class Distribution:
 
 
 def distribution(columns: EvaluationColumns, space: DesignSpace) -> Distribution:
-    """Say how designs are spread, iteration by iteration.
-
-    Args:
-        columns: whole iterations, in order, of any number of designs each.
-        space: of their job.
-
-    Returns:
-        The distribution, in the order of the rows.
-    """
+    """Say how designs are spread, iteration by iteration."""
     starts = iteration_starts(columns)
     sizes = np.diff(starts, append=len(columns))
     found = Distribution(
@@ -84,9 +76,6 @@ def _describe(
 def iteration_starts(columns: EvaluationColumns) -> NDArray[np.intp]:
     """Where each iteration begins.
 
-    Args:
-        columns: whole iterations, in order.
-
     Returns:
         (I,) row of the first design of each.
     """
@@ -98,7 +87,6 @@ def finite_quantiles(values: Floats, quantiles: tuple[float, ...]) -> Floats:
 
     Args:
         values: (I, n), +inf for a value that is none.
-        quantiles: q shares from 0 to 1, ascending.
 
     Returns:
         (I, q), NaN for a row without a finite value.
@@ -121,10 +109,6 @@ def thinned(columns: EvaluationColumns, most: int) -> NDArray[np.intp]:
 
     The row of least fitness is always among them. Where one iteration is too much, its rows are
     thinned as well.
-
-    Args:
-        columns: whole iterations, in order.
-        most: rows to choose, at least 1.
 
     Returns:
         (n,) indices of rows, ascending, n <= `most`.

@@ -78,41 +78,21 @@ class Parent:
         """What the search of a job with this history is told.
 
         Args:
-            spec: Of the job.
             fitness: (r,) of every evaluation, by its measure.
-
-        Returns:
-            As `Spec.told`, of each iteration.
         """
         told = spec.told(self.columns.objectives, self.columns.failed, fitness)
         return self.by_iteration(told)
 
 
 def budgets_of(job: Job) -> tuple[int, ...]:
-    """Budgets under which the iterations of a job may have been asked for.
-
-    Args:
-        job: As it was read.
-
-    Returns:
-        Iterations, in the order in which the job, or those that it was forked from, were given
-        them. One that was given and replaced by another before the last is not known.
-    """
+    """Budgets under which the iterations of a job may have been asked for."""
     earlier = () if job.lineage is None else job.lineage.budgets
     present = job.spec.iterations
     return tuple(dict.fromkeys((*earlier, job.submitted_iterations or present, present)))
 
 
 def check_begun(job: Job, iterations: int) -> None:
-    """Check that a job has committed so many iterations.
-
-    Args:
-        job: As it was read.
-        iterations: With which a fork is to begin.
-
-    Raises:
-        InvalidRequest: It has not; names the field of `ForkRequest`.
-    """
+    """Check that a job has committed so many iterations."""
     committed = job.progress.iterations
     if iterations > committed:
         raise InvalidRequest(
@@ -133,19 +113,7 @@ def forked(
     """Decide how a job is forked.
 
     Args:
-        parent: The job that is forked.
-        request: What is asked for.
-        provenance: Spec -> provenance of what is computed here for it.
         longest: Time that bringing its search to where it was may take [s].
-
-    Returns:
-        Spec of the fork, and how it is stored.
-
-    Raises:
-        InvalidRequest: It makes no sense; names the field.
-        ProvenanceChanged: The fork would go on with numbers of another provenance, and that is not
-            accepted.
-        Conflict: Its search cannot be brought to where it was, or not in that time.
     """
     before = parent.job.spec
     spec = forked_spec(before, request)

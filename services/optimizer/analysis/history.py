@@ -21,19 +21,7 @@ _PIECE_ITERATIONS: Final = 16
 def read_history(
     store: Store, job_id: str, *, after: int | None
 ) -> Iterator[tuple[Iteration, tuple[Evaluation, ...]]]:
-    """Read committed iterations with their particles, piece by piece as they are consumed.
-
-    Args:
-        store: where they are.
-        job_id: id of the job.
-        after: only iterations with a greater index; None for all.
-
-    Yields:
-        An iteration and its particles, in order.
-
-    Raises:
-        NotFound: no job of that id; at the first item.
-    """
+    """Read committed iterations with their particles, piece by piece as they are consumed."""
     while True:
         page = store.iterations(job_id, after=after, limit=_PIECE_ITERATIONS)
         if page.items:
@@ -48,16 +36,7 @@ def read_history(
 
 
 def read_columns(store: Store, job: Job, *, rows: int) -> Iterator[EvaluationColumns]:
-    """Read a job's evaluations as columns, piece by piece as they are consumed.
-
-    Args:
-        store: where they are.
-        job: as it was read; iterations committed later are left out.
-        rows: evaluations in a piece on average, but one iteration at least.
-
-    Yields:
-        Whole iterations, in order.
-    """
+    """Read a job's evaluations as columns, piece by piece as they are consumed."""
     step = iterations_of(rows, job)
     for first in range(0, job.progress.iterations, step):
         piece = store.evaluation_columns(job.id, first, min(first + step, job.progress.iterations))
@@ -66,14 +45,6 @@ def read_columns(store: Store, job: Job, *, rows: int) -> Iterator[EvaluationCol
 
 
 def iterations_of(rows: int, job: Job) -> int:
-    """Say how many iterations of a job have so many evaluations on average.
-
-    Args:
-        rows: evaluations.
-        job: as it was read.
-
-    Returns:
-        The number of iterations, one at least.
-    """
+    """Say how many iterations of a job have so many evaluations on average."""
     progress = job.progress
     return max(1, rows * progress.iterations // max(1, progress.evaluations))

@@ -49,14 +49,7 @@ class Shape:
         return sum(array.nbytes for array in self.empty(1).arrays)
 
     def empty(self, rows: int) -> EvaluationColumns:
-        """Make columns.
-
-        Args:
-            rows: How many.
-
-        Returns:
-            Columns of any numbers.
-        """
+        """Make columns."""
         return EvaluationColumns(
             iteration=np.empty(rows, dtype=np.int64),
             particle=np.empty(rows, dtype=np.int64),
@@ -74,7 +67,6 @@ class HistoryMemory:
     with, as well. The history asked about longest ago is dropped first.
 
     Args:
-        max_bytes: Of all arrays together.
         longest_wait: How long a history waits for memory that others use [s].
     """
 
@@ -96,15 +88,7 @@ class HistoryMemory:
 
     @contextmanager
     def history(self, cache: HistoryCache, job: Job) -> Iterator[_History]:
-        """Have the history of a job alone; it is the one that was asked about last.
-
-        Args:
-            cache: Of the store that the job is in.
-            job: As it was read.
-
-        Yields:
-            The history.
-        """
+        """Have the history of a job alone; it is the one that was asked about last."""
         key = (id(cache), job.id)
         while True:
             with self._changed:
@@ -119,11 +103,7 @@ class HistoryMemory:
                     return
 
     def forget(self, cache_id: int) -> None:
-        """Drop the histories of a cache.
-
-        Args:
-            cache_id: Its `id`.
-        """
+        """Drop the histories of a cache."""
         with self._changed:
             for key in [key for key in self._histories if key[0] == cache_id]:
                 del self._histories[key]
@@ -132,17 +112,6 @@ class HistoryMemory:
         """Make columns, as soon as there is room for them.
 
         Histories that nobody is reading are dropped for them, and others are waited for.
-
-        Args:
-            rows: How many.
-            shape: Of a row.
-            job_id: Whose columns they are, for messages.
-
-        Returns:
-            Columns of any numbers; each counts until it dies.
-
-        Raises:
-            EvaluatorUnavailable: Others use too much of the memory for too long.
         """
         nbytes = rows * shape.nbytes
         with self._changed:
@@ -188,30 +157,13 @@ class HistoryCache:
     """Columns of a store's jobs that were asked about last. Thread-safe."""
 
     def __init__(self, store: Store, *, memory: HistoryMemory = MEMORY) -> None:
-        """Create an empty cache.
-
-        Args:
-            store: where histories are read.
-            memory: that they share with those of other caches.
-        """
+        """Create an empty cache."""
         self._store = store
         self._memory = memory
         weakref.finalize(self, memory.forget, id(self)).atexit = False
 
     def columns(self, job: Job) -> EvaluationColumns:
-        """Every evaluation of a job's committed iterations.
-
-        Args:
-            job: as it was read.
-
-        Returns:
-            Its columns as of its progress or later, which cannot be written to and stay as they
-            are when more are read.
-
-        Raises:
-            Conflict: the job is too large to be held.
-            EvaluatorUnavailable: the memory is used by others; later it may not be.
-        """
+        """Every evaluation of a job's committed iterations."""
         with self._memory.history(self, job) as history:
             history.reserve(job.progress.evaluations)
             while history.iterations < job.progress.iterations:

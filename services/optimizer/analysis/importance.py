@@ -62,13 +62,7 @@ def first_order_indices(
 
     Args:
         designs: (r, d) values of the variables, in their units.
-        variables: The d variables.
         output: (r,) what they lead to, of any unit; only its order counts.
-
-    Returns:
-        The share of each variable in the variance of the output's rank, 0 to 1, with the interval
-        that a bootstrap over the designs gives it; None if the output is the same throughout, or
-        of fewer designs than `LEAST_DESIGNS`.
     """
     if len(output) < LEAST_DESIGNS:
         return None
@@ -93,10 +87,6 @@ def companions(designs: Floats, variables: Sequence[Variable]) -> tuple[Companio
 
     Args:
         designs: (r, d) values of the variables.
-        variables: The d variables.
-
-    Returns:
-        The companion of each variable; None where it has none, as it or all others never change.
     """
     ranks = np.apply_along_axis(average_ranks, 0, designs)
     ranks -= ranks.mean(axis=0)

@@ -32,11 +32,7 @@ def percentile_interval(value: float, resampled: NDArray[np.float64]) -> Interva
     """Interval between two quantiles of what resamples come to (Efron 1979).
 
     Args:
-        value: The estimate.
         resampled: (B,) the same of each resample, NaN for one that has none; +-inf allowed.
-
-    Returns:
-        The estimate with its interval; the ends are NaN if no resample has a value.
     """
     known = resampled[~np.isnan(resampled)]
     if not len(known):

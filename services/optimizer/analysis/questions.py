@@ -44,29 +44,11 @@ class Questions:
         object.__setattr__(self, "_histories", HistoryCache(self.store))
 
     def columns(self, job: Job) -> EvaluationColumns:
-        """Read every committed evaluation at once.
-
-        Args:
-            job: as it was read.
-
-        Returns:
-            Its columns, as of its progress or later.
-
-        Raises:
-            Conflict: the job is too large to be held in memory.
-        """
+        """Read every committed evaluation at once."""
         return self._histories.columns(job)
 
     def column_pieces(self, job: Job, *, rows: int = PIECE) -> Iterator[EvaluationColumns]:
-        """As `columns`, piece by piece as they are consumed: for histories of any length.
-
-        Args:
-            job: As it was read; iterations committed later are left out.
-            rows: Evaluations in a piece on average, but one iteration at least.
-
-        Returns:
-            Whole iterations, in order.
-        """
+        """As `columns`, piece by piece as they are consumed: for histories of any length."""
         return read_columns(self.store, job, rows=rows)
 
     def history(
@@ -76,39 +58,15 @@ class Questions:
 
         Read by pieces as it is consumed: however long it takes, no transaction stays open, and
         what is committed meanwhile comes too.
-
-        Args:
-            job_id: id of the job.
-            after: only iterations with a greater index; None for all.
-
-        Returns:
-            Iterations and their particles, in order.
-
-        Raises:
-            NotFound: no job of that id; at the first item.
         """
         return read_history(self.store, job_id, after=after)
 
     def reference(self, job_id: str) -> tuple[Job, str | None]:
-        """Compare a job's best with the published design, which walks where that is not known.
-
-        Args:
-            job_id: id of the job.
-
-        Returns:
-            The job with its reference; and why it has no gain, None if it has one.
-
-        Raises:
-            NotFound: no job of that id.
-        """
+        """Compare a job's best with the published design, which walks where that is not known."""
         return with_reference(self.store, self.store.job(job_id))
 
     def asked(self, job: Job, iterations: int | None = None) -> tuple[NDArray[np.float64], ...]:
         """Read what the search asked for.
-
-        Args:
-            job: as it was read.
-            iterations: how many of the first iterations; None for all that it had committed.
 
         Returns:
             (n, d) positions of each iteration, in the variables' units.
@@ -117,70 +75,25 @@ class Questions:
         return self.store.asked(job.id, 0, end)
 
     def reevaluations(self, job: Job) -> tuple[tuple[int, Reevaluation], ...]:
-        """Read what designs came to that were evaluated anew in double precision.
-
-        Args:
-            job: as it was read.
-
-        Returns:
-            Index of the iteration, and what its best design came to, in order.
-        """
+        """Read what designs came to that were evaluated anew in double precision."""
         return self.store.reevaluations(job.id)
 
     def distribution(
         self, job: Job, *, after: int | None = None, limit: int
     ) -> tuple[Distribution, bool]:
-        """Say how designs are spread, iteration by iteration.
-
-        Args:
-            job: as it was read.
-            after: only iterations with a greater index; None for all.
-            limit: most iterations.
-
-        Returns:
-            The distribution, and whether more iterations follow.
-
-        Raises:
-            Conflict: the job is too large to be held in memory.
-        """
+        """Say how designs are spread, iteration by iteration."""
         columns = self.columns(job).after(after)
         following = iteration_starts(columns)[limit:]
         page = columns.rows(slice(int(following[0]) if len(following) else None))
         return distribution(page, job.spec.design_space()), len(following) > 0
 
     def rank(self, job: Job, preference: Preference, *, top: int) -> RankedJob:
-        """Judge all designs by another preference, from what is stored.
-
-        Args:
-            job: that tunes a drive, as it was read.
-            preference: to judge by.
-            top: how many designs to name.
-
-        Returns:
-            The ranking, with the evaluations that it refers to.
-
-        Raises:
-            InvalidRequest: a job of another kind, which has no preference.
-            Conflict: the job is too large to be held in memory.
-        """
+        """Judge all designs by another preference, from what is stored."""
         spec, columns = tuning_of(job), self.columns(job)
         return RankedJob(spec, columns, rank(columns, preference, top=top, worlds=spec.worlds))
 
     def identifiability(self, jobs: Sequence[Job]) -> Identifiability:
-        """Say which parameters several runs of one problem agree on.
-
-        Args:
-            jobs: at least one, all of different seeds; name, optimizer and iterations may differ
-                too.
-
-        Returns:
-            Intervals and, of several jobs, how far each parameter can be trusted.
-
-        Raises:
-            InvalidRequest: jobs of different problems, or two of one seed.
-            Conflict: a job has no design yet that did not fail, or is too large to be held in
-                memory.
-        """
+        """Say which parameters several runs of one problem agree on."""
         check_comparable(jobs)
         runs = [self.columns(job) for job in jobs]
         spec = jobs[0].spec

@@ -72,17 +72,7 @@ class RankedJob:
 
 
 def tuning_of(job: Job) -> JobSpec:
-    """The spec of a job whose designs can be ranked.
-
-    Args:
-        job: As it was read.
-
-    Returns:
-        Its spec.
-
-    Raises:
-        InvalidRequest: A job of another kind, which has no preference.
-    """
+    """The spec of a job whose designs can be ranked."""
     if not isinstance(job.spec, JobSpec):
         raise InvalidRequest(
             f"job {job.id} is of kind {job.spec.kind}; only the designs of a job that tunes a"
@@ -99,17 +89,7 @@ def rank(
     top: int,
     worlds: TuningWorlds | None = None,
 ) -> Ranking:
-    """Judge all rows by another preference.
-
-    Args:
-        columns: evaluations of a job that tunes a drive, with fitness by the job's own preference.
-        preference: to judge by.
-        top: how many designs to name; fewer if fewer walk in every scenario.
-        worlds: in which the job judges every design; None for the model alone.
-
-    Returns:
-        The ranking; the designs' order by the new preference beside that by the old.
-    """
+    """Judge all rows by another preference."""
     fitness, before = fitness_by(columns, preference, worlds=worlds), columns.fitness
     present, ordered = _best_first(before, 1), np.sort(before)
     return Ranking(
@@ -132,11 +112,6 @@ def fitness_by(
     columns: EvaluationColumns, preference: Preference, *, worlds: TuningWorlds | None = None
 ) -> Floats:
     """Judge all rows by a preference.
-
-    Args:
-        columns: r evaluations of a job that tunes a drive.
-        preference: to judge by.
-        worlds: in which the job judges every design; None for the model alone.
 
     Returns:
         (r,) fitness, minimized, +inf for a design that failed.

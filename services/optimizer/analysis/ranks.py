@@ -16,9 +16,6 @@ def spearman(one: Floats, other: Floats) -> float:
     Args:
         one: (M,) values.
         other: (M,) values of the same things.
-
-    Returns:
-        -1 to 1; NaN where one of the two is constant.
     """
     a, b = (average_ranks(values) for values in (one, other))
     a, b = a - a.mean(), b - b.mean()

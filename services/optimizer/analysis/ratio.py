@@ -31,14 +31,7 @@ class MedianInterval:
 
 
 def median_interval(values: Sequence[float]) -> MedianInterval:
-    """Median of n runs, between two of their order statistics (binomial, exact).
-
-    Args:
-        values: n >= 1 of them, finite.
-
-    Returns:
-        The median and its interval; from 6 runs on there is one.
-    """
+    """Median of n runs, between two of their order statistics (binomial, exact)."""
     n = len(values)
     return _between(list(values), [comb(n, k) for k in range(n + 1)])
 
@@ -49,13 +42,6 @@ def median_ratio(numerators: Sequence[float], denominators: Sequence[float]) -> 
     That is the estimate of Hodges and Lehmann for a shift of the logarithms. Its interval lies
     between two of the ordered ratios, by the exact distribution of Mann and Whitney's U; it holds
     if the methods' values differ by a factor. Runs of one seed are not paired: they share nothing.
-
-    Args:
-        numerators: n >= 1 of them, positive and finite.
-        denominators: m >= 1 of them, positive and finite.
-
-    Returns:
-        The median ratio and its interval; from 4 runs of each on there is one.
     """
     ratios = np.divide.outer(np.array(numerators), np.array(denominators)).ravel()
     return _between(ratios.tolist(), _counts_of_u(len(numerators), len(denominators)))

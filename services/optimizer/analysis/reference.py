@@ -34,17 +34,7 @@ _log = logging.getLogger(__name__)
 
 
 def walked_reference(spec: Spec) -> Reference:
-    """Let the published or the start design of a job walk in the job's cases.
-
-    Args:
-        spec: Of the job.
-
-    Returns:
-        What it comes to, the same for the same spec to the bit.
-
-    Raises:
-        SimulationError: It cannot be simulated here.
-    """
+    """Let the published or the start design of a job walk in the job's cases."""
     if reference_design(spec) is None:
         return NONE
     return _walked(spec.model_dump_json(include=set(_JUDGED_BY)))
@@ -75,17 +65,6 @@ def with_reference(store: Store, job: Job) -> tuple[Job, str | None]:
 
     Nothing that determines results depends on it. A job whose numbers come of other code is left
     as it is, as its gain would be over what that code has never computed.
-
-    Args:
-        store: Where the job is kept.
-        job: As it was read.
-
-    Returns:
-        The job with its reference, as far as that is known; and why it has no gain, for people,
-        None if it has one.
-
-    Raises:
-        StoreUnavailable: The reference cannot be stored.
     """
     if job.reference is None:
         if not job.readable or not isinstance(job.spec, JobSpec):
@@ -114,15 +93,7 @@ def _why_none(job: Job) -> str:
 
 
 def note_reference(store: Store, job: Job) -> Job:
-    """As `with_reference` of a job that has ended or paused; the log says what went wrong.
-
-    Args:
-        store: Where the job is kept.
-        job: As it was read.
-
-    Returns:
-        The job with its reference, as far as that is known.
-    """
+    """As `with_reference` of a job that has ended or paused; the log says what went wrong."""
     if job.reference is not None:
         return job
     try:

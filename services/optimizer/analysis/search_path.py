@@ -26,19 +26,8 @@ def retraced(
     """Take a search along a path, up to its last ask, which is not answered.
 
     Args:
-        spec: Of its job.
-        budgets: Iterations that the job was to run, in the order in which it was given them. A
-            method may ask for other designs under another budget.
         asked: (n, d) positions of every iteration, at least one.
-        told: What it was told of every iteration, see `Spec.told`; that of the last is left out.
         until: When `time.monotonic` is past this, it is given up [s].
-
-    Returns:
-        The search, which has asked for the last of these positions.
-
-    Raises:
-        ValueError: It would have asked for others; names the first such iteration.
-        TimeoutError: It takes too long; says how far it came.
     """
     searches = [create_optimizer(spec.model_copy(update={"iterations": n})) for n in budgets]
     search = searches.pop(0)

@@ -22,22 +22,7 @@ def started(
     job_of: Callable[[str], Job],
     columns_of: Callable[[Job], EvaluationColumns],
 ) -> Spec:
-    """Look up the designs that a job starts from, if it names earlier jobs.
-
-    Args:
-        spec: Of the new job.
-        job_of: Id -> job.
-        columns_of: Job -> all that it evaluated.
-
-    Returns:
-        The spec with designs in place of the jobs: of each job the best by its own fitness, then
-        the second of each, and so on, without repeats. Of other variables than the new job searches
-        they say nothing.
-
-    Raises:
-        InvalidRequest: A job that is not there, that has no design yet or none that fits; names its
-            place in `start`.
-    """
+    """Look up the designs that a job starts from, if it names earlier jobs."""
     if not isinstance(spec.start, EarlierJobs):
         return spec
     searched = tuple(variable.name for variable in spec.design_space().variables)
@@ -68,17 +53,7 @@ def started(
 def best_designs(
     space: DesignSpace, columns: EvaluationColumns, searched: tuple[str, ...], count: int
 ) -> Iterator[Design]:
-    """Choose the best different designs of a job.
-
-    Args:
-        space: Of the job.
-        columns: What it evaluated.
-        searched: Variables that a new job searches.
-        count: Designs, at most.
-
-    Yields:
-        Values of these variables by name, as far as the job has them, the best design first.
-    """
+    """Choose the best different designs of a job."""
     seen = set[tuple[float | str, ...]]()
     for row in np.argsort(columns.fitness, kind="stable").tolist():
         if len(seen) == count or not np.isfinite(columns.fitness[row]):

@@ -1,6 +1,6 @@
 """Bias-weighted product and geometric mean (eq. 3.8, 4.1, 4.2) of many designs at once.
 
-The same numbers as `gaitswarm.services.optimizer.jobs.preference` to twelve digits. numpy's logarithm may
+The same numbers as `services.optimizer.jobs.preference` to twelve digits. numpy's logarithm may
 differ from Python's in the last bit, so that nothing that is stored is computed here.
 """
 
@@ -26,10 +26,6 @@ _BLOCK: Final = 4096
 
 def log_utilities(columns: EvaluationColumns, preference: Preference) -> Floats:
     """Logarithm of the bias-weighted product (eq. 3.8, 4.1).
-
-    Args:
-        columns: r evaluations of walks in K scenarios.
-        preference: biases and exponents.
 
     Returns:
         (r, K), +inf where the walk failed or lacks an objective with a weight.
@@ -84,11 +80,6 @@ def objective_vectors(
     worlds, fitness under any preference with these biases is the product of these numbers, each to
     the power of its exponent.
 
-    Args:
-        columns: r evaluations of walks in K scenarios.
-        bias: M = 5 or 6 biases b_m >= 0 in the units of f_m; by default none.
-        worlds: in which the job judges every design; None for the model alone.
-
     Returns:
         (r, M), each in its objective's unit, minimized; a row is +inf throughout where a walk of
         the design failed or lacks an objective.
@@ -104,10 +95,6 @@ def objective_vectors(
 
 def utilities(columns: EvaluationColumns, spec: Spec) -> Floats:
     """What each design is worth in each case by its job's own measure.
-
-    Args:
-        columns: r evaluations of a job.
-        spec: of the job.
 
     Returns:
         (r, K) utilities, minimized, +inf where a case failed.

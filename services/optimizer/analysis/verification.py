@@ -43,12 +43,7 @@ _UNREADABLE: Final = (
 
 
 class BrokenChain(Exception):
-    """What is stored of an iteration is not what was committed.
-
-    Args:
-        iteration: Index of the iteration.
-        problem: What is wrong with it, for people.
-    """
+    """What is stored of an iteration is not what was committed."""
 
     def __init__(self, iteration: int, problem: str) -> None:
         super().__init__(f"iteration {iteration}: {problem}")
@@ -77,15 +72,7 @@ class Chain:
     places: dict[str, int] = field(default_factory=dict)
 
     def extend(self, link: Link, outcomes: Outcomes) -> None:
-        """Look at the next iteration.
-
-        Args:
-            link: The iteration, with the digest that is stored.
-            outcomes: What is stored of its designs.
-
-        Raises:
-            BrokenChain: It is not what was committed.
-        """
+        """Look at the next iteration."""
         index = self.iterations
         if link.iteration != index:
             raise BrokenChain(index, "it is missing")
@@ -130,16 +117,7 @@ class HistoryCheck:
 
 
 def check_history(store: Store, job: Job, *, head: str | None = None) -> HistoryCheck:
-    """Compute a job's chain again from its rows, by pieces.
-
-    Args:
-        store: Where the rows are.
-        job: As it was read; iterations committed later are left out.
-        head: Digest that was noted down earlier, to be looked for.
-
-    Returns:
-        How far its history is what was committed, and what is wrong first.
-    """
+    """Compute a job's chain again from its rows, by pieces."""
     spec = job.spec if job.readable else None
     chain = Chain(store.chain_documents(job.id), spec)
     broken_at, problem, sizes = None, "", list[int]()
@@ -307,10 +285,6 @@ def _same(expected: Any, stored: Any) -> bool:
 
 def judged(spec: AnySpec, columns: EvaluationColumns) -> NDArray[np.float64]:
     """Judge stored evaluations again.
-
-    Args:
-        spec: By which they are judged.
-        columns: The evaluations.
 
     Returns:
         (r,) fitness that follows from their raw objectives.

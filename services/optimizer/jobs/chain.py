@@ -59,14 +59,7 @@ class ChainDocuments:
         return _digest(["gaitswarm job", VERSION, self.spec, self.lineage])
 
     def provenance_of(self, iteration: int) -> Any:
-        """Find what an iteration depends on.
-
-        Args:
-            iteration: Its index, from 0.
-
-        Returns:
-            The last record from that iteration or an earlier one on; None if there is none.
-        """
+        """Find what an iteration depends on."""
         found = [r for r in self.provenance or () if r["from_iteration"] <= iteration]
         return found[-1] if found else None
 
@@ -109,11 +102,7 @@ class Outcomes:
 
     @classmethod
     def of(cls, done: CompletedIteration) -> Outcomes:
-        """Take them from an iteration that is about to be stored.
-
-        Args:
-            done: The iteration.
-        """
+        """Take them from an iteration that is about to be stored."""
         return cls(
             done.designs,
             np.stack([outcome.objectives for outcome in done.outcomes], axis=1),
@@ -124,28 +113,13 @@ class Outcomes:
 
     @classmethod
     def read(cls, columns: EvaluationColumns, reevaluation: Reevaluation | None) -> Outcomes:
-        """Take them from what was stored.
-
-        Args:
-            columns: Evaluations of the iteration alone.
-            reevaluation: Of its best design in double precision, if there is one.
-        """
+        """Take them from what was stored."""
         stored = (columns.designs, columns.objectives, columns.statuses, columns.fitness)
         return cls(*stored, reevaluation)
 
 
 def iteration_digest(before: str, documents: ChainDocuments, link: Link, outcomes: Outcomes) -> str:
-    """Compute the digest of an iteration.
-
-    Args:
-        before: Digest of the iteration before, or of the job.
-        documents: Of the job.
-        link: The iteration; its own digest is not looked at.
-        outcomes: What its designs came to.
-
-    Returns:
-        64 hexadecimal digits.
-    """
+    """Compute the digest of an iteration."""
     anew = outcomes.reevaluation
     content = [
         "gaitswarm iteration",
@@ -171,15 +145,7 @@ def iteration_digest(before: str, documents: ChainDocuments, link: Link, outcome
 
 
 def ask_digest(positions: Floats, state: Mapping[str, Any]) -> str:
-    """Compute the digest of an ask, which stays when the state is cleared.
-
-    Args:
-        positions: (n, d) that the search asked for.
-        state: The optimizer's dump after that, of what JSON has.
-
-    Returns:
-        64 hexadecimal digits.
-    """
+    """Compute the digest of an ask, which stays when the state is cleared."""
     return _digest(["gaitswarm ask", VERSION, positions, state])
 
 
@@ -195,17 +161,7 @@ def _digest(value: Any) -> str:
 
 
 def encoded(value: Any) -> bytes:
-    """Encode as CBOR: equal values are equal bytes.
-
-    Args:
-        value: Of what JSON has, and arrays of floats.
-
-    Returns:
-        The encoding.
-
-    Raises:
-        TypeError: There is something else in it.
-    """
+    """Encode as CBOR: equal values are equal bytes."""
     out = bytearray()
     _write(out, value)
     return bytes(out)

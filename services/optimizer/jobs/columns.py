@@ -54,14 +54,7 @@ class EvaluationColumns:
         return np.asarray(self.statuses != Status.OK)
 
     def rows(self, chosen: slice | NDArray[np.intp]) -> EvaluationColumns:
-        """Choose rows.
-
-        Args:
-            chosen: slice, or (n,) indices.
-
-        Returns:
-            These rows in that order: views for a slice, copies for indices.
-        """
+        """Choose rows."""
         return EvaluationColumns(
             self.iteration[chosen],
             self.particle[chosen],
@@ -72,25 +65,11 @@ class EvaluationColumns:
         )
 
     def of_iteration(self, iteration: int) -> EvaluationColumns:
-        """Choose one iteration.
-
-        Args:
-            iteration: its index.
-
-        Returns:
-            Its rows, as views.
-        """
+        """Choose one iteration."""
         return self.rows(slice(*np.searchsorted(self.iteration, [iteration, iteration + 1])))
 
     def after(self, iteration: int | None) -> EvaluationColumns:
-        """Leave out the first iterations.
-
-        Args:
-            iteration: index of the last one to leave out; None leaves out none.
-
-        Returns:
-            The rows of all later iterations, as views.
-        """
+        """Leave out the first iterations."""
         if iteration is None:
             return self
         return self.rows(slice(int(np.searchsorted(self.iteration, iteration, "right")), None))

@@ -43,21 +43,7 @@ class DesignSpace:
         chosen: Sequence[str | Variable] | None,
         fixed: Mapping[str, float | str],
     ) -> DesignSpace:
-        """Combine a catalogue with a user's choice.
-
-        Args:
-            required: variables of which every one must be chosen or fixed: the controller's.
-            optional: variables that may be: the controller's conventions and the gait's.
-            chosen: what is searched, by name with the catalogue's bounds, or with bounds of one's
-                own; None for all that are required, less those that are fixed.
-            fixed: value of each variable that is held, by name: a number, or a choice's name.
-
-        Returns:
-            The space, its variables in the order of `chosen`.
-
-        Raises:
-            ValueError: the choice makes no sense; names the variable and the way out.
-        """
+        """Combine a catalogue with a user's choice."""
         catalogue = VariableCatalogue((*required, *optional))
         held = _held(fixed, catalogue)
         if chosen is None:
@@ -114,31 +100,12 @@ class DesignSpace:
         return (*self.variables, *self.catalogue[len(self.variables) :])
 
     def designs(self, positions: NDArray[np.float64]) -> NDArray[np.float64]:
-        """What is judged and stored for points of the box.
-
-        Args:
-            positions: (n, d), inside the bounds.
-
-        Returns:
-            (n, len(names)), integer variables rounded, of categorical ones the index of the choice
-            in whose equal share of the bounds the point lies, and fixed values appended.
-        """
+        """What is judged and stored for points of the box."""
         held = np.array([value for _, value in self.fixed], dtype=np.float64)
         return np.hstack([self.box.designs(positions), np.tile(held, (len(positions), 1))])
 
     def positions(self, designs: Sequence[Mapping[str, float | str]]) -> NDArray[np.float64]:
-        """Points of the box for designs as people give them, of which `designs` gives them back.
-
-        Args:
-            designs: k designs: values by name, of a categorical variable a choice's name or index.
-
-        Returns:
-            (k, d), inside the bounds.
-
-        Raises:
-            ValueError: A design is none of this space; the message begins with its index and the
-                variable, and says the way out.
-        """
+        """Points of the box for designs as people give them, of which `designs` gives them back."""
         held = {v.name: value for v, (_, value) in zip(self._held, self.fixed, strict=True)}
         rows = []
         for index, design in enumerate(designs):
@@ -167,15 +134,7 @@ class DesignSpace:
             )
 
     def simulated(self, designs: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Designs as the simulator takes them, which knows every choice of its catalogue.
-
-        Args:
-            designs: (n, len(names)), in which a categorical variable's index is among the choices
-                that are searched.
-
-        Returns:
-            The same, the index among all choices.
-        """
+        """Designs as the simulator takes them, which knows every choice of its catalogue."""
         translated = designs.copy()
         for j, (own, known) in enumerate(zip(self.columns, self.catalogue, strict=True)):
             if own.choices != known.choices:
@@ -184,14 +143,7 @@ class DesignSpace:
         return translated
 
     def shown(self, design: Iterable[float]) -> dict[str, float | str]:
-        """A design as people read it.
-
-        Args:
-            design: (len(names),) values.
-
-        Returns:
-            Values by name; of a categorical variable the choice's name.
-        """
+        """A design as people read it."""
         return {
             variable.name: variable.shown(value)
             for variable, value in zip(self.columns, design, strict=True)
@@ -211,14 +163,7 @@ class DesignSpace:
             yield dict(zip(self.names, values.tolist(), strict=True))
 
     def refusal(self, error: SimulationInputError) -> InvalidRequest:
-        """An error in a design as one of the spec's field that the design has the value from.
-
-        Args:
-            error: begins with the name of the variable that is to blame, and a colon.
-
-        Returns:
-            The same message about `variables` or `fixed`.
-        """
+        """An error in a design as one of the spec's field that the design has the value from."""
         culprit = str(error).partition(":")[0]
         return InvalidRequest(
             str(error), field="fixed" if culprit in dict(self.fixed) else "variables"

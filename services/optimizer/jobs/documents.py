@@ -49,18 +49,7 @@ SPECS: Final[
 
 
 def checked_spec(spec: AnySpec, changes: Mapping[str, Any]) -> AnySpec:
-    """A spec with other values of some fields, so that what is stored of it can be read again.
-
-    Args:
-        spec: A valid one.
-        changes: Values by field.
-
-    Returns:
-        The spec with these values.
-
-    Raises:
-        InvalidRequest: They make no sense; names the field.
-    """
+    """A spec with other values of some fields, so that what is stored of it can be read again."""
     try:
         return SPECS.validate_python({**spec.model_dump(), **changes})
     except ValidationError as error:
@@ -71,15 +60,7 @@ def checked_spec(spec: AnySpec, changes: Mapping[str, Any]) -> AnySpec:
 
 
 def check_budget(spec: AnySpec, iterations: int) -> None:
-    """Check that a job can have another budget, as if it had been submitted with it.
-
-    Args:
-        spec: Of the job.
-        iterations: Of the budget, in all.
-
-    Raises:
-        InvalidRequest: It cannot; its field is `iterations`.
-    """
+    """Check that a job can have another budget, as if it had been submitted with it."""
     try:
         checked_spec(spec.with_budget(iterations), {})
     except InvalidRequest as error:

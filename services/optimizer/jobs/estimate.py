@@ -63,17 +63,7 @@ class Estimate:
 def estimate(
     spec: Spec, cases: Sequence[Case], earlier: Sequence[Job], measured: MeasuredRates
 ) -> Estimate:
-    """Estimate a job by the rate of jobs like it, or else of a short walk in this thread.
-
-    Args:
-        spec: of the job.
-        cases: those of the spec.
-        earlier: jobs, newest first, of which those that are like it tell a rate.
-        measured: rates that were measured before, to which a new one is added.
-
-    Returns:
-        Counts, and times where a rate is known.
-    """
+    """Estimate a job by the rate of jobs like it, or else of a short walk in this thread."""
     evaluations = spec.budget
     one = duration(spec, cases)
     positions = create_optimizer(spec).ask()
@@ -96,15 +86,7 @@ def estimate(
 
 
 def duration(spec: Spec, cases: Sequence[Case]) -> float:
-    """Simulated time of one design in some of a spec's cases.
-
-    Args:
-        spec: of the job.
-        cases: of the spec, or like them.
-
-    Returns:
-        All walks together [s]; a cycle time that is searched counts by the middle of its bounds.
-    """
+    """Simulated time of one design in some of a spec's cases."""
     cycle_time = _typical(spec.design_space(), "cycle_time")
     return sum(
         case.scenario.cycles * cycle_time
@@ -115,19 +97,7 @@ def duration(spec: Spec, cases: Sequence[Case]) -> float:
 
 
 def checked_length(spec: Spec, cases: Sequence[Case], longest: float) -> float:
-    """Refuse a job whose walks are too many at once, or last too long.
-
-    Args:
-        spec: of the job.
-        cases: those of the spec.
-        longest: simulated time of all walks of all designs that it may have [s].
-
-    Returns:
-        The time that it has [s].
-
-    Raises:
-        InvalidRequest: it is too much; names the field.
-    """
+    """Refuse a job whose walks are too many at once, or last too long."""
     at_once = len(cases) * spec.optimizer.particles
     if at_once > _MOST_WALKS:
         raise InvalidRequest(
@@ -161,15 +131,6 @@ class MeasuredRates:
         """Measure, unless it was measured before, how fast walks of a spec are simulated.
 
         Compiles the robot's kernel if need be, as the job itself would.
-
-        Args:
-            spec: of a job.
-            cases: those of the spec.
-            positions: (n, d) that its method asks for first; as many walk at once.
-
-        Returns:
-            Simulated seconds per second on all cores, None without a compiled kernel or a design
-            that can begin to walk; and what that is based on, for people.
         """
         if any(isinstance(case, LongCase) for case in cases):
             return None, "nothing: a run takes too long to be measured beforehand"

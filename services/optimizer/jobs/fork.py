@@ -154,18 +154,7 @@ class Fork:
 
 
 def forked_spec(parent: AnySpec, request: ForkRequest) -> AnySpec:
-    """The spec of a fork, resolved.
-
-    Args:
-        parent: Spec of the job that is forked.
-        request: What is to be different.
-
-    Returns:
-        The parent's spec with that laid over it.
-
-    Raises:
-        InvalidRequest: It makes no sense; names the field.
-    """
+    """The spec of a fork, resolved."""
     changes = {name: getattr(request, name) for name in _LAID}
     changes = {name: value for name, value in changes.items() if value is not None}
     if request.particles is not None:
@@ -178,14 +167,6 @@ def forked_spec(parent: AnySpec, request: ForkRequest) -> AnySpec:
 
 
 def changed_fields(parent: AnySpec, fork: AnySpec) -> tuple[str, ...]:
-    """What is different of a fork, but for its name and budget.
-
-    Args:
-        parent: Spec of the job that is forked, resolved.
-        fork: Spec of the fork, resolved.
-
-    Returns:
-        Names of fields, in the spec's order.
-    """
+    """What is different of a fork, but for its name and budget."""
     names = (name for name in type(parent).model_fields if name not in _FREE)
     return tuple(name for name in names if getattr(parent, name) != getattr(fork, name))

@@ -172,13 +172,6 @@ class CompletedIteration:
 
 
 def best_particle(fitness: NDArray[np.float64]) -> int | None:
-    """Find the best of a swarm.
-
-    Args:
-        fitness: (n,), +inf where a design failed.
-
-    Returns:
-        Index of the least finite fitness, the earliest of equals; None if there is none.
-    """
+    """Find the best of a swarm."""
     finite = np.isfinite(fitness)
     return int(np.argmin(np.where(finite, fitness, np.inf))) if finite.any() else None

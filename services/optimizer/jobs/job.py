@@ -96,18 +96,7 @@ TRANSITIONS: Final[dict[tuple[JobState, Command], JobState]] = {
 
 
 def commanded(state: JobState, command: Command) -> JobState:
-    """The state after a command.
-
-    Args:
-        state: before it.
-        command: of the user.
-
-    Returns:
-        The state that `TRANSITIONS` names.
-
-    Raises:
-        Conflict: not possible in that state; says what is.
-    """
+    """The state after a command."""
     try:
         return TRANSITIONS[state, command]
     except KeyError:
@@ -127,20 +116,7 @@ LARGEST_BUDGET: Final = 1_000_000
 
 
 def extended(state: JobState, committed: int, iterations: int) -> JobState:
-    """The state of a job after it got another budget.
-
-    Args:
-        state: before.
-        committed: iterations of the budget that are spent.
-        iterations: of the new budget, in all.
-
-    Returns:
-        QUEUED for a job that had succeeded, else the state before.
-
-    Raises:
-        Conflict: the job was cancelled.
-        InvalidRequest: the budget is spent already, or too large.
-    """
+    """The state of a job after it got another budget."""
     if state is JobState.CANCELLED:
         raise Conflict("cannot extend a job that is cancelled; submit its spec as a new one")
     if not committed < iterations <= LARGEST_BUDGET:
@@ -267,11 +243,7 @@ class Job:
 
     @property
     def spec(self) -> AnySpec:
-        """The spec of a job that can be read.
-
-        Raises:
-            Unreadable: It cannot; says why, and what to do.
-        """
+        """The spec of a job that can be read."""
         if isinstance(self.stored_spec, UnreadableSpec):
             raise Unreadable(f"job {self.id}: {self.stored_spec.reason}")
         return self.stored_spec
@@ -293,15 +265,7 @@ class Job:
 
 
 def refusal(job: Job, now: JobProvenance) -> str | None:
-    """Why a job must not go on without its user's consent, and how it does with it.
-
-    Args:
-        job: the job as stored.
-        now: the provenance of the process that is to go on with it.
-
-    Returns:
-        Sentences for people; None if its numbers would be mixed with no others.
-    """
+    """Why a job must not go on without its user's consent, and how it does with it."""
     iterations = job.progress.iterations
     changes = changes_since(job.provenance, iterations, now)
     if not changes:

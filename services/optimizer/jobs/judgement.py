@@ -42,14 +42,7 @@ class Judgement:
 
 
 def exponential(logarithm: float) -> float:
-    """The exponential function. Python's, as numpy's differs in the last bit between processors.
-
-    Args:
-        logarithm: any number but NaN.
-
-    Returns:
-        Its exponential, +inf where a double ends.
-    """
+    """The exponential function. Python's, as numpy's differs in the last bit between processors."""
     try:
         return math.exp(logarithm)
     except OverflowError:
@@ -57,14 +50,7 @@ def exponential(logarithm: float) -> float:
 
 
 def by_design(outcomes: tuple[Outcome, ...]) -> tuple[Floats, NDArray[np.bool_]]:
-    """Turn outcomes by case to numbers by design.
-
-    Args:
-        outcomes: K, one per case, of the same n designs each.
-
-    Returns:
-        (n, K, m) raw objectives, in their units; (n, K), true for a case without a result.
-    """
+    """Turn outcomes by case to numbers by design."""
     objectives = np.stack([outcome.objectives for outcome in outcomes], axis=1)
     failed = np.stack([outcome.statuses != Status.OK for outcome in outcomes], axis=1)
     return objectives, failed

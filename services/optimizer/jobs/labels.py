@@ -55,14 +55,7 @@ class LabelsChange(BaseModel):
     )
 
     def applied(self, labels: Labels) -> Labels:
-        """Change labels.
-
-        Args:
-            labels: As they are.
-
-        Returns:
-            As they are to be, each tag once.
-        """
+        """Change labels."""
         name = labels.name if self.name is None else self.name.strip() or None
         return Labels(
             name=name,
@@ -156,11 +149,7 @@ class FacetCounts:
     tags: Counter[str] = field(default_factory=Counter)
 
     def add(self, facets: Facets) -> None:
-        """Count a job.
-
-        Args:
-            facets: Of the job.
-        """
+        """Count a job."""
         self.total += 1
         self.states[facets.state] += 1
         for counter, value in (
@@ -174,15 +163,7 @@ class FacetCounts:
 
 
 def robot_name(robot: Any) -> str | None:
-    """Name the robot of a spec.
-
-    Args:
-        robot: As the spec has it: a name, a variant or files; as object, document or JSON text.
-
-    Returns:
-        Its name, of files that in robot.toml, or `own` where these say none or that of a shipped
-        robot; None for none.
-    """
+    """Name the robot of a spec."""
     known = _parsed(robot)
     if is_own_robot(known):
         return _name_in(str(_part(known, "toml")))
@@ -192,14 +173,7 @@ def robot_name(robot: Any) -> str | None:
 
 
 def is_own_robot(robot: Any) -> bool:
-    """Say whether the robot of a spec is a user's own.
-
-    Args:
-        robot: As for `robot_name`.
-
-    Returns:
-        Whether it is given by its files.
-    """
+    """Say whether the robot of a spec is a user's own."""
     return _part(_parsed(robot), "toml") is not None
 
 
@@ -218,15 +192,7 @@ def _name_in(toml: str) -> str:
 
 
 def preference_name(preference: Any) -> str | None:
-    """Name the preference of a spec.
-
-    Args:
-        preference: As the spec has it: a name or biases and exponents; as object, document or JSON
-            text.
-
-    Returns:
-        Its name among `PREFERENCES`, `own` for any other; None for none.
-    """
+    """Name the preference of a spec."""
     known = _parsed(preference)
     if not known:
         return None

@@ -53,61 +53,24 @@ class Outbox(Protocol):
     """
 
     def take(self, *, lease_seconds: float) -> Notification | None:
-        """Take the notification that has been due for longest, for one attempt.
-
-        Args:
-            lease_seconds: for so long it is nobody else's; then it is due again [s].
-
-        Returns:
-            The notification; None if none is due.
-        """
+        """Take the notification that has been due for longest, for one attempt."""
 
     def settle(self, taken: Notification, error: str | None, *, final: bool = False) -> None:
-        """Note what came of an attempt: it is delivered, due again later, or given up.
-
-        Args:
-            taken: as `take` gave it.
-            error: why it failed, for people; None if it was delivered.
-            final: whether it is given up at once.
-        """
+        """Note what came of an attempt: it is delivered, due again later, or given up."""
 
     def about(self, job_id: str) -> tuple[Notification, ...]:
-        """Read the notifications about a job.
-
-        Args:
-            job_id: of the job.
-
-        Returns:
-            The oldest first; none while the job has not ended, or if nobody is notified.
-
-        Raises:
-            NotFound: there is no such job.
-        """
+        """Read the notifications about a job."""
 
 
 def pause_after(attempts: int) -> float | None:
-    """How long to wait after an attempt that failed.
-
-    Args:
-        attempts: how many have failed (>= 1).
-
-    Returns:
-        Seconds to wait, each time twice as long up to an hour; None: it is given up.
-    """
+    """How long to wait after an attempt that failed."""
     if attempts >= MOST_ATTEMPTS:
         return None
     return float(min(_FIRST_PAUSE * 2.0 ** (attempts - 1), _LONGEST_PAUSE))
 
 
 def unusable_url(url: str) -> str | None:
-    """Why nothing can be sent to a URL, whoever sends.
-
-    Args:
-        url: by anybody.
-
-    Returns:
-        The reason, for people; None for a URL of HTTP without credentials.
-    """
+    """Why nothing can be sent to a URL, whoever sends."""
     try:
         parts = urlsplit(url)
         name, _ = parts.hostname, parts.port
@@ -128,13 +91,6 @@ def refused_url(url: str, hosts: Collection[str]) -> str | None:
     """Why nothing is sent to a URL.
 
     A server must not be made to send requests where only it can: to itself, or into its network.
-
-    Args:
-        url: by anybody.
-        hosts: that its administrator allows, each with or without a port.
-
-    Returns:
-        The reason, for people; None for a URL that is allowed.
     """
     if not hosts:
         return "notifications are off here; GAITSWARM_WEBHOOK_HOSTS of the server allows hosts"
@@ -151,16 +107,7 @@ def refused_url(url: str, hosts: Collection[str]) -> str | None:
 
 
 def check_url(url: str, hosts: Collection[str], *, field: str) -> None:
-    """Refuse a URL to which nothing is sent.
-
-    Args:
-        url: by anybody.
-        hosts: as for `refused_url`.
-        field: of the request, to blame.
-
-    Raises:
-        InvalidRequest: nothing is sent there; says why.
-    """
+    """Refuse a URL to which nothing is sent."""
     reason = refused_url(url, hosts)
     if reason is not None:
         raise InvalidRequest(reason, field=field)

@@ -38,18 +38,7 @@ def _model(name: str) -> type[SearchSettings]:
 
 
 def optimizer_settings(choice: object) -> object:
-    """Look up settings that are named, and name the default method where none is.
-
-    Args:
-        choice: Name of a method or preset, a document of settings, or anything else.
-
-    Returns:
-        The settings of a name, a document with a `name`; anything else as it is.
-
-    Raises:
-        ValueError: No method or preset of that name, or no setting of the method; names those that
-            there are.
-    """
+    """Look up settings that are named, and name the default method where none is."""
     if isinstance(choice, Mapping):
         name = choice.get("name", DEFAULT_METHOD)
         if isinstance(name, str):
@@ -65,16 +54,7 @@ def optimizer_settings(choice: object) -> object:
 
 
 def with_settings(choice: object, settings: Mapping[str, Any]) -> object:
-    """Lay settings over those of an optimizer.
-
-    Args:
-        choice: Settings, a document of some, or the name of a method or preset.
-        settings: Those that are to be different, by name; a `name` of another method leaves
-            nothing of the first.
-
-    Returns:
-        A document; what is no optimizer as it is, for validation to refuse.
-    """
+    """Lay settings over those of an optimizer."""
     with suppress(ValueError):
         choice = optimizer_settings(choice)
     if isinstance(choice, SearchSettings):

@@ -98,14 +98,6 @@ def figure_of_merit(fitness: float, preference: Preference) -> float | None:
     """F of eq. 3.1, which chapter 3 maximizes: 1e5 V^2 / (E F_GEAR F_ACC F_ANGACC (|Z| + 0.03)).
 
     Of several scenarios it is the geometric mean of theirs.
-
-    Args:
-        fitness: by the preference, +inf where a walk failed.
-        preference: that the fitness is by.
-
-    Returns:
-        1e5 / fitness under the preference `chapter-3`; None under any other, and for a fitness
-        that has no finite reciprocal.
     """
     if preference != PREFERENCES["chapter-3"] or not 0.0 < fitness < math.inf:
         return None
@@ -116,17 +108,7 @@ def figure_of_merit(fitness: float, preference: Preference) -> float | None:
 def judge(
     objectives: NDArray[np.float64], failed: NDArray[np.bool_], preference: Preference
 ) -> Judgement:
-    """Judge designs by the bias-weighted product and the geometric mean (eq. 4.1, 4.2).
-
-    Args:
-        objectives: (n, K, 6) raw objectives of n designs in K scenarios, f1..f6 of table 4.1, in
-            their units.
-        failed: (n, K), true where a walk has no utility.
-        preference: biases and exponents.
-
-    Returns:
-        Fitness and logarithms of the utilities.
-    """
+    """Judge designs by the bias-weighted product and the geometric mean (eq. 4.1, 4.2)."""
     logarithms = log_utilities(objectives, failed, preference)
     return Judgement(geometric_mean(logarithms), logarithms)
 
@@ -134,16 +116,7 @@ def judge(
 def log_utilities(
     objectives: NDArray[np.float64], failed: NDArray[np.bool_], preference: Preference
 ) -> NDArray[np.float64]:
-    """Logarithm of the bias-weighted product (eq. 3.8, 4.1).
-
-    Args:
-        objectives: (..., 6) raw objectives, f1..f6 of table 4.1, in their units.
-        failed: (...), true where a walk has no utility.
-        preference: biases and exponents.
-
-    Returns:
-        (...), +inf where a walk failed, or where an objective with a weight is not finite.
-    """
+    """Logarithm of the bias-weighted product (eq. 3.8, 4.1)."""
     flat, lost = objectives.reshape(-1, objectives.shape[-1]), failed.reshape(-1)
     values = np.empty(len(flat))
     for begin in range(0, len(flat), _PIECE):
@@ -156,14 +129,7 @@ def log_utilities(
 
 
 def geometric_mean(log_utility: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Geometric mean over scenarios (eq. 4.2).
-
-    Args:
-        log_utility: (n, K) logarithms of utilities, +inf where a walk failed.
-
-    Returns:
-        (n,) fitness, +inf where any walk failed or a double ends.
-    """
+    """Geometric mean over scenarios (eq. 4.2)."""
     fitness = np.empty(len(log_utility))
     for begin in range(0, len(log_utility), _PIECE):
         piece = slice(begin, begin + _PIECE)
@@ -184,16 +150,6 @@ def objective_vectors(
     Objective m of a design is the geometric mean over scenarios of b_m + f_m. Under any preference
     with these biases, fitness is the product of these numbers, each to the power of its exponent
     (eq. 4.1, 4.2); so whatever the exponents, the best design is one that no other dominates.
-
-    Args:
-        objectives: (n, K, 6) raw objectives of n designs in K scenarios, f1..f6 of table 4.1, in
-            their units.
-        failed: (n, K), true where a walk has no utility.
-        bias: M = 5 or 6 biases b_m >= 0 in the units of f_m; by default none.
-
-    Returns:
-        (n, M), each in its objective's unit, minimized; a row is +inf throughout where any walk of
-        the design failed or lacks an objective.
     """
     count = len(bias)
     factors = objectives[:, :, :count].copy()

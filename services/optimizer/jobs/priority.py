@@ -19,15 +19,7 @@ HIGHEST: Final = 10
 
 
 def check_priority(priority: int, *, field: str = "priority") -> None:
-    """Refuse what is no priority.
-
-    Args:
-        priority: Wanted for a job; the higher, the sooner.
-        field: Of the request, to blame.
-
-    Raises:
-        InvalidRequest: It is out of bounds; says which they are.
-    """
+    """Refuse what is no priority."""
     if not LOWEST <= priority <= HIGHEST:
         raise InvalidRequest(
             f"must be from {LOWEST} (last) to {HIGHEST} (first), it is {priority}", field=field
@@ -35,25 +27,11 @@ def check_priority(priority: int, *, field: str = "priority") -> None:
 
 
 def check_can_be_prioritized(state: JobState) -> None:
-    """Refuse another priority for a job that neither waits nor runs.
-
-    Args:
-        state: Of the job.
-
-    Raises:
-        Conflict: It has ended.
-    """
+    """Refuse another priority for a job that neither waits nor runs."""
     if state.terminal:
         raise Conflict(f"cannot prioritize a job that is {state}; it has ended")
 
 
 def weight(priority: int) -> float:
-    """The weight with which running jobs share slots: each step up doubles it.
-
-    Args:
-        priority: Of a job.
-
-    Returns:
-        Its share of slots that several jobs want, in proportion to the others' [1]; 1 for 0.
-    """
+    """The weight with which running jobs share slots: each step up doubles it."""
     return 2.0**priority

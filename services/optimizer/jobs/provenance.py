@@ -53,14 +53,7 @@ class JobProvenance(BaseModel):
     simulation: Provenance = Field(description="What its walks depend on.")
 
     def changes(self, now: JobProvenance) -> tuple[str, ...]:
-        """What is different now, in words for people.
-
-        Args:
-            now: the provenance that is compared with this earlier one.
-
-        Returns:
-            One phrase for every difference that counts; none if numbers of both may be mixed.
-        """
+        """What is different now, in words for people."""
         found = list(self.simulation.changes(now.simulation))
         if now.optimizer_digest != self.optimizer_digest:
             found.append("other code of search and judgement")
@@ -88,17 +81,7 @@ RECORDS: Final = TypeAdapter(ProvenanceRecords)
 
 
 def job_provenance(spec: Spec) -> JobProvenance:
-    """The provenance of what this process computes for a job.
-
-    Args:
-        spec: what the job was asked to do.
-
-    Returns:
-        The provenance; the spec itself is no part of it.
-
-    Raises:
-        SimulationInputError: the robot's description cannot be used.
-    """
+    """The provenance of what this process computes for a job."""
     return JobProvenance(
         gaitswarm=_version(),
         optimizer_digest=optimizer_digest(),
@@ -114,17 +97,7 @@ def job_provenance(spec: Spec) -> JobProvenance:
 def changes_since(
     records: Sequence[ProvenanceRecord], iterations: int, now: JobProvenance
 ) -> tuple[str, ...]:
-    """What keeps a job from going on without its user's consent.
-
-    Args:
-        records: the job's.
-        iterations: how many it has committed.
-        now: the provenance of the process that is to go on.
-
-    Returns:
-        One phrase for every change, for people; none if it may go on. A job without records may
-        if it has nothing yet that could be mixed with something else.
-    """
+    """What keeps a job from going on without its user's consent."""
     if records:
         return records[-1].provenance.changes(now)
     if iterations:
@@ -135,17 +108,7 @@ def changes_since(
 def as_stored(
     objectives: Sequence[Objective], records: Sequence[ProvenanceRecord], iterations: int
 ) -> tuple[Objective, ...]:
-    """What a job's objectives mean in what is stored of it: earlier versions had f6's other sign.
-
-    Args:
-        objectives: of its cases, as they are today.
-        records: the job's.
-        iterations: how many it has committed.
-
-    Returns:
-        The objectives; the description of the loss of height says which iterations have the sign
-        of table 4.1, if there are any.
-    """
+    """What a job's objectives mean in what is stored of it: earlier versions had f6's other sign"""
     begins = (
         r.from_iteration
         for r in records
@@ -162,30 +125,14 @@ def as_stored(
 
 
 def first_record(provenance: JobProvenance | None) -> ProvenanceRecords:
-    """Records of a job that is submitted.
-
-    Args:
-        provenance: what its numbers are to depend on; None leaves that to its first claim.
-
-    Returns:
-        One record from the first iteration on, or none.
-    """
+    """Records of a job that is submitted."""
     return () if provenance is None else with_record((), 0, provenance)
 
 
 def with_record(
     records: ProvenanceRecords, iterations: int, now: JobProvenance
 ) -> ProvenanceRecords:
-    """Records of a job that goes on.
-
-    Args:
-        records: those so far.
-        iterations: how many iterations it has committed, which is the index of the next.
-        now: the provenance of the process that goes on.
-
-    Returns:
-        The records with one more, or as they are if nothing has changed.
-    """
+    """Records of a job that goes on."""
     if records and not records[-1].provenance.changes(now):
         return records
     return (*records, ProvenanceRecord(from_iteration=iterations, provenance=now))

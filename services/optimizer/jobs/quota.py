@@ -23,17 +23,7 @@ class Quota:
     seconds: float
 
     def check(self, jobs: int, seconds: float, *, new_jobs: int, new_seconds: float) -> None:
-        """Refuse what would be too much.
-
-        Args:
-            jobs: that are unfinished already.
-            seconds: simulated time of their walks [s].
-            new_jobs: 1 for a job that is added, 0 for one that is changed.
-            new_seconds: simulated time that is added [s].
-
-        Raises:
-            QuotaExceeded: says what there is, what may be, and the way out.
-        """
+        """Refuse what would be too much."""
         if new_jobs and jobs + new_jobs > self.jobs:
             raise QuotaExceeded(
                 f"there are {jobs} unfinished jobs of this owner, and there may be {self.jobs};"

@@ -38,15 +38,7 @@ class Reference:
     kind: ReferenceKind = "published"
 
     def gain(self, fitness: float | None) -> float | None:
-        """How much better a design is.
-
-        Args:
-            fitness: Of the design, which is the better the less it is.
-
-        Returns:
-            The share by which its fitness is less than the reference's [1], negative where it is
-            greater; None where one of the two is not known.
-        """
+        """How much better a design is."""
         if fitness is None or self.fitness is None or not self.fitness > 0.0:
             return None
         return 1.0 - fitness / self.fitness
@@ -57,14 +49,6 @@ def published_for(spec: Spec) -> tuple[str, Mapping[str, float]] | None:
 
     Published designs are of the robots that ship with gaitswarm. A plug-in's case judges by
     another measure.
-
-    Args:
-        spec: Of the job.
-
-    Returns:
-        Its name and its values, on the job's terms. Where none was published for that preference,
-        the controller's first; None where there is none for the controller or the robot, and for
-        a job that tunes no drive.
     """
     if not isinstance(spec, JobSpec) or spec.case is not None:
         return None
@@ -78,13 +62,6 @@ def start_of(spec: Spec) -> Mapping[str, float] | None:
     """The start design of a job: the middle of the bounds within which it searches.
 
     Nobody published a design of a user's own robot; this one shows what the search has gained.
-
-    Args:
-        spec: Of the job.
-
-    Returns:
-        Its values by name; None for a shipped robot, a plug-in's case, and a job that tunes no
-        drive.
     """
     if not isinstance(spec, JobSpec) or spec.case is not None or not is_own_robot(spec.robot):
         return None
@@ -95,14 +72,7 @@ def start_of(spec: Spec) -> Mapping[str, float] | None:
 
 
 def reference_design(spec: Spec) -> tuple[str, ReferenceKind, Mapping[str, float]] | None:
-    """The design that a job's best is measured against.
-
-    Args:
-        spec: Of the job.
-
-    Returns:
-        Its name, its kind and its values; None for none.
-    """
+    """The design that a job's best is measured against."""
     published = published_for(spec)
     if published is not None:
         name, design = published
@@ -112,14 +82,7 @@ def reference_design(spec: Spec) -> tuple[str, ReferenceKind, Mapping[str, float
 
 
 def published_study(spec: JobSpec) -> str | None:
-    """Name the published design of a job's controller that was tuned as the job tunes.
-
-    Args:
-        spec: Of the job.
-
-    Returns:
-        That of its preference, or else the controller's first; None for none.
-    """
+    """Name the published design of a job's controller that was tuned as the job tunes."""
     published = CONTROLLERS[spec.controller].published
     wanted = spec.resolved_preference()
     names = [name for name, known in PREFERENCES.items() if known == wanted and name in published]
@@ -131,13 +94,6 @@ def on_the_jobs_terms(published: Mapping[str, float], spec: JobSpec) -> dict[str
 
     It walks in its own gait only as far as the job searches the gait; else in the gait that all of
     the job's designs have. So with conventions that the job holds fixed.
-
-    Args:
-        published: A design with or without a gait of its own.
-        spec: Of the job.
-
-    Returns:
-        The design's values by name.
     """
     space = spec.design_space()
     searched = {variable.name for variable in space.variables}

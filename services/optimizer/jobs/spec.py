@@ -365,25 +365,10 @@ class Spec(BaseModel):
 
 
 def judge_outcomes(spec: Spec, outcomes: tuple[Outcome, ...]) -> Judgement:
-    """Judge designs by what the simulator says of them.
-
-    Args:
-        spec: of their job.
-        outcomes: K, one per case, of the same n designs each.
-
-    Returns:
-        Fitness and utilities of the n designs.
-    """
+    """Judge designs by what the simulator says of them."""
     return spec.judge(*by_design(outcomes))
 
 
 def create_optimizer(spec: Spec) -> Optimizer:
-    """Create the optimizer that a job asks for.
-
-    Args:
-        spec: of the job.
-
-    Returns:
-        The optimizer before its first ask.
-    """
+    """Create the optimizer that a job asks for."""
     return spec.create_search()

@@ -35,15 +35,7 @@ class TimeLeft:
 
 
 def recent_pace(before: float | None, latest: float) -> float:
-    """The pace of a job when another iteration has ended.
-
-    Args:
-        before: seconds for a design, as of the iterations before [s]; None if there was none.
-        latest: the same of the last iteration [s].
-
-    Returns:
-        An exponentially weighted mean [s], which follows when workers come or go.
-    """
+    """The pace of a job when another iteration has ended."""
     return latest if before is None else (1.0 - _WEIGHT) * before + _WEIGHT * latest
 
 
@@ -51,13 +43,6 @@ def time_left(job: Job, now: datetime) -> TimeLeft:
     """Estimate when a job ends, from its own committed iterations.
 
     Rates are over the time spent evaluating, so pauses and the time in the queue do not count.
-
-    Args:
-        job: as it was read.
-        now: aware; the iteration under way counts as done in part, by the time since the last one.
-
-    Returns:
-        Rates and time left.
     """
     progress = job.progress
     nothing_known = job.own_evaluations == 0 or progress.compute_seconds <= 0.0

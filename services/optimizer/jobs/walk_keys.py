@@ -24,14 +24,6 @@ def walk_keys(
     A key is a digest of all that an outcome depends on: the design by name, as it is simulated; the
     fields of the spec that are not in `Spec.unwalked`; and what is simulated. It does not depend on
     whether a variable is searched or fixed, nor on the order of variables.
-
-    Args:
-        spec: Of the job, resolved.
-        provenance: Of the walks, with their precision.
-        simulated: (n, v) designs as the simulator takes them.
-
-    Returns:
-        n keys; none for a job whose outcomes depend on more than what is simulated.
     """
     if spec.unwalked is None:
         return ()

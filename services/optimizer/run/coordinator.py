@@ -1,6 +1,6 @@
 """What happens next in a job: a pure function of (state, event) -> (state, actions).
 
-No I/O, clock or thread is in here; `gaitswarm.services.optimizer.run.execution` executes the actions, in
+No I/O, clock or thread is in here; `services.optimizer.run.execution` executes the actions, in
 order, and answers the last of them with an event. An action that raises voids those after it.
 
 event                  in phase         actions                      phase after
@@ -128,18 +128,7 @@ class Coordination:
 
 
 def handle(state: Coordination, event: Event) -> tuple[Coordination, tuple[Action, ...]]:
-    """Answer one event.
-
-    Args:
-        state: Where the run is.
-        event: What has happened.
-
-    Returns:
-        Where the run is then, and what is to be done, in order; nothing when it has ended.
-
-    Raises:
-        ValueError: The event makes no sense in this phase.
-    """
+    """Answer one event."""
     match state.phase, event:
         case Phase.ENDED, _:
             return state, ()

@@ -33,19 +33,6 @@ def evaluate_unknown(
 
     The outcomes are those of evaluating all of it, to the bit, because a walk's outcome depends on
     design and case alone. A store that does not answer knows nothing.
-
-    Args:
-        evaluator: Runs the walks.
-        store: Knows earlier ones; None: every walk is walked.
-        request: What is asked.
-        keys: n, of its designs, as `walk_keys` gives them; without any all is walked.
-        should_stop: As for `Evaluator.evaluate`.
-
-    Returns:
-        The outcomes, and the key of each design that was walked for this, None for all others.
-
-    Raises:
-        Exception: Whatever the evaluator raises.
     """
     if store is None or not keys:
         return evaluator.evaluate(request, should_stop), tuple(keys)

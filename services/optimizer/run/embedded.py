@@ -67,33 +67,6 @@ def run_embedded(
 
     While another process holds the job, it is followed instead. As soon as that one gives it back,
     or is not heard of for the time of its lease, the job goes on here.
-
-    Args:
-        store: Where the job is kept.
-        evaluator: Where its walks run; or what opens that, called when the job is this process's.
-            It may raise EvaluationStopped when `stop` is set.
-        job: Its id; or the claim of a process that has submitted it for itself.
-        on_commit: Called after an iteration that this process has stored.
-        on_retry: Called before a wait for the workers.
-        on_follow: Called for every iteration that another process stores meanwhile, in order.
-        on_news: Told when the job turns out to be another process's, and when it no longer is.
-        stop: When set, the function returns soon, and a job that this process holds goes back to
-            the queue.
-        backoff: How to wait for workers that cannot be reached.
-        accepts_changes: Whether the job goes on here although what its numbers depend on has
-            changed, which is then recorded with it; else it fails.
-        cache: Whether a design is walked only if no job has walked it before.
-        known: How many committed iterations the caller knows of; `on_follow` is told of those after
-            them. Default: as many as there are now.
-
-    Returns:
-        The job as it is then.
-
-    Raises:
-        NotFound: There is no such job.
-        EvaluatorUnavailable: The workers cannot be opened; the job is queued again.
-        StoreUnavailable: Nothing can be stored or read, and the job stays as last committed; or it
-            has ended, but what is stored is damaged.
     """
     claim = None if isinstance(job, str) else job
     begun = store.job(job) if isinstance(job, str) else job.job

@@ -197,14 +197,7 @@ Action = Record | Begin | Evaluate | Commit | Wait | Release
 
 
 def iteration_of(action: Action) -> int | None:
-    """Which iteration an action is about.
-
-    Args:
-        action: What is to be done.
-
-    Returns:
-        Its index; None for what is about the job as a whole.
-    """
+    """Which iteration an action is about."""
     match action:
         case Begin(ask=ask):
             return ask.iteration

@@ -120,21 +120,6 @@ def run_claim(
 
     Workers or a store that are away are waited for, however long that takes, as long as nobody else
     has taken the job over.
-
-    Args:
-        claim: On the job.
-        around: What the run needs beside it.
-        stop: When set, work under way is dropped and the job is given back to the queue. So it is
-            when `on_commit` raises, which is passed on.
-        drain: When set, the job is given back to the queue as soon as the iteration under way is
-            committed, or at once while it waits for workers.
-
-    Returns:
-        The job as it is then.
-
-    Raises:
-        StoreUnavailable: The store does not answer in the end; the job then stays as last
-            committed, and is taken up again when its lease has run out.
     """
     run = _Run.of(claim, around, stop or threading.Event(), drain or threading.Event())
     try:

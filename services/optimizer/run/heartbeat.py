@@ -26,13 +26,6 @@ class Heartbeat:
 
     A store that does not answer is tried again, however long that takes: it refuses whatever is
     written under a claim that another runner has taken over meanwhile.
-
-    Args:
-        store: Where the job is kept.
-        claim: What is renewed.
-        lease_seconds: How long each renewal holds [s].
-        waiting: Tells why the job waits; None while it does not. Users see it.
-        outage: Where it is noted that the store is away.
     """
 
     def __init__(

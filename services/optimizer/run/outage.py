@@ -87,14 +87,6 @@ def is_infrastructure(error: BaseException) -> bool:
 
     Such an error says nothing of the job: the same work may succeed later, so it is tried again.
     Any other is the job's own fault or a bug, and would come again.
-
-    Args:
-        error: What was raised, with what caused it.
-
-    Returns:
-        True for what `Unavailable` stands for, for a lack of memory, threads, processes, files or
-        space, for connections that broke, for a kernel that the system kept from being compiled,
-        stored or loaded, and for a module that it kept from being loaded.
     """
     return any(_is_of_the_machine(link) for link in _causes(error)) or (
         isinstance(error, KernelBuildError)
@@ -128,9 +120,6 @@ class Outage:
     attempted(); failed("refused")     ->  False
     ended()                            ->  seconds since the first failure
     ended()                            ->  None
-
-    Args:
-        clock: Monotonic time [s].
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
@@ -156,14 +145,7 @@ class Outage:
         return self._failures
 
     def failed(self, reason: str) -> bool:
-        """Note a failure.
-
-        Args:
-            reason: Why, for people.
-
-        Returns:
-            Whether it is the first of an outage.
-        """
+        """Note a failure."""
         with self._lock:
             is_news = self._reason is None
             if is_news:
@@ -178,11 +160,7 @@ class Outage:
             self._attempt_since = self._clock()
 
     def ended(self) -> float | None:
-        """Note a success.
-
-        Returns:
-            How long the outage took [s]; None if there was none.
-        """
+        """Note a success."""
         with self._lock:
             was_away = self._reason is not None
             self._reason, self._attempt_since, self._failures = None, None, 0

@@ -48,24 +48,7 @@ def runner_name() -> str:
 
 
 class Runner:
-    """Runs up to `concurrency` jobs, each in a thread of its own, from start() to stop().
-
-    Args:
-        store: Where jobs are claimed.
-        evaluator: Where their walks run.
-        concurrency: Jobs to run at once.
-        lease_seconds: After so long without a word from here another runner takes a job over [s].
-        poll_seconds: How often the store is asked for a queued job while there is room for one [s].
-        cache: Whether a design is walked only if no job has walked it before.
-        quarantine_after: A job with which so many runner processes in a row went down fails.
-        name: Of this runner, which no other one may have; a random one by default.
-        on_ended: Called in a job's thread when nothing more is done at the job here, unless the
-            runner is stopped.
-        clock: Monotonic time [s]; replaced in tests.
-
-    Raises:
-        ValueError: concurrency is less than 1.
-    """
+    """Runs up to `concurrency` jobs, each in a thread of its own, from start() to stop()."""
 
     def __init__(
         self,
@@ -124,12 +107,7 @@ class Runner:
         self._scheduler.start()
 
     def drain(self, seconds: float, at_once: threading.Event | None = None) -> None:
-        """Let every job commit its iteration under way, and give it back to the queue; then stop.
-
-        Args:
-            seconds: After so long what is not committed is dropped [s].
-            at_once: When set, by any thread, it is dropped then.
-        """
+        """Let every job commit its iteration under way, and give it back to the queue; then stop"""
         hurry = at_once or threading.Event()
         self._drain.set()
         until = self._clock() + seconds

@@ -59,16 +59,7 @@ class Rule:
     kinds: frozenset[Kind] = frozenset({"continuous", "integer", "categorical"})
 
     def suits(self, space: Space, budget: int) -> bool:
-        """Whether it is for a search.
-
-        Args:
-            space: The box that is searched.
-            budget: Evaluations of the planned run.
-
-        Returns:
-            True within its limits, unless the method needs what is not installed here, or could
-            not be resumed after so many evaluations.
-        """
+        """Whether it is for a search."""
         method = METHODS[self.settings.name]
         return (
             not method.missing
@@ -95,16 +86,6 @@ walks for many.
 def chosen_method(
     settings: AutoSettings, space: Space, budget: int, rules: tuple[Rule, ...] = RULES
 ) -> OptimizerSettings:
-    """Choose the method of a search.
-
-    Args:
-        settings: As the job has them.
-        space: The box that is searched.
-        budget: Evaluations of the planned run.
-        rules: From which the first that suits is taken.
-
-    Returns:
-        Settings of that method, with as many designs of one iteration as the job has.
-    """
+    """Choose the method of a search."""
     rule = next(rule for rule in rules if rule.suits(space, budget))
     return rule.settings.model_copy(update={"particles": settings.particles})

@@ -33,14 +33,7 @@ class Enumeration:
     """
 
     def __init__(self, name: str, particles: int, positions: Callable[[int, int], Floats]) -> None:
-        """Create one that has not been asked yet.
-
-        Args:
-            name: Of the method, in its state.
-            particles: Positions of an ask, at most.
-            positions: Gives positions start <= k < stop, (stop - start, d); the same ones whatever
-                the piece.
-        """
+        """Create one that has not been asked yet."""
         self._name = name
         self._particles = particles
         self._positions = positions
@@ -59,50 +52,24 @@ class Enumeration:
         return self._evaluations
 
     def start_from(self, positions: Floats) -> None:
-        """Refuse to begin elsewhere.
-
-        Args:
-            positions: (k, d); none are allowed.
-
-        Raises:
-            ValueError: There are some.
-        """
+        """Refuse to begin elsewhere."""
         if len(positions):
             raise ValueError(f"start_from(): {self._name} begins with the first of its positions")
 
     def ask(self, most: int | None = None) -> Floats:
-        """Give the positions to evaluate next; the same ones again until they are told.
-
-        Args:
-            most: Positions to give, at most, >= 1; what is asked already stays. Default:
-                `particles`, which also is the limit.
-
-        Returns:
-            (n, d) positions.
-        """
+        """Give the positions to evaluate next; the same ones again until they are told."""
         if not self._asked:
             self._asked = self._particles if most is None else min(most, self._particles)
         return self._positions(self._evaluations, self._evaluations + self._asked)
 
     def tell(self, fitness: Floats) -> None:
-        """Go on to the next positions.
-
-        Args:
-            fitness: (n,) of each of those last asked for.
-
-        Raises:
-            ValueError: Nothing was asked for, the shape is another, or a value is NaN or -inf.
-        """
+        """Go on to the next positions."""
         self._evaluations += len(checked_fitness(fitness, self._asked))
         self._iteration += 1
         self._asked = 0
 
     def dump(self) -> dict[str, Any]:
-        """Give the whole state.
-
-        Returns:
-            JSON-able counts.
-        """
+        """Give the whole state."""
         return {
             "optimizer": self._name,
             "schema_version": 1,
@@ -112,14 +79,7 @@ class Enumeration:
         }
 
     def load(self, state: dict[str, Any]) -> None:
-        """Take on a state.
-
-        Args:
-            state: As `dump` gave it.
-
-        Raises:
-            ValueError: It is of another method or version; the state before is kept.
-        """
+        """Take on a state."""
         dumped = parse_state(state, self._name, _CountedState)
         if dumped.optimizer != self._name:
             raise ValueError(f"not a state of {self._name}: optimizer: {dumped.optimizer}")

@@ -79,14 +79,7 @@ class Generational(ABC, Generic[S, G]):
     schema_version: ClassVar[int] = 1
 
     def __init__(self, settings: S, space: Space, budget: int, seed: int) -> None:
-        """Create a search that has not been asked yet.
-
-        Args:
-            settings: Of the method.
-            space: The box that is searched.
-            budget: Evaluations of the planned run.
-            seed: Of all random numbers.
-        """
+        """Create a search that has not been asked yet."""
         self.settings: Final = settings
         self.space: Final = space
         self.budget: Final = budget
@@ -115,28 +108,12 @@ class Generational(ABC, Generic[S, G]):
         return self._evaluations
 
     def start_from(self, positions: Floats) -> None:
-        """Put positions in the places of the first members.
-
-        Args:
-            positions: (k, d), in the variables' own units.
-
-        Raises:
-            ValueError: One is outside the bounds or of another dimension, or something was asked
-                for already.
-        """
+        """Put positions in the places of the first members."""
         begun = bool(self._evaluations or len(self.positions))
         self._start = checked_start(positions, self.space, begun=begun)
 
     def ask(self, most: int | None = None) -> Floats:
-        """Give the positions to evaluate next; the same ones again until they are told.
-
-        Args:
-            most: Positions to give, at most, >= 1; what is asked already stays. Default: the
-                settings' `particles`, which also is the limit.
-
-        Returns:
-            (n, d), inside the bounds, in the variables' own units.
-        """
+        """Give the positions to evaluate next; the same ones again until they are told."""
         told = len(self._fitness)
         if not self._asked:
             if told == len(self.positions):
@@ -147,14 +124,7 @@ class Generational(ABC, Generic[S, G]):
         return self.positions[told : told + self._asked].copy()
 
     def tell(self, fitness: Floats) -> None:
-        """Take what the positions last asked for are worth.
-
-        Args:
-            fitness: (n,) of each of them, minimized; +inf for a failed evaluation.
-
-        Raises:
-            ValueError: Nothing was asked for, the shape is another, or a value is NaN or -inf.
-        """
+        """Take what the positions last asked for are worth."""
         values = self.checked(fitness, self._asked)
         self._fitness = np.concatenate([self._fitness, values]) if len(self._fitness) else values
         self._iteration += 1
@@ -167,12 +137,7 @@ class Generational(ABC, Generic[S, G]):
             self.generations += 1
 
     def dump(self) -> dict[str, Any]:
-        """Give the whole state.
-
-        Returns:
-            JSON-able values with a schema version. JSON prints the shortest text that reads back
-            as the same float, so none loses a bit.
-        """
+        """Give the whole state."""
         return {
             "optimizer": self.settings.name,
             "schema_version": self.schema_version,
@@ -186,15 +151,7 @@ class Generational(ABC, Generic[S, G]):
         }
 
     def load(self, state: dict[str, Any]) -> None:
-        """Take on a state.
-
-        Args:
-            state: As `dump` gave it, for the same settings, space, budget, seed and start.
-
-        Raises:
-            ValueError: It is of another method, version or shape, or outside the bounds; the state
-                before is kept.
-        """
+        """Take on a state."""
         name = self.settings.name
         dumped = parse_state(self.upgrade(state), name, self.state_model)
         for field, expected in (("optimizer", name), ("schema_version", self.schema_version)):
@@ -223,72 +180,25 @@ class Generational(ABC, Generic[S, G]):
         self.positions, self._fitness = self.positions[kept], self._fitness[kept]
 
     def inside(self, positions: Floats, name: str) -> Floats:
-        """Check positions of a dumped state.
-
-        Args:
-            positions: (n, d).
-            name: Of the field, for messages.
-
-        Returns:
-            The positions.
-
-        Raises:
-            ValueError: One is outside the bounds.
-        """
+        """Check positions of a dumped state."""
         if (positions < self.space.low).any() or (positions > self.space.high).any():
             raise ValueError(f"{name}: outside the bounds of this job")
         return positions
 
     def checked(self, fitness: Floats, asked: int) -> Floats:
-        """Check what is told.
-
-        Args:
-            fitness: Of the positions last asked for.
-            asked: How many those are, 0 if there are none.
-
-        Returns:
-            (asked,), a copy.
-
-        Raises:
-            ValueError: Nothing was asked for, the shape is another, or a value is NaN or -inf.
-        """
+        """Check what is told."""
         return checked_fitness(fitness, asked)
 
     def best(self, fitness: Floats, count: int) -> NDArray[np.intp]:
-        """Choose the best of more start positions than there are members.
-
-        Args:
-            fitness: (n,) of each, +inf for a failed evaluation.
-            count: How many, < n.
-
-        Returns:
-            (count,) their indices; the earlier of equals.
-        """
+        """Choose the best of more start positions than there are members."""
         return np.argsort(fitness, kind="stable")[:count]
 
     def written(self, fitness: Floats) -> list[Any]:
-        """Write what was told as JSON takes it.
-
-        Args:
-            fitness: (n,), +inf for a failed evaluation.
-
-        Returns:
-            One entry for each.
-        """
+        """Write what was told as JSON takes it."""
         return worth(fitness)
 
     def read(self, values: list[Any]) -> Floats:
-        """Read back what `written` gave.
-
-        Args:
-            values: The entries.
-
-        Returns:
-            (n,), +inf for a failed evaluation.
-
-        Raises:
-            ValueError: `written` gives no such entries.
-        """
+        """Read back what `written` gave."""
         return of_worth(values)
 
     @abstractmethod
@@ -296,19 +206,11 @@ class Generational(ABC, Generic[S, G]):
         """Make the next generation, of any size >= 1.
 
         It may depend on settings, space, budget, seed, `generations` and the method's memory.
-
-        Returns:
-            (n, d), inside the bounds.
         """
 
     @abstractmethod
     def learn(self, positions: Floats, fitness: Floats) -> None:
-        """Take a whole generation into the method's memory.
-
-        Args:
-            positions: (n, d) as `propose` made them.
-            fitness: (n,) of each, +inf for a failed evaluation.
-        """
+        """Take a whole generation into the method's memory."""
 
     @abstractmethod
     def memory(self) -> dict[str, Any]:
@@ -316,46 +218,18 @@ class Generational(ABC, Generic[S, G]):
 
     @abstractmethod
     def recall(self, state: G) -> None:
-        """Check and take on the method's own fields of a state.
-
-        Args:
-            state: As it was parsed.
-
-        Raises:
-            ValueError: A shape is another, or something is outside the bounds; nothing is changed.
-        """
+        """Check and take on the method's own fields of a state."""
 
     def upgrade(self, state: dict[str, Any]) -> dict[str, Any]:
-        """Bring a state of an older version to this one.
-
-        Args:
-            state: Of any version.
-
-        Returns:
-            The same search's state in this version.
-        """
+        """Bring a state of an older version to this one."""
         return state
 
 
 def worth(fitness: Floats | list[float]) -> Worth:
-    """Write fitness values as JSON takes them.
-
-    Args:
-        fitness: (n,), +inf for a failed evaluation.
-
-    Returns:
-        The values, None for +inf.
-    """
+    """Write fitness values as JSON takes them."""
     return [f if math.isfinite(f) else None for f in map(float, fitness)]
 
 
 def of_worth(values: Worth) -> Floats:
-    """Read fitness values back.
-
-    Args:
-        values: As `worth` writes them.
-
-    Returns:
-        (n,), +inf for None.
-    """
+    """Read fitness values back."""
     return np.array([math.inf if f is None else f for f in values], dtype=np.float64)

@@ -43,60 +43,21 @@ class MultiObjective(Generational[S, V]):
         return self._fitness.shape[1] if len(self._fitness) else None
 
     def checked(self, fitness: Floats, asked: int) -> Floats:
-        """Check what is told.
-
-        Args:
-            fitness: Objective vectors of the positions last asked for.
-            asked: How many those are, 0 if there are none.
-
-        Returns:
-            (asked, M), a copy.
-
-        Raises:
-            ValueError: Nothing was asked for, the shape is another, or a value is NaN or -inf.
-        """
+        """Check what is told."""
         first = fitness.shape[1] if fitness.ndim > 1 else 0
         return checked_fitness(fitness, asked, self.objectives or max(1, first))
 
     def written(self, fitness: Floats) -> list[Any]:
-        """Write objective vectors as JSON takes them.
-
-        Args:
-            fitness: (n, M).
-
-        Returns:
-            n lists of M numbers, None for +inf.
-        """
+        """Write objective vectors as JSON takes them."""
         return [worth(row) for row in fitness.tolist()]
 
     def read(self, values: list[Any]) -> Floats:
-        """Read back what `written` gave.
-
-        Args:
-            values: n lists of M numbers, None for +inf.
-
-        Returns:
-            (n, M); (0,) of none.
-
-        Raises:
-            ValueError: They are of several lengths, or of none.
-        """
+        """Read back what `written` gave."""
         return vectors_of(values, "fitness")
 
 
 def vectors_of(rows: list[Worth], name: str) -> Floats:
-    """Read objective vectors of a dumped state.
-
-    Args:
-        rows: n vectors of M numbers, None for +inf.
-        name: Of the field, for messages.
-
-    Returns:
-        (n, M); (0,) of none.
-
-    Raises:
-        ValueError: They are of several lengths, or of none.
-    """
+    """Read objective vectors of a dumped state."""
     if len({len(row) for row in rows}) > 1 or any(not row for row in rows):
         raise ValueError(f"{name}: vectors of one length were expected")
     return np.array([of_worth(row) for row in rows], dtype=np.float64)

@@ -22,17 +22,7 @@ def random_search(
     budget: int,  # noqa: ARG001 - the same for every budget
     random: RandomNumbers,
 ) -> Proposals:
-    """Search by designs that are uniform in the box, integers and choices as likely as each other.
-
-    Args:
-        settings: Of the method.
-        space: The box that is searched.
-        budget: Evaluations of the planned run.
-        random: Its random numbers.
-
-    Yields:
-        (particles, d) positions.
-    """
+    """Sample designs uniformly in the box, all integers and choices with equal probability."""
     while True:
         unit = random.uniform(settings.particles, space.dimension)
         yield space.evenly(unit)

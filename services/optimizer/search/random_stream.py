@@ -20,16 +20,6 @@ def uniform(
 
     The key is (seed, purpose), and the counter starts at (iteration, particle): no stream overlaps
     another, and none depends on how many numbers another one took.
-
-    Args:
-        seed: of the job, 64 bits.
-        purpose: what the numbers are for, 64 bits.
-        iteration: from 0, 64 bits.
-        particle: from 0, 64 bits.
-        count: of numbers.
-
-    Returns:
-        (count,) in [0, 1), multiples of 2**-53.
     """
     philox = np.random.Philox(
         key=np.array([seed, purpose], dtype=np.uint64),
@@ -43,18 +33,7 @@ def uniform(
 def swarm_uniform(
     seed: int, purpose: int, *, iteration: int, particles: int, count: int
 ) -> NDArray[np.float64]:
-    """Uniform random numbers of a whole swarm.
-
-    Args:
-        seed: of the job, 64 bits.
-        purpose: what the numbers are for, 64 bits.
-        iteration: from 0, 64 bits.
-        particles: size of the swarm.
-        count: of numbers for each particle.
-
-    Returns:
-        (particles, count) in [0, 1); a row is what `uniform` gives for that particle.
-    """
+    """Uniform random numbers of a whole swarm."""
     rows = [
         uniform(seed, purpose, iteration=iteration, particle=particle, count=count)
         for particle in range(particles)
@@ -69,13 +48,7 @@ class RandomNumbers:
     """
 
     def __init__(self, seed: int, purpose: int, *, iteration: int = 0) -> None:
-        """Start a stream.
-
-        Args:
-            seed: of the job, 64 bits.
-            purpose: what the numbers are for, 64 bits.
-            iteration: from 0, 64 bits; each has a stream of its own.
-        """
+        """Start a stream."""
         self._philox = np.random.Philox(
             key=np.array([seed, purpose], dtype=np.uint64),
             counter=np.array([0, 0, 0, iteration], dtype=np.uint64),

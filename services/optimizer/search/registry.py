@@ -226,11 +226,7 @@ _PRESETS: Final[dict[str, SearchSettings]] = {
 
 
 class NamedSettings(Mapping[str, SearchSettings]):
-    """What a job may name in place of settings: methods of the registry, and presets.
-
-    Args:
-        first: Other names, before all of these.
-    """
+    """What a job may name in place of settings: methods of the registry, and presets."""
 
     def __init__(self, first: Mapping[str, SearchSettings] = MappingProxyType({})) -> None:
         self._first = first
@@ -253,14 +249,7 @@ class NamedSettings(Mapping[str, SearchSettings]):
         return (*self._first, *sorted({*METHODS.built_in, *_PRESETS}))
 
     def unknown(self, name: str) -> str:
-        """Say that a name is none.
-
-        Args:
-            name: That was given.
-
-        Returns:
-            For people, with those that there are.
-        """
+        """Say that a name is none."""
         return f"unknown optimizer {name!r}; {METHODS.instead_of(name, self)}"
 
 
@@ -279,21 +268,7 @@ def create_search(
     seed: int,
     start: Floats | None = None,
 ) -> Optimizer:
-    """Create a search.
-
-    Args:
-        settings: Of its method.
-        space: The box that is searched.
-        budget: Evaluations of the planned run.
-        seed: Of all random numbers.
-        start: (k, d) positions to begin with, in the variables' own units; None for none.
-
-    Returns:
-        The optimizer before its first ask.
-
-    Raises:
-        ValueError: A start position is outside the bounds.
-    """
+    """Create a search."""
     optimizer = METHODS[settings.name].create(settings, space, budget, seed)
     if start is not None and len(start):
         optimizer.start_from(start)

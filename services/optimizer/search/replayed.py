@@ -109,15 +109,7 @@ class Replayed:
     def __init__(
         self, search: Search[S], settings: S, space: Space, budget: int, seed: int
     ) -> None:
-        """Create a search that has not been asked yet.
-
-        Args:
-            search: The method.
-            settings: Of the method.
-            space: The box that is searched.
-            budget: Evaluations of the planned run.
-            seed: Of all random numbers.
-        """
+        """Create a search that has not been asked yet."""
 
         def begin(budget: int, start: Floats) -> Proposals:
             random = RandomNumbers(seed, _SEARCH)
@@ -147,29 +139,13 @@ class Replayed:
         return len(self._told)
 
     def start_from(self, positions: Floats) -> None:
-        """Ask for these before the method begins.
-
-        Args:
-            positions: (k, d), in the variables' own units.
-
-        Raises:
-            ValueError: One is outside the bounds or of another dimension, or something was asked
-                for already.
-        """
+        """Ask for these before the method begins."""
         begun = bool(self._told or self._asked)
         self._start = checked_start(positions, self._space, begun=begun)
         self._course = None
 
     def ask(self, most: int | None = None) -> Floats:
-        """Give the positions to evaluate next; the same ones again until they are told.
-
-        Args:
-            most: Positions to give, at most, >= 1; what is asked already stays. Default: the
-                settings' `particles`, which also is the limit.
-
-        Returns:
-            (n, d), inside the bounds, in the variables' own units.
-        """
+        """Give the positions to evaluate next; the same ones again until they are told."""
         course = self._under_way()
         told = len(course.fitness)
         if not self._asked:
@@ -179,14 +155,7 @@ class Replayed:
         return course.positions[told : told + self._asked].copy()
 
     def tell(self, fitness: Floats) -> None:
-        """Take what the positions last asked for are worth.
-
-        Args:
-            fitness: (n,) of each of them, minimized; +inf for a failed evaluation.
-
-        Raises:
-            ValueError: Nothing was asked for, the shape is another, or a value is NaN or -inf.
-        """
+        """Take what the positions last asked for are worth."""
         values = checked_fitness(fitness, self._asked)
         self._under_way().tell(values)
         self._told.extend(values.tolist())
@@ -194,11 +163,7 @@ class Replayed:
         self._asked = 0
 
     def dump(self) -> dict[str, Any]:
-        """Give the whole state.
-
-        Returns:
-            JSON-able values: all fitness values so far, None for +inf.
-        """
+        """Give the whole state."""
         if self._course is not None:
             _UNDER_WAY.keep(self._key(), self._course)
             self._course = None
@@ -212,15 +177,7 @@ class Replayed:
         }
 
     def load(self, state: dict[str, Any]) -> None:
-        """Take on a state.
-
-        Args:
-            state: As `dump` gave it, for the same settings, space, budget, seed and start.
-
-        Raises:
-            ValueError: It is of another method or version, or more is asked for than the method
-                proposes; the state before is kept.
-        """
+        """Take on a state."""
         name = self._settings.name
         dumped = parse_state(state, name, _ToldState)
         if dumped.optimizer != name:
@@ -272,14 +229,7 @@ _UNDER_WAY: Final = _UnderWay()
 
 
 def uses_start(search: Callable[..., Proposals]) -> bool:
-    """Whether a method makes use of start positions, or goes on as if there had been none.
-
-    Args:
-        search: The method.
-
-    Returns:
-        True where it has an argument for them.
-    """
+    """Whether a method makes use of start positions, or goes on as if there had been none."""
     return "start" in inspect.signature(search).parameters
 
 

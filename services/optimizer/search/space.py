@@ -50,11 +50,7 @@ class Space:
     """
 
     def __init__(self, axes: Sequence[Axis]) -> None:
-        """Make a box.
-
-        Args:
-            axes: Its variables, at least one.
-        """
+        """Make a box."""
         self.axes: Final = tuple(axes)
         self.low: Final[Floats] = np.array([axis.low for axis in axes], dtype=np.float64)
         self.high: Final[Floats] = np.array([axis.high for axis in axes], dtype=np.float64)
@@ -154,23 +150,12 @@ class Judged:
     """Designs that were judged, so that none is asked for twice."""
 
     def __init__(self, space: Space) -> None:
-        """Begin with none.
-
-        Args:
-            space: The box that is searched.
-        """
+        """Begin with none."""
         self._space: Final = space
         self._seen: set[bytes] = set()
 
     def new(self, designs: Floats) -> NDArray[np.bool_]:
-        """Tell which designs were not judged yet, and take them as judged from now on.
-
-        Args:
-            designs: (n, d).
-
-        Returns:
-            (n,) true where a design is new; of equal ones, for the first.
-        """
+        """Tell which designs were not judged yet, and take them as judged from now on."""
         keys = np.rint(self._space.to_unit(designs) * _RESOLUTION).astype(np.int64)
         new = np.zeros(len(designs), dtype=np.bool_)
         for i, row in enumerate(keys):

@@ -104,16 +104,7 @@ class BenchmarkFunction:
     def value(
         self, designs: NDArray[np.float64], random: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Evaluate the function.
-
-        Args:
-            designs: (n, d) points in the box; integer variables are rounded.
-            random: (n,) in [0, 1), r of each evaluation; functions without a random part do not
-                read it.
-
-        Returns:
-            (n,) values from 0 on; +inf, a failed evaluation, at the pole of x1.
-        """
+        """Evaluate the function."""
         x = np.where(self.integer, _round(designs), designs).T
         total = self._four(x, random) if self.dimension == 4 else self._seven(x, random)
         return np.abs(total)
@@ -174,14 +165,6 @@ def draw(seed: int, *, first: int, count: int) -> NDArray[np.float64]:
 
     A number depends on the run's seed and on how many evaluations came before, not on the batches
     that they came in.
-
-    Args:
-        seed: of the run, 64 bits.
-        first: index of the first of the evaluations in the run, from 0.
-        count: of evaluations.
-
-    Returns:
-        (count,) uniform in [0, 1).
     """
     numbers = [
         uniform(seed, _NOISE, iteration=index, particle=0, count=1)

@@ -40,44 +40,19 @@ def method_names() -> tuple[str, ...]:
 
 
 def is_multi_objective(name: str) -> bool:
-    """Whether a method of the registry is told objective vectors, and so cannot take part.
-
-    Args:
-        name: Of a method, or anything else.
-
-    Returns:
-        True for a multi-objective method.
-    """
+    """Whether a method of the registry is told objective vectors, and so cannot take part."""
     return name in METHODS.built_in and METHODS[name].multi_objective
 
 
 def why_unknown(name: str, known: Iterable[str]) -> str:
-    """Say why a name is none of a method that may take part.
-
-    Args:
-        name: That was given.
-        known: Those that there are.
-
-    Returns:
-        The reason, for people.
-    """
+    """Say why a name is none of a method that may take part."""
     if is_multi_objective(name):
         return f"{name} is multi-objective; a tournament ranks methods by a single number"
     return f"unknown method {name!r}; {instead_of(name, known)}"
 
 
 def named_settings(name: str) -> SearchSettings:
-    """Settings that a name stands for.
-
-    Args:
-        name: Of a method or preset that a job may name, or of a rival.
-
-    Returns:
-        The settings.
-
-    Raises:
-        ValueError: There is none of that name; names those that there are.
-    """
+    """Settings that a name stands for."""
     if name in RIVALS:
         return RIVALS[name].settings()
     if name in method_names():
@@ -97,28 +72,14 @@ def settings_models() -> dict[str, type[SearchSettings]]:
 
 
 def search_of(settings: SearchSettings) -> Search:
-    """The method that settings are of.
-
-    Args:
-        settings: Of a method that takes part.
-
-    Returns:
-        What runs it.
-    """
+    """The method that settings are of."""
     if settings.name in RIVALS:
         return partial(_rival, settings)
     return partial(_ask_and_tell, settings)
 
 
 def libraries_of(settings: SearchSettings) -> tuple[str, ...]:
-    """Distributions that a method computes with, beside those that every job does.
-
-    Args:
-        settings: Of the method; of `auto`, those of all methods that it may choose.
-
-    Returns:
-        Their names.
-    """
+    """Distributions that a method computes with, beside those that every job does."""
     if settings.name in RIVALS:
         return RIVALS[settings.name].libraries
     chosen = {rule.settings.name for rule in RULES} if settings.name == "auto" else {settings.name}
@@ -129,44 +90,19 @@ def libraries_of(settings: SearchSettings) -> tuple[str, ...]:
 
 
 def extra_of(settings: SearchSettings) -> str:
-    """The optional dependencies of gaitswarm that a method's libraries are in.
-
-    Args:
-        settings: Of a method that needs some.
-
-    Returns:
-        As in `gaitswarm[extra]`.
-    """
+    """The optional dependencies of gaitswarm that a method's libraries are in."""
     return "search" if settings.name in METHODS else "rivals"
 
 
 def settings_variables(model: type[SearchSettings]) -> tuple[Variable, ...]:
-    """What may be drawn of a method's settings: numbers by their bounds, names by their choices.
-
-    Args:
-        model: Of the settings.
-
-    Returns:
-        One variable for each; a setting that is true or false has the choices `no` and `yes`.
-    """
+    """What may be drawn of a method's settings: numbers by their bounds, names by their choices."""
     properties = model.model_json_schema()["properties"]
     found = [_variable(name, schema) for name, schema in properties.items() if name != "name"]
     return tuple(variable for variable in found if variable is not None)
 
 
 def drawn_settings(settings: SearchSettings, drawn: dict[str, float]) -> SearchSettings:
-    """Settings of one run.
-
-    Args:
-        settings: Of the method.
-        drawn: What is other in this run, by name: numbers, of a choice its index.
-
-    Returns:
-        The settings of the run.
-
-    Raises:
-        ValueError: The method refuses them; says why.
-    """
+    """Settings of one run."""
     known = {variable.name: variable for variable in settings_variables(type(settings))}
     values = {name: _value(known[name], number) for name, number in drawn.items()}
     try:
@@ -178,15 +114,7 @@ def drawn_settings(settings: SearchSettings, drawn: dict[str, float]) -> SearchS
 
 
 def random_ranges(name: str) -> tuple[Variable, ...]:
-    """What the thesis's tournament draws anew for every run of a method.
-
-    Args:
-        name: Of the method.
-
-    Returns:
-        Of every number from half to twice its default, inside its bounds, unless `RANGES` has it;
-        of every choice all, with equal shares. A setting whose default is 0 or none stays.
-    """
+    """What the thesis's tournament draws anew for every run of a method."""
     model = settings_models()[name]
     own = RANGES.get(name, {})
     defaults = {key: getattr(model(name=name), key) for key in model.model_fields}

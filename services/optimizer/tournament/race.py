@@ -35,27 +35,10 @@ class Problem(Protocol):
         """The box that is searched."""
 
     def fitness(self, designs: Floats, *, seed: int, first: int) -> Floats:
-        """Judge designs, as the search sees them.
-
-        Args:
-            designs: (n, d), as `Space.designs` gives them.
-            seed: Of the run.
-            first: Evaluations of the run before these.
-
-        Returns:
-            (n,), minimized, +inf for a failed evaluation.
-        """
+        """Judge designs, as the search sees them."""
 
     def final(self, designs: Floats, fitness: Floats) -> Floats:
-        """Judge what a search found, as it is reported.
-
-        Args:
-            designs: (n, d) that a search found.
-            fitness: (n,) that it was told of them.
-
-        Returns:
-            (n,) fitness in double precision.
-        """
+        """Judge what a search found, as it is reported."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,14 +83,7 @@ class _Ended(Exception):
 
 
 def default_checkpoints(evaluations: int) -> tuple[int, ...]:
-    """Evaluations at which runs are looked at: ten in each decade from 10 on, and the last.
-
-    Args:
-        evaluations: Budget of a run.
-
-    Returns:
-        Ascending; the budget is the last one.
-    """
+    """Evaluations at which runs are looked at: ten in each decade from 10 on, and the last."""
     found: list[int] = []
     decade = 1
     while decade * 10 < evaluations:
@@ -119,21 +95,7 @@ def default_checkpoints(evaluations: int) -> tuple[int, ...]:
 def race(
     search: Search, problem: Problem, terms: Terms, seed: int, should_stop: Stop = lambda: False
 ) -> Run:
-    """Run a method once.
-
-    Args:
-        search: The method with its settings.
-        problem: That it is to solve.
-        terms: What it is given.
-        seed: Of the search and of the problem's random part.
-        should_stop: Polled before each batch of evaluations.
-
-    Returns:
-        What it came to.
-
-    Raises:
-        RunAbandoned: `should_stop` said so.
-    """
+    """Run a method once."""
     record = _Record(problem, terms, seed, should_stop)
     with suppress(_Ended):
         search(problem.space, terms.evaluations, seed, record.evaluate)

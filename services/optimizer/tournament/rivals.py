@@ -80,14 +80,7 @@ RivalSettings = (
 
 
 def pymoo_pso(settings: PymooPsoSettings, space: Space, seed: int, evaluate: Evaluate) -> None:
-    """Search by pymoo's PSO.
-
-    Args:
-        settings: Of the method.
-        space: The box that is searched.
-        seed: Of its random numbers.
-        evaluate: Judges positions; raises when the run is over.
-    """
+    """Search by pymoo's PSO."""
     pso = import_module("pymoo.algorithms.soo.nonconvex.pso")
     core, evaluator = (import_module(f"pymoo.core.{name}") for name in ("problem", "evaluator"))
     termination = import_module("pymoo.core.termination").NoTermination
@@ -107,12 +100,6 @@ def scipy_de(settings: ScipyDeSettings, space: Space, seed: int, evaluate: Evalu
     """Search by scipy's differential evolution, a generation at a time, integers as integers.
 
     Variables are in their own units. Its tolerance is 0, so that it spends its budget.
-
-    Args:
-        settings: Of the method.
-        space: The box that is searched.
-        seed: Of its random numbers.
-        evaluate: Judges positions; raises when the run is over.
     """
     optimize, qmc = (import_module(f"scipy.{name}") for name in ("optimize", "stats.qmc"))
 
@@ -146,12 +133,6 @@ def cma_es(settings: CmaSettings, space: Space, seed: int, evaluate: Evaluate) -
     """Search by the library cma, restarted with twice the offspring (IPOP) from a random point.
 
     Integers are in their own units, of which it keeps a least step.
-
-    Args:
-        settings: Of the method.
-        space: The box that is searched.
-        seed: Of its random numbers.
-        evaluate: Judges positions; raises when the run is over.
     """
     cma = import_module("cma")
     discrete = space.integer | space.categorical
@@ -190,12 +171,6 @@ def optuna_tpe(settings: OptunaTpeSettings, space: Space, seed: int, evaluate: E
     """Search by Optuna's TPE sampler, by ask and tell of batches, with its constant liar.
 
     Variables are in their own units.
-
-    Args:
-        settings: Of the method.
-        space: The box that is searched.
-        seed: Of its random numbers.
-        evaluate: Judges positions; raises when the run is over.
     """
     options = {"multivariate": settings.multivariate, "constant_liar": True}
     _study("TPESampler", options, settings.particles, space, seed, evaluate)
@@ -207,12 +182,6 @@ def optuna_cma_es(
     """Search by Optuna's CMA-ES sampler, by ask and tell of whole generations.
 
     Variables are in their own units; categorical ones are drawn independently, as the sampler does.
-
-    Args:
-        settings: Of the method.
-        space: The box that is searched.
-        seed: Of its random numbers.
-        evaluate: Judges positions; raises when the run is over.
     """
     options = {"popsize": settings.particles, "warn_independent_sampling": False}
     _study("CmaEsSampler", options, settings.particles, space, seed, evaluate)

@@ -34,18 +34,7 @@ PROCESSES: Final = LimitedProcesses(
 
 
 def derived_source(robot: Robot, precision: Precision = "double") -> str:
-    """As `kernel_source`; in a process of its own, unless the robot ships.
-
-    Args:
-        robot: As for `native_kernel`.
-        precision: Of the physics.
-
-    Returns:
-        C text that lacks the definition of DOUBLES only.
-
-    Raises:
-        KernelBuildError: It took too much time or memory, or ended its process.
-    """
+    """As `kernel_source`; in a process of its own, unless the robot ships."""
     if robot.ships:
         return kernel_source(robot, precision)
     request = {

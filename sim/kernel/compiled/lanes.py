@@ -35,13 +35,6 @@ def plan_lanes(durations: Sequence[float], lanes: int) -> LanePlan:
 
     Longest first onto the lane that is free first (Graham's LPT rule); then walks of the lane that
     ends last are moved or exchanged, as long as that lets it end earlier.
-
-    Args:
-        durations: of the walks, in any unit, >= 0.
-        lanes: walks that are computed together, >= 1.
-
-    Returns:
-        The plan. A kernel that fills each free lane with the next walk of its order follows it.
     """
     if not durations:
         return LanePlan((), 0.0, 1.0)

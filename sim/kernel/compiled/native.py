@@ -45,15 +45,7 @@ _CODED: Final = tuple(field.name for field in dataclasses.fields(Coding))
 
 
 class NativeKernel:
-    """A robot's physics and control, compiled. Its loop runs outside the interpreter's lock.
-
-    Args:
-        robot: The robot that the library was compiled for.
-        library: What `load_library` gave.
-
-    Raises:
-        KernelBuildError: It was not made from this program's source, or for another robot.
-    """
+    """A robot's physics and control, compiled. Its loop runs outside the interpreter's lock."""
 
     backend: Final = "native"
 
@@ -101,18 +93,6 @@ class NativeKernel:
 
         Concurrent calls without logs share their walks: what a thread's lanes have room for at the
         end, it takes over from another call, and waits for what others have taken over from it.
-
-        Args:
-            setups: Walks of this kernel's robot.
-            coding: Sensors, PWM and rates of all of them.
-            log: Whether to keep the states at every control tick.
-
-        Returns:
-            As many results, in the setups' order, each with the same bits alone and in any company.
-
-        Raises:
-            SimulationInputError: An array of a setup has not the shape that this kernel reads, or
-                a control law asks for an inference rather than a table, or has too large a gain.
         """
         for law in {id(s.control_law): s.control_law for s in setups}.values():
             check_gains(law, torque=self._torque)
@@ -173,9 +153,6 @@ def _order(ticks: tuple[int, ...], lanes: int) -> tuple[int, ...]:
 def text_size(library: bytes) -> int | None:
     """Size of the section `.text` of a 64-bit little-endian ELF file.
 
-    Args:
-        library: Content of the file.
-
     Returns:
         [B]; None for another format.
     """
@@ -203,16 +180,6 @@ def native_kernel(robot: Robot, precision: Precision = "double") -> NativeKernel
 
     Robots that differ in run-time parameters only share one. While one kernel is compiled, others
     can be loaded.
-
-    Args:
-        robot: Its URDF, actuators, legs and law of friction choose the kernel.
-        precision: Of the physics. In single twice as many walks are stepped together.
-
-    Returns:
-        The kernel; None on a machine without a C compiler whose cache has none.
-
-    Raises:
-        KernelBuildError: It cannot be compiled, stored or loaded.
     """
     identity = kernel_identity(robot, precision)
     with _registering:
@@ -240,20 +207,7 @@ def load_kernel(
     wanted: Target | None = None,
     extra_flags: Sequence[str] = (),
 ) -> NativeKernel | None:
-    """A kernel that `native_kernel` does not keep, to compare ways of compiling.
-
-    Args:
-        robot: As for `native_kernel`.
-        precision: As for `native_kernel`.
-        wanted: What it is compiled for; this machine's target if left out.
-        extra_flags: For the compiler, after its usual ones.
-
-    Returns:
-        As `native_kernel`.
-
-    Raises:
-        KernelBuildError: It cannot be compiled, stored or loaded.
-    """
+    """A kernel that `native_kernel` does not keep, to compare ways of compiling."""
     library = _load(robot, precision, wanted, extra_flags)
     return None if library is None else NativeKernel(robot, library)
 

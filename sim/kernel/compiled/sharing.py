@@ -42,9 +42,6 @@ class Pool:
 
     A thread first begins all walks of its own call. Lanes that become free then are filled with
     walks of the other calls, so that all threads end at nearly the same time.
-
-    Args:
-        library: Of the kernel.
     """
 
     def __init__(self, library: ctypes.CDLL) -> None:
@@ -57,12 +54,6 @@ class Pool:
         self, walkers: ctypes.Array[Any], coding: ctypes.Structure, memory: object
     ) -> tuple[LaneCounts, float]:
         """Compute walks, and perhaps some of other calls.
-
-        Args:
-            walkers: The kernel's structures, in the order in which they begin.
-            coding: The kernel's structure.
-            memory: Whatever owns what the walkers point to; kept until the last of them has ended,
-                even if an interrupt ends this call before.
 
         Returns:
             How the lanes of this thread were used; and how long it then waited for walks that other

@@ -109,15 +109,7 @@ class Addresses:
         self._laws: dict[int, tuple[_Law, ControlLaw]] = {}
 
     def of(self, array: NDArray[Any], dtype: Any) -> int:
-        """Where an array's numbers are.
-
-        Args:
-            array: Of any shape; it is not changed while this object lives.
-            dtype: As which the kernel reads it; always the same one for an array.
-
-        Returns:
-            Address of its contiguous numbers, of the array or of a copy.
-        """
+        """Where an array's numbers are."""
         known = self._arrays.get(id(array))
         if known is None:
             contiguous = np.ascontiguousarray(array, dtype=dtype)
@@ -126,28 +118,11 @@ class Addresses:
         return known[0]
 
     def if_any(self, array: Floats | None) -> int | None:
-        """As `of`, for doubles.
-
-        Args:
-            array: None for none.
-
-        Returns:
-            The address; None for no array.
-        """
+        """As `of`, for doubles."""
         return None if array is None else self.of(array, np.float64)
 
     def law(self, law: ControlLaw) -> _Law:
-        """A control law as the kernel reads it.
-
-        Args:
-            law: Gains and tables.
-
-        Returns:
-            Its gains with the addresses of its tables.
-
-        Raises:
-            SimulationInputError: it asks for an inference rather than a table.
-        """
+        """A control law as the kernel reads it."""
         known = self._laws.get(id(law))
         if known is None:
             packed = _Law(

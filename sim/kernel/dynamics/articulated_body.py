@@ -84,14 +84,7 @@ class LinkState:
     tensor: Matrix
 
     def carries(self, link: Link) -> LinkState:
-        """State of a link that hangs on this one.
-
-        Args:
-            link: The link.
-
-        Returns:
-            Its state.
-        """
+        """State of a link that hangs on this one."""
         own = link.rotation.outwards
         v, w = self.velocity.linear, self.velocity.angular
         turning = scale(link.rate, link.axis)
@@ -120,14 +113,7 @@ class LinkState:
         return subtract(add(self.bias.linear, cross(self.bias.angular, point)), cross(w, v))
 
     def force(self, body: RigidBody) -> Force:
-        """Force that the bias takes.
-
-        Args:
-            body: Of the link.
-
-        Returns:
-            In its frame.
-        """
+        """Force that the bias takes."""
         return body.force(self.velocity.angular, self.bias, self.tensor)
 
 
@@ -157,16 +143,8 @@ def inward(
     """Second pass over a chain: from its last link to the frame that carries it.
 
     Args:
-        links: Of the chain, from that frame on.
-        states: Of the links.
         torques: At the joints [N m].
         armature: What resists each joint's acceleration beside the links [kg m2].
-        resistance: What resists the last link's acceleration beside its inertia.
-        external: Force on the last link in its frame.
-
-    Returns:
-        Articulated inertia, and force that the bias takes, as the carrying frame feels them, and
-        what `outward` needs.
     """
     inertia, force, passed = resistance, Force((0.0,) * 3, (0.0,) * 3).less(external), []
     for link, state, torque, rotor in reversed(
@@ -190,12 +168,6 @@ def inward(
 def outward(links: Sequence[Link], passed: Sequence[Passed], carrier: Motion) -> tuple[Scalar, ...]:
     """Third pass over a chain: accelerations of its joints.
 
-    Args:
-        links: As for `inward`.
-        passed: By `inward`.
-        carrier: Acceleration of the frame that carries the chain, relative to free fall and to its
-            bias.
-
     Returns:
         By joint [rad/s2].
     """
@@ -216,15 +188,7 @@ def outward(links: Sequence[Link], passed: Sequence[Passed], carrier: Motion) ->
 
 
 def free_acceleration(inertia: Inertia, force: Force) -> Motion:
-    """Motion a with inertia a = -force, by blocks: the angular part from a Schur complement.
-
-    Args:
-        inertia: Articulated inertia of the whole robot as its body feels it.
-        force: That the bias takes, likewise.
-
-    Returns:
-        Acceleration of the body, relative to free fall and to its bias.
-    """
+    """Motion a with inertia a = -force, by blocks: the angular part from a Schur complement."""
     light = inverse(inertia.linear)
     ratio = multiply(light, inertia.coupling)
     coupled = transpose(inertia.coupling)

@@ -34,12 +34,7 @@ def body_state(q: Sequence[Scalar], v: Sequence[Scalar], gravity: Sequence[Scala
     """Where the body is and how it moves.
 
     Args:
-        q: Position and quaternion x y z w first.
-        v: Twist in the body's own frame first.
         gravity: In the world [m/s2].
-
-    Returns:
-        Its state.
     """
     attitude = rotation_of(q[3:7])
     w, nothing = _triple(v[3:6]), (0.0, 0.0, 0.0)
@@ -55,14 +50,7 @@ def body_state(q: Sequence[Scalar], v: Sequence[Scalar], gravity: Sequence[Scala
 
 
 def body_of(p: Mapping[str, Sequence[Scalar]]) -> RigidBody:
-    """The body with its load.
-
-    Args:
-        p: Parameters by name, as `parameters.Layout` says.
-
-    Returns:
-        In the body's frame.
-    """
+    """The body with its load."""
     xx, yy, zz, xy, xz, yz = p["base_inertia"]
     tensor = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
     return RigidBody(p["base_mass"][0], _triple(p["base_moment"]), tensor)
@@ -72,7 +60,6 @@ def pushed(state: LinkState, push: Sequence[Scalar]) -> Vector:
     """What a force on the body adds to the force that the bias takes.
 
     Args:
-        state: Of the body.
         push: At the body's origin, along the world's axes [N].
 
     Returns:
@@ -86,17 +73,7 @@ def pushed(state: LinkState, push: Sequence[Scalar]) -> Vector:
 
 
 def solved(state: LinkState, inertia: Inertia, force: Force) -> tuple[Motion, Motion]:
-    """The body's acceleration under all limbs.
-
-    Args:
-        state: Of the body.
-        inertia: Of the body, and what the limbs pass to it.
-        force: That the bias takes, likewise.
-
-    Returns:
-        Acceleration relative to free fall, which `limb.after` wants, and the rate of the body's
-        twist in its own frame.
-    """
+    """The body's acceleration under all limbs."""
     falling = free_acceleration(inertia, force)
     v, w = state.velocity.linear, state.velocity.angular
     return falling, Motion(
@@ -110,8 +87,6 @@ def body_integrands(
     """What the driver accumulates of the body, at the step's middle.
 
     Args:
-        state: Before the step.
-        acceleration: In the step.
         timestep: [s].
 
     Returns:
@@ -135,12 +110,7 @@ def drifted(q: Sequence[Scalar], v: Sequence[Scalar], time: Scalar) -> list[Scal
     """Positions after some time at constant velocities.
 
     Args:
-        q: Position, quaternion x y z w, angles (7+J).
-        v: Base twist in its own frame, rates (6+J).
         time: [s].
-
-    Returns:
-        q then. The body's path bends with its turning, to the second order.
     """
     turn = scale(time, _triple(v[3:6]))
     along = scale(time, _triple(v[0:3]))

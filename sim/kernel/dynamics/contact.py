@@ -1,6 +1,6 @@
 """Ground contact of a point foot and its laws of friction, as symbols (thesis 2.2.6).
 
-What a law reads and carries from step to step, as data: `gaitswarm.sim.kernel.parameters.CONTACT_LAWS`.
+What a law reads and carries from step to step, as data: `sim.kernel.parameters.CONTACT_LAWS`.
 """
 
 from __future__ import annotations
@@ -67,9 +67,6 @@ class Foot:
 
         Args:
             time: [s].
-
-        Returns:
-            1 if it is in the air and, at this speed, on the ground by then; else 0.
         """
         return (1.0 - self.touching) * (self.penetration > self.rising * time)
 
@@ -82,9 +79,6 @@ class Foot:
         Args:
             drag: The whole friction per speed [N s/m].
             timestep: [s].
-
-        Returns:
-            1 for sure, 0 if the friction may stop the foot.
         """
         return ca.fmax(1.0 - drag * (timestep * self.mobility), 0.0)
 
@@ -135,13 +129,8 @@ def foot_on_ground(
     The sole's spring hangs below the tibia's end along the ground's normal.
 
     Args:
-        link: State of the tibia.
         at: The tibia's end in its frame [m].
-        ground: Parameters of the foot by the names of `gaitswarm.sim.robot.description.Contact`.
         mobility: Upper bound of the tibia's end's acceleration under a force [1/kg].
-
-    Returns:
-        The foot.
     """
     velocity = add(link.velocity.linear, cross(link.velocity.angular, at))
     penetration = ground["sole"] - (link.height + dot(link.up, at))
@@ -169,13 +158,7 @@ def linear_zone(
     """F_t = -mu F_z v / max(|v|, v_lin) (table 2.6).
 
     Args:
-        foot: The foot.
-        ground: Its `friction` and `slip_velocity`.
-        internal_state: Nothing.
         timestep: Of the physics [s].
-
-    Returns:
-        The reaction.
     """
     del internal_state
     zone = ground["slip_velocity"]
@@ -193,17 +176,7 @@ def linear_zone(
 def karnopp(
     foot: Foot, ground: Mapping[str, Scalar], internal_state: InternalState, timestep: Scalar
 ) -> Reaction:
-    """Full friction against the motion along each axis of the ground, none below v_d (eq. 2.14).
-
-    Args:
-        foot: The foot.
-        ground: Its `friction` and `stick_velocity`.
-        internal_state: Nothing.
-        timestep: Not needed.
-
-    Returns:
-        The reaction.
-    """
+    """Full friction against the motion along each axis of the ground, none below v_d (eq. 2.14)."""
     del internal_state, timestep
     threshold, limit = ground["stick_velocity"], ground["friction"] * foot.normal
     force = scale(foot.normal, foot.up)
@@ -220,14 +193,8 @@ def stick(
     """Spring and damper along the ground from where the foot came down, saturated at mu F_z.
 
     Args:
-        foot: The foot.
-        ground: Its `friction`, `stick_stiffness` and `stick_damping`.
         internal_state: The spring's elongation along the world's x and y [m].
         timestep: Of the physics [s].
-
-    Returns:
-        The reaction, with the elongation after the step, which shrinks when the foot slips, and is
-        gone when it lifts off.
     """
     k, c = ground["stick_stiffness"], ground["stick_damping"]
     stretched, wanted = [], []
@@ -253,13 +220,7 @@ def dead_zone(
     """F_t = -mu F_z min(1, (|v| - v_d) / (v_lin - v_d)) v / |v|, none below v_d (table 2.6).
 
     Args:
-        foot: The foot.
-        ground: Its `friction`, `stick_velocity` v_d and `slip_velocity` v_lin.
-        internal_state: Nothing.
         timestep: Of the physics [s].
-
-    Returns:
-        The reaction.
     """
     del internal_state
     threshold = ground["stick_velocity"]

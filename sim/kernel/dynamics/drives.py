@@ -56,15 +56,7 @@ class Friction:
 
 
 def friction_of(joint: int, p: Mapping[str, Sequence[Scalar]]) -> Friction:
-    """Friction among the run-time parameters.
-
-    Args:
-        joint: Number of the joint among those that the parameters are of.
-        p: By the names of `parameters.Layout`.
-
-    Returns:
-        Of the joint.
-    """
+    """Friction among the run-time parameters."""
     static = p["static_friction"]
     return Friction(p["viscous"][joint], static[joint] if static else None)
 
@@ -75,14 +67,9 @@ def drive_of(
     """The drive of a joint at the beginning of a step.
 
     Args:
-        joint: Its constants.
         duty: Motor voltage per supply voltage, or commanded torque per torque limit [1].
         rate: Of the motor at the joint [rad/s].
         supply: Voltage of the battery under load [V].
-        friction: Of the joint.
-
-    Returns:
-        The drive; of a torque-controlled actuator a `TorqueDrive`.
     """
     if is_torque_controlled(joint):
         return _torque_drive(joint, duty, rate, supply, friction)
@@ -125,8 +112,6 @@ def at_middle(joint: LimbJoint, drive: Drive, faster: Scalar) -> tuple[Scalar, S
     """Voltage and current of a motor later in a step.
 
     Args:
-        joint: Its constants.
-        drive: At the step's beginning.
         faster: By which the motor's rate at the joint has grown since [rad/s].
 
     Returns:
@@ -161,7 +146,6 @@ def battery_voltage(
         rates: Of the motors at the joints, (J,) [rad/s].
         source: Open-circuit voltage of the battery [V].
         internal: Resistance of the battery [ohm].
-        torque: Whether actuators are torque-controlled.
 
     Returns:
         Under load [V].

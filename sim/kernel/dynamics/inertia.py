@@ -43,14 +43,7 @@ class Inertia:
     angular: Matrix
 
     def plus(self, other: Inertia) -> Inertia:
-        """Sum.
-
-        Args:
-            other: In the same frame.
-
-        Returns:
-            The sum.
-        """
+        """Sum."""
         return Inertia(
             mirrored(plus(self.linear, other.linear)),
             plus(self.coupling, other.coupling),
@@ -64,24 +57,13 @@ class Inertia:
         Args:
             at: The point [m].
             resistance: Force per acceleration of the point, symmetric [kg].
-
-        Returns:
-            The same as a spatial inertia: force = resistance (a + alpha x at).
         """
         lever = skew(at)
         coupling = minus(((0.0,) * 3,) * 3, multiply(resistance, lever))
         return cls(resistance, coupling, mirrored(multiply(lever, coupling)))
 
     def less_outer(self, scaled: Force, column: Force) -> Inertia:
-        """Difference to the product scaled column^T, which is symmetric.
-
-        Args:
-            scaled: The column times a number.
-            column: In this inertia's frame.
-
-        Returns:
-            The difference.
-        """
+        """Difference to the product scaled column^T, which is symmetric."""
         return Inertia(
             mirrored(minus(self.linear, outer(scaled.linear, column.linear))),
             minus(self.coupling, outer(scaled.linear, column.angular)),
@@ -92,11 +74,7 @@ class Inertia:
         """The same seen from the parent's frame.
 
         Args:
-            rotation: From this frame to the parent's.
             offset: Of this frame's origin in the parent's [m].
-
-        Returns:
-            The inertia there.
         """
         angular = mirrored(rotation.tensor_inwards(self.angular))
         linear = mirrored(rotation.tensor_inwards(self.linear))
@@ -122,11 +100,7 @@ class RigidBody:
     angular: Matrix
 
     def inertia(self) -> Inertia:
-        """The same as a spatial inertia.
-
-        Returns:
-            The inertia.
-        """
+        """The same as a spatial inertia."""
         mass = self.mass
         diagonal = ((mass, 0.0, 0.0), (0.0, mass, 0.0), (0.0, 0.0, mass))
         return Inertia(diagonal, transpose(skew(self.moment)), self.angular)
@@ -136,11 +110,7 @@ class RigidBody:
 
         Args:
             angular_velocity: omega [rad/s].
-            acceleration: Of the frame's origin, and alpha.
             tensor: [alpha]x + [omega]x^2, by `angular_acceleration_tensor`.
-
-        Returns:
-            m a + tensor (m c), and I alpha + omega x I omega + m c x a.
         """
         linear = add(scale(self.mass, acceleration.linear), apply(tensor, self.moment))
         w, alpha, inertia = angular_velocity, acceleration.angular, self.angular
@@ -204,36 +174,18 @@ class Force:
     angular: Vector
 
     def plus(self, other: Force) -> Force:
-        """Sum.
-
-        Args:
-            other: In the same frame.
-
-        Returns:
-            The sum.
-        """
+        """Sum."""
         return Force(add(self.linear, other.linear), add(self.angular, other.angular))
 
     def less(self, other: Force) -> Force:
-        """Difference.
-
-        Args:
-            other: In the same frame.
-
-        Returns:
-            The difference.
-        """
+        """Difference."""
         return Force(subtract(self.linear, other.linear), subtract(self.angular, other.angular))
 
     def in_parent(self, rotation: Rotation, offset: Vector) -> Force:
         """The same seen from the parent's frame.
 
         Args:
-            rotation: From this frame to the parent's.
             offset: Of this frame's origin in the parent's [m].
-
-        Returns:
-            The force there.
         """
         linear = rotation.inwards(self.linear)
         return Force(linear, add(rotation.inwards(self.angular), cross(offset, linear)))

@@ -18,15 +18,7 @@ from gaitswarm.sim.robot.limbs import Limb, LimbJoint, electrical_constants, lim
 
 @lru_cache(maxsize=64)
 def robot_constants(robot: Robot) -> NDArray[np.float64]:
-    """What a kernel reads of its robot beside the run-time parameters.
-
-    Args:
-        robot: The robot.
-
-    Returns:
-        What the battery's voltage needs, by joint: motors' conductances and r K_M, or R / k^2 and
-        torque limits of torque-controlled actuators. Then the numbers of every limb; read-only.
-    """
+    """What a kernel reads of its robot beside the run-time parameters."""
     limbs = limbs_of(robot)
     joints = [joint for limb in limbs for joint in limb.joints]
     kinds = limb_kinds(limbs)
@@ -54,40 +46,18 @@ class LimbKind:
     trivial: tuple[float | None, ...]
 
     def numbers_of(self, limb: Limb) -> list[float]:
-        """What a limb of this kind differs in from another one.
-
-        Args:
-            limb: The limb.
-
-        Returns:
-            Its constants that are not trivial.
-        """
+        """What a limb of this kind differs in from another one."""
         return [x for x, known in zip(_constants(limb), self.trivial, strict=True) if known is None]
 
     def symbolic(self, limb: Limb, symbols: Sequence[Scalar]) -> Limb:
-        """A limb of this kind, as symbols.
-
-        Args:
-            limb: Any limb of this kind.
-            symbols: In the place of its `numbers_of`.
-
-        Returns:
-            The limb.
-        """
+        """A limb of this kind, as symbols."""
         left = iter(symbols)
         values = iter([next(left) if known is None else known for known in self.trivial])
         return _with_constants(limb, values)
 
 
 def limb_kinds(limbs: Sequence[Limb]) -> list[LimbKind]:
-    """The kind of every limb: as few kinds as there are sets of axes.
-
-    Args:
-        limbs: Of a robot.
-
-    Returns:
-        As many kinds, equal ones for limbs that share a function.
-    """
+    """The kind of every limb: as few kinds as there are sets of axes."""
     alike: dict[tuple[tuple[float, ...], ...], list[list[float]]] = {}
     for limb in limbs:
         alike.setdefault(_axes(limb), []).append(_constants(limb))

@@ -156,20 +156,7 @@ def before(
     environment: Environment,
     p: Mapping[str, Scalars],
 ) -> Before:
-    """From the body's state to what the body feels of the limb.
-
-    Args:
-        limb: Its constants.
-        law: Of contact.
-        base: State of the body.
-        state: Of the limb.
-        environment: Of the step.
-        p: Run-time parameters of the limb, by the names of `parameters.Layout`: by joint, or one
-            by foot.
-
-    Returns:
-        What the body and `after` need.
-    """
+    """From the body's state to what the body feels of the limb."""
     half = 0.5 * environment.timestep
     sines, cosines = _turns(limb, state.angles)
     links = _links(limb, sines, cosines, state.rates)
@@ -242,14 +229,8 @@ def after(
     """From the body's acceleration to the limb's.
 
     Args:
-        limb: Its constants.
-        held: By `before`.
-        carrier: Acceleration of the body, relative to free fall.
         rates: Of the joints before the step [rad/s].
         timestep: [s].
-
-    Returns:
-        What the limb comes to.
     """
     half = 0.5 * timestep
     links = _links(limb, held.sines, held.cosines, rates)
@@ -293,12 +274,8 @@ def links_at(limb: Limb, angles: Sequence[Scalar], rates: Sequence[Scalar]) -> l
     """The links of a limb.
 
     Args:
-        limb: Its constants.
         angles: Of the joints [rad].
         rates: Of the joints [rad/s].
-
-    Returns:
-        From the body on.
     """
     return _links(limb, *_turns(limb, angles), rates)
 

@@ -65,14 +65,7 @@ class PhysicsModel:
     """
 
     def __init__(self, robot: Robot) -> None:
-        """Read a robot's URDF; `physics_model` keeps what was made of it.
-
-        Args:
-            robot: The robot.
-
-        Raises:
-            RobotFileError: The tree is not one that can be simulated.
-        """
+        """Read a robot's URDF; `physics_model` keeps what was made of it."""
         self.layout = Layout(robot)
         self._robot = robot
         self._limbs = _limbs_by_pinocchio(robot)
@@ -137,17 +130,7 @@ class PhysicsModel:
 
 @lru_cache(maxsize=16)
 def physics_model(robot: Robot) -> PhysicsModel:
-    """Derive the step from a robot's URDF.
-
-    Args:
-        robot: The robot.
-
-    Returns:
-        Its functions.
-
-    Raises:
-        RobotFileError: The tree is not one that can be simulated.
-    """
+    """Derive the step from a robot's URDF."""
     return PhysicsModel(robot)
 
 
@@ -267,13 +250,7 @@ _tracing: Final = threading.Lock()
 
 
 class _ByKind(Generic[*Trees, T]):
-    """A function of limbs, traced once for all of a kind.
-
-    Args:
-        limbs: Of a robot.
-        function: Of a limb and trees.
-        given: All that the function depends on besides.
-    """
+    """A function of limbs, traced once for all of a kind."""
 
     def __init__(
         self, limbs: Sequence[Limb], function: Callable[[Limb, *Trees], T], *given: str

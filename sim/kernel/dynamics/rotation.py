@@ -35,36 +35,15 @@ class Rotation:
     cosine: Scalar
 
     def inwards(self, a: Vector) -> Vector:
-        """A vector in the frame before the link.
-
-        Args:
-            a: In the link's frame.
-
-        Returns:
-            The same vector.
-        """
+        """A vector in the frame before the link."""
         return apply(self.rest, self._turned(a, self.sine))
 
     def outwards(self, a: Vector) -> Vector:
-        """A vector in the link's frame.
-
-        Args:
-            a: In the frame before it.
-
-        Returns:
-            The same vector.
-        """
+        """A vector in the link's frame."""
         return self._turned(apply(transpose(self.rest), a), -self.sine)
 
     def tensor_inwards(self, m: Matrix) -> Matrix:
-        """A tensor in the frame before the link.
-
-        Args:
-            m: In the link's frame.
-
-        Returns:
-            The same tensor.
-        """
+        """A tensor in the frame before the link."""
         return multiply(multiply(self.rest, self._turned_tensor(m)), transpose(self.rest))
 
     def _turned(self, a: Vector, sine: Scalar) -> Vector:

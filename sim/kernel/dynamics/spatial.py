@@ -23,9 +23,6 @@ def vector(values: Sequence[Scalar] | NDArray[np.float64]) -> Vector:
 
     Args:
         values: (3,).
-
-    Returns:
-        The vector.
     """
     x, y, z = (_snap(value) for value in values)
     return x, y, z
@@ -36,9 +33,6 @@ def matrix(values: NDArray[np.float64]) -> Matrix:
 
     Args:
         values: (3, 3).
-
-    Returns:
-        The matrix.
     """
     return vector(values[0]), vector(values[1]), vector(values[2])
 
@@ -132,16 +126,7 @@ def inverse(m: Matrix) -> Matrix:
 
 
 def rotation_about(axis: Vector, sine: Scalar, cosine: Scalar) -> Matrix:
-    """Rodrigues' formula.
-
-    Args:
-        axis: Constant unit axis.
-        sine: Of the angle.
-        cosine: Of the angle.
-
-    Returns:
-        Rotation from the turned frame.
-    """
+    """Rodrigues' formula."""
     versine = 1.0 - cosine
     rows = []
     for i in range(3):
@@ -160,14 +145,7 @@ def rotation_about(axis: Vector, sine: Scalar, cosine: Scalar) -> Matrix:
 
 
 def rotation_of(quaternion: Sequence[Scalar]) -> Matrix:
-    """Rotation matrix of a quaternion.
-
-    Args:
-        quaternion: Unit quaternion x, y, z, w (body to world).
-
-    Returns:
-        Rotation from body to world.
-    """
+    """Rotation matrix of a quaternion."""
     x, y, z, w = quaternion
     return (
         (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),

@@ -23,12 +23,7 @@ class Traced(Generic[*Trees, T]):
     """
 
     def __init__(self, function: Callable[[*Trees], T], *examples: *Trees) -> None:
-        """Run the function.
-
-        Args:
-            function: Makes a tree of trees.
-            examples: Arguments; leaves that are symbols may be anything else in a call.
-        """
+        """Run the function."""
         self._given = [_is_symbolic(leaf) for leaf in leaves(examples)]
         symbols = mapped(examples, lambda leaf: ca.SX.sym("x") if _is_symbolic(leaf) else leaf)
         self._made = function(*symbols)
@@ -39,15 +34,7 @@ class Traced(Generic[*Trees, T]):
         )
 
     def __call__(self, *arguments: *Trees) -> T:
-        """What the function makes of other arguments.
-
-        Args:
-            arguments: Of the shape of the examples; what was a number there is taken to be the
-                same.
-
-        Returns:
-            The tree.
-        """
+        """What the function makes of other arguments."""
         pairs = zip(leaves(arguments), self._given, strict=True)
         given: Any = ca.vertcat(*(leaf for leaf, taken in pairs if taken))
         found = iter(ca.vertsplit(self._function(given)))
@@ -55,14 +42,7 @@ class Traced(Generic[*Trees, T]):
 
 
 def outline(tree: object) -> str:
-    """All of a tree but its symbols: trees with one outline are traced alike.
-
-    Args:
-        tree: Examples for `Traced`.
-
-    Returns:
-        Its shape and numbers.
-    """
+    """All of a tree but its symbols: trees with one outline are traced alike."""
     return repr(mapped(tree, lambda leaf: "symbol" if _is_symbolic(leaf) else float(leaf)))
 
 

@@ -12,14 +12,7 @@ T = TypeVar("T")
 
 
 def leaves(tree: object) -> Iterator[Scalar]:
-    """All leaves, in one order for all trees of a shape.
-
-    Args:
-        tree: The tree.
-
-    Yields:
-        Leaf by leaf.
-    """
+    """All leaves, in one order for all trees of a shape."""
     if isinstance(tree, tuple):
         for branch in tree:
             yield from leaves(branch)
@@ -31,15 +24,7 @@ def leaves(tree: object) -> Iterator[Scalar]:
 
 
 def mapped(tree: T, function: Callable[[Scalar], Scalar]) -> T:
-    """A tree of the same shape with other leaves.
-
-    Args:
-        tree: The tree.
-        function: From a leaf to the new one; it is called in the order of `leaves`.
-
-    Returns:
-        The new tree.
-    """
+    """A tree of the same shape with other leaves."""
     if isinstance(tree, tuple):
         return tuple(mapped(branch, function) for branch in tree)  # type: ignore[return-value]
     if is_dataclass(tree):

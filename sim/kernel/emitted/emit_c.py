@@ -45,19 +45,6 @@ def emit_c(
     angle share their range reduction, a divisor used more than once is inverted once, and a
     product that is only a term of sums is rounded with each of them (fused multiply-add). The order
     of statements is that of `order.ordered`.
-
-    Args:
-        function: A CasADi function of scalars (`SX`).
-        name: Of the C function.
-        uniform: Names of inputs that all walkers share: `const double *` in place of `const vec *`.
-        added: Names of outputs that are added to what is there.
-        in_place: Whether outputs are written when all inputs have been read.
-
-    Returns:
-        C text that needs `vec.h`.
-
-    Raises:
-        SimulationError: An operation of the function has no rule.
     """
     return _Emitter(function, uniform, added, in_place=in_place).source(name)
 

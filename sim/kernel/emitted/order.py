@@ -44,15 +44,7 @@ class Statement:
 
 
 def ordered(statements: Sequence[Statement]) -> Iterator[Statement]:
-    """The same statements in an order that suits registers and pipelines.
-
-    Args:
-        statements: Each after those that it reads from.
-
-    Yields:
-        Each of them once, after those that it reads from; an operand in memory just before it is
-        first read, or at the end.
-    """
+    """The same statements in an order that suits registers and pipelines."""
     return _Schedule(statements).run()
 
 

@@ -40,15 +40,7 @@ _CONSTANTS: Final = "constants"
 
 
 def kernel_pieces(robot: Robot) -> str:
-    """C text of `kick` for a robot.
-
-    Args:
-        robot: The robot; its constants are no part of the text, but which of them are 0 or 1 is.
-
-    Returns:
-        C text that needs vec.h and the macros NJ, NI and NP; it defines NR, the length of
-        `robot_constants`.
-    """
+    """C text of `kick` for a robot."""
     return _Pieces(robot).text()
 
 

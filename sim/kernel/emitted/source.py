@@ -27,16 +27,7 @@ _deriving: Final = threading.Lock()
 
 @lru_cache(maxsize=128)
 def kernel_identity(robot: Robot, precision: Precision = "double") -> bytes:
-    """All that a kernel's source depends on, without deriving it.
-
-    Args:
-        robot: As for `native_kernel`; its run-time parameters are left out, so that robots share
-            a kernel.
-        precision: Of the physics.
-
-    Returns:
-        A digest of 32 bytes.
-    """
+    """All that a kernel's source depends on, without deriving it."""
     options = (
         precision,
         robot.n_joints,
@@ -50,15 +41,7 @@ def kernel_identity(robot: Robot, precision: Precision = "double") -> bytes:
 
 
 def kernel_source(robot: Robot, precision: Precision = "double") -> str:
-    """Derive a robot's physics and write it as C, some seconds of work.
-
-    Args:
-        robot: As for `native_kernel`.
-        precision: Of the physics.
-
-    Returns:
-        C text that lacks the definition of DOUBLES only.
-    """
+    """Derive a robot's physics and write it as C, some seconds of work."""
     # Imported only to compile: a worker with a warm cache needs neither CasADi nor Pinocchio.
     from gaitswarm.sim.kernel.emitted.pieces import kernel_pieces  # noqa: PLC0415
 
@@ -90,11 +73,7 @@ def kernel_source(robot: Robot, precision: Precision = "double") -> str:
 
 
 def control_tick() -> str:
-    """The control tick in C, which says nothing of the arithmetic that it is computed in.
-
-    Returns:
-        Text of tick.c.
-    """
+    """The control tick in C, which says nothing of the arithmetic that it is computed in."""
     return _own_file("tick.c")
 
 

@@ -31,14 +31,7 @@ class Past:
 
     @classmethod
     def of(cls, n_joints: int) -> Past:
-        """Before the first tick.
-
-        Args:
-            n_joints: J.
-
-        Returns:
-            Empty integrators, and no error yet.
-        """
+        """Before the first tick."""
         return cls(np.zeros(n_joints, dtype=np.int64))
 
 
@@ -65,7 +58,6 @@ def coded(
         angles: That the encoders see, (J,) [rad].
         current: Absolute, behind the filter, (J,) [A].
         desired: Coded angles, (J,) [counts].
-        coding: Of sensors and PWM.
 
     Returns:
         Angle error and absolute current, (J,) [counts].
@@ -78,11 +70,8 @@ def control(law: ControlLaw, coding: Coding, error: Ints, load: Ints, past: Past
     """One tick of all joints' controllers (thesis 5.3).
 
     Args:
-        law: Of every joint.
-        coding: Of sensors and PWM.
         error: Of the angles, (J,) [counts].
         load: Absolute currents, (J,) [counts].
-        past: Is updated in place.
 
     Returns:
         PWM counts, (J,).
@@ -106,13 +95,7 @@ def status_of(q: Floats, v: Floats, internal_state: Floats, setup: WalkSetup) ->
     """Whether a walk goes on, as it is asked at the end of every control tick.
 
     Args:
-        q: Positions, (7+J,).
-        v: Velocities, (6+J,).
         internal_state: (I,).
-        setup: The walk.
-
-    Returns:
-        OK, or how it has ended.
     """
     if not all(np.isfinite(array).all() for array in (q, v, internal_state)):
         return Status.DIVERGED
@@ -123,15 +106,7 @@ def status_of(q: Floats, v: Floats, internal_state: Floats, setup: WalkSetup) ->
 
 
 def padded_states(rows: Sequence[Floats], ticks: int) -> Floats:
-    """States of a walk, as `WalkResult` has them.
-
-    Args:
-        rows: Of the ticks that were walked.
-        ticks: T.
-
-    Returns:
-        T rows, NaN after an early end.
-    """
+    """States of a walk, as `WalkResult` has them."""
     states = np.full((ticks, len(rows[0])), np.nan)
     states[: len(rows)] = rows
     return states

@@ -21,11 +21,6 @@ class InnerLoop:
     """What a robot's actuators are given from inner tick to inner tick.
 
     A DC motor is given the voltage of the control tick.
-
-    Args:
-        robot: The robot.
-        setup: Its walk.
-        coding: Of its sensors and its controller's output.
     """
 
     def __init__(self, robot: Robot, setup: WalkSetup, coding: Coding) -> None:
@@ -40,7 +35,6 @@ class InnerLoop:
         """Begin a control tick.
 
         Args:
-            tick: Of the walk.
             output: Of the controllers, (J,) [counts].
         """
         self._commanded = output.astype(np.float64) * self._coding.duty_per_count

@@ -41,12 +41,7 @@ Floats = NDArray[np.float64]
 
 
 class ReferenceKernel:
-    """Walks over CasADi's interpreter, some hundred times slower than the compiled kernel.
-
-    Args:
-        robot: That walks.
-        model: Its physics.
-    """
+    """Walks over CasADi's interpreter, some hundred times slower than the compiled kernel."""
 
     backend: Final = "reference"
     lanes: Final = 1
@@ -118,12 +113,7 @@ class ReferenceKernel:
 
 
 class Stepper:
-    """CasADi's kick and drift on fixed buffers: several times cheaper than calling the functions.
-
-    Args:
-        model: The robot's physics.
-        setup: The walk to be stepped, from its start.
-    """
+    """CasADi's kick and drift on fixed buffers: several times cheaper than calling the functions"""
 
     def __init__(self, model: PhysicsModel, setup: WalkSetup) -> None:
         n_joints = setup.desired.shape[1]
@@ -160,9 +150,6 @@ class Stepper:
     def motors(self, *, loose: bool) -> tuple[Floats, Floats]:
         """Angles and rates that the encoders see.
 
-        Args:
-            loose: Whether backlash parts motors from links.
-
         Returns:
             Views, (J,) [rad] and (J,) [rad/s].
         """
@@ -172,20 +159,12 @@ class Stepper:
         return self.q[7:], self.v[6:]
 
     def push(self, tick: int) -> None:
-        """Let the shove's force act, or not.
-
-        Args:
-            tick: Of the walk.
-        """
+        """Let the shove's force act, or not."""
         begin, end = self._shove_ticks
         self.parameters[self._push_at] = self._push * (begin <= tick < end)
 
     def refine(self, refinement: int) -> None:
-        """Set the length of the steps that follow.
-
-        Args:
-            refinement: How many of them are a physics step.
-        """
+        """Set the length of the steps that follow."""
         self.parameters[self._at] = self._timestep / refinement
 
     def kick(self) -> None:
@@ -195,11 +174,7 @@ class Stepper:
             array[:] = after
 
     def drift(self, steps: float) -> None:
-        """Positions at these velocities, in place.
-
-        Args:
-            steps: For how many of the steps that `refine` set.
-        """
+        """Positions at these velocities, in place."""
         self._time[:] = steps * self.parameters[self._at]
         self._drift[1]()
         for array, after in self._drifted:
@@ -218,12 +193,5 @@ def _buffered(function: Any, inputs: Sequence[Floats], outputs: Sequence[Floats]
 
 @lru_cache(maxsize=8)
 def reference_kernel(robot: Robot) -> ReferenceKernel:
-    """The robot's interpreter kernel.
-
-    Args:
-        robot: The robot.
-
-    Returns:
-        The kernel, made once.
-    """
+    """The robot's interpreter kernel."""
     return ReferenceKernel(robot, physics_model(robot))

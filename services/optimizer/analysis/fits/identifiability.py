@@ -103,9 +103,6 @@ class ParameterIdentifiability:
     def width(self, threshold: float = DECISIVE) -> float:
         """Width of an interval.
 
-        Args:
-            threshold: one of `THRESHOLDS`.
-
         Returns:
             Share of the range that was searched [1].
         """
@@ -133,19 +130,7 @@ def identifiability(
     runs: Sequence[EvaluationColumns],
     as_good_as: Callable[[float], float] = lambda fitness: fitness * (1.0 + DECISIVE),
 ) -> Identifiability:
-    """Find the intervals of parameters over runs of one problem.
-
-    Args:
-        variables: that were searched, the first columns of the runs' designs.
-        runs: all evaluations of each run.
-        as_good_as: best fitness of a run -> greatest that counts as good; see `Spec.as_good_as`.
-
-    Returns:
-        Intervals and, of several runs, how far each parameter can be trusted.
-
-    Raises:
-        ValueError: there is no run, or one without a design that did not fail.
-    """
+    """Find the intervals of parameters over runs of one problem."""
     if not runs or not all(np.isfinite(run.fitness).any() for run in runs):
         raise ValueError("every run needs a design that did not fail")
     best = [int(np.argmin(run.fitness)) for run in runs]
@@ -178,15 +163,7 @@ def identifiability(
 
 
 def check_comparable(jobs: Sequence[Job]) -> None:
-    """Check that jobs are runs of one problem that tell something about each other.
-
-    Args:
-        jobs: at least one, as they were read.
-
-    Raises:
-        InvalidRequest: jobs of different problems, or two of one seed.
-        Conflict: a job has no design yet that did not fail.
-    """
+    """Check that jobs are runs of one problem that tell something about each other."""
     first, *others = jobs
     seeds = {first.spec.seed: first.id}
     for other in others:

@@ -84,19 +84,6 @@ def target_results(
 
     What is left out is predicted from stored objectives: the designs are judged anew without it,
     and the one that is then best says what it would have been. Nothing is simulated.
-
-    Args:
-        spec: of the runs, which differ in their seed alone.
-        runs: all evaluations of each run.
-        leave_out: what to leave out, each in its turn; None for nothing.
-        bests: the best design of each run with its reevaluation, of runs in single precision: what
-            the best comes to is then told in double, and only what is left out is of the search.
-
-    Returns:
-        What the best design comes to in every target.
-
-    Raises:
-        ValueError: no run has a design that did not fail.
     """
     fitness = np.concatenate([run.fitness for run in runs])
     if not np.isfinite(fitness).any():

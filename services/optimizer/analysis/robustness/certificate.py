@@ -171,21 +171,7 @@ class Certificate:
 def certificate(
     spec: CertificateSpec, columns: EvaluationColumns, *, worlds: int | None = None, most: int = 5
 ) -> Certificate:
-    """Say what a certificate's walks come to.
-
-    Args:
-        spec: Of the job.
-        columns: Its evaluations, in order: the nominal world, by our engine and then by the others
-            that the spec names, then the worlds that were drawn.
-        worlds: Drawn worlds to take, the first ones; None for all that have walked.
-        most: Worst worlds to name.
-
-    Returns:
-        The summary.
-
-    Raises:
-        Conflict: No drawn world has walked yet.
-    """
+    """Say what a certificate's walks come to."""
     first = spec.nominal_rows
     nominal = columns.rows(slice(first))
     walked = columns.rows(slice(None if worlds is None else first + worlds))
@@ -218,9 +204,6 @@ def proportion(happened: NDArray[np.bool_]) -> Proportion:
 
     Args:
         happened: (n,), by world; n >= 1.
-
-    Returns:
-        The count and its interval.
     """
     # It takes a quarter of a second to import, and few questions need it.
     require_room_for_scipy()
@@ -238,11 +221,6 @@ def conditional_value_at_risk(values: Floats, level: float = LEVEL) -> float:
 
     Args:
         values: (n,) finite numbers, n >= 1.
-        level: Share of the values that are not in the tail.
-
-    Returns:
-        Mean of the greatest (1 - level) n values; of a value that is in the tail in part, that part
-        counts.
     """
     ordered = np.sort(values)[::-1].tolist()
     size = max((1.0 - level) * len(ordered), 1.0)

@@ -71,15 +71,7 @@ class ComparedEngine:
 def compared_engines(
     spec: CertificateSpec, nominal: EvaluationColumns
 ) -> tuple[ComparedEngine, ...]:
-    """Compare engines.
-
-    Args:
-        spec: Of the certificate.
-        nominal: Its evaluations of the nominal world, ours first, as `spec.nominal_rows` counts.
-
-    Returns:
-        The engines that the spec names, in its order.
-    """
+    """Compare engines."""
     judged = spec.judge(nominal.objectives, nominal.failed)
     utilities = judged.utilities
     values = nominal.objectives.copy()

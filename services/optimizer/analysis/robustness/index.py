@@ -107,14 +107,7 @@ class Robustness:
 
 
 def least_samples(varied: int) -> int:
-    """How many designs a sample has at least.
-
-    Args:
-        varied: variables whose values differ.
-
-    Returns:
-        Four for each coefficient of the regression.
-    """
+    """How many designs a sample has at least."""
     return 4 * (varied + 1)
 
 
@@ -131,19 +124,6 @@ def local_sample(
     A variable's values are within `radius` times the width of its bounds on either side, and never
     outside the bounds: near one of them, they are on one side. A design that lies outside its
     bounds is sampled on the side towards them. More samples begin with the same designs as fewer.
-
-    Args:
-        design: value by name, in the variables' units; of a categorical variable an index.
-        variables: that may vary, with the bounds by which they are normalised; all in the design.
-        radius: half the box's width, as a share of the bounds.
-        samples: n, how many designs beside the given one.
-        seed: of the sample.
-
-    Returns:
-        The sample.
-
-    Raises:
-        ValueError: no variable varies, or the samples are too few for so many.
     """
     varied = tuple(v for v in variables if _reaches_neighbours(v, radius))
     if not varied:
@@ -191,14 +171,6 @@ def robustness(sample: LocalSample, objectives: Floats, failed: NDArray[np.bool_
     An objective's logarithm is fitted, so that its derivative is a relative change. What noise
     adds to the square of a norm is subtracted. Intervals are those of a bootstrap over the designs,
     which are drawn alike for all scenarios.
-
-    Args:
-        sample: 1 + n designs.
-        objectives: (1 + n, K, m) raw objectives, of which the first five count.
-        failed: (1 + n, K) walks without a result.
-
-    Returns:
-        Sensitivities by scenario, and the index over all of them.
     """
     values = objectives[:, :, : len(NORMALISED_OBJECTIVES)]
     usable = ~failed & (np.isfinite(values) & (values > 0.0)).all(axis=2)

@@ -52,14 +52,6 @@ def drawn_preferences(columns: EvaluationColumns, *, count: int, seed: int) -> l
     Exponents are uniform in 0 to 1, as in table 4.5; their ratios alone matter to a ranking. Biases
     are uniform between 0 and the median of their objective among the job's walks: a bias of the
     size of its objective halves what a relative change of it counts.
-
-    Args:
-        columns: evaluations of the job.
-        count: of preferences.
-        seed: of the draw.
-
-    Returns:
-        The preferences.
     """
     size = len(NORMALISED_OBJECTIVES)
     walked = columns.objectives[columns.statuses == 0][:, :size]
@@ -80,16 +72,7 @@ def winners(
     *,
     worlds: TuningWorlds | None = None,
 ) -> tuple[Winner, ...]:
-    """Find who wins under any of the preferences.
-
-    Args:
-        columns: evaluations of a job; one at least walks in all scenarios.
-        drawn: preferences beside those of table 4.5.
-        worlds: in which the job judges every design; None for the model alone.
-
-    Returns:
-        The winners: those of table 4.5 first, then by the share of preferences.
-    """
+    """Find who wins under any of the preferences."""
     preferences = [*NAMED.values(), *drawn]
     names = [*NAMED, *("" for _ in drawn)]
     best = np.array([fitness_by(columns, p, worlds=worlds).argmin() for p in preferences])

@@ -105,10 +105,6 @@ def scenario_families(log_utilities: Floats, *, tolerance: float) -> ScenarioFam
     Args:
         log_utilities: (r, K) logarithms of utilities, +inf where a walk failed; in at least one row
             none did.
-        tolerance: largest regret of a smallest family, as a share.
-
-    Returns:
-        Regrets and losses, with intervals of a bootstrap over the designs.
     """
     judged = _Judged.of(log_utilities)
     count = log_utilities.shape[1]

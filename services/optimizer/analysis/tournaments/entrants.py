@@ -54,14 +54,7 @@ class Tournament:
         return self.entrants[0].spec
 
     def results(self, columns: Callable[[Job], EvaluationColumns]) -> dict[str, dict[str, Runs]]:
-        """Runs by problem, then by method.
-
-        Args:
-            columns: Job -> all that it evaluated.
-
-        Returns:
-            Every run that has ended; methods without one are left out.
-        """
+        """Runs by problem, then by method."""
         found = {
             entrant.label: runs_of(entrant.spec, columns(entrant.job))
             for entrant in self.entrants
@@ -71,14 +64,7 @@ class Tournament:
 
 
 def by_problem(found: Mapping[str, Mapping[str, Runs]]) -> dict[str, dict[str, Runs]]:
-    """Turn runs by method, then by problem, into runs by problem, then by method.
-
-    Args:
-        found: Of methods on the same problems.
-
-    Returns:
-        The runs, problems and methods in order.
-    """
+    """Turn runs by method, then by problem, into runs by problem, then by method."""
     turned: dict[str, dict[str, Runs]] = {}
     for label, of_method in found.items():
         for problem, runs in of_method.items():
@@ -91,12 +77,6 @@ def tournaments_of(jobs: Iterable[Job]) -> tuple[Tournament, ...]:
 
     Runs are compared that were given the same problems, budget and checkpoints, and whose numbers
     depend on the same code, robots and precision.
-
-    Args:
-        jobs: Any; only those of the kind `tournament` take part that were not cancelled.
-
-    Returns:
-        The tournaments, newest first by their first job.
     """
     groups: dict[str, list[tuple[Job, TournamentSpec]]] = {}
     for job in sorted(jobs, key=lambda job: (job.created_at, job.id)):

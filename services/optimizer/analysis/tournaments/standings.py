@@ -100,30 +100,14 @@ class Standings:
 
 
 def looked_at(evaluations: int) -> tuple[int, ...]:
-    """Evaluations after which medians are reported.
-
-    Args:
-        evaluations: Budget of a run.
-
-    Returns:
-        Those of `LOOKED_AT` below the budget, and the budget.
-    """
+    """Evaluations after which medians are reported."""
     return (*(count for count in LOOKED_AT if count < evaluations), evaluations)
 
 
 def standings_of(
     results: Results, looked_at: Sequence[int], other: Results | None = None
 ) -> Standings:
-    """Judge a tournament.
-
-    Args:
-        results: Its runs, one at least of every method.
-        looked_at: Evaluations after which medians are told, the budget last.
-        other: Runs of another tournament, whose ranks are compared.
-
-    Returns:
-        The standings.
-    """
+    """Judge a tournament."""
     methods = list(next(iter(results.values())))
     targets = {name: _target(by_method) for name, by_method in results.items()}
     of_methods = mean_ranks(results, methods)
@@ -145,14 +129,7 @@ def standings_of(
 
 
 def profiles_of(results: Results) -> tuple[Profile, ...]:
-    """Data profiles, one for each of `PRECISIONS`.
-
-    Args:
-        results: Of all methods, one run at least of each.
-
-    Returns:
-        The profiles, over budgets from one evaluation a variable to the whole.
-    """
+    """Data profiles, one for each of `PRECISIONS`."""
     methods = list(next(iter(results.values())))
     most = max(
         runs.budget / (runs.dimension + 1)

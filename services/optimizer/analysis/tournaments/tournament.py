@@ -66,14 +66,7 @@ class Runs:
         return int(self.checkpoints[-1])
 
     def aiming_at(self, target: float) -> Runs:
-        """The same runs with another target, reached at the first checkpoint that shows it.
-
-        Args:
-            target: Fitness that counts as solved.
-
-        Returns:
-            The runs; `to_target` are checkpoints.
-        """
+        """The same runs with another target, reached at the first checkpoint that shows it."""
         reached = np.nan_to_num(self.best, nan=math.inf) <= target
         at = self.checkpoints[reached.argmax(axis=1)].astype(np.float64)
         return replace(self, to_target=np.where(reached.any(axis=1), at, math.nan), target=target)
@@ -88,15 +81,7 @@ class Runs:
         return rows
 
     def median_after(self, evaluations: int) -> float:
-        """Median of the best after so many evaluations.
-
-        Args:
-            evaluations: One of the checkpoints, or the last one before counts.
-
-        Returns:
-            The middle run's, the lower of two; +inf if it has none, NaN before the first
-            checkpoint.
-        """
+        """Median of the best after so many evaluations."""
         index = int(np.searchsorted(self.checkpoints, evaluations, "right")) - 1
         return math.nan if index < 0 else float(self.quartiles()[1, index])
 
@@ -108,16 +93,7 @@ Results = Mapping[str, Mapping[str, Runs]]
 def runs_of(
     spec: TournamentSpec, columns: EvaluationColumns, most: int | None = None
 ) -> dict[str, Runs]:
-    """Runs of a job, by problem.
-
-    Args:
-        spec: Of the job.
-        columns: Its evaluations, one for each repetition.
-        most: Repetitions to take, the first ones; None for all.
-
-    Returns:
-        Runs of its method on each of its problems, in order.
-    """
+    """Runs of a job, by problem."""
     rows = columns.objectives[:most]
     count = len(spec.checkpoints)
     return {
@@ -142,23 +118,12 @@ def expected_running_time(to_target: Floats, budget: int) -> float:
 
     Args:
         to_target: (r,) evaluations until the target was reached, NaN for runs that did not.
-        budget: Evaluations of such a run.
-
-    Returns:
-        The expected running time; +inf if no run reached the target.
     """
     return float(_running_times(to_target[None], budget)[0])
 
 
 def running_time_interval(runs: Runs) -> Interval:
-    """Expected running time with an interval, of resampled runs.
-
-    Args:
-        runs: Of a method on a problem with a target.
-
-    Returns:
-        The estimate; a bound is +inf where so many resamples have no successful run.
-    """
+    """Expected running time with an interval, of resampled runs."""
     value = expected_running_time(runs.to_target, runs.budget)
     return percentile_interval(
         value, _running_times(runs.to_target[_picks(len(runs))], runs.budget)
@@ -176,9 +141,6 @@ def data_profile(
     solved it.
 
     Args:
-        results: Of all methods.
-        method: Whose profile is wanted.
-        precision: tau.
         budgets: (b,) evaluations over the number of variables plus one, the unit of a simplex
             gradient.
 
@@ -205,9 +167,6 @@ def ranks(by_method: Mapping[str, Runs]) -> Floats:
     took fewer evaluations, or neither did and its best is less. Methods are ranked by the mean rank
     of their runs among all runs, ties sharing a mean rank.
 
-    Args:
-        by_method: Runs of each method.
-
     Returns:
         (M,) ranks from 1, the best, in the order of the methods.
     """
@@ -215,15 +174,7 @@ def ranks(by_method: Mapping[str, Runs]) -> Floats:
 
 
 def mean_ranks(results: Results, methods: Sequence[str]) -> dict[str, Interval]:
-    """Ranks of methods, averaged over problems, with intervals of resampled runs.
-
-    Args:
-        results: Of all methods.
-        methods: Their names.
-
-    Returns:
-        Mean rank of each; 1 is that of a method that is the best on every problem.
-    """
+    """Ranks of methods, averaged over problems, with intervals of resampled runs."""
     fields = _fields(results, methods)
     value = _mean_ranks(fields, _Field.ranks)
     samples = np.array([_mean_ranks(fields, ranks) for ranks in _resampled_ranks()])
@@ -233,17 +184,7 @@ def mean_ranks(results: Results, methods: Sequence[str]) -> dict[str, Interval]:
 
 
 def rank_correlation(one: Results, other: Results, methods: Sequence[str]) -> Interval:
-    """Spearman's correlation of methods' mean ranks on two sets of problems.
-
-    Args:
-        one: A set of problems with runs of each method.
-        other: Another one.
-        methods: That are in both, three at least.
-
-    Returns:
-        The correlation, with an interval of resampled runs: it says how sure the ranks are, not
-        what other methods would do. NaN where all methods are equal on a set.
-    """
+    """Spearman's correlation of methods' mean ranks on two sets of problems."""
     fields = [_fields(results, methods) for results in (one, other)]
 
     def correlation(ranks: Ranks) -> float:

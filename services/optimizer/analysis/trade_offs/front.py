@@ -99,14 +99,7 @@ class Front:
     standard_error: float
 
     def spread(self, most: int) -> Rows:
-        """Choose designs that cover the front: named ones, then always the one farthest from all.
-
-        Args:
-            most: how many; those with a name are always among them.
-
-        Returns:
-            Rows of the front, ascending.
-        """
+        """Choose designs that cover the front: named ones, then always the one farthest from all"""
         if most >= len(self.rows):
             return self.rows
         winners = [winner.row for winner in self.winners.values() if winner.on_front]
@@ -133,12 +126,7 @@ def pareto_front(
     """Find the front of a job's designs.
 
     Args:
-        columns: r evaluations of a job that tunes a drive.
         vectors: (r, M) their objectives over all scenarios, at least one row finite.
-        worlds: in which the job judges every design; None for the model alone.
-
-    Returns:
-        The front with what is remarkable of it.
     """
     came = _best_at_their_time(vectors)
     rows = came[non_dominated(vectors[came])]
@@ -180,10 +168,6 @@ def knees(normalised: Floats, rows: Rows, extremes: Rows) -> tuple[Knee, ...]:
         normalised: (r, M) objectives of all designs, 0 at the ideal and 1 at the nadir.
         rows: (f,) those of the front.
         extremes: (M,) rows of the best in each objective.
-
-    Returns:
-        At most `MOST_KNEES`, those of the greatest distance, the greatest first; none where no
-        design is nearer to the ideal than the extremes are on average.
     """
     plane = normalised[extremes].sum(axis=1).mean()
     distances = (plane - normalised[rows].sum(axis=1)) / math.sqrt(normalised.shape[1])

@@ -55,10 +55,6 @@ def hypervolume_curve(points: Floats, *, most_bounds: int = MOST_BOUNDS) -> Hype
         points: (n, M) objectives, minimized, in the order in which they came; each is counted in
             the box from 0 to 1, at whose corner 1 is the reference point. What lies below 0 is
             taken for 0.
-        most_bounds: local upper bounds at which exact values are given up for an estimate.
-
-    Returns:
-        The hypervolume after each point.
     """
     clipped = np.maximum(points, 0.0)
     exact = _exact(clipped, most_bounds)

@@ -92,15 +92,6 @@ def preference_fits(
 
     In worlds the linear program is about an approximation: the aggregate of a product is not the
     product of the aggregates.
-
-    Args:
-        columns: r evaluations of a job that tunes a drive.
-        row: of the design, which walks in all scenarios.
-        own: preference of the job.
-        worlds: in which the job judges every design; None for the model alone.
-
-    Returns:
-        The fits, the best first: by rank, then by margin.
     """
     fits = []
     for bias, names in _biases(own).items():

@@ -20,33 +20,14 @@ Floats = NDArray[np.float64]
 def world_space(
     variables: Sequence[str | Variable] | None, fixed: Mapping[str, float | str]
 ) -> DesignSpace:
-    """The perturbations that are drawn or held.
-
-    Args:
-        variables: Those that are drawn; None for all that are not held.
-        fixed: Values of those that are held, by name.
-
-    Returns:
-        The space; what is neither drawn nor held is as the robot has it.
-
-    Raises:
-        ValueError: The choice makes no sense; names the perturbation and the way out.
-    """
+    """The perturbations that are drawn or held."""
     if variables is None:
         variables = tuple(v for v in PERTURBATIONS if v.name not in fixed)
     return DesignSpace.build(required=(), optional=PERTURBATIONS, chosen=variables, fixed=fixed)
 
 
 def with_engine(space: DesignSpace, engines: Sequence[EngineName]) -> DesignSpace:
-    """The same worlds, each with the engine that computes its walks.
-
-    Args:
-        space: Of the worlds.
-        engines: Beside ours; the space stays as it is without any.
-
-    Returns:
-        The space with the engine as the last of its variables.
-    """
+    """The same worlds, each with the engine that computes its walks."""
     if not engines:
         return space
     drawn = len(space.variables)
@@ -60,17 +41,7 @@ def with_engine(space: DesignSpace, engines: Sequence[EngineName]) -> DesignSpac
 def world_positions(
     space: DesignSpace, engines: Sequence[EngineName], seed: int
 ) -> Callable[[int, int], Floats]:
-    """The order of a certificate's walks.
-
-    Args:
-        space: Of the worlds, without the engine.
-        engines: Beside ours.
-        seed: Of the worlds that are drawn.
-
-    Returns:
-        Positions start <= k < stop of `with_engine`: first the nominal world by our engine, then by
-        each of the others, then the worlds that are drawn, by ours.
-    """
+    """The order of a certificate's walks."""
     first = [[min(max(NOMINAL[v.name], v.low), v.high) for v in space.variables]]
     nominal = np.array(first * (1 + len(engines)))
     box = with_engine(space, engines).box

@@ -41,21 +41,7 @@ def certificate_scenarios(
     robot: RobotChoice = DEFAULT_ROBOT,
     design: Mapping[str, float] | None = None,
 ) -> tuple[Scenario, ...]:
-    """The scenarios of a certificate: those that a design was tuned in, and held-out ones.
-
-    Args:
-        tuned: Scenarios of the job that found the design; by default those of table 4.2.
-        robot: That walks.
-        design: As the simulator takes it; its gait variables replace the scenarios' values. None
-            for a design without any.
-
-    Returns:
-        These, and so many held-out ones that there are `CASES`, but `LEAST` of them at least, as
-        far as a robot that does not ship with gaitswarm reaches so many.
-
-    Raises:
-        SimulationInputError: The robot cannot be read.
-    """
+    """The scenarios of a certificate: those that a design was tuned in, and held-out ones."""
     count = max(LEAST, CASES - len(tuned))
     if load_robot(robot).ships:
         names = {scenario.name for scenario in tuned}
@@ -69,19 +55,7 @@ def certificate_scenarios(
 def certificate_walks(
     tuned: Sequence[Scenario], robot: RobotChoice, design: Mapping[str, float]
 ) -> dict[str, Any]:
-    """Fields of a certificate's spec that say where a design walks.
-
-    Args:
-        tuned: Scenarios of the job that found the design.
-        robot: That walks.
-        design: As the simulator takes it.
-
-    Returns:
-        `scenarios`; and `held_out` where these are derived from the tuned ones, and no presets.
-
-    Raises:
-        SimulationInputError: The robot cannot be read.
-    """
+    """Fields of a certificate's spec that say where a design walks."""
     scenarios = certificate_scenarios(tuned, robot, design)
     if load_robot(robot).ships:
         return {"scenarios": scenarios}

@@ -29,17 +29,7 @@ def reached(
     failed: NDArray[np.bool_],
     of_walk: Mapping[str, Sequence[int]],
 ) -> Floats:
-    """What designs come to where a target is set.
-
-    Args:
-        target: which quantity of which walk, and relative to which other one, if to any.
-        objectives: (n, K, m) raw results of walks, in their units.
-        failed: (n, K), true for a walk without a result.
-        of_walk: indices of a walk's cases among the K, by the walk's name.
-
-    Returns:
-        (n,) values, NaN where any of a walk's cases failed.
-    """
+    """What designs come to where a target is set."""
 
     def of(walk: str) -> Floats:
         cases = list(of_walk[walk])
@@ -68,16 +58,7 @@ def _of_all(quantity: str, rows: Floats, bad: NDArray[np.bool_]) -> Floats:
 
 
 def difference(target: Target, value: float) -> float:
-    """How far off a value is, in tolerances.
-
-    Args:
-        target: what it should be.
-        value: in the target's unit.
-
-    Returns:
-        ln(value / target) / ln(1 + tolerance), of height_loss (value - target) / tolerance; +inf
-        where there is no value.
-    """
+    """How far off a value is, in tolerances."""
     if not math.isfinite(value):
         return math.inf
     if not QUANTITIES[target.quantity].positive:
@@ -88,13 +69,6 @@ def difference(target: Target, value: float) -> float:
 
 
 def root_mean_square(differences: Floats) -> Floats:
-    """Root mean square of each row.
-
-    Args:
-        differences: (n, t).
-
-    Returns:
-        (n,), 0 for no columns, +inf where a value is not finite.
-    """
+    """Root mean square of each row."""
     rows = [[difference * difference for difference in row] for row in differences.tolist()]
     return np.array([math.sqrt(math.fsum(row) / len(row)) if row else 0.0 for row in rows])

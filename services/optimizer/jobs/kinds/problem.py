@@ -83,16 +83,7 @@ class FunctionProblem(BaseModel):
         )
 
     def fitness(self, designs: Floats, *, seed: int, first: int) -> Floats:
-        """Values of the function, with random numbers of the run where it has a random part.
-
-        Args:
-            designs: (n, d).
-            seed: Of the run.
-            first: Evaluations of the run before these.
-
-        Returns:
-            (n,).
-        """
+        """Values of the function, with random numbers of the run where it has a random part."""
         function = FUNCTIONS[self.name]
         numbers = np.zeros(len(designs))
         if function.is_random:
@@ -100,15 +91,7 @@ class FunctionProblem(BaseModel):
         return function.value(designs, numbers)
 
     def final(self, designs: Floats, fitness: Floats) -> Floats:  # noqa: ARG002
-        """What the search was told.
-
-        Args:
-            designs: (n, d) that a search found.
-            fitness: (n,) that it was told of them.
-
-        Returns:
-            The fitness.
-        """
+        """What the search was told."""
         return fitness
 
 
@@ -156,28 +139,11 @@ class TuningProblem(BaseModel):
         return self.job.design_space().box
 
     def fitness(self, designs: Floats, *, seed: int, first: int) -> Floats:  # noqa: ARG002
-        """What designs are worth in the precision of the search.
-
-        Args:
-            designs: (n, d).
-            seed: Of the run; walks are not random.
-            first: Evaluations of the run before these.
-
-        Returns:
-            (n,), +inf for one that fails in a scenario.
-        """
+        """What designs are worth in the precision of the search."""
         return _fitness(self.job, designs)
 
     def final(self, designs: Floats, fitness: Floats) -> Floats:
-        """What designs are worth in double precision.
-
-        Args:
-            designs: (n, d) that a search found.
-            fitness: (n,) that it was told of them.
-
-        Returns:
-            (n,) fitness.
-        """
+        """What designs are worth in double precision."""
         if self.job.precision == "double":
             return fitness
         return _fitness(self.job.in_double(), designs)

@@ -68,29 +68,11 @@ class RaceCase:
         return self.terms.evaluations * self.problem.duration
 
     def run(self, designs: Floats) -> Outcome:
-        """Run the method with each design's settings and seed.
-
-        Args:
-            designs: (n, v), columns as in `variables`.
-
-        Returns:
-            Curves and counts, one row for each run.
-        """
+        """Run the method with each design's settings and seed."""
         return self.run_until(designs, lambda: False)
 
     def run_until(self, designs: Floats, should_stop: Stop) -> Outcome:
-        """As `run`, unless nobody waits for it any more.
-
-        Args:
-            designs: As for `run`.
-            should_stop: Polled between batches of evaluations.
-
-        Returns:
-            As of `run`.
-
-        Raises:
-            RunAbandoned: `should_stop` said so.
-        """
+        """As `run`, unless nobody waits for it any more."""
         if optimizer_digest() != self.digest:
             raise SimulationError(
                 "this worker has other code of search and judgement than the job was begun with;"
@@ -108,19 +90,7 @@ class RaceCase:
 def settings_of_run(
     method: SearchSettings, names: tuple[str, ...], values: list[float]
 ) -> tuple[SearchSettings, int]:
-    """Settings and seed of the run that a design stands for.
-
-    Args:
-        method: Settings, before what is drawn.
-        names: Columns of the design, the seed's among them.
-        values: Of the design.
-
-    Returns:
-        The settings of the run, and its seed.
-
-    Raises:
-        ValueError: The method refuses the settings.
-    """
+    """Settings and seed of the run that a design stands for."""
     drawn = dict(zip(names, values, strict=True))
     seed = int(drawn.pop(SEED.name))
     return drawn_settings(method, drawn), seed

@@ -89,14 +89,7 @@ class CmaEs(Generational[CmaEsSettings, _CmaEsState]):
     state_model = _CmaEsState
 
     def __init__(self, settings: CmaEsSettings, space: Space, budget: int, seed: int) -> None:
-        """Create a search that has not been asked yet.
-
-        Args:
-            settings: Of the method.
-            space: The box that is searched.
-            budget: Evaluations of the planned run; it changes nothing.
-            seed: Of all random numbers.
-        """
+        """Create a search that has not been asked yet."""
         super().__init__(settings, space, budget, seed)
         self._restarts = 0
         self._bests: list[float] = []
@@ -114,22 +107,13 @@ class CmaEs(Generational[CmaEsSettings, _CmaEsState]):
         return self.population
 
     def propose(self) -> Floats:
-        """Sample the distribution; before that, judge the start positions.
-
-        Returns:
-            (n, d), inside the bounds.
-        """
+        """Sample the distribution; before that, judge the start positions."""
         if not self.generations and len(self._start):
             return np.empty((0, self.space.dimension))
         return self._distribution.sample(self._random())
 
     def learn(self, positions: Floats, fitness: Floats) -> None:
-        """Adapt to the samples' order, or begin about the best start position.
-
-        Args:
-            positions: (n, d) as `propose` made them.
-            fitness: (n,) of each, +inf for a failed evaluation.
-        """
+        """Adapt to the samples' order, or begin about the best start position."""
         if not self.generations and len(self._start):
             best = positions[np.argmin(fitness)]
             self._distribution = self._about(self.space.to_unit(best[np.newaxis])[0])
@@ -154,14 +138,7 @@ class CmaEs(Generational[CmaEsSettings, _CmaEsState]):
         }
 
     def recall(self, state: _CmaEsState) -> None:
-        """Take on a distribution.
-
-        Args:
-            state: As it was parsed.
-
-        Raises:
-            ValueError: A shape is another.
-        """
+        """Take on a distribution."""
         before, self._restarts = self._restarts, state.restarts
         try:
             distribution = self._about(np.full(self.space.dimension, 0.5))

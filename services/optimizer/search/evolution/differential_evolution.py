@@ -135,14 +135,7 @@ class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
     _crossovers: Floats
 
     def __init__(self, settings: DeSettings, space: Space, budget: int, seed: int) -> None:
-        """Create a search that has not been asked yet.
-
-        Args:
-            settings: Of the method.
-            space: The box that is searched.
-            budget: Evaluations of the planned run, over which the population falls.
-            seed: Of all random numbers.
-        """
+        """Create a search that has not been asked yet."""
         super().__init__(settings, space, budget, seed)
         self._begin()
 
@@ -157,11 +150,7 @@ class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
         return self._members.copy()
 
     def propose(self) -> Floats:
-        """Scatter a population, or make a trial of each member.
-
-        Returns:
-            (n, d), inside the bounds.
-        """
+        """Scatter a population, or make a trial of each member."""
         random = self._random()
         if not len(self._members):
             return latin_hypercube(self.space, self.settings.population, random)
@@ -170,12 +159,7 @@ class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
         return without_duplicates(self.space, self._members, trials, random)
 
     def learn(self, positions: Floats, fitness: Floats) -> None:
-        """Replace each member by its trial, if that is no worse.
-
-        Args:
-            positions: (n, d) of the trials, or of a new population.
-            fitness: (n,) of each, +inf for a failed evaluation.
-        """
+        """Replace each member by its trial, if that is no worse."""
         if len(self._members):
             self._select(positions, fitness)
         else:
@@ -197,14 +181,7 @@ class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
         }
 
     def recall(self, state: _PopulationState) -> None:
-        """Take on a population, its archive and what it had learned.
-
-        Args:
-            state: As it was parsed.
-
-        Raises:
-            ValueError: A shape is another, or something is outside the bounds.
-        """
+        """Take on a population, its archive and what it had learned."""
         settings, d = self.settings, self.space.dimension
         size = len(state.members)
         least = settings.population_end if size else 0
@@ -314,15 +291,7 @@ class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
 
 
 def gains(before: Floats, after: Floats) -> Floats:
-    """By how much trials are better than their members.
-
-    Args:
-        before: (n,) fitness of members, +inf if they failed.
-        after: (n,) fitness of trials.
-
-    Returns:
-        (n,) finite; where a member failed and its trial did not, the greatest of the others, or 1.
-    """
+    """By how much trials are better than their members."""
     known = np.isfinite(before) & np.isfinite(after)
     gain = np.where(known, np.where(known, before, 0.0) - np.where(known, after, 0.0), 0.0)
     greatest = float(gain.max()) if (gain > 0.0).any() else 1.0
@@ -330,14 +299,6 @@ def gains(before: Floats, after: Floats) -> Floats:
 
 
 def lehmer_mean(values: Floats, weights: Floats) -> float:
-    """Weighted Lehmer mean, of sums that are rounded once, so that their order does not matter.
-
-    Args:
-        values: (n,) from 0 on.
-        weights: (n,) of which one is positive.
-
-    Returns:
-        Sum of w v^2 over that of w v; 0 where all values are.
-    """
+    """Weighted Lehmer mean, of sums that are rounded once, so that their order does not matter."""
     total = math.fsum(weights * values)
     return math.fsum(weights * values * values) / total if total > 0.0 else 0.0

@@ -66,15 +66,6 @@ def genetic_algorithm(
     uniform crossover and random mutation. Of members and offspring together the best stay, so that
     all members are elites. No child is the same design as a member. Where none can be bred that is
     not, it starts anew with another population, and keeps nothing.
-
-    Args:
-        settings: Of the method.
-        space: The box that is searched.
-        budget: Evaluations of the planned run.
-        random: Its random numbers.
-
-    Yields:
-        (population, d) and then (offspring, d) positions; fewer where fewer could be bred.
     """
     from pymoo.core.evaluator import Evaluator  # noqa: PLC0415 - an optional extra, slow to import
     from pymoo.core.termination import NoTermination  # noqa: PLC0415

@@ -95,14 +95,7 @@ class Hype(MultiObjective[HypeSettings, _PopulationState]):
     _vectors: Floats
 
     def __init__(self, settings: HypeSettings, space: Space, budget: int, seed: int) -> None:
-        """Create a search that has not been asked yet.
-
-        Args:
-            settings: Of the method.
-            space: The box that is searched.
-            budget: Evaluations of the planned run; it changes nothing.
-            seed: Of all random numbers.
-        """
+        """Create a search that has not been asked yet."""
         super().__init__(settings, space, budget, seed)
         self._begin()
 
@@ -122,23 +115,14 @@ class Hype(MultiObjective[HypeSettings, _PopulationState]):
         return self._vectors.shape[1] if len(self._vectors) else super().objectives
 
     def propose(self) -> Floats:
-        """Scatter a population, or make trials.
-
-        Returns:
-            (n, d), inside the bounds.
-        """
+        """Scatter a population, or make trials."""
         random = RandomNumbers(self.seed, _VARY, iteration=self.generations)
         if not len(self._members):
             return latin_hypercube(self.space, self.settings.population, random)
         return self._trials(random)
 
     def learn(self, positions: Floats, fitness: Floats) -> None:
-        """Let the best of members and trials be the population.
-
-        Args:
-            positions: (n, d) of the trials, or of a new population.
-            fitness: (n, M) objective vectors of each, +inf for a failed evaluation.
-        """
+        """Let the best of members and trials be the population."""
         pool = np.concatenate([self._members, positions])
         vectors = np.concatenate([self._vectors, fitness]) if len(self._vectors) else fitness
         kept = self.best(vectors, min(len(pool), self.settings.population))
@@ -147,15 +131,7 @@ class Hype(MultiObjective[HypeSettings, _PopulationState]):
             self._begin()
 
     def best(self, fitness: Floats, count: int) -> Indices:
-        """Choose whole fronts, and of the next one those that dominate the most hypervolume.
-
-        Args:
-            fitness: (n, M) objective vectors, +inf for a failed evaluation.
-            count: How many, at most n.
-
-        Returns:
-            (count,) indices, ascending.
-        """
+        """Choose whole fronts, and of the next one those that dominate the most hypervolume."""
         ranks = pareto_ranks(fitness)
         kept = np.empty(0, dtype=np.intp)
         for rank in range(int(ranks.max()) + 1):
@@ -171,14 +147,7 @@ class Hype(MultiObjective[HypeSettings, _PopulationState]):
         return {"members": self._members.tolist(), "vectors": self.written(self._vectors)}
 
     def recall(self, state: _PopulationState) -> None:
-        """Take on a population.
-
-        Args:
-            state: As it was parsed.
-
-        Raises:
-            ValueError: A shape is another, or something is outside the bounds.
-        """
+        """Take on a population."""
         size, most = len(state.members), self.settings.population
         if size > most:
             raise ValueError(f"members: {size} of them, more than {most}")

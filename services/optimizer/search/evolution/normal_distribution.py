@@ -108,14 +108,7 @@ class NormalDistribution:
     """
 
     def __init__(self, space: Space, size: int, mean: Floats, sigma: float) -> None:
-        """Make one that knows nothing.
-
-        Args:
-            space: The box.
-            size: Samples of a generation, at least 4.
-            mean: (d,) unit position.
-            sigma: Standard deviation, as a share of each range.
-        """
+        """Make one that knows nothing."""
         d = space.dimension
         self._space: Final = space
         self._size: Final = size
@@ -139,14 +132,7 @@ class NormalDistribution:
         self._scale_rates: Final = self._rates(float(d))
 
     def sample(self, random: RandomNumbers) -> Floats:
-        """Draw a generation.
-
-        Args:
-            random: Numbers of the generation, from the first on.
-
-        Returns:
-            (size, d) positions inside the bounds.
-        """
+        """Draw a generation."""
         _, y = self._steps(random)
         unit = self._mean + self._sigma * self._scale * y
         designs = self._space.designs(self._space.from_unit(unit))
@@ -155,12 +141,7 @@ class NormalDistribution:
         return self._space.positions(designs)
 
     def learn(self, random: RandomNumbers, order: NDArray[np.intp]) -> None:
-        """Move towards the better samples.
-
-        Args:
-            random: The numbers that the generation was sampled with, from the first on.
-            order: (size,) the samples, best first.
-        """
+        """Move towards the better samples."""
         root = self._root()
         z, y = self._steps(random)
         choices = self._choices(random)[order] if self._chosen else None
@@ -209,14 +190,7 @@ class NormalDistribution:
         }
 
     def load(self, state: DistributionState) -> None:
-        """Take on a state of the same space and size.
-
-        Args:
-            state: As `dump` gave it.
-
-        Raises:
-            ValueError: A shape is another; the state before is kept.
-        """
+        """Take on a state of the same space and size."""
         d = self._space.dimension
         rows = {
             name: matrix([getattr(state, name)], (1, d), f"distribution.{name}")[0]

@@ -23,15 +23,7 @@ _UNIT: Final = 2.0**32
 
 
 def pareto_ranks(vectors: Floats) -> Indices:
-    """Sort objective vectors into fronts (Deb et al. 2002), all objectives minimized.
-
-    Args:
-        vectors: (n, M); a row with +inf is that of a failed evaluation.
-
-    Returns:
-        (n,) 0 for those that no other dominates, 1 for those that only these dominate, and so on;
-        failed ones are a front of their own, the last.
-    """
+    """Sort objective vectors into fronts (Deb et al. 2002), all objectives minimized."""
     ranks = np.full(len(vectors), -1, dtype=np.intp)
     left = np.isfinite(vectors).all(axis=1)
     no_worse = np.ones((len(vectors), len(vectors)), dtype=np.bool_)
@@ -56,13 +48,7 @@ class SampledHypervolume:
     """
 
     def __init__(self, front: Floats, samples: int, random: RandomNumbers) -> None:
-        """Draw the points.
-
-        Args:
-            front: (n, M) finite objective vectors.
-            samples: Points to draw.
-            random: Numbers to draw.
-        """
+        """Draw the points."""
         low = front.min(axis=0)
         span = front.max(axis=0) - low
         scaled = (front - low) / np.where(span > 0.0, span, 1.0)
@@ -73,11 +59,7 @@ class SampledHypervolume:
         self._covers: Final = covers
 
     def shares(self) -> NDArray[np.int64]:
-        """How much is dominated by each vector alone.
-
-        Returns:
-            (n,) points.
-        """
+        """How much is dominated by each vector alone."""
         alone = self._covers.sum(axis=0) == 1
         return np.asarray((self._covers & alone).sum(axis=1), dtype=np.int64)
 
@@ -86,12 +68,6 @@ class SampledHypervolume:
 
         One after the other goes whose loss is the least to be expected, if of all that have to go
         the others were drawn at random (equations 12 and 13 of the paper).
-
-        Args:
-            count: How many stay, at most n.
-
-        Returns:
-            (count,) indices, ascending; of equals the earlier goes.
         """
         kept = np.arange(len(self._covers))
         covered = self._covers.sum(axis=0)

@@ -21,15 +21,7 @@ _NEGLIGIBLE: Final = 1e-15
 
 
 def product(left: Floats, right: Floats) -> Floats:
-    """Matrix product, summed in the order of the inner index.
-
-    Args:
-        left: (n, k).
-        right: (k, m).
-
-    Returns:
-        (n, m).
-    """
+    """Matrix product, summed in the order of the inner index."""
     rows = max(2, _MOST_TERMS // max(1, right.size))
     if len(left) > rows:
         blocks = [left[first : first + rows] for first in range(0, len(left), rows)]
@@ -41,14 +33,7 @@ def product(left: Floats, right: Floats) -> Floats:
 
 
 def eigen(symmetric: Floats) -> tuple[Floats, Floats]:
-    """Decompose a symmetric matrix, by Jacobi's rotations (Golub and Van Loan, 8.5).
-
-    Args:
-        symmetric: (d, d); of one that is so but for rounding, the mean with its transpose.
-
-    Returns:
-        (d,) eigenvalues in no order, and (d, d) their vectors as columns.
-    """
+    """Decompose a symmetric matrix, by Jacobi's rotations (Golub and Van Loan, 8.5)."""
     a, vectors = (symmetric + symmetric.T) * 0.5, np.eye(len(symmetric))
     for _ in range(_SWEEPS):
         turned = False

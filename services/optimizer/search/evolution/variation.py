@@ -17,16 +17,7 @@ _ANY_CHOICE: Final = 0.1
 
 
 def latin_hypercube(space: Space, count: int, random: RandomNumbers) -> Floats:
-    """Scatter positions so that each variable has one in each of `count` equal parts.
-
-    Args:
-        space: The box.
-        count: How many, n.
-        random: Numbers to draw.
-
-    Returns:
-        (n, d), inside the bounds.
-    """
+    """Scatter positions so that each variable has one in each of `count` equal parts."""
     d = space.dimension
     cells = np.array([random.permutation(count) for _ in range(d)], dtype=np.float64).T
     return space.evenly((cells + random.uniform(count, d)) / count)
@@ -35,17 +26,7 @@ def latin_hypercube(space: Space, count: int, random: RandomNumbers) -> Floats:
 def with_choices(
     space: Space, mutants: Floats, givers: tuple[Floats, Floats, Floats], random: RandomNumbers
 ) -> Floats:
-    """Give mutants their choices, which have no differences: a giver's, or now and then any.
-
-    Args:
-        space: The box.
-        mutants: (n, d) positions, of which the categorical variables mean nothing.
-        givers: (n, d) positions each, from one of which a choice is taken, each as likely.
-        random: Numbers to draw.
-
-    Returns:
-        (n, d).
-    """
+    """Give mutants their choices, which have no differences: a giver's, or now and then any."""
     lot, share = random.uniform(*mutants.shape), (1.0 - _ANY_CHOICE) / 3.0
     conditions = [lot < share, lot < 2.0 * share, lot < 3.0 * share]
     anything = space.from_unit((lot - 3.0 * share) / _ANY_CHOICE)
@@ -53,17 +34,7 @@ def with_choices(
 
 
 def crossed(parents: Floats, mutants: Floats, crossover: Floats, random: RandomNumbers) -> Floats:
-    """Binomial crossover: of the mutant, at least one variable.
-
-    Args:
-        parents: (n, d) positions.
-        mutants: (n, d) positions.
-        crossover: (n,) chance of each variable to be the mutant's.
-        random: Numbers to draw.
-
-    Returns:
-        (n, d) trials.
-    """
+    """Binomial crossover: of the mutant, at least one variable."""
     n, d = mutants.shape
     changed = random.uniform(n, d) < crossover[:, np.newaxis]
     changed[np.arange(n), indices(random.uniform(n), d)] = True
@@ -73,17 +44,7 @@ def crossed(parents: Floats, mutants: Floats, crossover: Floats, random: RandomN
 def without_duplicates(
     space: Space, members: Floats, trials: Floats, random: RandomNumbers
 ) -> Floats:
-    """Draw one variable anew of a trial whose design is a member's or another trial's, too.
-
-    Args:
-        space: The box.
-        members: (m, d) positions.
-        trials: (n, d) positions, which are changed in place.
-        random: Numbers to draw.
-
-    Returns:
-        The trials.
-    """
+    """Draw one variable anew of a trial whose design is a member's or another trial's, too."""
     n, d = trials.shape
     variable, anything = indices(random.uniform(n), d), space.evenly(random.uniform(n, d))
     seen = {design.tobytes() for design in space.designs(members)}
@@ -95,13 +56,5 @@ def without_duplicates(
 
 
 def indices(uniform: Floats, count: int) -> NDArray[np.intp]:
-    """Choose from `count` things.
-
-    Args:
-        uniform: (n,) numbers in [0, 1).
-        count: Of things to choose from.
-
-    Returns:
-        (n,) indices 0 to count - 1.
-    """
+    """Choose from `count` things."""
     return (uniform * count).astype(np.intp)

@@ -88,16 +88,6 @@ def annealing(
 
     Integers move by one at least, a choice to any other one. Chains know nothing of each other, and
     their moves are one batch.
-
-    Args:
-        settings: Of the method.
-        space: The box that is searched.
-        budget: Evaluations of the planned run, of one annealing.
-        random: Its random numbers.
-        start: Chains begin at the best of these and of the first sample.
-
-    Returns:
-        The proposals.
     """
     known = known_points(space, start)
     search = _annealings(settings, Axes(space), budget, random, known)
@@ -146,16 +136,7 @@ def _anneal(
 
 
 def initial_temperature(fitness: list[float], acceptance: float) -> float:
-    """Give the temperature at which a usual rise is accepted in a given share.
-
-    Args:
-        fitness: Of random designs.
-        acceptance: The share.
-
-    Returns:
-        The temperature, in units of fitness: that of the median difference between designs that
-        succeeded; 1 if all are equal.
-    """
+    """Give the temperature at which a usual rise is accepted in a given share."""
     values = [f for f in fitness if math.isfinite(f)]
     rises = sorted(abs(a - b) for k, a in enumerate(values) for b in values[:k] if abs(a - b) > 0.0)
     return rises[len(rises) // 2] / -math.log(acceptance) if rises else 1.0
@@ -171,13 +152,7 @@ class Chain:
     """
 
     def __init__(self, start: Point, axes: Axes, step: float) -> None:
-        """Begin a chain.
-
-        Args:
-            start: Where.
-            axes: Of the space.
-            step: First step [unit].
-        """
+        """Begin a chain."""
         self.here = start
         self.best = start
         self.steps: Floats = np.maximum(np.full(len(start.unit), step), axes.least)
@@ -185,15 +160,7 @@ class Chain:
         self._accepted = np.zeros(len(start.unit))
 
     def trial(self, j: int, random: RandomNumbers) -> Floats:
-        """Propose a move.
-
-        Args:
-            j: Index of the variable that is moved.
-            random: Random numbers; two are drawn.
-
-        Returns:
-            (d,) unit position, another one.
-        """
+        """Propose a move."""
         draw, fallback = random.uniform(2).tolist()
         space, unit = self._axes.space, self.here.unit.copy()
         if space.categorical[j] or space.integer[j]:
@@ -218,14 +185,7 @@ class Chain:
         return unit
 
     def move(self, j: int, there: Point, temperature: float, chance: float) -> None:
-        """Accept a move, or stay.
-
-        Args:
-            j: Index of the variable that was moved.
-            there: Where to.
-            temperature: In units of fitness.
-            chance: Uniform in [0, 1): a rise is accepted if its share is larger.
-        """
+        """Accept a move, or stay."""
         rise = there.fitness - self.here.fitness if math.isfinite(there.fitness) else math.inf
         accepts = there.fitness <= self.here.fitness
         if accepts or chance < math.exp(-rise / temperature):
@@ -235,11 +195,7 @@ class Chain:
                 self.best = there
 
     def adapt(self, cycles: int) -> None:
-        """Adapt the steps to what was accepted, and go back to the best.
-
-        Args:
-            cycles: Moves in each variable since the last time.
-        """
+        """Adapt the steps to what was accepted, and go back to the best."""
         share = self._accepted / cycles
         longer = 1.0 + _STEP_CHANGE * (share - 0.6) / 0.4
         shorter = 1.0 / (1.0 + _STEP_CHANGE * (0.4 - share) / 0.4)

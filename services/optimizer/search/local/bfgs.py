@@ -37,20 +37,6 @@ def bfgs(
     integer's neighbour is one away at least. A variable at a bound that its gradient would leave is
     held for the step, and a step is cut at the bounds (projection; Bertsekas 1982). Steps are
     halved, or cut to the least of a parabola, until they decrease the fitness enough (Armijo).
-
-    Args:
-        start: Where from, already judged.
-        axes: Of the space; smooth variables are moved, the others held.
-        step: First step, in the variable that moves most [unit].
-        tolerance: Gain of a last step, as a share of the fitness.
-        difference: Distance of a neighbour [unit].
-        least: Longest step that is too short to be tried [unit].
-
-    Yields:
-        (m, d) neighbours, or one trial point.
-
-    Returns:
-        The best point that was judged.
     """
     here = start
     gradient, nearby = yield from _gradient(here, axes, difference)

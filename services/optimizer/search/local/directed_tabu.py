@@ -92,16 +92,6 @@ def directed_tabu(
 
     Integers move by one at least. A choice's neighbour is another one at random; it has no part in
     descent directions.
-
-    Args:
-        settings: Of the method.
-        space: The box that is searched.
-        budget: Evaluations of the planned run.
-        random: Its random numbers.
-        start: The first exploration begins at the best of these; None: of a random sample.
-
-    Returns:
-        The proposals.
     """
     first = known_points(space, start)[:1]
     return evaluated_once(space, _explorations(settings, Axes(space), random, first), start)
@@ -137,21 +127,7 @@ def explore(
     visited: VisitedRegions,
     random: RandomNumbers,
 ) -> Walk:
-    """Explore from a point, until there is no new best for a while.
-
-    Args:
-        start: Where from.
-        axes: Of the space.
-        settings: Of the method.
-        visited: Regions; those that the exploration comes to are added.
-        random: Random numbers.
-
-    Yields:
-        Neighbours of a point, or points along a direction.
-
-    Returns:
-        The best point.
-    """
+    """Explore from a point, until there is no new best for a while."""
     here, best, step, failures = start, start, settings.step, 0
     tabu = TabuList(settings.tabu_list, settings.tabu_radius, settings.semi_tabu_radius)
     while failures < settings.patience:
@@ -189,18 +165,7 @@ def _judged_unless_tabu(unit: Floats, tabu: TabuList) -> Generator[Floats, Float
 def neighbours(
     unit: Floats, axes: Axes, step: float, tabu: TabuList, random: RandomNumbers
 ) -> Floats:
-    """Give a neighbour in each variable, on the side that leads out of semi-tabu regions.
-
-    Args:
-        unit: (d,) where from.
-        axes: Of the space.
-        step: Distance [unit]; of an integer at least one.
-        tabu: Points that were visited.
-        random: Random numbers, for the side where no region decides and for choices.
-
-    Returns:
-        (d, d) unit positions.
-    """
+    """Give a neighbour in each variable, on the side that leads out of semi-tabu regions."""
     d, space = len(unit), axes.space
     away, draws = tabu.way_out(unit), random.uniform(d)
     sides = np.where(away == 0.0, np.where(draws < 0.5, -1.0, 1.0), np.sign(away))
@@ -219,17 +184,7 @@ def neighbours(
 
 
 def descent_direction(here: Point, trials: list[Point], axes: Axes) -> Floats:
-    """The approximate descent direction that neighbours give (Hedar and Fukushima 2004).
-
-    Args:
-        here: The point.
-        trials: Neighbours of it.
-        axes: Of the space.
-
-    Returns:
-        (d,) of length 1, the directions from the neighbours, weighted by how much they are worse;
-        0 if none can be given.
-    """
+    """The approximate descent direction that neighbours give (Hedar and Fukushima 2004)."""
     direction = np.zeros(len(here.unit))
     for trial in trials:
         away = np.where(axes.space.categorical, 0.0, here.unit - trial.unit)
@@ -244,46 +199,22 @@ class TabuList:
     """The last points that were visited, with the regions around them."""
 
     def __init__(self, length: int, radius: float, semi_radius: float) -> None:
-        """Begin with no point.
-
-        Args:
-            length: Points that are remembered.
-            radius: Of a tabu region, in the variable in which points differ most [unit].
-            semi_radius: Of a semi-tabu region [unit].
-        """
+        """Begin with no point."""
         self._length: Final = length
         self._radius: Final = radius
         self._semi_radius: Final = semi_radius
         self._points: list[Floats] = []
 
     def visit(self, unit: Floats) -> None:
-        """Remember a point, and forget the oldest beyond the list's length.
-
-        Args:
-            unit: (d,) the point.
-        """
+        """Remember a point, and forget the oldest beyond the list's length."""
         self._points = [*self._points, unit][-self._length :]
 
     def is_tabu(self, unit: Floats) -> bool:
-        """Tell whether a position lies in a tabu region.
-
-        Args:
-            unit: (d,) the position.
-
-        Returns:
-            Whether it does.
-        """
+        """Tell whether a position lies in a tabu region."""
         return any(float(np.abs(unit - point).max()) < self._radius for point in self._points)
 
     def way_out(self, unit: Floats) -> Floats:
-        """Give the direction out of semi-tabu regions.
-
-        Args:
-            unit: (d,) where from.
-
-        Returns:
-            (d,) from the centroid of the points in whose regions it lies, 0 if there are none.
-        """
+        """Give the direction out of semi-tabu regions."""
         near = [p for p in self._points if float(np.abs(unit - p).max()) < self._semi_radius]
         return unit - np.array(near).sum(axis=0) / len(near) if near else np.zeros(len(unit))
 
@@ -292,22 +223,13 @@ class VisitedRegions:
     """Regions that were explored, with how often."""
 
     def __init__(self, dimension: int, radius: float) -> None:
-        """Begin with no region.
-
-        Args:
-            dimension: Of the space.
-            radius: Of a region, in the variable in which points differ most [unit].
-        """
+        """Begin with no region."""
         self._radius: Final = radius
         self._centres: Floats = np.empty((0, dimension))
         self._visits: Floats = np.empty(0)
 
     def visit(self, unit: Floats) -> None:
-        """Count a visit to the nearest region; a point outside of all is the centre of a new one.
-
-        Args:
-            unit: (d,) the point.
-        """
+        """Count a visit to the nearest region; a point outside of all is the centre of a new one"""
         distances = np.abs(self._centres - unit).max(axis=1)
         if (distances < self._radius).any():
             self._visits[int(np.argmin(distances))] += 1.0
@@ -316,15 +238,7 @@ class VisitedRegions:
             self._visits = np.append(self._visits, 1.0)
 
     def farthest(self, candidates: Floats) -> Floats:
-        """Choose where to go next.
-
-        Args:
-            candidates: (n, d) unit positions.
-
-        Returns:
-            (d,) the first one that is outside of all regions, whose radii count larger by half for
-            each doubling of their visits; if there is none, the one that is least inside.
-        """
+        """Choose where to go next."""
         # Their number of digits in base 2 is the same on every processor.
         doublings = np.frexp(self._visits)[1] - 1
         radii = self._radius * (1.0 + 0.5 * doublings)

@@ -63,16 +63,6 @@ def mads(
     one, with another seed, and keeps nothing. A random design that fails is left at once. A choice
     of more than two is an integer to NOMAD, its index. No design is judged twice, but where
     draws find no other.
-
-    Args:
-        settings: Of the method.
-        space: The box that is searched.
-        budget: Evaluations of the planned run.
-        random: Its random numbers.
-        start: What was evaluated before; the first run begins at its best.
-
-    Yields:
-        (n, d) positions: the design that a run begins at, or a block of a poll.
     """
     known: dict[bytes, float] = {}
     nomad = Nomad()

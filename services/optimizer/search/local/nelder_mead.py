@@ -68,16 +68,6 @@ def nelder_mead(
 
     Integers of few values and choices are held by a simplex and polled before and after it; a
     simplex is never smaller than one in an integer of many values. Bounds are kept by projection.
-
-    Args:
-        settings: Of the method.
-        space: The box that is searched.
-        budget: Evaluations of the planned run.
-        random: Its random numbers.
-        start: The first simplex is around the best of these; None: of a random sample.
-
-    Returns:
-        The proposals.
     """
     first = known_points(space, start)[:1]
     return evaluated_once(space, _restarted(settings, Axes(space), random, first), start)
@@ -101,21 +91,7 @@ def _restarted(
 def simplex_search(
     start: Point, axes: Axes, edge: float, tolerance: float, least: float = 1e-9
 ) -> Walk:
-    """Move a simplex over the smooth variables until it has converged.
-
-    Args:
-        start: A vertex, already judged.
-        axes: Of the space.
-        edge: Of the first simplex [unit].
-        tolerance: Difference of fitness in a converged simplex, as a share of the best.
-        least: Extent in every variable of a converged simplex [unit].
-
-    Yields:
-        (n, d) unit positions: n vertices of a first or shrunken simplex, or one trial point.
-
-    Returns:
-        The best vertex.
-    """
+    """Move a simplex over the smooth variables until it has converged."""
     smooth = axes.smooth
     n = len(smooth)
     # Gao and Han (2012), equation 4.1; in one dimension they would shrink to a point.

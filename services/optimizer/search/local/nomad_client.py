@@ -37,29 +37,12 @@ class Nomad:
     def begin(
         self, x0: list[float], lower: list[float], upper: list[float], parameters: list[str]
     ) -> Block | None:
-        """Begin a run, where none is under way.
-
-        Args:
-            x0: (d,) the point that it begins with.
-            lower: (d,) lower bounds.
-            upper: (d,) upper bounds.
-            parameters: Of NOMAD, a line each.
-
-        Returns:
-            The first points to evaluate; None if the run has ended.
-        """
+        """Begin a run, where none is under way."""
         run = {"x0": x0, "lower": lower, "upper": upper, "parameters": parameters}
         return self._exchange(json.dumps(run))
 
     def tell(self, values: list[float | None]) -> Block | None:
-        """Give what the last points are worth.
-
-        Args:
-            values: Of each of them, None for one that failed.
-
-        Returns:
-            The next points to evaluate; None if the run has ended.
-        """
+        """Give what the last points are worth."""
         return self._exchange(json.dumps({"values": values}))
 
     def close(self) -> None:

@@ -73,16 +73,6 @@ def pattern_search(
     design. When its mesh is below the tolerance, and no neighbour in the integers and choices is
     better, it begins anew at another one and keeps nothing. A random design that fails is left at
     once.
-
-    Args:
-        settings: Of the method.
-        space: The box that is searched.
-        budget: Evaluations of the planned run.
-        random: Its random numbers.
-        start: What was evaluated before; the first search begins at its best.
-
-    Yields:
-        (n, d) positions: a random design, or a poll of up to 2d designs and all other choices.
     """
     judged = Judged(space)
     if start is not None:
@@ -111,17 +101,6 @@ def polls(
     step is the mesh size times the variable's range; a step beyond a bound ends at it. Integers go
     by whole numbers, at least by one; of a categorical variable, a poll has all other choices. The
     best design that is better becomes the next centre.
-
-    Args:
-        settings: Of mesh and poll.
-        space: The box that is searched.
-        start: (d,) the design to start from.
-        fitness: What it is worth.
-        judged: Designs that are left out; what is polled is added.
-        random: Random numbers, for the order.
-
-    Yields:
-        (n, d) positions of designs that were not judged before.
     """
     mesh = settings.initial_mesh
     centre = start

@@ -23,20 +23,6 @@ def unirandi(
     After two directions of which neither side was better, the step is halved; the walk ends when
     it is at its least, or when the last step that was better gained next to nothing. An integer is
     moved by what the direction comes to, which may be less than one and then is no move in it.
-
-    Args:
-        start: Where from, already judged.
-        axes: Of the space; smooth variables are moved, the others held.
-        random: Random numbers.
-        step: First step [unit].
-        tolerance: Gain of a last step, as a share of the fitness.
-        least: Step that ends the walk [unit].
-
-    Yields:
-        (1, d) unit positions.
-
-    Returns:
-        The best point.
     """
     here, failures, is_level = start, 0, False
     while True:

@@ -71,11 +71,7 @@ class Axes:
     """
 
     def __init__(self, space: Space) -> None:
-        """Sort the variables.
-
-        Args:
-            space: The box.
-        """
+        """Sort the variables."""
         few = space.categorical | (space.integer & (space.span < FEW_VALUES))
         self.space: Final = space
         self.smooth: Final[Indices] = np.flatnonzero(~few)
@@ -83,26 +79,12 @@ class Axes:
         self.least: Final[Floats] = np.where(space.integer, 1.0 / space.span, 0.0)
 
     def design(self, unit: Floats) -> Floats:
-        """Give what is judged for a unit position.
-
-        Args:
-            unit: (d,) inside the box.
-
-        Returns:
-            (d,) the design.
-        """
+        """Give what is judged for a unit position."""
         design: Floats = self.space.designs(self.space.from_unit(unit[None]))[0]
         return design
 
     def neighbours(self, unit: Floats) -> Floats:
-        """Unit positions that differ in one polled variable: an integer by one, or another choice.
-
-        Args:
-            unit: (d,) where from.
-
-        Returns:
-            (n, d), n >= 0.
-        """
+        """Unit positions that differ in one polled variable: an integer by one, or a choice."""
         here = self.design(unit)
         found = []
         for j in self.polled.tolist():
@@ -120,30 +102,13 @@ class Axes:
         return np.array(found, dtype=np.float64).reshape(-1, self.space.dimension)
 
     def random(self, random: RandomNumbers, count: int) -> Floats:
-        """Draw unit positions of designs that are uniform in the box.
-
-        Args:
-            random: Where the numbers are from.
-            count: Of positions.
-
-        Returns:
-            (count, d).
-        """
+        """Draw unit positions of designs that are uniform in the box."""
         unit = random.uniform(count, self.space.dimension)
         return self.space.to_unit(self.space.evenly(unit))
 
 
 def gains(new: Point, old: Point, tolerance: float) -> bool:
-    """Tell whether a point is better than another one by more than a tolerance.
-
-    Args:
-        new: The point.
-        old: The other one.
-        tolerance: As a share of the other one's fitness.
-
-    Returns:
-        Whether it is; any success is better than a failed evaluation.
-    """
+    """Tell whether a point is better than another one by more than a tolerance."""
     if not math.isfinite(old.fitness):
         return new.fitness < old.fitness
     return new.fitness < old.fitness - tolerance * abs(old.fitness)
@@ -152,19 +117,7 @@ def gains(new: Point, old: Point, tolerance: float) -> bool:
 def sampled(
     axes: Axes, random: RandomNumbers, count: int
 ) -> Generator[Floats, Floats, list[Point]]:
-    """Judge random positions, as one batch.
-
-    Args:
-        axes: Of the space.
-        random: Random numbers.
-        count: Of positions.
-
-    Yields:
-        (count, d) unit positions.
-
-    Returns:
-        The points, best first.
-    """
+    """Judge random positions, as one batch."""
     unit = axes.random(random, count)
     fitness = yield unit
     order = np.argsort(fitness, kind="stable")
@@ -172,32 +125,14 @@ def sampled(
 
 
 def judged(unit: Floats) -> Walk:
-    """Judge one position, brought to the nearest face of the box.
-
-    Args:
-        unit: (d,) unit position, anywhere.
-
-    Yields:
-        (1, d) the position inside the box.
-
-    Returns:
-        It, with its fitness.
-    """
+    """Judge one position, brought to the nearest face of the box."""
     inside = np.clip(unit, 0.0, 1.0)
     fitness = yield inside[None]
     return Point(inside, float(fitness[0]))
 
 
 def known_points(space: Space, start: Start | None) -> list[Point]:
-    """Give what was judged before a method began.
-
-    Args:
-        space: The box.
-        start: Positions with their fitness; None for none.
-
-    Returns:
-        The points that did not fail, best first.
-    """
+    """Give what was judged before a method began."""
     if start is None:
         return []
     positions, fitness = start.best_first
@@ -206,18 +141,7 @@ def known_points(space: Space, start: Start | None) -> list[Point]:
 
 
 def poll(start: Point, axes: Axes) -> Walk:
-    """Go to the best neighbour in the polled variables as long as it is better.
-
-    Args:
-        start: Where from.
-        axes: Of the space.
-
-    Yields:
-        All neighbours of a point, as one batch.
-
-    Returns:
-        A point that is no worse than its neighbours; `start` itself if none was better.
-    """
+    """Go to the best neighbour in the polled variables as long as it is better."""
     here = start
     while True:
         near = axes.neighbours(here.unit)
@@ -231,19 +155,7 @@ def poll(start: Point, axes: Axes) -> Walk:
 
 
 def mixed(start: Point, axes: Axes, search: LocalSearch) -> Walk:
-    """Search smooth variables by a local search and the others by polls, in turn.
-
-    Args:
-        start: Where from.
-        axes: Of the space.
-        search: Of the smooth variables; it holds the others.
-
-    Yields:
-        Unit positions (n, d).
-
-    Returns:
-        Where neither finds anything better.
-    """
+    """Search smooth variables by a local search and the others by polls, in turn."""
     here, scale = (yield from poll(start, axes)), 1.0
     if not len(axes.smooth):
         return here
@@ -261,14 +173,6 @@ def evaluated_once(space: Space, search: Endless, start: Start | None = None) ->
     A design that was judged is answered from memory. Where there is nothing new to ask for, as in a
     space of a few designs that are all known, one is asked for again from time to time: a method
     never ends.
-
-    Args:
-        space: The box.
-        search: Yields unit positions; outside of the box they are brought to its nearest face.
-        start: Positions that were judged before.
-
-    Yields:
-        (n, d) positions.
     """
     known: dict[bytes, float] = {}
     if start is not None:

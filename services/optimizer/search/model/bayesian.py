@@ -81,16 +81,6 @@ def bayesian(
     Ginsbourger et al. 2010). The model sees designs: integers rounded, choices as 0 and 1. Where
     the region has shrunk to nothing, it starts anew with another sample, and keeps nothing. Bits
     may differ between processors, as LAPACK's do; it is held to one thread.
-
-    Args:
-        settings: Of the method.
-        space: The box that is searched.
-        budget: Evaluations of the planned run.
-        random: Its random numbers.
-        start: What the first model knows beside its sample.
-
-    Yields:
-        (sample, d) and then (batch, d) positions.
     """
     known = (np.empty((0, space.dimension)), np.empty(0))
     if start is not None:

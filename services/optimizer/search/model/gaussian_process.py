@@ -26,11 +26,7 @@ class GaussianProcess:
     """A model of fitness that sees integers rounded and choices as 0 and 1 (scikit-learn)."""
 
     def __init__(self, space: Space) -> None:
-        """Create a model that knows nothing.
-
-        Args:
-            space: The box that is searched.
-        """
+        """Create a model that knows nothing."""
         from sklearn.gaussian_process.kernels import (  # noqa: PLC0415 - optional, slow to import
             ConstantKernel,
             Matern,
@@ -46,26 +42,12 @@ class GaussianProcess:
         self._least = 0.0
 
     def nearest(self, designs: Floats, centre: Floats, most: int) -> NDArray[np.intp]:
-        """Which designs are nearest to one.
-
-        Args:
-            designs: (n, d).
-            centre: (d,).
-            most: How many of them, at most.
-
-        Returns:
-            (min(n, most),) indices in rising order.
-        """
+        """Which designs are nearest to one."""
         offset = self._features(designs) - self._features(centre[np.newaxis])
         return np.sort(np.argsort(np.square(offset).sum(axis=1), kind="stable")[:most])
 
     def fit(self, designs: Floats, values: Floats) -> None:
-        """Fit by the likelihood, from the last fit on.
-
-        Args:
-            designs: (n, d).
-            values: (n,) of mean 0 and variance 1 or less.
-        """
+        """Fit by the likelihood, from the last fit on."""
         require_room_for_scipy()
         from scipy.optimize import minimize  # noqa: PLC0415 - slow to import
         from sklearn.gaussian_process import GaussianProcessRegressor  # noqa: PLC0415
@@ -95,11 +77,7 @@ class GaussianProcess:
         self._model, self._least = model, float(values.min())
 
     def sides(self) -> Floats:
-        """Sides of a region that is long where the fitness changes little.
-
-        Returns:
-            (d,) of a product of 1; those of choices have no meaning.
-        """
+        """Sides of a region that is long where the fitness changes little."""
         lengths = self._kernel.k1.k2.length_scale
         first = np.cumsum(self._widths()) - self._widths()
         sides: Floats = np.atleast_1d(lengths)[first]
@@ -107,15 +85,7 @@ class GaussianProcess:
         return scaled
 
     def batch(self, candidates: Floats, count: int) -> Floats:
-        """Choose designs by expected improvement, each as if those before were as expected.
-
-        Args:
-            candidates: (n, d) designs.
-            count: How many to choose.
-
-        Returns:
-            (count, d), different from each other as far as there are so many.
-        """
+        """Choose designs by expected improvement, each as if those before were as expected."""
         require_room_for_scipy()
         from scipy.special import ndtr  # noqa: PLC0415 - slow to import
 

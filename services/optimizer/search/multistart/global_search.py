@@ -119,16 +119,6 @@ def global_search(
     A cycle's sample is one batch. Local searches run one after the other, because what one finds
     decides whether the next is needed. They move continuous variables and integers of many values;
     other integers and choices are held and polled.
-
-    Args:
-        settings: Of the method; they say which local search.
-        space: The box that is searched.
-        budget: Evaluations of the planned run.
-        random: Its random numbers.
-        start: These are part of the first sample.
-
-    Returns:
-        The proposals.
     """
     axes = Axes(space)
 
@@ -174,17 +164,7 @@ def _cycles(
 
 
 def critical_distance(count: int, dimension: int, alpha: float) -> float:
-    """Distance below which two sample points belong to one cluster.
-
-    Args:
-        count: Of all points that were drawn.
-        dimension: Of the space.
-        alpha: As in the settings.
-
-    Returns:
-        The distance in the variable in which they differ most [unit]; the source's, which is of
-        the box from -1 to 1, is twice as large.
-    """
+    """Distance below which two sample points belong to one cluster."""
     share: float = 1.0 - alpha ** (1.0 / max(count - 1, 1))
     return float(0.5 * share ** (1.0 / dimension))
 
@@ -198,11 +178,7 @@ class Clusters:
     """
 
     def __init__(self, axes: Axes) -> None:
-        """Begin without a cluster.
-
-        Args:
-            axes: Of the space.
-        """
+        """Begin without a cluster."""
         self.minima: list[Point] = []
         self.critical = 0.0
         self._categorical: Final = axes.space.categorical
@@ -211,11 +187,7 @@ class Clusters:
         self._cluster: dict[bytes, int] = {}
 
     def reduce(self, sample: list[Point]) -> None:
-        """Take the sample to be clustered; a point keeps the cluster that it was in.
-
-        Args:
-            sample: The points, best first.
-        """
+        """Take the sample to be clustered; a point keeps the cluster that it was in."""
         self._sample = [point for point in sample if np.isfinite(point.fitness)]
 
     def grow(self) -> None:
@@ -225,20 +197,11 @@ class Clusters:
             self._link(k, [*self._seeds[k], *members])
 
     def unclustered(self) -> Point | None:
-        """Give the best point that belongs to no cluster.
-
-        Returns:
-            The point; None if there is none.
-        """
+        """Give the best point that belongs to no cluster."""
         return next((point for point in self._sample if _key(point) not in self._cluster), None)
 
     def add(self, start: Point, found: Point) -> None:
-        """Take what a local search found.
-
-        Args:
-            start: Where it began, a point of the sample.
-            found: Where it ended: a known minimum, or that of a new cluster.
-        """
+        """Take what a local search found."""
         same = self._distances(found.unit, [minimum.unit for minimum in self.minima])
         near = np.flatnonzero(same < _SAME_MINIMUM * self.critical)
         if len(near):

@@ -61,15 +61,6 @@ def gsa(settings: GsaSettings, space: Space, budget: int, random: RandomNumbers)
     every variable is scaled to a range of 2, which nearly all have in the thesis's test functions.
 
     The schedule takes the budget; after it, all begins anew and nothing is kept.
-
-    Args:
-        settings: Of the method.
-        space: The box that is searched.
-        budget: Evaluations of the planned run.
-        random: Its random numbers.
-
-    Yields:
-        (particles, d) positions.
     """
     shape = settings.particles, space.dimension
     iterations = max(math.ceil(budget / settings.particles), 1)
@@ -90,14 +81,7 @@ def gsa(settings: GsaSettings, space: Space, budget: int, random: RandomNumbers)
 
 
 def masses(fitness: Floats) -> Floats:
-    """What masses are of what fitness (eq. 14, 15).
-
-    Args:
-        fitness: (n,), +inf for a failed evaluation.
-
-    Returns:
-        (n,) from 0 for the worst and the failed ones; the sum is 1. All equal if none is better.
-    """
+    """What masses are of what fitness (eq. 14, 15)."""
     alive = np.isfinite(fitness)
     if not alive.any():
         return np.full(len(fitness), 1.0 / len(fitness))
@@ -113,15 +97,6 @@ def accelerations(places: Floats, mass: Floats, attracting: int, random: RandomN
     """How the heaviest masses pull each one, for a gravitational constant of 1 (eq. 7 to 10, 21).
 
     A mass cancels out of its own acceleration, so that one of no mass moves, too.
-
-    Args:
-        places: (n, d).
-        mass: (n,), of sum 1.
-        attracting: How many of the heaviest ones attract.
-        random: Random numbers: one for each pair and variable.
-
-    Returns:
-        (n, d).
     """
     n, d = places.shape
     pull = np.zeros((n, d))

@@ -103,15 +103,7 @@ class ParticleSwarm(Generational[SwarmSettings, _SwarmState]):
     schema_version = 2
 
     def __init__(self, settings: SwarmSettings, space: Space, budget: int, seed: int) -> None:
-        """Create a swarm that has not been asked yet.
-
-        Args:
-            settings: of the method.
-            space: the box that is searched.
-            budget: evaluations of the planned run, over which inertia goes from its start to its
-                end.
-            seed: of all random numbers.
-        """
+        """Create a swarm that has not been asked yet."""
         super().__init__(settings, space, budget, seed)
         self._velocities = np.zeros((settings.particles, space.dimension))
         self.best_positions = np.tile(space.low, (settings.particles, 1))
@@ -119,20 +111,11 @@ class ParticleSwarm(Generational[SwarmSettings, _SwarmState]):
         self._informed_since = 0
 
     def propose(self) -> NDArray[np.float64]:
-        """Scatter the swarm, or move it on.
-
-        Returns:
-            (particles, d), inside the bounds.
-        """
+        """Scatter the swarm, or move it on."""
         return self._moved() if self.generations else self._scattered()
 
     def learn(self, positions: NDArray[np.float64], fitness: NDArray[np.float64]) -> None:
-        """Let each particle remember its best.
-
-        Args:
-            positions: (particles, d) of the swarm.
-            fitness: (particles,) of each, +inf for a failed evaluation.
-        """
+        """Let each particle remember its best."""
         self._remember(self.generations, positions, fitness)
 
     def rejudge(
@@ -141,13 +124,6 @@ class ParticleSwarm(Generational[SwarmSettings, _SwarmState]):
         """Let each particle remember its best of what it came by, by another fitness.
 
         Positions and velocities stay: the swarm goes on from where it is, towards other bests.
-
-        Args:
-            generations: (particles, d) positions and (particles,) fitness of all that were told, in
-                order.
-
-        Raises:
-            ValueError: This is not all that was told, or a generation was not told as a whole.
         """
         shape = self.best_positions.shape
         whole = all(positions.shape == shape for positions, _ in generations)
@@ -178,14 +154,7 @@ class ParticleSwarm(Generational[SwarmSettings, _SwarmState]):
         return memory | {"informed_since": self._informed_since} if drawn else memory
 
     def recall(self, state: _SwarmState) -> None:
-        """Take on what `memory` gave.
-
-        Args:
-            state: as it was parsed.
-
-        Raises:
-            ValueError: a shape is another, or something is outside the bounds.
-        """
+        """Take on what `memory` gave."""
         shape = self.best_positions.shape
         # The first generation may be of more start positions than there are particles.
         asked = shape[0] if state.generations else max(shape[0], len(self._start))
@@ -200,14 +169,7 @@ class ParticleSwarm(Generational[SwarmSettings, _SwarmState]):
         self._informed_since = state.informed_since
 
     def upgrade(self, state: dict[str, Any]) -> dict[str, Any]:
-        """Bring a state of version 1, which knew whole swarms only, to this one.
-
-        Args:
-            state: of any version.
-
-        Returns:
-            The same search's state in this version.
-        """
+        """Bring a state of version 1, which knew whole swarms only, to this one."""
         if state.get("schema_version") != 1 or not isinstance(state.get("asked"), bool):
             return state
         iteration, asked = state["iteration"], state["asked"]
@@ -290,17 +252,7 @@ def absorb(
     low: NDArray[np.float64],
     high: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Let a particle beyond a wall stop at it.
-
-    Args:
-        positions: (n, d), in the variables' own units.
-        velocities: (n, d), in the same units per iteration.
-        low: (d,) lower bounds.
-        high: (d,) upper bounds.
-
-    Returns:
-        Positions inside the bounds, and velocities without the components into a wall.
-    """
+    """Let a particle beyond a wall stop at it."""
     inside = np.clip(positions, low, high)
     return inside, np.where(inside == positions, velocities, 0.0)
 
@@ -311,17 +263,7 @@ def reflect(
     low: NDArray[np.float64],
     high: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Let a particle beyond a wall bounce, as often as it takes.
-
-    Args:
-        positions: (n, d), in the variables' own units.
-        velocities: (n, d), in the same units per iteration.
-        low: (d,) lower bounds.
-        high: (d,) upper bounds.
-
-    Returns:
-        Positions inside the bounds, and velocities, turned round after an odd number of bounces.
-    """
+    """Let a particle beyond a wall bounce, as often as it takes."""
     span = high - low
     outside = (positions < low) | (positions > high)
     phase = np.mod(positions - low, 2.0 * span)

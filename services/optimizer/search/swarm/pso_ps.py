@@ -52,17 +52,6 @@ def pso_ps(
 
     The searches take turns: each batch has one poll of each that goes on. When all have ended, it
     begins anew with another swarm and keeps nothing.
-
-    Args:
-        settings: Of the method.
-        space: The box that is searched.
-        budget: Evaluations of the planned run, of which the swarm has its share, in whole
-            iterations and at least one.
-        random: Its random numbers.
-        start: What was evaluated before, the first members of the first swarm.
-
-    Yields:
-        (n, d) positions: the swarm, or polls.
     """
     iterations = max(round(settings.swarm_share * budget / settings.particles), 1)
     while True:
@@ -96,15 +85,7 @@ def _begin(swarm: ParticleSwarm, start: Start) -> None:
 
 
 def best_members(swarm: ParticleSwarm, count: int) -> tuple[Floats, Floats]:
-    """The best designs that a swarm's particles remember.
-
-    Args:
-        swarm: That was told at least once.
-        count: How many designs, at most.
-
-    Returns:
-        (n, d) designs, the best first, each one once; and (n,) their fitness. None failed.
-    """
+    """The best designs that a swarm's particles remember."""
     designs = swarm.space.designs(swarm.best_positions)
     order = np.argsort(swarm.best_fitness, kind="stable")
     order = order[np.isfinite(swarm.best_fitness[order])]

@@ -68,16 +68,6 @@ def tlbo(
 
     Moves are in the variables' own units, as in the source. The teacher phase depends on where a
     variable has its zero.
-
-    Args:
-        settings: Of the method.
-        space: The box that is searched.
-        budget: Evaluations of the planned run.
-        random: Its random numbers.
-        start: What was evaluated before; the best of it are learners of the first class.
-
-    Yields:
-        (n, d) positions: what a class still lacks, or (particles, d) in a phase.
     """
     judged = Judged(space)
     known, worth = np.empty((0, space.dimension)), np.empty(0)

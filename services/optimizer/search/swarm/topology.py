@@ -13,12 +13,6 @@ def ring(particles: int) -> Links:
     """Links of a swarm in which each particle informs both its neighbours.
 
     The "lbest" swarm of Bratton and Kennedy (2007). The last particle is a neighbour of the first.
-
-    Args:
-        particles: Size of the swarm.
-
-    Returns:
-        Who informs whom.
     """
     every = np.arange(particles)
     informed = [every, (every + 1) % particles, (every - 1) % particles]
@@ -30,12 +24,6 @@ def random_informants(draws: NDArray[np.float64]) -> Links:
 
     The same one may be drawn twice, so how many inform a particle varies: the topology of the
     standard swarm of 2011 (Clerc 2012).
-
-    Args:
-        draws: (particles, k) random numbers in [0, 1), for k particles that each one informs.
-
-    Returns:
-        Who informs whom.
     """
     particles, k = draws.shape
     every = np.arange(particles)
@@ -44,15 +32,7 @@ def random_informants(draws: NDArray[np.float64]) -> Links:
 
 
 def leaders(links: Links, fitness: NDArray[np.float64]) -> NDArray[np.intp]:
-    """The best of those that inform each particle.
-
-    Args:
-        links: Who informs whom.
-        fitness: (particles,) the best that each one knows of itself, +inf for none.
-
-    Returns:
-        (particles,) indices.
-    """
+    """The best of those that inform each particle."""
     informs, informed = links
     worst_first = np.argsort(-fitness[informs], kind="stable")
     best = np.empty(len(fitness), dtype=np.intp)

@@ -1,4 +1,4 @@
-"""Runs migrations on the connection that `gaitswarm.services.optimizer.store.schema.migrate` hands over.
+"""Runs migrations on the connection that `services.optimizer.store.schema.migrate` hands over.
 
 Alembic executes this file; it is not a module to import. The transaction belongs to the caller.
 """

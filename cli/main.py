@@ -69,6 +69,28 @@ from gaitswarm.cli.output import (
     warnings_as_notes,
 )
 
+PANELS: Final = {
+    "Start here": ("optimize", "serve", "submit", "list", "status", "best", "simulate", "robot"),
+    "Jobs": (
+        *("watch", "history", "pause", "resume", "extend", "prioritize", "cancel", "fork"),
+        *("label", "keep", "delete", "diff", "runner"),
+    ),
+    "Analysis of jobs": (
+        *("rank", "front", "importance", "scenarios", "preferences", "plot"),
+        *("export", "evidence", "verify"),
+    ),
+    "Designs": ("compare", "certify", "robustness", "firmware"),
+    "Robots and measurements": (
+        *("gaits", "mjcf", "record", "recordings", "identify", "parameters"),
+        *("calibrate", "targets", "validate", "synthesize", "reconstruct"),
+    ),
+    "Installation": (
+        *("optimizers", "cases", "plugins", "token", "audit", "db", "bench"),
+        *("study", "tournament"),
+    ),
+}
+"""Commands in the order of the help text, by heading."""
+
 
 class _HelpAtOnce(TyperGroup):
     """Shows a command's help before anything is parsed: Typer imports Pydantic to read options.
@@ -87,12 +109,12 @@ class _HelpAtOnce(TyperGroup):
         return list(super().parse_args(ctx, args))
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """List commands with the whole of their first sentences, on as many lines as they take."""
-        commands = [(name, self.get_command(ctx, name)) for name in self.list_commands(ctx)]
-        with formatter.section("Commands"):
-            formatter.write_dl(
-                [(name, c.get_short_help_str(1000)) for name, c in commands if c and not c.hidden]
-            )
+        """List commands by panel, each with the whole of its first sentence."""
+        commands = {name: self.get_command(ctx, name) for name in self.list_commands(ctx)}
+        for panel, names in (PANELS if "optimize" in commands else {"Commands": commands}).items():
+            listed = [(name, commands[name]) for name in names if name in commands]
+            with formatter.section(panel):
+                formatter.write_dl([(name, c.get_short_help_str(1000)) for name, c in listed if c])
 
     def _command_named(self, context: Any, words: list[str]) -> tuple[Any, Any]:
         """The innermost command that is named, with its context; None where one is unknown."""

@@ -69,9 +69,17 @@ def test_help_after_two_dashes_is_an_argument(gaitswarm: Gaitswarm) -> None:
 
 
 def test_help_cuts_no_commands_sentence(gaitswarm: Gaitswarm) -> None:
-    listed = gaitswarm("--help").out.split("Commands:")[1]
+    listed = gaitswarm("--help").out.split("Start here:")[1]
     assert "..." not in listed
     assert "search methods of other" in listed
+
+
+def test_help_lists_every_command_once_and_the_eight_main_ones_first(gaitswarm: Gaitswarm) -> None:
+    every: Any = commands()
+    listed = re.findall(r"^  ([a-z][a-z-]*)  ", gaitswarm("--help").out, re.MULTILINE)
+    assert sorted(listed) == sorted(every.commands)
+    main = ["optimize", "serve", "submit", "list", "status", "best", "simulate", "robot"]
+    assert listed[:8] == main
 
 
 def test_help_documents_the_exit_codes(gaitswarm: Gaitswarm) -> None:

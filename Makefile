@@ -15,7 +15,7 @@ DB_OPTION := --db $(DB)
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help demo serve page manual wheel bench test test-all test-firefox unit lint lint-code lint-page format pictures lock clean setup setup-dev setup-manual page-if-possible
+.PHONY: help demo serve page manual wheel research bench test test-all test-firefox unit lint lint-code lint-page format pictures lock clean setup setup-dev setup-manual page-if-possible
 
 help: ## Show this list.
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' Makefile
@@ -40,6 +40,9 @@ wheel: setup page-if-possible manual ## Build a wheel into dist/, with the page,
 	@$(BIN)/python -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .
 	@rm -rf sim/compiler/prebuilt
 
+research: setup-dev ## Compare search methods in a small experiment of the research package.
+	@$(BIN)/gaitswarm-research --help
+
 bench: setup ## Measure the simulator on one core of this machine.
 	@$(BIN)/gaitswarm bench $(ARGS)
 
@@ -47,20 +50,21 @@ bench: setup ## Measure the simulator on one core of this machine.
 test test-all unit: export PYTHONDONTWRITEBYTECODE =
 
 test: EACH_ONCE = -m "not thorough"
+test: FOLDERS = tests
 test test-all: setup-dev
 	@scripts/npm.sh --if-possible test
 	@scripts/page.sh --if-possible
-	@$(BIN)/python -m pytest $(WORKERS) $(EACH_ONCE) $(ARGS)
+	@$(BIN)/python -m pytest $(WORKERS) $(EACH_ONCE) $(FOLDERS) $(ARGS)
 
 test: ## Test all that the program does; what is of the page needs node with npm, and Chromium.
-test-all: ## Test it with other robots, methods and processors too, and at length; CI does.
+test-all: ## Test it with other robots, methods and processors too, and the research package; CI does.
 
 test-firefox: setup-dev page ## Go the page's main path in Firefox; installs Debian's where there is none.
 	@scripts/browser.sh firefox
 	@GAITSWARM_REQUIRE_FIREFOX=1 $(BIN)/python -m pytest tests/web/test_firefox.py $(ARGS)
 
 unit: setup-dev ## Run the fast tests only.
-	@$(BIN)/python -m pytest $(WORKERS) -m "not slow and not thorough" $(ARGS)
+	@$(BIN)/python -m pytest $(WORKERS) -m "not slow and not thorough" tests $(ARGS)
 
 lint: lint-code lint-page ## Check style, types, imports between packages and declared dependencies.
 
@@ -70,6 +74,7 @@ lint-code: setup-dev
 	@$(BIN)/mypy
 	@$(BIN)/lint-imports
 	@$(BIN)/deptry .
+	@$(BIN)/deptry --config research/pyproject.toml research/gaitswarm_research
 
 lint-page: setup-dev
 	@scripts/npm.sh --if-possible run check

@@ -68,7 +68,8 @@ install_with_pips() {
         --require-hashes --only-binary :all: -r
 }
 
-key="$(cat "$lock" requirements/compiler.lock requirements/installer.lock pyproject.toml scripts/setup.sh | cksum) $PWD ${PYTHON:-}"
+key="$(cat "$lock" requirements/compiler.lock requirements/installer.lock pyproject.toml research/pyproject.toml \
+    scripts/setup.sh | cksum) $PWD ${PYTHON:-}"
 stamp="$venv/installed-$1"
 if [ -x "$venv/bin/gaitswarm" ] && is_suitable "$venv/bin/python" \
     && [ "$(cat "$stamp" 2>/dev/null)" = "$key" ]; then
@@ -95,6 +96,7 @@ if ! has_compiler; then
         || say "that failed; simulation falls back to the slow reference interpreter"
 fi
 install --no-build-isolation --editable .
+if [ "$1" = dev ]; then install --no-build-isolation --editable ./research; fi
 # On all processors, which pip does on one. What cannot be compiled is never imported, nor are the
 # tests that packages bring, Ray's libraries for learning, what is compiled to C besides, and
 # parts that nothing here asks for.

@@ -1,0 +1,1 @@
+"""Research on the public library of gaitswarm."""

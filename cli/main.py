@@ -5,7 +5,6 @@ Commands import what they need when they run, so that `gaitswarm --help` answers
 
 from __future__ import annotations
 
-import gc
 import sys
 import traceback
 from collections.abc import Callable, Sequence
@@ -207,15 +206,9 @@ for _module in (
 
 def main() -> None:
     """Entry point of the console script."""
-    gc.set_threshold(*_COLLECTED)
     replace_closed_streams()
     warnings_as_notes()
     sys.exit(run(sys.argv[1:]))
-
-
-_COLLECTED: Final = (5_000, 10, 20)
-"""When objects in cycles are looked for, as of `gc.set_threshold`. A search among all stops every
-thread of a server for up to a tenth of a second (docs/decisions/0064-answers-first.md)."""
 
 
 @cache

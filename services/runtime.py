@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import partial
 from queue import SimpleQueue
 from types import FrameType
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from gaitswarm.services.optimizer.analysis.reference import note_reference
 from gaitswarm.services.optimizer.deletion import Housekeeping
@@ -35,10 +35,6 @@ if TYPE_CHECKING:
     from gaitswarm.services.monitoring.tracing import Tracing
 
 
-_NICENESS: Final = 10
-"""Of walks beside a server: people wait for its answers."""
-
-
 def open_evaluator(
     kind: EvaluatorKind = "ray",
     *,
@@ -46,14 +42,13 @@ def open_evaluator(
     cpus: int | None = None,
     should_stop: Callable[[], bool] = lambda: False,
     patient: bool = False,
-    niceness: int = 0,
 ) -> InProcessEvaluator | HybridEvaluator | RayEvaluator:
     """Open workers for walks."""
     check_address(address)
     if kind == "in-process":
-        return InProcessEvaluator(cpus, niceness=niceness)
+        return InProcessEvaluator(cpus)
     if address is None:
-        return HybridEvaluator(cpus, niceness=niceness)
+        return HybridEvaluator(cpus)
     cluster = RayEvaluator(address, cpus=cpus)
     if patient:
         cluster.stay_connected(should_stop)
@@ -154,7 +149,6 @@ def open_runtime(
             cpus=cpus,
             should_stop=should_stop,
             patient=True,
-            niceness=_NICENESS,
         )
         stack.callback(workers.close)
         if metrics is not None:

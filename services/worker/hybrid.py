@@ -39,7 +39,6 @@ class HybridEvaluator:
     Args:
         cpus: Walks to compute at once; all processors by default.
         long_job_seconds: Ray is started for a job that is expected to take longer yet [s].
-        niceness: Of the threads, as for `InProcessEvaluator`; Ray's workers have one of their own.
 
     Raises:
         ValueError: cpus is less than 1.
@@ -50,11 +49,10 @@ class HybridEvaluator:
         cpus: int | None = None,
         *,
         long_job_seconds: float = LONG_JOB_SECONDS,
-        niceness: int = 0,
     ) -> None:
         self._long_job_seconds = long_job_seconds
         self._kernels = KernelBuilder()
-        self._threads = InProcessEvaluator(cpus, niceness=niceness)
+        self._threads = InProcessEvaluator(cpus)
         self._changing = threading.Lock()
         self._ray: RayEvaluator | None = None
         self._without_ray = False

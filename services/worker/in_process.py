@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 import threading
 from collections.abc import Callable
 from functools import partial
@@ -26,20 +25,16 @@ class InProcessEvaluator:
 
     Args:
         cpus: Their number, all processors by default.
-        niceness: How far they stand back where other threads of this machine want their
-            processors, from 0 to 19, as of `nice`. Without effect but on Linux, where threads
-            have one of their own.
 
     Raises:
         ValueError: cpus is less than 1.
     """
 
-    def __init__(self, cpus: int | None = None, *, niceness: int = 0) -> None:
+    def __init__(self, cpus: int | None = None) -> None:
         slots = cpus if cpus is not None else available_cpus()
         if slots < 1:
             raise ValueError(f"cpus must be at least 1, it is {slots}")
         self._kernels = KernelBuilder()
-        self._niceness = niceness
         self._dispatcher = Dispatcher(slots, simulate.lanes, shared=True)
         self._threads = [
             threading.Thread(target=self._work, name=f"walks-{k}", daemon=True)
@@ -84,9 +79,6 @@ class InProcessEvaluator:
             thread.join()
 
     def _work(self) -> None:
-        if self._niceness and sys.platform == "linux":
-            # Of this thread alone, on Linux.
-            os.nice(self._niceness)
         while not self._dispatcher.closed:
             work = self._dispatcher.take(timeout=1.0)
             if work is None:

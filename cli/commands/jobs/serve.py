@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
@@ -65,65 +64,58 @@ def serve(
     options: RunnerOptions,
 ) -> None:
     """Serve the page and the REST API, and run queued jobs, until Ctrl-C."""
-    from contextlib import ExitStack
+    import logging
+    from dataclasses import asdict
 
-    with ExitStack() as starting:
-        starting.enter_context(_without_collection())
-        import logging
-        from dataclasses import asdict
+    from gaitswarm.api.app import create_app
+    from gaitswarm.api.connections import ConnectionLimits
+    from gaitswarm.api.page import is_built
+    from gaitswarm.api.server import ApiServer
+    from gaitswarm.cli.logs import log_to_stderr
+    from gaitswarm.cli.output import note
+    from gaitswarm.services.monitoring.activity import Activity
+    from gaitswarm.services.monitoring.metrics import Metrics
+    from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
+    from gaitswarm.settings import read_settings
 
-        from gaitswarm.api.app import create_app
-        from gaitswarm.api.connections import ConnectionLimits
-        from gaitswarm.api.page import is_built
-        from gaitswarm.api.server import ApiServer
-        from gaitswarm.cli.logs import log_to_stderr
-        from gaitswarm.cli.output import note
-        from gaitswarm.services.monitoring.activity import Activity
-        from gaitswarm.services.monitoring.metrics import Metrics
-        from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
-        from gaitswarm.settings import read_settings
-
-        settings = read_settings(
-            **asdict(options), api_host=host, api_port=port, robots=robots or None
+    settings = read_settings(**asdict(options), api_host=host, api_port=port, robots=robots or None)
+    log_to_stderr(settings.log_level, settings.log_format)
+    tell = note if settings.log_format == "console" else logging.getLogger("gaitswarm").info
+    metrics = Metrics()
+    activity = None if no_runner else Activity()
+    runs_jobs = not no_runner
+    with _runtime(
+        settings, metrics, runs_jobs=runs_jobs, keeps_house=True, activity=activity
+    ) as opened:
+        beside = opened.runner
+        components = _components(opened, beside)
+        app = create_app(
+            opened.service,
+            settings=settings,
+            components=components,
+            metrics=metrics,
+            activity=activity,
         )
-        log_to_stderr(settings.log_level, settings.log_format)
-        tell = note if settings.log_format == "console" else logging.getLogger("gaitswarm").info
-        metrics = Metrics()
-        activity = None if no_runner else Activity()
-        runs_jobs = not no_runner
-        with _runtime(
-            settings, metrics, runs_jobs=runs_jobs, keeps_house=True, activity=activity
-        ) as opened:
-            beside = opened.runner
-            components = _components(opened, beside)
-            app = create_app(
-                opened.service,
-                settings=settings,
-                components=components,
-                metrics=metrics,
-                activity=activity,
+        try:
+            server = ApiServer(
+                app,
+                host=settings.api_host,
+                port=settings.api_port,
+                shutdown_seconds=settings.api_shutdown_seconds,
+                drain=lambda at_once: _drain(beside, settings, at_once),
+                limits=ConnectionLimits.of(settings),
             )
-            try:
-                server = ApiServer(
-                    app,
-                    host=settings.api_host,
-                    port=settings.api_port,
-                    shutdown_seconds=settings.api_shutdown_seconds,
-                    drain=lambda at_once: _drain(beside, settings, at_once),
-                    limits=ConnectionLimits.of(settings),
-                )
-            except OSError as error:
-                raise EvaluatorUnavailable(
-                    f"cannot listen: {error.strerror}; choose another --port, or --port 0"
-                ) from error
-            doing = "runs no jobs" if beside is None else "runs queued jobs"
-            if not is_built():
-                tell("there is no page, only the API: in a checkout, `make page` builds the page")
-            tell(f"gaitswarm serves {server.url} and {doing}; {server.url}/docs; Ctrl-C ends it")
-            if settings.tokens_required:
-                _tell_of_tokens(tell, opened.service.store.tokens.create_first(), server.url)
-            starting.close()
-            server.run()
+        except OSError as error:
+            raise EvaluatorUnavailable(
+                f"cannot listen: {error.strerror}; choose another --port, or --port 0"
+            ) from error
+        doing = "runs no jobs" if beside is None else "runs queued jobs"
+        if not is_built():
+            tell("there is no page, only the API: in a checkout, `make page` builds the page")
+        tell(f"gaitswarm serves {server.url} and {doing}; {server.url}/docs; Ctrl-C ends it")
+        if settings.tokens_required:
+            _tell_of_tokens(tell, opened.service.store.tokens.create_first(), server.url)
+        server.run()
 
 
 @with_groups
@@ -206,17 +198,6 @@ def _tell_of_tokens(tell: Callable[[str], None], secret: str | None, url: str) -
         f"  the page with it: {url}/#token={secret}\n"
         "`gaitswarm token create NAME` makes more, and `gaitswarm token revoke first` ends this one"
     )
-
-
-@contextmanager
-def _without_collection() -> Iterator[None]:
-    """Objects that a start makes are to stay: looking for garbage among them would delay it."""
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.freeze()
-        gc.enable()
 
 
 def _runtime(

@@ -16,7 +16,7 @@ from gaitswarm.services.worker.cluster.nodes import (
     Nodes,
     Wanted,
 )
-from gaitswarm.services.worker.cluster.shared_cases import CaseShelf, run_behind_others, sent
+from gaitswarm.services.worker.cluster.shared_cases import CaseShelf, run_sent, sent
 from gaitswarm.services.worker.cluster.shares import Shares
 from gaitswarm.services.worker.dispatch import Dispatcher, Work
 from gaitswarm.services.worker.ray_session import RaySession
@@ -63,7 +63,7 @@ class Pump:
         self._warm = warm
         # Ray's own retries would run a task again behind our accounts.
         options = {"num_cpus": 1, "max_retries": 0}
-        self._walk = session.ray.remote(**options, name="run_in_worker")(run_behind_others)
+        self._walk = session.ray.remote(**options, name="run_in_worker")(run_sent)
         self._warm_up = session.ray.remote(**options)(warm_up)
         self._shelf = CaseShelf(session.ray)
         self._shares = None if session.directory is not None else Shares(session)

@@ -14,7 +14,6 @@ from types import ModuleType
 from typing import Any, Final
 
 from gaitswarm.services.worker.cluster.interrupts import interrupted_outside_imports
-from gaitswarm.services.worker.cluster.priority import Priority
 from gaitswarm.services.worker.tasks import Answer, Failure, Task, run_in_worker
 from gaitswarm.sim.case import Case
 
@@ -22,8 +21,6 @@ _KEPT: Final = 32
 """Lists of cases, of as many jobs: those that were used last."""
 
 _MISSING_IN_MODULE: Final = re.compile(r"module '[\w.]+' has no attribute")
-
-_PRIORITY: Final = Priority()
 
 _received: Final[OrderedDict[str, tuple[Case, ...]]] = OrderedDict()
 """In a worker, by key."""
@@ -130,19 +127,6 @@ def sent(task: Task, chosen: Sequence[int], shared: SharedCases) -> SentTask:
         The same task, without what its worker may have already.
     """
     return SentTask(replace(task, cases=()), shared, tuple(chosen))
-
-
-def run_behind_others(sent_task: SentTask) -> Answer | Failure:
-    """The body of a remote task: first the process is put behind all others of the machine.
-
-    Args:
-        sent_task: What is to be run.
-
-    Returns:
-        As of `run_sent`.
-    """
-    _PRIORITY.stand_back()
-    return run_sent(sent_task)
 
 
 def run_sent(sent_task: SentTask) -> Answer | Failure:

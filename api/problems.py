@@ -294,4 +294,4 @@ def _in_the_words_of_the_request(
     if in_body and not isinstance(body, dict):
         message = "send a JSON object as application/json; /docs has examples"
         return [FieldErrorView(field="body", message=message)]
-    return field_errors(in_parameters, {}) + field_errors(in_body, body)
+    return field_errors(in_parameters) + field_errors(in_body)

@@ -23,7 +23,7 @@ KeyboardInterrupt
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -83,15 +83,13 @@ class Interrupted(KeyboardInterrupt):
         )
 
 
-def invalid_request(
-    error: ValidationError, document: Mapping[str, Any], model: Any = None
-) -> InvalidRequest:
+def invalid_request(error: ValidationError, model: Any = None) -> InvalidRequest:
     """What pydantic found wrong, in the words of the input."""
     from gaitswarm.sim.input.wording import with_known_keys
     from gaitswarm.views import field_errors
 
     found = with_known_keys(error.errors(include_url=False), model)
-    first, *others = field_errors(found, document)
+    first, *others = field_errors(found)
     more = "".join(f"; {o.field}: {o.message}" if o.field else f"; {o.message}" for o in others)
     return InvalidRequest(first.message + more, field=first.field)
 

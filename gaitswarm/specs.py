@@ -152,7 +152,7 @@ def chosen_spec(spec: SpecInput | None, options: SpecOptions) -> AnySpec:
     try:
         return SPECS.validate_python(document)
     except ValidationError as error:
-        refused = invalid_request(error, document, AnySpec)
+        refused = invalid_request(error, AnySpec)
         raise (refused if file is None else file.located(refused)) from error
 
 

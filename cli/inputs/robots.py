@@ -34,7 +34,7 @@ def chosen_robot(text: str | None) -> str | RobotVariant | RobotFiles:
     try:
         robot: str | RobotVariant | RobotFiles = TypeAdapter(RobotSource).validate_python(data)
     except ValidationError as error:
-        raise _refusal(error, data, "robot") from error
+        raise _refusal(error, "robot") from error
     return robot
 
 
@@ -129,13 +129,13 @@ def _own_scenario(data: dict[str, Any]) -> Scenario:
     try:
         return Scenario.model_validate(data)
     except ValidationError as error:
-        raise _refusal(error, data, "scenario") from error
+        raise _refusal(error, "scenario") from error
 
 
-def _refusal(error: ValidationError, data: Any, option: str) -> InvalidRequest:
+def _refusal(error: ValidationError, option: str) -> InvalidRequest:
     from gaitswarm.views import field_errors
 
-    first = field_errors(error.errors(include_url=False), data, prefix=option)[0]
+    first = field_errors(error.errors(include_url=False), prefix=option)[0]
     return InvalidRequest(first.message, field=first.field)
 
 

@@ -209,7 +209,7 @@ def parse_spec(data: Mapping[str, Any]) -> AnySpec:
     try:
         spec = SPECS.validate_python(data)
     except ValidationError as error:
-        raise invalid_request(error, data, AnySpec) from error
+        raise invalid_request(error, AnySpec) from error
     spec.check_can_be_simulated()
     return spec
 

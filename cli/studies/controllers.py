@@ -153,7 +153,7 @@ def _runs(chapter: int, controller: str, name: str, robot: object, budget: Budge
         try:
             spec = JobSpec.model_validate({**document, "name": title[:200], "seed": seed})
         except ValidationError as error:
-            raise invalid_request(error, document) from error
+            raise invalid_request(error) from error
         specs.append(spec.with_gait_searched() if chapter == 3 else spec)
     return Runs(controller, tuple(specs))
 

@@ -130,7 +130,7 @@ def _contestant(
             spec = {**document, "worlds": own, "seed": seed, "name": name}
             specs.append(JobSpec.model_validate(spec))
         except ValidationError as error:
-            raise invalid_request(error, document) from error
+            raise invalid_request(error) from error
     return Contestant(title, worlds, tuple(specs))
 
 

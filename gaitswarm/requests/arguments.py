@@ -161,4 +161,4 @@ def checked(kind: type[M], document: dict[str, Any]) -> M:
     try:
         return kind.model_validate(document)
     except ValidationError as error:
-        raise invalid_request(error, document, kind) from error
+        raise invalid_request(error, kind) from error

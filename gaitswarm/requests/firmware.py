@@ -95,7 +95,7 @@ def firmware_request_of_best(
     try:
         return FirmwareRequest.model_validate(document)
     except ValidationError as error:
-        raise invalid_request(error, document) from error
+        raise invalid_request(error) from error
 
 
 def run_firmware(request: FirmwareRequest) -> Firmware:

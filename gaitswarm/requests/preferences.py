@@ -178,7 +178,7 @@ def _robustness_request(
     try:
         return RobustnessRequest.model_validate(document)
     except ValidationError as error:
-        raise invalid_request(error, document) from error
+        raise invalid_request(error) from error
 
 
 def _told(

@@ -9,7 +9,6 @@ from typing import Any, Final
 from pydantic import Field
 
 from gaitswarm.sim.input.choice import without_tags
-from gaitswarm.sim.input.former_names import as_written
 from gaitswarm.sim.input.wording import message_of
 from gaitswarm.views.base import View
 
@@ -56,15 +55,13 @@ class ProblemView(View):
     )
 
 
-def field_errors(
-    errors: Iterable[Mapping[str, Any]], document: Any, *, prefix: str = ""
-) -> list[FieldErrorView]:
-    """Errors of pydantic with the paths of the document, without repeats."""
+def field_errors(errors: Iterable[Mapping[str, Any]], *, prefix: str = "") -> list[FieldErrorView]:
+    """Return pydantic's errors by field, without repeats."""
     found = []
     for error in errors:
         if _follows_from_others(error):
             continue
-        location = as_written(document, without_tags(error["loc"]))
+        location = without_tags(error["loc"])
         path = ".".join(str(part) for part in (*([prefix] if prefix else []), *location))
         found.append(FieldErrorView.from_message(path, message_of(error)))
     return list(dict.fromkeys(found))

@@ -10,8 +10,6 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 
-from gaitswarm.sim.input import former_names
-from gaitswarm.sim.input.former_names import current_names
 from gaitswarm.sim.robot.bounds import Number, PartName
 
 ActuatorKind = Literal["dc", "torque"]
@@ -82,11 +80,6 @@ class Shaft(Data):
         ge=0.0,
         description="of the closed play, only with backlash [N m s/rad]",
     )
-
-    @model_validator(mode="before")
-    @classmethod
-    def _read_former_names(cls, document: Any) -> Any:
-        return current_names(document, former_names.ACTUATOR)
 
 
 class Actuator(Shaft):

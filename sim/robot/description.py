@@ -11,8 +11,6 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import ConfigDict, Field, model_validator
 
-from gaitswarm.sim.input import former_names
-from gaitswarm.sim.input.former_names import current_names
 from gaitswarm.sim.robot.actuators import (
     CONTROL_RATE,
     LARGEST_OUTPUT,
@@ -155,11 +153,6 @@ class Leg(Data):
     )
     contact: Contact | None = Field(default=None, description="this foot's own contact")
 
-    @model_validator(mode="before")
-    @classmethod
-    def _read_former_names(cls, document: Any) -> Any:
-        return current_names(document, former_names.ROBOT_FILE)
-
     @property
     def joints(self) -> tuple[str, str, str]:
         """Names of the joints in the URDF."""
@@ -233,11 +226,6 @@ class RobotDescription(Data):
         description="movable joints that belong to no leg, each with the angle at which it is held"
         " [rad]",
     )
-
-    @model_validator(mode="before")
-    @classmethod
-    def _read_former_names(cls, document: Any) -> Any:
-        return current_names(document, former_names.ROBOT_FILE)
 
     @model_validator(mode="after")
     def _names_exist(self) -> RobotDescription:

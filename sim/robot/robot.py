@@ -231,7 +231,7 @@ def parse_robot(toml: str, urdf: str) -> Robot:
     try:
         description = RobotDescription.model_validate(document)
     except ValidationError as error:
-        raise RobotFileError(first_problem(error, toml, document)) from error
+        raise RobotFileError(first_problem(error, toml)) from error
     with by_leg(toml, [leg.name for leg in description.legs]):
         return assembled(description, urdf)
 

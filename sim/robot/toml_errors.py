@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, Final
+from typing import Final
 
 from pydantic import BaseModel, ValidationError
 
 from gaitswarm.sim.errors import RobotFileError
-from gaitswarm.sim.input.former_names import as_written
 from gaitswarm.sim.input.wording import message_of, with_known_keys
 from gaitswarm.sim.robot.actuators import Actuator, Gearhead, Motor, TorqueActuator, TorqueCommand
 from gaitswarm.sim.robot.bounds import shortened
@@ -45,10 +44,10 @@ _PARTS: Final[tuple[type[BaseModel], ...]] = (
 )
 
 
-def first_problem(error: ValidationError, text: str, document: Mapping[str, Any]) -> str:
+def first_problem(error: ValidationError, text: str) -> str:
     """The first thing that is wrong."""
     first = with_known_keys(error.errors(), RobotDescription)[0]
-    location = as_written(document, _without_kind(first["loc"]))
+    location = _without_kind(first["loc"])
     where = shortened(".".join(str(part) for part in location))
     line = line_of(text, [part for part in location if not _is_class(part)])
     message = message_of(first)
@@ -115,7 +114,7 @@ def _split(key: str) -> list[str]:
 
 def _without_kind(location: tuple[str | int, ...]) -> tuple[str | int, ...]:
     """Pydantic names the kind of an actuator behind its name."""
-    if len(location) > 2 and location[0] in ("actuators", "drives"):
+    if len(location) > 2 and location[0] == "actuators":
         return (*location[:2], *location[3:])
     return location
 

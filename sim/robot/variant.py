@@ -9,9 +9,7 @@ from typing import Annotated, Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field, Tag, model_validator
 
-from gaitswarm.sim.input import former_names
 from gaitswarm.sim.input.choice import NAME, alternatives
-from gaitswarm.sim.input.former_names import current_names
 from gaitswarm.sim.robot.actuators import AnyActuator
 from gaitswarm.sim.robot.bounds import (
     DEEPEST,
@@ -52,11 +50,6 @@ class RobotVariant(BaseModel):
         description="Soles that the gait is planned for: nominal, all as the datasheet has them, or"
         " own, each leg's; null is the robot's own choice, nominal.",
     )
-
-    @model_validator(mode="before")
-    @classmethod
-    def _read_former_names(cls, document: Any) -> Any:
-        return current_names(document, former_names.ROBOT_VARIANT)
 
 
 class RobotFiles(BaseModel):

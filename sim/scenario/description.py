@@ -15,8 +15,6 @@ from pydantic import (
     model_validator,
 )
 
-from gaitswarm.sim.input import former_names
-from gaitswarm.sim.input.former_names import current_names
 from gaitswarm.sim.input.wording import message_of
 from gaitswarm.sim.scenario.usual_duty import USUAL_SUPPORT, with_duty_factor
 from gaitswarm.sim.variables import VariableName, split_name
@@ -237,8 +235,8 @@ class Scenario(BaseModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _read_former_names(cls, document: Any) -> Any:
-        return with_duty_factor(current_names(document, former_names.SCENARIO))
+    def _add_duty_factor(cls, document: Any) -> Any:
+        return with_duty_factor(document)
 
     @model_validator(mode="after")
     def _gait_is_one(self) -> Scenario:

@@ -39,17 +39,6 @@ def test_presets_are_written_out_when_a_job_is_submitted(client: httpx2.Client) 
     assert spec["preference"]["exponent"] == [0.1, 0.7, 0.3, 0.3, 0.1]
 
 
-def test_former_names_are_read_and_answered_with_the_current_ones(client: httpx2.Client) -> None:
-    walk = {"name": "own", "cycle_time": 1.5, "radius": 0.16, "withers": 0.15}
-    body = {**SPEC, "scenarios": [walk], "robot": {"gearlash": [2.5, 1, 1]}}
-    spec = client.post("/v1/jobs", json=body).json()["spec"]
-
-    assert spec["scenarios"][0]["hip_height"] == 0.15
-    assert "withers" not in spec["scenarios"][0]
-    assert spec["robot"]["backlash"] == [2.5, 1.0, 1.0]
-    assert "gearlash" not in spec["robot"]
-
-
 def test_the_same_key_and_body_make_one_job(client: httpx2.Client, store: SqlStore) -> None:
     first = client.post("/v1/jobs", json=SPEC, headers={"Idempotency-Key": "k1"})
     again = client.post("/v1/jobs", json=SPEC, headers={"Idempotency-Key": "k1"})

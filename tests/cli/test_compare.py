@@ -53,7 +53,6 @@ def test_a_design_file_is_compared_on_a_variant_of_the_robot(
         (["compare", "mpc:design.json"], "mpc"),
         (["compare", "--scenario", "moon"], "moon"),
         (["compare", "--robot", '{"backlash": 3}'], "robot.backlash"),
-        (["compare", "--robot", '{"gearlash": 3}'], "robot.gearlash"),
         (["compare", "--robot", "{"], "robot"),
         (["study", "steps", "--scenario", "moon"], "moon"),
         (["study", "noise", "--deviation", "5"], "deviation: 5 rad is more than 0.5 rad"),

@@ -52,17 +52,6 @@ def test_the_identified_robot_walks_by_its_name_and_as_a_variant(
     assert len({walk["objectives"]["energy"] for walk in walks}) == 3
 
 
-def test_files_with_former_names_walk_as_well(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    former = edited(tmp_path, "robot.toml", "actuators", "drives")
-    edited(tmp_path, "crawl.json", "hip_height", "withers")
-    assert run([*SIMULATE, "--robot", str(QUADRUPED), "--scenario", CRAWL]) == 0
-    walked = json.loads(capsys.readouterr().out)["scenarios"]
-    assert run([*SIMULATE, "--robot", str(former), "--scenario", str(former / "crawl.json")]) == 0
-    assert json.loads(capsys.readouterr().out)["scenarios"] == walked
-
-
 def test_a_job_with_a_quadruped_is_stored_with_its_robot(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:

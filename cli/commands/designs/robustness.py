@@ -118,7 +118,7 @@ def robustness_request(
     try:
         return RobustnessRequest.model_validate(data)
     except ValidationError as error:
-        raise invalid_request(error, data) from error
+        raise invalid_request(error) from error
 
 
 def estimate(request: RobustnessRequest) -> RobustnessView:

@@ -96,7 +96,7 @@ def simulate(
     try:
         request = SimulationRequest.model_validate(data)
     except ValidationError as error:
-        raise invalid_request(error, data) from error
+        raise invalid_request(error) from error
     view = run_simulation(request)
     if log is not None:
         from gaitswarm.cli.walk_log import write_walk_logs

@@ -57,7 +57,7 @@ def _request(preference: str, top: int) -> RankingRequest:
     try:
         return RankingRequest.model_validate(data)
     except ValidationError as error:
-        raise invalid_request(error, data) from error
+        raise invalid_request(error) from error
 
 
 def _print(ranking: RankingView) -> None:

@@ -101,7 +101,7 @@ def test_help_names_every_controller_that_there_is(name: str) -> None:
         assert f" {controller}" in shown
 
 
-@pytest.mark.parametrize("file", ["README.md", "docs/cli.md", "docs/robots.md"])
+@pytest.mark.parametrize("file", ["docs/cli.md", "docs/robots.md"])
 def test_documents_name_every_controller_that_there_is(file: str) -> None:
     text = (ROOT / file).read_text(encoding="utf-8")
     assert [name for name in CONTROLLERS.built_in if f"`{name}`" not in text] == []

@@ -33,10 +33,10 @@ from mujoco.rollout import Rollout
 
 from benchmarks.physics import ROBOT, pinocchio_aba
 from gaitswarm.sim.assembly import PHYSICS_RATE, control_steps, plan_walk
-from gaitswarm.sim.compiler.target import Target, target
+from gaitswarm.sim.compiler.compilation import Target, target
 from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
-from gaitswarm.sim.kernel.compiled.native import load_kernel
+from gaitswarm.sim.kernel.native import load_kernel
 from gaitswarm.sim.kernel.observation import WalkLog
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.mujoco.mjcf import Surroundings

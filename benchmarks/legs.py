@@ -21,7 +21,7 @@ import numpy as np
 
 from gaitswarm.robot_checks import standing_scenario
 from gaitswarm.sim.assembly import PHYSICS_RATE
-from gaitswarm.sim.kernel.batch import walk_together
+from gaitswarm.sim.kernel.walk import walk_together
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.proposal.document import propose_robot
 from gaitswarm.sim.robot import DEFAULT_ROBOT, Robot, load_robot, parse_robot

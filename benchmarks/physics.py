@@ -21,7 +21,7 @@ from gaitswarm.sim.assembly import PHYSICS_RATE, plan_walk
 from gaitswarm.sim.benchmark import measure
 from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.kernel.dynamics.physics_step import physics_model
-from gaitswarm.sim.kernel.readable.reference import Stepper
+from gaitswarm.sim.kernel.reference import Stepper
 from gaitswarm.sim.robot import load_robot
 from gaitswarm.sim.scenario import SCENARIOS
 

@@ -29,7 +29,7 @@ COMMAND = "from gaitswarm.cli.main import main; main()"
 # Notes when a kernel is first called: the clock is the same for all processes of a machine.
 WALK = f"""
 import sys, time
-from gaitswarm.sim.kernel.compiled.native import NativeKernel
+from gaitswarm.sim.kernel.native import NativeKernel
 walk = NativeKernel.walk
 def first(*arguments, **options):
     NativeKernel.walk = walk

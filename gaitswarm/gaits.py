@@ -10,8 +10,7 @@ from pydantic import Field
 from gaitswarm.errors import simulation_errors
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.sim.errors import BeyondJointLimit, UnreachablePose
-from gaitswarm.sim.gait.gaits import GAITS, find_gait, suits
-from gaitswarm.sim.gait.leg_gaits import leg_gaits, supporting
+from gaitswarm.sim.gait.gaits import GAITS, find_gait, leg_gaits, suits, supporting
 from gaitswarm.sim.gait.stability import static_stability
 from gaitswarm.sim.robot import Robot, RobotChoice, load_robot
 from gaitswarm.sim.scenario import GaitName, Scenario

@@ -14,10 +14,16 @@ from functools import partial
 from pathlib import Path
 from typing import Final, get_args
 
-from gaitswarm.sim.compiler.compilation import PREBUILT, build_library
-from gaitswarm.sim.compiler.target import ARM, ARM_TARGET, X86_TARGETS, Target
-from gaitswarm.sim.compiler.toolchain import find_compiler
-from gaitswarm.sim.controllers.native_inference import inference_source
+from gaitswarm.sim.compiler.compilation import (
+    ARM,
+    ARM_TARGET,
+    PREBUILT,
+    X86_TARGETS,
+    Target,
+    build_library,
+    find_compiler,
+)
+from gaitswarm.sim.controllers.quantisation import inference_source
 from gaitswarm.sim.kernel.emitted.source import kernel_identity, kernel_source
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.robot.shipped import SHIPPED, shipped_robot

@@ -11,13 +11,13 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gaitswarm.sim.compiler.toolchain import find_compiler, without_compiler
+from gaitswarm.sim.compiler.compilation import find_compiler, without_compiler
 from gaitswarm.sim.controllers import ControlLaw
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.gait.feed_forward import carrying_torques
 from gaitswarm.sim.gait.trajectory import Trajectory, desired_angles
-from gaitswarm.sim.kernel.compiled.native import native_kernel
+from gaitswarm.sim.kernel.native import native_kernel
 from gaitswarm.sim.kernel.parameters import (
     GRAVITY,
     SHOVE_DURATION,
@@ -83,7 +83,7 @@ def kernel_of(
             stacklevel=3,
         )
     # The native kernel does without CasADi and Pinocchio, which are slow to import.
-    from gaitswarm.sim.kernel.readable.reference import reference_kernel  # noqa: PLC0415
+    from gaitswarm.sim.kernel.reference import reference_kernel  # noqa: PLC0415
 
     return reference_kernel(robot)
 

@@ -9,8 +9,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from gaitswarm.sim.kernel.batch import KernelTime, Walking, walk_together
-from gaitswarm.sim.kernel.walk import Kernel, Precision
+from gaitswarm.sim.kernel.walk import Kernel, KernelTime, Precision, Walking, walk_together
 from gaitswarm.sim.outcome import MEASUREMENTS, OBJECTIVES, Objective, Outcome
 from gaitswarm.sim.robot import RobotSource
 from gaitswarm.sim.scenario import Scenario

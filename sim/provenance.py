@@ -27,7 +27,6 @@ _SUFFIXES: Final = (".py", ".c", ".h")
 _NOT_IN_A_CASE: Final = (
     "benchmark.py",
     "measurement",
-    "mujoco/export.py",
     "proposal",
     "provenance.py",
     "replay.py",

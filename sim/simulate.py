@@ -20,18 +20,24 @@ from gaitswarm.sim.assembly import (
     measure,
     plan_walk,
 )
-from gaitswarm.sim.compiler.target import target
+from gaitswarm.sim.compiler.compilation import target
 from gaitswarm.sim.controllers import CONTROLLERS, ControlLaw, control_law, names_of
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.gait.leg_gaits import LegGait, leg_gaits
+from gaitswarm.sim.gait.gaits import LegGait, leg_gaits
 from gaitswarm.sim.gait.trajectory import desired_angles, require_reachable
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
 from gaitswarm.sim.input.near_names import instead_of
-from gaitswarm.sim.kernel.batch import Walking, WantedWalk, walk_together
-from gaitswarm.sim.kernel.gains import NO_JOINT_PD
 from gaitswarm.sim.kernel.observation import WalkLog, walk_log
-from gaitswarm.sim.kernel.walk import Kernel, Precision, WalkSetup
+from gaitswarm.sim.kernel.walk import (
+    NO_JOINT_PD,
+    Kernel,
+    Precision,
+    Walking,
+    WalkSetup,
+    WantedWalk,
+    walk_together,
+)
 from gaitswarm.sim.noise import LinkNoise
 from gaitswarm.sim.outcome import N_MEASUREMENTS, N_OBJECTIVES, Measurements, Outcome, Status
 from gaitswarm.sim.robot import DEFAULT_ROBOT, Robot, RobotChoice, load_robot

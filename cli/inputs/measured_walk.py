@@ -11,9 +11,8 @@ import typer
 from gaitswarm.services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
-    from gaitswarm.sim.measurement.measured_log import MeasuredLog
+    from gaitswarm.sim.measurement.measured_log import MeasuredLog, MeasuredWalk
     from gaitswarm.sim.measurement.synchronise import Synchronised
-    from gaitswarm.sim.measurement.walk import MeasuredWalk
     from gaitswarm.sim.robot import Robot
 
 LARGEST_FILE: Final = 1 << 28
@@ -61,7 +60,7 @@ def read_walk(
     """
     from gaitswarm.cli.inputs.design_file import given_design
     from gaitswarm.cli.inputs.robots import chosen_scenarios
-    from gaitswarm.sim.measurement.walk import MeasuredWalk
+    from gaitswarm.sim.measurement.measured_log import MeasuredWalk
     from gaitswarm.sim.robot import load_robot
 
     given = given_design(design, controller, trajectory, robot=robot, server=server, db=db)

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
-from gaitswarm.sim.calibration.catalogue import ROBOT
 from gaitswarm.sim.calibration.targets import TargetWalk
-from gaitswarm.sim.calibration.walk import RESULTS, CalibrationWalk
+from gaitswarm.sim.calibration.walk import RESULTS, ROBOT, CalibrationWalk
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
 from gaitswarm.sim.input.near_names import instead_of
 from gaitswarm.sim.outcome import Outcome

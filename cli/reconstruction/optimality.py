@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, PreferenceName, judge
-from gaitswarm.sim.calibration.catalogue import robot_variables, varied_robot
+from gaitswarm.sim.calibration.walk import robot_variables, varied_robot
 from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.robot import RobotSource
 from gaitswarm.sim.scenario import SCENARIOS

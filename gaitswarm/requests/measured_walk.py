@@ -12,9 +12,8 @@ from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.sim.errors import MeasuredLogError
 from gaitswarm.sim.identification.recorded_walk import RecordedWalk, record
 from gaitswarm.sim.measurement.measured_csv import parse_measured_log
-from gaitswarm.sim.measurement.measured_log import MeasuredLog
+from gaitswarm.sim.measurement.measured_log import MeasuredLog, MeasuredWalk
 from gaitswarm.sim.measurement.synchronise import Synchronised, synchronise
-from gaitswarm.sim.measurement.walk import MeasuredWalk
 from gaitswarm.sim.robot import load_robot
 from gaitswarm.sim.scenario import Scenario, ScenarioChoice
 

@@ -12,7 +12,7 @@ from gaitswarm.sim.catalogue import check_design
 from gaitswarm.sim.controllers import CONTROLLERS, ControlLaw, Controller, LookupTable, names_of
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE
-from gaitswarm.sim.kernel.gains import check_gains
+from gaitswarm.sim.kernel.walk import check_gains
 from gaitswarm.sim.robot import RobotSource, load_robot
 from gaitswarm.sim.robot.shipped import DEFAULT_ROBOT
 from gaitswarm.sim.scenario import find_scenario

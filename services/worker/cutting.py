@@ -12,7 +12,7 @@ from functools import lru_cache
 from typing import Final
 
 from gaitswarm.services.worker.pace import LONGEST_UNMEASURED, Pace
-from gaitswarm.sim.kernel.compiled.lanes import plan_lanes
+from gaitswarm.sim.kernel.lanes import plan_lanes
 
 _TASKS_PER_SLOT: Final = 3
 """Of chunks of one case: enough for the last ones to end at about the same time."""

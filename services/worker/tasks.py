@@ -17,8 +17,7 @@ from gaitswarm.services.worker.cutting import Part
 from gaitswarm.sim.case import Case, run_together
 from gaitswarm.sim.controllers.quantisation import timing_tables
 from gaitswarm.sim.errors import SimulationError
-from gaitswarm.sim.kernel.batch import KernelTime
-from gaitswarm.sim.kernel.walk import LaneUse
+from gaitswarm.sim.kernel.walk import KernelTime, LaneUse
 from gaitswarm.sim.outcome import Outcome
 from gaitswarm.sim.provenance import Provenance, provenance_of, simulator_digest
 

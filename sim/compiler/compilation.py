@@ -7,27 +7,274 @@ saves the compilation, or the compiler.
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import hashlib
+import importlib.util
+import math
 import os
 import platform
 import re
-from collections.abc import Callable, Sequence
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
 from importlib import resources
 from pathlib import Path
 from typing import Final
 
 from gaitswarm.sim.compiler import cache
-from gaitswarm.sim.compiler.target import Target, target
-from gaitswarm.sim.compiler.toolchain import (
-    FLAGS,
-    SCHEDULING,
-    Compiler,
-    find_compiler,
-    run_compiler,
-    without_compiler,
-)
 from gaitswarm.sim.errors import KernelBuildError
+
+X86: Final = "x86_64"
+ARM: Final = "aarch64"
+
+_SPELLINGS: Final[Mapping[str, str]] = {"amd64": X86, "x64": X86, "arm64": ARM}
+"""What systems call these two; Windows says AMD64, macOS arm64."""
+
+
+def host_architecture() -> str:
+    """The architecture of this machine."""
+    machine = platform.machine().lower()
+    return _SPELLINGS.get(machine, machine)
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """What code is compiled for.
+
+    Attributes:
+        lanes: Doubles in a vector register.
+        level: Micro-architecture level of the x86-64 ABI as GCC names it, or empty for the
+            architecture's plain one.
+        architecture: As `host_architecture` spells it; empty for this machine's.
+    """
+
+    lanes: int
+    level: str = ""
+    architecture: str = ""
+
+    def resolved(self) -> Target:
+        """This target, with the architecture named."""
+        return Target(self.lanes, self.level, self.architecture or host_architecture())
+
+
+# Named levels rather than -march=native: one binary for all machines of a level. A machine has a
+# level if its CPU has the flags of this one and of all below it.
+_V2: Final = frozenset({"cx16", "popcnt", "pni", "sse4_1", "sse4_2", "ssse3"})
+_V3: Final = _V2 | {"avx2", "bmi1", "bmi2", "f16c", "fma", "movbe"}
+_V4: Final = _V3 | {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"}
+
+X86_TARGETS: Final[Mapping[Target, frozenset[str]]] = {
+    Target(8, "x86-64-v4", X86): _V4,
+    Target(4, "x86-64-v3", X86): _V3,
+    Target(2, "x86-64-v2", X86): _V2,
+}
+"""Levels from the widest on, each with the CPU flags that it needs, as Linux names them."""
+
+ARM_TARGET: Final = Target(2, "", ARM)
+"""NEON, which every aarch64 has."""
+
+
+@lru_cache(maxsize=1)
+def target() -> Target:
+    """The widest target that this machine runs."""
+    if host_architecture() == X86:
+        flags = cpu_flags()
+        for candidate, needed in X86_TARGETS.items():
+            if needed <= flags:
+                return candidate
+    return Target(2).resolved()
+
+
+def cpu_flags() -> frozenset[str]:
+    """What this machine's x86-64 CPU can do, as far as the system says so."""
+    try:
+        if platform.system() == "Darwin":
+            return _flags_of_macos(subprocess.check_output(_SYSCTL, text=True, timeout=10.0))
+        return frozenset(Path("/proc/cpuinfo").read_text(encoding="utf-8").split())
+    except (OSError, subprocess.SubprocessError):
+        return frozenset()
+
+
+_SYSCTL: Final = (
+    *("/usr/sbin/sysctl", "-n"),
+    *("machdep.cpu.features", "machdep.cpu.leaf7_features"),
+)
+
+
+def _flags_of_macos(text: str) -> frozenset[str]:
+    """`SSE4.1` is Linux's `sse4_1`, and only one flag has another name."""
+    flags = frozenset(text.lower().replace(".", "_").split())
+    return flags | {"pni"} if "sse3" in flags else flags
+
+
+# No contraction into fused multiply-adds and no fast-math: a lane's bits must not depend on
+# compiler or machine. Integers wrap: a lane that has diverged computes on. Zig's compiler adds what
+# a debugger needs, ten times the code, unless it is told not to.
+FLAGS: Final = (
+    "-std=gnu11",
+    "-O2",
+    "-g0",
+    "-ffp-contract=off",
+    "-fno-math-errno",
+    "-fwrapv",
+    "-fPIC",
+    "-shared",
+    "-Wall",
+    "-Wextra",
+)
+"""For every compiler and target."""
+
+SCHEDULING: Final = ("-fschedule-insns", "-fsched-pressure")
+"""For GCC, which orders a limb's instructions a tenth slower without them. Clang has its own."""
+
+_PROBE_LIMIT: Final = 30.0
+"""Seconds that a compiler may take to say its version."""
+
+COMPILER_MEMORY: Final = 8 << 30
+"""Data that a process of a compiler may have [B]; a kernel takes one a fortieth of that."""
+
+# Limits are set in the process that becomes the compiler, and are those of all that it starts.
+_LIMITED: Final = """
+import os, sys
+try:
+    import resource
+    for kind, value in ((resource.RLIMIT_DATA, sys.argv[1]), (resource.RLIMIT_CPU, sys.argv[2])):
+        resource.setrlimit(kind, (int(value), resource.getrlimit(kind)[1]))
+except (ImportError, ValueError, OSError):
+    pass
+os.execvp(sys.argv[3], sys.argv[3:])
+"""
+
+_ADVICE: Final[Mapping[str, str]] = {
+    "Windows": "kernels are compiled on Linux and macOS only; run gaitswarm in WSL",
+    "Darwin": "install one with `xcode-select --install`, or `pip install gaitswarm[compiler]`",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Compiler:
+    """A C compiler: its command, and the first line it says of its version."""
+
+    command: tuple[str, ...]
+    version: str
+
+    def flags(self, aim: Target) -> tuple[str, ...]:
+        """Flags for a target, whose level zig spells in its own way."""
+        flags = FLAGS if self._is_clang else (*FLAGS, *SCHEDULING)
+        if not aim.level:
+            return flags
+        if _is_zig(self.command):
+            return (*flags, "-mcpu=" + aim.level.replace("-", "_"))
+        return (*flags, f"-march={aim.level}")
+
+    @property
+    def _is_clang(self) -> bool:
+        return _is_zig(self.command) or "clang" in self.version.lower()
+
+
+def find_compiler(architecture: str = "") -> Compiler | None:
+    """Look for a C compiler, once a process."""
+    wanted = architecture or host_architecture()
+    return _find(wanted, wanted == host_architecture())
+
+
+@lru_cache(maxsize=4)
+def _find(architecture: str, native: bool) -> Compiler | None:
+    if platform.system() == "Windows":
+        return None
+    for command in _for_this_machine() if native else _for_another(architecture):
+        version = _version(command)
+        if version:
+            return Compiler(tuple(command), version)
+    return None
+
+
+def without_compiler() -> str:
+    """What is missing where nothing can be compiled."""
+    system = platform.system()
+    advice = _ADVICE.get(system, "install gcc or clang, or `pip install gaitswarm[compiler]`")
+    return f"no C compiler found: {advice}"
+
+
+def run_compiler(
+    compiler: Compiler, arguments: Sequence[str], scratch: Path, purpose: str, time_limit: float
+) -> None:
+    """Run a compiler to its end."""
+    command = shlex.join(compiler.command)
+    # What the compiler keeps for itself goes with the directory, even if it is killed.
+    environment = {**os.environ, "TMPDIR": str(scratch)}
+    limits = [str(COMPILER_MEMORY), str(math.ceil(time_limit))]
+    limited = [sys.executable, "-I", "-S", "-c", _LIMITED, *limits]
+    try:
+        done = _run([*limited, *compiler.command, *arguments], time_limit, environment)
+    except subprocess.TimeoutExpired as error:
+        raise KernelBuildError(
+            f"{command} did not {purpose} within {time_limit:g} s, and was ended"
+        ) from error
+    except OSError as error:
+        raise KernelBuildError(f"{command} cannot be run: {error}") from error
+    if done.returncode != 0:
+        raise KernelBuildError(f"{command} did not {purpose}:\n{done.stderr[-2000:]}")
+
+
+def _for_this_machine() -> Iterable[list[str]]:
+    yield from (shlex.split(os.environ.get("CC", "")), ["cc"], ["gcc"], ["clang"])
+    yield from _zig()
+
+
+def _for_another(architecture: str) -> Iterable[list[str]]:
+    yield [f"{architecture}-linux-gnu-gcc"]
+    for zig in (*_zig(), ["zig", "cc"]):
+        yield [*zig, "-target", f"{architecture}-linux-gnu"]
+
+
+def _zig() -> Iterable[list[str]]:
+    if importlib.util.find_spec("ziglang"):
+        yield [sys.executable, "-m", "ziglang", "cc"]
+
+
+def _is_zig(command: Sequence[str]) -> bool:
+    return "ziglang" in command or Path(command[0]).name == "zig"
+
+
+def _version(command: Sequence[str]) -> str:
+    if not command or not shutil.which(command[0]):
+        return ""
+    try:
+        done = _run([*command, "--version"], _PROBE_LIMIT)
+    except (OSError, subprocess.TimeoutExpired):
+        return ""
+    return done.stdout.partition("\n")[0] if done.returncode == 0 else ""
+
+
+def _run(
+    command: Sequence[str], time_limit: float, environment: Mapping[str, str] | None = None
+) -> subprocess.CompletedProcess[str]:
+    """`subprocess.run`, but when time is up, all that the command started ends with it."""
+    with subprocess.Popen(
+        command,
+        env=environment,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        errors="replace",
+        start_new_session=True,
+    ) as process:
+        try:
+            out, err = process.communicate(timeout=time_limit)
+        except BaseException:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            raise
+    return subprocess.CompletedProcess(command, process.returncode, out, err)
+
 
 TIME_LIMIT: Final = 300.0
 """Seconds that a compiler may take; a kernel takes one some five."""

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from gaitswarm.sim.controllers.base import LookupTable
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
-from gaitswarm.sim.firmware.control_log import ControlLog
 from gaitswarm.sim.firmware.integers import LawIntegers
-from gaitswarm.sim.firmware.trajectory_table import TrajectoryTable
+from gaitswarm.sim.firmware.memory import BUDGET, Memory, TrajectoryTable
 from gaitswarm.sim.robot import Robot
 
 _WIDTH: Final = 24
@@ -125,9 +124,9 @@ def trajectories_source(tables: Sequence[TrajectoryTable]) -> str:
     return "\n".join(lines)
 
 
-def expected_header(law: LawIntegers, logs: Sequence[ControlLog], legs: int) -> str:
+def expected_header(law: LawIntegers, walks: int, legs: int) -> str:
     """`test/expected.h`: how many walks and tables are compared."""
-    return filled("test/expected.h", legs=legs, walks=len(logs), tables=len(_tables(law)))
+    return filled("test/expected.h", legs=legs, walks=walks, tables=len(_tables(law)))
 
 
 def expected_source(law: LawIntegers, walks: Mapping[str, int]) -> str:
@@ -177,3 +176,40 @@ def _rows(values: NDArray[np.integer]) -> Iterable[str]:
 def _remark(text: str) -> str:
     """What neither ends a remark nor begins another one."""
     return text.replace("*/", "* /").replace("/*", "/ *").replace("\n", " ")
+
+
+def readme(
+    label: str,
+    controller: str,
+    memory: Memory,
+    trajectories: Sequence[TrajectoryTable],
+    scenarios: Sequence[str],
+    robot: str,
+) -> str:
+    """`README.md` of a folder of firmware."""
+    rows = [
+        f"| {t.name} | {len(t.rows)} | {t.rows.shape[1]} |"
+        f" {t.repeats_from if t.repeats else 'none'} | {t.bytes} | {t.bytes_of_a_leg} |"
+        for t in trajectories
+    ]
+    rows.append(f"| all | | | | {memory.trajectories} | {memory.trajectories_of_a_leg} |")
+    robot_option = f" --robot {robot}" if robot else ""
+    return filled(
+        "README.md",
+        label=label,
+        controller=controller,
+        period=f"{CONTROL_PERIOD * 1000:g}",
+        rate=f"{1.0 / CONTROL_PERIOD:g}",
+        processor=BUDGET.name,
+        flash=BUDGET.flash,
+        ram=BUDGET.ram,
+        tables=memory.tables,
+        remembered=memory.ram,
+        remarks="\n".join(f"\n**It does not fit:** {remark}." for remark in memory.remarks()),
+        trajectories="\n".join(rows),
+        validate="\n".join(
+            f"gaitswarm validate measured.csv --design firmware.json --controller {controller}"
+            f" --scenario {scenario}{robot_option}"
+            for scenario in scenarios
+        ),
+    )

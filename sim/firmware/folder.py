@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from typing import Final, Protocol, runtime_checkable
 
 import numpy as np
+from numpy.typing import NDArray
 
-from gaitswarm.sim.assembly import control_steps
+from gaitswarm.sim.assembly import control_steps, judge, kernel_of, plan_walk
 from gaitswarm.sim.controllers import CONTROLLERS, ControlLaw, ControllerName, control_law
 from gaitswarm.sim.controllers.quantisation import Axis
 from gaitswarm.sim.errors import SimulationInputError
@@ -21,20 +22,111 @@ from gaitswarm.sim.firmware.c_text import (
     expected_source,
     law_header,
     own_file,
+    readme,
     tables_source,
     trajectories_source,
 )
-from gaitswarm.sim.firmware.control_log import ControlLog, control_logs
-from gaitswarm.sim.firmware.integers import LawIntegers, law_integers
-from gaitswarm.sim.firmware.memory import Memory
-from gaitswarm.sim.firmware.readme import readme
-from gaitswarm.sim.firmware.trajectory_table import TrajectoryTable, trajectory_table
-from gaitswarm.sim.gait_variables import GAIT_CATALOGUE
+from gaitswarm.sim.firmware.integers import LawIntegers, in_16_bits, law_integers
+from gaitswarm.sim.firmware.memory import Memory, TrajectoryTable, trajectory_table
+from gaitswarm.sim.gait.trajectory import require_reachable
+from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
 from gaitswarm.sim.kernel.emitted.source import control_tick
-from gaitswarm.sim.outcome import OBJECTIVE_NAMES
-from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotChoice, RobotFiles, RobotVariant, load_robot
+from gaitswarm.sim.kernel.observation import encoder_angles, split_states
+from gaitswarm.sim.kernel.walk import Coding, WalkResult, WalkSetup
+from gaitswarm.sim.outcome import OBJECTIVE_NAMES, Status
+from gaitswarm.sim.robot import (
+    DEFAULT_ROBOT,
+    Robot,
+    RobotChoice,
+    RobotFiles,
+    RobotVariant,
+    load_robot,
+)
 from gaitswarm.sim.robot.description import JOINTS_PER_LEG
 from gaitswarm.sim.scenario import PRESETS, Scenario
+
+Codes = NDArray[np.int16]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ControlLog:
+    """Every sample of a walk's controllers; T ticks, J joints.
+
+    Attributes:
+        scenario: that was walked, in the gait of the design.
+        status: how the walk ended.
+        desired: (T, J) [counts of angle].
+        angle: of the motors, (T, J) [counts of angle].
+        current: absolute, (T, J) [counts of current].
+        pwm: that the controllers gave, (T, J) [PWM counts].
+        objectives: what the walk is worth, f1 to f6, (6,), NaN where there is none.
+    """
+
+    scenario: Scenario
+    status: Status
+    desired: Codes
+    angle: Codes
+    current: NDArray[np.uint16]
+    pwm: Codes
+    objectives: NDArray[np.float64]
+
+    @property
+    def ticks(self) -> int:
+        """T."""
+        return len(self.pwm)
+
+
+def control_logs(
+    robot: Robot,
+    scenarios: Sequence[Scenario],
+    law: ControlLaw,
+    gait: Mapping[str, float],
+) -> tuple[ControlLog, ...]:
+    """Let a control law walk, and keep what it read and gave."""
+    kernel = kernel_of(robot)
+    coding, timestep = control_steps(robot)
+    walked = [with_gait(scenario, gait) for scenario in scenarios]
+    setups = []
+    for scenario in walked:
+        require_reachable(robot, scenario)
+        plan = plan_walk(robot, scenario, timestep)
+        if plan is None:
+            raise AssertionError("a gait within reach is planned")
+        setups.append(plan(law))
+    results = kernel.walk(setups, coding, log=True)
+    return tuple(
+        _control_log(robot, scenario, coding, timestep, setup, result)
+        for scenario, setup, result in zip(walked, setups, results, strict=True)
+    )
+
+
+def _control_log(
+    robot: Robot,
+    scenario: Scenario,
+    coding: Coding,
+    timestep: float,
+    setup: WalkSetup,
+    result: WalkResult,
+) -> ControlLog:
+    if result.states is None:
+        raise AssertionError("states are kept of a walk whose log is asked for")
+    walked = int(np.isfinite(result.states).all(axis=1).sum())
+    states = split_states(robot, result.states[:walked])
+    desired = setup.desired[:walked].astype(np.int64)
+    angle = coding.angle_codes(encoder_angles(robot, states))
+    current = coding.current_codes(states.sensed_current)
+    joints = robot.joint_names
+    status, objectives = judge(setup, result, coding.substeps, timestep)
+    return ControlLog(
+        scenario=scenario,
+        status=status,
+        desired=in_16_bits(desired, np.int16, f"{scenario.name}: the desired angle", joints),
+        angle=in_16_bits(angle, np.int16, f"{scenario.name}: the angle", joints),
+        current=in_16_bits(current, np.uint16, f"{scenario.name}: the current", joints),
+        pwm=coding.pwm_codes(states.duty).astype(np.int16),
+        objectives=objectives,
+    )
+
 
 MANIFEST: Final = "firmware.json"
 """File that says what the others are, by which a folder is known as firmware."""
@@ -128,7 +220,7 @@ def firmware_of(
         "law.h": law_header(integers),
         "tables.c": tables_source(integers),
         "trajectories.c": trajectories_source(trajectories),
-        "test/expected.h": expected_header(integers, logs, legs),
+        "test/expected.h": expected_header(integers, len(logs), legs),
         "test/expected.c": expected_source(integers, {f: log.ticks for f, log in walks.items()}),
         "README.md": readme(label, controller, memory, trajectories, names, robot_option),
         **own_scenarios,

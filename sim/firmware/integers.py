@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from gaitswarm.sim.controllers.base import ControlLaw, LookupTable, Response
 from gaitswarm.sim.controllers.fixed_point import FRACTION_BITS, INTEGRAL_BITS
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.kernel.gains import check_gains
-from gaitswarm.sim.kernel.walk import CODE_LIMIT, Coding
+from gaitswarm.sim.kernel.walk import CODE_LIMIT, Coding, check_gains
 
 _INT32: Final = (1 << 31) - 1
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
-from gaitswarm.sim.gait.leg_gaits import leg_gaits, supporting
+from gaitswarm.sim.gait.gaits import leg_gaits, supporting
 from gaitswarm.sim.gait.trajectory import desired_angles, require_reachable
 from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.posture import feet_and_centre_of_mass

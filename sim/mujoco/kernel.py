@@ -17,9 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
-from gaitswarm.sim.kernel.gains import check_gains
-from gaitswarm.sim.kernel.parameters import CONTACT_LAWS, Layout, internal_state_size
-from gaitswarm.sim.kernel.readable.control_tick import (
+from gaitswarm.sim.kernel.control_tick import (
+    InnerLoop,
     Past,
     coded,
     control,
@@ -27,7 +26,7 @@ from gaitswarm.sim.kernel.readable.control_tick import (
     padded_states,
     status_of,
 )
-from gaitswarm.sim.kernel.readable.joint_pd import InnerLoop
+from gaitswarm.sim.kernel.parameters import CONTACT_LAWS, Layout, internal_state_size
 from gaitswarm.sim.kernel.sensors import Sensors
 from gaitswarm.sim.kernel.walk import (
     INTEGRANDS,
@@ -36,6 +35,7 @@ from gaitswarm.sim.kernel.walk import (
     WalkResult,
     WalkResults,
     WalkSetup,
+    check_gains,
 )
 from gaitswarm.sim.mujoco.gears import gears_of
 from gaitswarm.sim.mujoco.ground import GROUNDS

@@ -14,9 +14,13 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from gaitswarm.sim.gait.gaits import leg_gaits
+from gaitswarm.sim.gait.trajectory import desired_angles, require_reachable
 from gaitswarm.sim.mujoco.mjcf import TIMESTEP, Rig, Surroundings, mjcf
 from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.description import Contact
+from gaitswarm.sim.robot.posture import resting_height
+from gaitswarm.sim.robot.shapes import visible_links
 from gaitswarm.sim.scenario import Scenario
 
 Floats = NDArray[np.float64]
@@ -117,3 +121,30 @@ def _pair(
         "solref": f"{-spring!r} {-damper!r}",
         "solreffriction": f"-1 {-rub!r}",
     }
+
+
+def exported(robot: Robot, scenario: Scenario, *, contacts: bool = True) -> str:
+    """Write a robot in a scenario as MJCF that MuJoCo's viewer opens and steps.
+
+    It has the scenario's load and slope, joints with the motors' voltages as controls [V], or with
+    torques [N m] where these are controlled, shapes to be seen, and a keyframe `start`, the pose in
+    which a walk through the scenario begins. Backlash, limits of torque by speed, the battery's sag
+    and static friction are not in it.
+    """
+    require_reachable(robot, scenario)
+    surroundings = Surroundings.of(robot, scenario)
+    joints = desired_angles(robot, scenario).start
+    mass = robot.mass + scenario.load
+    height = resting_height(robot, joints, mass * -float(surroundings.gravity[2]))
+    rig = Rig(
+        voltage_motors=True,
+        looks=visible_links(robot, scenario.load),
+        start=np.array([0.0, 0.0, height + scenario.drop, 1.0, 0.0, 0.0, 0.0, *joints]),
+    )
+    if contacts:
+        standing = sum(gait.support_share for gait in leg_gaits(robot, scenario))
+        feet = Feet(even_drags(robot, surroundings, standing))
+        rig = with_contacts(robot, surroundings, rig, feet)
+    text = mjcf(robot, surroundings, rig)
+    mujoco.MjModel.from_xml_string(text)
+    return text

@@ -10,9 +10,15 @@ from numpy.typing import NDArray
 from gaitswarm.sim.assembly import control_steps, judge, kernel_of, measure, plan_walk
 from gaitswarm.sim.controllers import ControllerName, control_law
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
-from gaitswarm.sim.kernel.batch import Walking, WantedWalk, walk_together
 from gaitswarm.sim.kernel.observation import WalkLog, walk_log
-from gaitswarm.sim.kernel.walk import Kernel, Precision, WalkSetup
+from gaitswarm.sim.kernel.walk import (
+    Kernel,
+    Precision,
+    Walking,
+    WalkSetup,
+    WantedWalk,
+    walk_together,
+)
 from gaitswarm.sim.outcome import (
     N_MEASUREMENTS,
     N_OBJECTIVES,

@@ -10,8 +10,7 @@ import pytest
 
 from gaitswarm.sim.identification.recorded_walk import RecordedWalk
 from gaitswarm.sim.measurement.measured_csv import format_measured_log
-from gaitswarm.sim.measurement.measured_log import MeasuredLog
-from gaitswarm.sim.measurement.walk import MeasuredWalk
+from gaitswarm.sim.measurement.measured_log import MeasuredLog, MeasuredWalk
 from gaitswarm.sim.robot import load_robot
 from tests.api.conftest import Serve
 from tests.examples.walks import PUBLISHED_A, SHORT_WALK, short_walk

@@ -13,7 +13,7 @@ from gaitswarm.cli.exit_codes import ExitCode
 from gaitswarm.cli.main import commands
 from gaitswarm.services.profile import profile_job
 from gaitswarm.sim.assembly import PHYSICS_RATE
-from gaitswarm.sim.kernel.compiled.native import native_kernel
+from gaitswarm.sim.kernel.native import native_kernel
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.robot import DEFAULT_ROBOT, load_robot
 from gaitswarm.sim.simulate import lanes, prepare

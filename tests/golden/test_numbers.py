@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from gaitswarm.sim.assembly import Backend
-from gaitswarm.sim.compiler.target import Target, target
+from gaitswarm.sim.compiler.compilation import Target, target
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.scenario import SCENARIOS
 from gaitswarm.sim.simulate import prepare
@@ -32,8 +32,8 @@ GOLDEN = read()
 # its environment to leave the wider instructions alone.
 NARROW_MACHINE = """
 import json, sys
-from gaitswarm.sim.compiler import compilation, target
-narrow = target.Target(int(sys.argv[1]), sys.argv[2])
+from gaitswarm.sim.compiler import compilation
+narrow = compilation.Target(int(sys.argv[1]), sys.argv[2])
 compilation.target = lambda: narrow
 from gaitswarm.sim.robot import DEFAULT_ROBOT, load_robot
 from gaitswarm.sim.assembly import kernel_of

@@ -10,7 +10,7 @@ import pytest
 
 from gaitswarm.sim.assembly import plan_walk
 from gaitswarm.sim.controllers import control_law
-from gaitswarm.sim.mujoco.export import exported
+from gaitswarm.sim.mujoco.model import exported
 from gaitswarm.sim.robot import RobotFiles, RobotVariant, load_robot
 from gaitswarm.sim.scenario import SCENARIOS, Scenario
 from tests.examples.commands import run_command

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from gaitswarm.sim.mujoco.export import exported
+from gaitswarm.sim.mujoco.model import exported
 from gaitswarm.sim.robot import load_robot
 from gaitswarm.sim.scenario import SCENARIOS
 from tests.examples.walks import short_walk, torque_quadruped_files, walk

@@ -17,7 +17,7 @@ from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.search.random_search import RandomSearchSettings
 from gaitswarm.services.optimizer.search.swarm.pso import PsoSettings
 from gaitswarm.sim.identification.recorded_walk import RecordedWalk
-from gaitswarm.sim.kernel.batch import Walking
+from gaitswarm.sim.kernel.walk import Walking
 from gaitswarm.sim.robot import RobotVariant
 from gaitswarm.sim.scenario import Scenario
 from gaitswarm.sim.simulate import Simulation, simulating

@@ -20,9 +20,14 @@ from typing import Any, Final
 import numpy as np
 import pytest
 
-from gaitswarm.sim.compiler.target import ARM, ARM_TARGET, Target, host_architecture
-from gaitswarm.sim.compiler.toolchain import find_compiler
-from gaitswarm.sim.kernel.compiled.structures import Walker
+from gaitswarm.sim.compiler.compilation import (
+    ARM,
+    ARM_TARGET,
+    Target,
+    find_compiler,
+    host_architecture,
+)
+from gaitswarm.sim.kernel.native import Walker
 from tests.examples.paths import ROOT
 
 TOOLS: Final = Path(sys.prefix) / "cross"

@@ -18,8 +18,8 @@ from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.controllers.base import JointPd
 from gaitswarm.sim.controllers.fuzzy_pi import CURRENT, ERROR, inference_system
 from gaitswarm.sim.controllers.mamdani import Shape
-from gaitswarm.sim.controllers.native_inference import compiled_table
-from gaitswarm.sim.kernel.compiled.native import NativeKernel
+from gaitswarm.sim.controllers.quantisation import compiled_table
+from gaitswarm.sim.kernel.native import NativeKernel
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import Robot, RobotVariant, load_robot

@@ -10,9 +10,9 @@ from typing import cast
 import numpy as np
 import pytest
 
-from gaitswarm.sim.compiler.target import target
-from gaitswarm.sim.kernel.compiled.native import NativeKernel, native_kernel
+from gaitswarm.sim.compiler.compilation import target
 from gaitswarm.sim.kernel.emitted.source import kernel_source
+from gaitswarm.sim.kernel.native import NativeKernel, native_kernel
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.scenario import SCENARIOS
 from tests.sim.emulated import EmulatedLibrary, tools_for_arm

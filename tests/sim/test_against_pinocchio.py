@@ -13,9 +13,9 @@ from gaitswarm.sim.kernel.dynamics.articulated_body import LinkState
 from gaitswarm.sim.kernel.dynamics.body import body_of, body_state
 from gaitswarm.sim.kernel.dynamics.limb import links_at
 from gaitswarm.sim.kernel.dynamics.physics_step import physics_model
-from gaitswarm.sim.kernel.dynamics.rotation import Rotation
 from gaitswarm.sim.kernel.dynamics.spatial import (
     Matrix,
+    Rotation,
     add,
     apply,
     cross,

@@ -10,9 +10,15 @@ from numpy.typing import NDArray
 
 from gaitswarm.sim.calibration.walk import CalibrationWalk
 from gaitswarm.sim.case import Case, MeasuredWalk, Walk, run_together
-from gaitswarm.sim.kernel.batch import Walking, walk_together
-from gaitswarm.sim.kernel.compiled.native import NativeKernel
-from gaitswarm.sim.kernel.walk import Coding, Precision, WalkResult, WalkSetup
+from gaitswarm.sim.kernel.native import NativeKernel
+from gaitswarm.sim.kernel.walk import (
+    Coding,
+    Precision,
+    Walking,
+    WalkResult,
+    WalkSetup,
+    walk_together,
+)
 from gaitswarm.sim.outcome import Objective, Outcome
 from gaitswarm.sim.robot import RobotSource
 from gaitswarm.sim.scenario import Scenario

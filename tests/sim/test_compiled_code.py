@@ -9,13 +9,18 @@ from pathlib import Path
 
 import pytest
 
-from gaitswarm.sim.compiler.compilation import build_library
-from gaitswarm.sim.compiler.target import X86, X86_TARGETS, Target, host_architecture
-from gaitswarm.sim.compiler.toolchain import find_compiler
-from gaitswarm.sim.controllers.native_inference import inference_source
+from gaitswarm.sim.compiler.compilation import (
+    X86,
+    X86_TARGETS,
+    Target,
+    build_library,
+    find_compiler,
+    host_architecture,
+)
+from gaitswarm.sim.controllers.quantisation import inference_source
 from gaitswarm.sim.errors import KernelBuildError
-from gaitswarm.sim.kernel.compiled.native import load_kernel, native_kernel
 from gaitswarm.sim.kernel.emitted.source import kernel_identity, kernel_source
+from gaitswarm.sim.kernel.native import load_kernel, native_kernel
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.robot import Robot, RobotFiles, RobotVariant, load_robot
 from tests.examples.walks import torque_quadruped_files

@@ -11,9 +11,9 @@ import pytest
 from gaitswarm.sim.assembly import control_steps, plan_walk
 from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.controllers.base import ControlLaw, LookupTable
-from gaitswarm.sim.kernel.compiled.native import native_kernel
+from gaitswarm.sim.kernel.native import native_kernel
 from gaitswarm.sim.kernel.observation import sensed_currents, walk_log
-from gaitswarm.sim.kernel.readable.reference import reference_kernel
+from gaitswarm.sim.kernel.reference import reference_kernel
 from gaitswarm.sim.kernel.walk import Coding, current_smoothing
 from gaitswarm.sim.robot import Robot, load_robot
 from tests.examples.robots import changed

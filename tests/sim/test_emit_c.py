@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gaitswarm.sim.compiler.compilation import load_library, vector_header
-from gaitswarm.sim.compiler.target import Target, target
+from gaitswarm.sim.compiler.compilation import Target, load_library, target, vector_header
 from gaitswarm.sim.errors import SimulationError
 from gaitswarm.sim.kernel.emitted.emit_c import emit_c
 

@@ -10,17 +10,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gaitswarm.sim.compiler.compilation import load_library
-from gaitswarm.sim.compiler.target import Target, target
+from gaitswarm.sim.compiler.compilation import Target, load_library, target
 from gaitswarm.sim.controllers import CONTROLLERS, control_law
 from gaitswarm.sim.controllers.base import LookupTable
 from gaitswarm.sim.controllers.fuzzy_pi import CURRENT, ERROR, inference_system, quantised_table
 from gaitswarm.sim.controllers.fuzzy_pi_3 import integral_system, voltage_system
 from gaitswarm.sim.controllers.fuzzy_sets import MembershipSets
 from gaitswarm.sim.controllers.mamdani import FuzzySet, Mamdani, Rule, Shape
-from gaitswarm.sim.controllers.native_inference import compiled_table, inference_source
 from gaitswarm.sim.controllers.quantisation import (
     Axis,
+    compiled_table,
+    inference_source,
     quantised,
     reference_table,
     table_bytes,

@@ -9,8 +9,7 @@ import pytest
 
 from gaitswarm.sim.errors import RobotFileError, SimulationInputError
 from gaitswarm.sim.gait.cycloid import cycloid
-from gaitswarm.sim.gait.gaits import GAITS, find_gait, lags_of
-from gaitswarm.sim.gait.leg_gaits import leg_gaits, supporting
+from gaitswarm.sim.gait.gaits import GAITS, find_gait, lags_of, leg_gaits, supporting
 from gaitswarm.sim.gait.trajectory import desired_angles, require_reachable
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
 from gaitswarm.sim.robot import Robot, load_robot, parse_robot

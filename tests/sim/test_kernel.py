@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from gaitswarm.sim.assembly import control_steps, plan_walk
-from gaitswarm.sim.compiler.target import X86, Target, host_architecture, target
+from gaitswarm.sim.compiler.compilation import X86, Target, host_architecture, target
 from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.controllers.base import ControlLaw, LookupTable
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
-from gaitswarm.sim.kernel.compiled.native import NativeKernel, load_kernel, native_kernel
+from gaitswarm.sim.kernel.native import NativeKernel, load_kernel, native_kernel
 from gaitswarm.sim.kernel.observation import walk_log
-from gaitswarm.sim.kernel.readable.reference import ReferenceKernel, reference_kernel
+from gaitswarm.sim.kernel.reference import ReferenceKernel, reference_kernel
 from gaitswarm.sim.kernel.walk import Coding, Kernel, WalkSetup
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import Robot, RobotVariant, load_robot

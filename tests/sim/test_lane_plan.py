@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gaitswarm.sim.kernel.compiled.lanes import plan_lanes
+from gaitswarm.sim.kernel.lanes import plan_lanes
 from gaitswarm.sim.scenario import SCENARIOS
 
 SWARM = [scenario.duration for scenario in SCENARIOS for _ in range(25)]

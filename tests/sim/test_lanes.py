@@ -15,9 +15,8 @@ import pytest
 
 from gaitswarm.sim.assembly import control_steps, plan_walk
 from gaitswarm.sim.controllers import CONTROLLERS
-from gaitswarm.sim.kernel.compiled.native import NativeKernel, native_kernel
-from gaitswarm.sim.kernel.compiled.sharing import LaneCounts, Pool
-from gaitswarm.sim.kernel.readable.reference import reference_kernel
+from gaitswarm.sim.kernel.native import LaneCounts, NativeKernel, Pool, native_kernel
+from gaitswarm.sim.kernel.reference import reference_kernel
 from gaitswarm.sim.kernel.walk import Coding, LaneUse, Precision, WalkResult, WalkSetup
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import RobotVariant, load_robot

@@ -11,12 +11,11 @@ import numpy as np
 import pytest
 
 from gaitswarm.sim.errors import RobotFileError
-from gaitswarm.sim.kernel.compiled.native import native_kernel
 from gaitswarm.sim.kernel.dynamics.kinds import robot_constants
-from gaitswarm.sim.kernel.dynamics.spatial import Scalar
-from gaitswarm.sim.kernel.dynamics.traced import Traced
-from gaitswarm.sim.kernel.dynamics.tree import leaves
+from gaitswarm.sim.kernel.dynamics.physics_step import Traced
+from gaitswarm.sim.kernel.dynamics.spatial import Scalar, leaves
 from gaitswarm.sim.kernel.emitted.source import kernel_identity, kernel_source
+from gaitswarm.sim.kernel.native import native_kernel
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import SHIPPED, Robot, RobotFiles, load_robot
 from gaitswarm.sim.robot.chain import Placement

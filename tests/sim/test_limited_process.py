@@ -16,7 +16,7 @@ from gaitswarm.sim.errors import (
     RobotFileError,
     SimulationInputError,
 )
-from gaitswarm.sim.kernel.compiled import derivation
+from gaitswarm.sim.kernel import derivation
 from gaitswarm.sim.kernel.emitted.source import kernel_source
 from gaitswarm.sim.limited_process import LimitedProcesses
 from gaitswarm.sim.robot import check, load_robot

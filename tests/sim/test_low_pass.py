@@ -7,8 +7,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from gaitswarm.sim.gait.low_pass import FirWindow, fir_gains, low_pass
-from gaitswarm.sim.gait.trajectory import desired_angles
+from gaitswarm.sim.gait.trajectory import FirWindow, desired_angles, fir_gains, low_pass
 from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.scenario import SCENARIOS
 

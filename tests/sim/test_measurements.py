@@ -10,7 +10,7 @@ import pytest
 
 from gaitswarm.sim.assembly import Backend, control_steps, measure, plan_walk
 from gaitswarm.sim.controllers import CONTROLLERS
-from gaitswarm.sim.kernel.compiled.native import native_kernel
+from gaitswarm.sim.kernel.native import native_kernel
 from gaitswarm.sim.kernel.observation import walk_log
 from gaitswarm.sim.kernel.walk import Coding
 from gaitswarm.sim.outcome import MEASUREMENT_NAMES, Measurements, Status

@@ -19,7 +19,7 @@ import os, resource
 import numpy as np
 from gaitswarm.services.optimizer.run.outage import is_infrastructure
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
-from gaitswarm.sim.gait.low_pass import fir_gains
+from gaitswarm.sim.gait.trajectory import fir_gains
 
 def limit(mebibytes):
     size = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()

@@ -12,11 +12,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gaitswarm.sim.compiler.compilation import build_library, load_library, vector_header
-from gaitswarm.sim.compiler.toolchain import COMPILER_MEMORY
+from gaitswarm.sim.compiler.compilation import (
+    COMPILER_MEMORY,
+    build_library,
+    load_library,
+    vector_header,
+)
 from gaitswarm.sim.errors import KernelBuildError, SimulationInputError
-from gaitswarm.sim.kernel.compiled.native import NativeKernel, native_kernel, text_size
 from gaitswarm.sim.kernel.dynamics.kinds import robot_constants
+from gaitswarm.sim.kernel.native import NativeKernel, native_kernel, text_size
 from gaitswarm.sim.kernel.parameters import Layout
 from gaitswarm.sim.robot import DEFAULT_ROBOT, Robot, RobotFiles, load_robot
 from gaitswarm.sim.simulate import prepare
@@ -187,7 +191,7 @@ LOAD_QUADRUPED = """
 import os
 from pathlib import Path
 from gaitswarm.sim.kernel.dynamics.kinds import robot_constants
-from gaitswarm.sim.kernel.compiled.native import native_kernel
+from gaitswarm.sim.kernel.native import native_kernel
 from gaitswarm.sim.robot import RobotFiles, load_robot
 files = Path(os.environ["FILES"])
 toml, urdf = ((files / f"robot.{kind}").read_text() for kind in ("toml", "urdf"))
@@ -198,7 +202,7 @@ import os, threading
 from pathlib import Path
 from gaitswarm.sim.errors import KernelBuildError, SimulationInputError
 from gaitswarm.sim.kernel.dynamics.kinds import robot_constants
-from gaitswarm.sim.kernel.compiled.native import native_kernel
+from gaitswarm.sim.kernel.native import native_kernel
 from gaitswarm.sim.robot import load_robot
 def compile_another():
     try:
@@ -278,7 +282,7 @@ def test_an_identity_changes_with_any_file_that_a_source_may_be_derived_by(tmp_p
             file.write("\n")
         found.append(identity())
     assert len(set(found)) == len(found)
-    with (kernel / "readable/reference.py").open("a") as file:
+    with (kernel / "reference.py").open("a") as file:
         file.write("\n")
     assert identity() == found[-1]
 

@@ -10,8 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from gaitswarm.sim.compiler.compilation import build_library, load_library
-from gaitswarm.sim.compiler.target import ARM, X86, target
+from gaitswarm.sim.compiler.compilation import ARM, X86, build_library, load_library, target
 from gaitswarm.sim.errors import KernelBuildError
 from gaitswarm.sim.robot import DEFAULT_ROBOT
 from scripts.prebuilt import TARGETS, main

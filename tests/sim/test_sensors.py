@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from gaitswarm.sim.assembly import control_steps, plan_walk
 from gaitswarm.sim.controllers import control_law
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.kernel.compiled.native import NativeKernel, native_kernel
-from gaitswarm.sim.kernel.readable.reference import reference_kernel
+from gaitswarm.sim.kernel.native import NativeKernel, native_kernel
+from gaitswarm.sim.kernel.reference import reference_kernel
 from gaitswarm.sim.kernel.sensors import LARGEST_DELAY, SensorErrors, Sensors, philox
 from gaitswarm.sim.kernel.walk import Coding, Precision, WalkResult, WalkSetup
 from gaitswarm.sim.robot import Robot, RobotVariant, load_robot

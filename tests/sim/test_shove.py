@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gaitswarm.sim.assembly import control_steps, plan_walk
 from gaitswarm.sim.controllers import control_law
-from gaitswarm.sim.kernel.compiled.native import native_kernel
+from gaitswarm.sim.kernel.native import native_kernel
 from gaitswarm.sim.kernel.walk import WalkResult
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import Robot, RobotVariant, load_robot

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 
 import pytest
 
-from gaitswarm.sim.kernel.emitted.order import PATIENCE, REGISTERS, Statement, ordered
+from gaitswarm.sim.kernel.emitted.emit_c import PATIENCE, REGISTERS, Statement, ordered
 
 
 def value(name: str, *reads: str, operations: int = 1, latency: int = 4) -> Statement:

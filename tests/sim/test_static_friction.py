@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gaitswarm.sim.kernel.compiled.native import native_kernel
 from gaitswarm.sim.kernel.dynamics.physics_step import physics_model
+from gaitswarm.sim.kernel.native import native_kernel
 from gaitswarm.sim.kernel.parameters import STATIC_FRICTION_RATE, pack_parameters
 from gaitswarm.sim.robot import Robot, load_robot
 from gaitswarm.sim.scenario import SCENARIOS

@@ -7,7 +7,7 @@ import pytest
 from gaitswarm.sim.assembly import PHYSICS_RATE, plan_walk
 from gaitswarm.sim.controllers.fuzzy_pi import FuzzyPi
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.kernel.compiled.native import native_kernel
+from gaitswarm.sim.kernel.native import native_kernel
 from gaitswarm.sim.kernel.walk import Coding
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotName, load_robot

@@ -10,8 +10,17 @@ from pathlib import Path
 
 import pytest
 
-from gaitswarm.sim.compiler.target import ARM, X86, Target, cpu_flags, host_architecture, target
-from gaitswarm.sim.compiler.toolchain import Compiler, find_compiler, without_compiler
+from gaitswarm.sim.compiler.compilation import (
+    ARM,
+    X86,
+    Compiler,
+    Target,
+    cpu_flags,
+    find_compiler,
+    host_architecture,
+    target,
+    without_compiler,
+)
 from tests.examples.walks import SHORT_WALK
 from tests.sim.processes import run_python
 
@@ -53,7 +62,9 @@ def test_the_target_is_the_widest_whose_instructions_the_cpu_has(
     monkeypatch: pytest.MonkeyPatch, flags: str, expected: Target, system: str, machine: str
 ) -> None:
     pretend(monkeypatch, system, machine)
-    monkeypatch.setattr("gaitswarm.sim.compiler.target.cpu_flags", lambda: frozenset(flags.split()))
+    monkeypatch.setattr(
+        "gaitswarm.sim.compiler.compilation.cpu_flags", lambda: frozenset(flags.split())
+    )
     assert target() == expected
 
 

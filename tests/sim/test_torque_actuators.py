@@ -12,12 +12,12 @@ import pinocchio as pin
 import pytest
 
 from gaitswarm.sim.assembly import control_steps, kernel_of, plan_walk
-from gaitswarm.sim.compiler.target import X86, Target, host_architecture, target
+from gaitswarm.sim.compiler.compilation import X86, Target, host_architecture, target
 from gaitswarm.sim.controllers import control_law
 from gaitswarm.sim.controllers.base import ControlLaw, JointPd
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.kernel.compiled.native import load_kernel, native_kernel
 from gaitswarm.sim.kernel.dynamics.physics_step import physics_model
+from gaitswarm.sim.kernel.native import load_kernel, native_kernel
 from gaitswarm.sim.kernel.observation import split_states
 from gaitswarm.sim.kernel.parameters import pack_parameters
 from gaitswarm.sim.kernel.walk import WalkResult, WalkSetup

@@ -11,8 +11,8 @@ from pydantic import ValidationError
 
 from gaitswarm.sim.assembly import plan_walk
 from gaitswarm.sim.controllers import CONTROLLERS
-from gaitswarm.sim.kernel.compiled.native import native_kernel
 from gaitswarm.sim.kernel.dynamics.physics_step import physics_model
+from gaitswarm.sim.kernel.native import native_kernel
 from gaitswarm.sim.kernel.observation import walk_log
 from gaitswarm.sim.kernel.parameters import internal_state_size, pack_parameters
 from gaitswarm.sim.kernel.walk import Coding

@@ -14,14 +14,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gaitswarm.sim.compiler.compilation import load_library, vector_header
-from gaitswarm.sim.compiler.target import (
+from gaitswarm.sim.compiler.compilation import (
     X86,
     X86_TARGETS,
     Target,
     cpu_flags,
     host_architecture,
+    load_library,
     target,
+    vector_header,
 )
 from gaitswarm.sim.kernel.walk import Precision
 

@@ -13,7 +13,7 @@ from gaitswarm.services.optimizer.run.runner import Runner
 from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from gaitswarm.services.worker.in_process import InProcessEvaluator
 from gaitswarm.sim.errors import ProcessEnded
-from gaitswarm.sim.kernel.compiled import derivation
+from gaitswarm.sim.kernel import derivation
 from gaitswarm.sim.robot import RobotFiles
 from tests.examples.hostile import TOML, URDF
 from tests.examples.processes import eventually

@@ -48,7 +48,7 @@ def mjcf(
     machine = load_robot(chosen_robot(robot))
     chosen = one_scenario(scenario, robot, preset="normal-fast")
     check_installed()
-    from gaitswarm.sim.mujoco.export import exported
+    from gaitswarm.sim.mujoco.model import exported
 
     text = exported(machine, chosen, contacts=contacts)
     if output is None:

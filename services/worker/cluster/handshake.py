@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from gaitswarm.sim.compiler.target import target
+from gaitswarm.sim.compiler.compilation import target
 from gaitswarm.sim.plugins import plugin_versions, source_digest
 from gaitswarm.sim.provenance import simulator_digest
 

@@ -14,19 +14,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from gaitswarm.sim.kernel.dynamics.inertia import (
+from gaitswarm.sim.kernel.dynamics.spatial import (
     Force,
     Inertia,
+    Matrix,
     Motion,
     RigidBody,
-    angular_acceleration_tensor,
-)
-from gaitswarm.sim.kernel.dynamics.rotation import Rotation
-from gaitswarm.sim.kernel.dynamics.spatial import (
-    Matrix,
+    Rotation,
     Scalar,
     Vector,
     add,
+    angular_acceleration_tensor,
     apply,
     cross,
     dot,

@@ -7,17 +7,15 @@ from collections.abc import Mapping, Sequence
 import casadi as ca
 
 from gaitswarm.sim.kernel.dynamics.articulated_body import LinkState, free_acceleration
-from gaitswarm.sim.kernel.dynamics.inertia import (
+from gaitswarm.sim.kernel.dynamics.spatial import (
     Force,
     Inertia,
     Motion,
     RigidBody,
-    angular_acceleration_tensor,
-)
-from gaitswarm.sim.kernel.dynamics.spatial import (
     Scalar,
     Vector,
     add,
+    angular_acceleration_tensor,
     apply,
     cross,
     dot,

@@ -10,8 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from gaitswarm.sim.kernel.dynamics.spatial import Scalar
-from gaitswarm.sim.kernel.dynamics.tree import leaves, mapped
+from gaitswarm.sim.kernel.dynamics.spatial import Scalar, leaves, mapped
 from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.limbs import Limb, LimbJoint, electrical_constants, limbs_of
 

@@ -17,12 +17,20 @@ import casadi as ca
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.kernel.dynamics.articulated_body import Link, LinkState, Passed, inward, outward
 from gaitswarm.sim.kernel.dynamics.contact import FRICTION, foot_on_ground
-from gaitswarm.sim.kernel.dynamics.drives import Drive, at_middle, drive_of, friction_of
-from gaitswarm.sim.kernel.dynamics.gearhead import shaft_torque
-from gaitswarm.sim.kernel.dynamics.inertia import Force, Inertia, Motion, RigidBody
-from gaitswarm.sim.kernel.dynamics.rotation import Rotation
+from gaitswarm.sim.kernel.dynamics.drives import (
+    Drive,
+    at_middle,
+    drive_of,
+    friction_of,
+    shaft_torque,
+)
 from gaitswarm.sim.kernel.dynamics.spatial import (
+    Force,
+    Inertia,
     Matrix,
+    Motion,
+    RigidBody,
+    Rotation,
     Scalar,
     Vector,
     add,

@@ -6,8 +6,9 @@ scalar by scalar, so structural zeros cost nothing and the algorithm stays reada
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -165,3 +166,250 @@ def _snap(value: Scalar) -> Scalar:
     number = float(value)
     nearest = float(round(number))
     return nearest if abs(number - nearest) < 1e-14 else number
+
+
+T = TypeVar("T")
+
+
+def leaves(tree: object) -> Iterator[Scalar]:
+    """All leaves, in one order for all trees of a shape."""
+    if isinstance(tree, tuple):
+        for branch in tree:
+            yield from leaves(branch)
+    elif is_dataclass(tree):
+        for field in fields(tree):
+            yield from leaves(getattr(tree, field.name))
+    elif tree is not None:
+        yield tree
+
+
+def mapped(tree: T, function: Callable[[Scalar], Scalar]) -> T:
+    """A tree of the same shape with other leaves."""
+    if isinstance(tree, tuple):
+        return tuple(mapped(branch, function) for branch in tree)  # type: ignore[return-value]
+    if is_dataclass(tree):
+        branches = {f.name: mapped(getattr(tree, f.name), function) for f in fields(tree)}
+        return replace(tree, **branches)  # type: ignore[type-var]
+    return tree if tree is None else function(tree)
+
+
+@dataclass(frozen=True, slots=True)
+class Rotation:
+    """From a link's frame to the frame before it: a turn about a joint's axis, then its rest.
+
+    Attributes:
+        rest: rotation at angle zero.
+        axis: constant unit axis, in the link's frame.
+        sine: of the angle.
+        cosine: of the angle.
+    """
+
+    rest: Matrix
+    axis: Vector
+    sine: Scalar
+    cosine: Scalar
+
+    def inwards(self, a: Vector) -> Vector:
+        """A vector in the frame before the link."""
+        return apply(self.rest, self._turned(a, self.sine))
+
+    def outwards(self, a: Vector) -> Vector:
+        """A vector in the link's frame."""
+        return self._turned(apply(transpose(self.rest), a), -self.sine)
+
+    def tensor_inwards(self, m: Matrix) -> Matrix:
+        """A tensor in the frame before the link."""
+        return multiply(multiply(self.rest, self._turned_tensor(m)), transpose(self.rest))
+
+    def _turned(self, a: Vector, sine: Scalar) -> Vector:
+        if 1.0 not in self.axis:
+            return apply(rotation_about(self.axis, sine, self.cosine), a)
+        i, j, k = _from(self.axis.index(1.0))
+        turned = [a[i]] * 3
+        turned[j] = self.cosine * a[j] - sine * a[k]
+        turned[k] = self.cosine * a[k] + sine * a[j]
+        return turned[0], turned[1], turned[2]
+
+    def _turned_tensor(self, m: Matrix) -> Matrix:
+        s, c = self.sine, self.cosine
+        if 1.0 not in self.axis:
+            turn = rotation_about(self.axis, s, c)
+            return multiply(multiply(turn, m), transpose(turn))
+        i, j, k = _from(self.axis.index(1.0))
+        t = [list(row) for row in m]
+        t[i][j], t[i][k] = c * m[i][j] - s * m[i][k], c * m[i][k] + s * m[i][j]
+        t[j][i], t[k][i] = c * m[j][i] - s * m[k][i], c * m[k][i] + s * m[j][i]
+        # As s^2 + c^2 = 1, half of the products will do.
+        change = c * (m[j][j] - m[k][k]) - s * (m[j][k] + m[k][j])
+        t[j][j], t[k][k] = m[k][k] + c * change, m[j][j] - c * change
+        t[j][k], t[k][j] = m[j][k] + s * change, m[k][j] + s * change
+        x, y, z = ((row[0], row[1], row[2]) for row in t)
+        return x, y, z
+
+
+def _from(i: int) -> tuple[int, int, int]:
+    return i, (i + 1) % 3, (i + 2) % 3
+
+
+@dataclass(frozen=True, slots=True)
+class Inertia:
+    """Articulated inertia in a link's frame: force = linear a + coupling alpha,
+    moment = coupling^T a + angular alpha.
+
+    Attributes:
+        linear: [kg].
+        coupling: [kg m].
+        angular: [kg m2].
+    """
+
+    linear: Matrix
+    coupling: Matrix
+    angular: Matrix
+
+    def plus(self, other: Inertia) -> Inertia:
+        """Sum."""
+        return Inertia(
+            mirrored(plus(self.linear, other.linear)),
+            plus(self.coupling, other.coupling),
+            mirrored(plus(self.angular, other.angular)),
+        )
+
+    @classmethod
+    def at_point(cls, at: Vector, resistance: Matrix) -> Inertia:
+        """What resists the acceleration of one point of a link.
+
+        Args:
+            at: The point [m].
+            resistance: Force per acceleration of the point, symmetric [kg].
+        """
+        lever = skew(at)
+        coupling = minus(((0.0,) * 3,) * 3, multiply(resistance, lever))
+        return cls(resistance, coupling, mirrored(multiply(lever, coupling)))
+
+    def less_outer(self, scaled: Force, column: Force) -> Inertia:
+        """Difference to the product scaled column^T, which is symmetric."""
+        return Inertia(
+            mirrored(minus(self.linear, outer(scaled.linear, column.linear))),
+            minus(self.coupling, outer(scaled.linear, column.angular)),
+            mirrored(minus(self.angular, outer(scaled.angular, column.angular))),
+        )
+
+    def in_parent(self, rotation: Rotation, offset: Vector) -> Inertia:
+        """The same seen from the parent's frame.
+
+        Args:
+            offset: Of this frame's origin in the parent's [m].
+        """
+        angular = mirrored(rotation.tensor_inwards(self.angular))
+        linear = mirrored(rotation.tensor_inwards(self.linear))
+        coupling = rotation.tensor_inwards(self.coupling)
+        lever = skew(offset)
+        shifted = minus(coupling, multiply(linear, lever))
+        moved = minus(angular, multiply(transpose(coupling), lever))
+        return Inertia(linear, shifted, mirrored(plus(moved, multiply(lever, shifted))))
+
+
+@dataclass(frozen=True, slots=True)
+class RigidBody:
+    """A body's mass and where it is, in the body's own frame.
+
+    Attributes:
+        mass: [kg].
+        moment: first moment m c [kg m].
+        angular: rotational inertia about the frame's origin [kg m2].
+    """
+
+    mass: Scalar
+    moment: Vector
+    angular: Matrix
+
+    def inertia(self) -> Inertia:
+        """The same as a spatial inertia."""
+        mass = self.mass
+        diagonal = ((mass, 0.0, 0.0), (0.0, mass, 0.0), (0.0, 0.0, mass))
+        return Inertia(diagonal, transpose(skew(self.moment)), self.angular)
+
+    def force(self, angular_velocity: Vector, acceleration: Motion, tensor: Matrix) -> Force:
+        """Force that makes the body move so (Newton's and Euler's equations).
+
+        Args:
+            angular_velocity: omega [rad/s].
+            tensor: [alpha]x + [omega]x^2, by `angular_acceleration_tensor`.
+        """
+        linear = add(scale(self.mass, acceleration.linear), apply(tensor, self.moment))
+        w, alpha, inertia = angular_velocity, acceleration.angular, self.angular
+        turning = []
+        # I alpha + omega x I omega, component by component: its products are the tensor's.
+        for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+            turning.append(
+                inertia[i][i] * alpha[i]
+                + (inertia[k][k] - inertia[j][j]) * (w[j] * w[k])
+                + inertia[j][k] * (tensor[j][j] - tensor[k][k])
+                + inertia[i][k] * tensor[j][i]
+                - inertia[i][j] * tensor[k][i]
+            )
+        x, y, z = turning
+        return Force(linear, add((x, y, z), cross(self.moment, acceleration.linear)))
+
+
+def angular_acceleration_tensor(velocity: Vector, acceleration: Vector) -> Matrix:
+    """What gives the acceleration of a body's points against one of them, by their offsets.
+
+    Args:
+        velocity: omega of the body [rad/s].
+        acceleration: alpha [rad/s2].
+
+    Returns:
+        [alpha]x + [omega]x^2 (Angeles, Fundamentals of Robotic Mechanical Systems).
+    """
+    x, y, z = velocity
+    a, b, c = acceleration
+    xx, yy, zz, xy, xz, yz = x * x, y * y, z * z, x * y, x * z, y * z
+    return (
+        (-(yy + zz), xy - c, xz + b),
+        (xy + c, -(xx + zz), yz - a),
+        (xz - b, yz + a, -(xx + yy)),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """Spatial velocity or acceleration.
+
+    Attributes:
+        linear: [m/s] or [m/s2].
+        angular: [rad/s] or [rad/s2].
+    """
+
+    linear: Vector
+    angular: Vector
+
+
+@dataclass(frozen=True, slots=True)
+class Force:
+    """Spatial force or momentum.
+
+    Attributes:
+        linear: [N] or [N s].
+        angular: about the frame's origin [N m] or [N m s].
+    """
+
+    linear: Vector
+    angular: Vector
+
+    def plus(self, other: Force) -> Force:
+        """Sum."""
+        return Force(add(self.linear, other.linear), add(self.angular, other.angular))
+
+    def less(self, other: Force) -> Force:
+        """Difference."""
+        return Force(subtract(self.linear, other.linear), subtract(self.angular, other.angular))
+
+    def in_parent(self, rotation: Rotation, offset: Vector) -> Force:
+        """The same seen from the parent's frame.
+
+        Args:
+            offset: Of this frame's origin in the parent's [m].
+        """
+        linear = rotation.inwards(self.linear)
+        return Force(linear, add(rotation.inwards(self.angular), cross(offset, linear)))

@@ -16,11 +16,9 @@ import numpy as np
 from gaitswarm.sim.kernel.dynamics.articulated_body import LinkState
 from gaitswarm.sim.kernel.dynamics.body import body_integrands, body_of, body_state, pushed, solved
 from gaitswarm.sim.kernel.dynamics.drives import battery_voltage
-from gaitswarm.sim.kernel.dynamics.inertia import Force, Inertia, Motion
 from gaitswarm.sim.kernel.dynamics.kinds import LimbKind, limb_kinds
 from gaitswarm.sim.kernel.dynamics.limb import Environment, Held, LimbState, after, before
-from gaitswarm.sim.kernel.dynamics.spatial import Scalar
-from gaitswarm.sim.kernel.dynamics.tree import leaves, mapped
+from gaitswarm.sim.kernel.dynamics.spatial import Force, Inertia, Motion, Scalar, leaves, mapped
 from gaitswarm.sim.kernel.emitted.emit_c import emit_c
 from gaitswarm.sim.kernel.parameters import CONTACT_LAWS, Layout, internal_state_size
 from gaitswarm.sim.robot import Robot

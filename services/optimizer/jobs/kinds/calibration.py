@@ -16,9 +16,14 @@ from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
 from gaitswarm.services.optimizer.jobs.judgement import Judgement
 from gaitswarm.services.optimizer.jobs.kinds.misfit import difference, reached, root_mean_square
 from gaitswarm.services.optimizer.jobs.spec import Spec
-from gaitswarm.sim.calibration.catalogue import robot_variables, varied_robot, walk_variables
 from gaitswarm.sim.calibration.targets import QUANTITIES, Target, TargetWalk
-from gaitswarm.sim.calibration.walk import RESULTS, CalibrationWalk
+from gaitswarm.sim.calibration.walk import (
+    RESULTS,
+    CalibrationWalk,
+    robot_variables,
+    varied_robot,
+    walk_variables,
+)
 from gaitswarm.sim.case import Case
 from gaitswarm.sim.catalogue import design_shown
 from gaitswarm.sim.controllers import CONTROLLERS

@@ -1,4 +1,4 @@
-"""In which order walks enter the lanes of a kernel that refills them."""
+"""The order in which walks enter the lanes of a kernel that refills them."""
 
 from __future__ import annotations
 

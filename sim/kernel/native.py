@@ -6,29 +6,22 @@ import ctypes
 import dataclasses
 import struct
 import threading
+import time
 from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from gaitswarm.sim.compiler.compilation import load_library
-from gaitswarm.sim.compiler.target import Target
-from gaitswarm.sim.errors import KernelBuildError
-from gaitswarm.sim.kernel.compiled.derivation import derived_source
-from gaitswarm.sim.kernel.compiled.lanes import plan_lanes
-from gaitswarm.sim.kernel.compiled.sharing import SHARED_STRUCTURES, Pool
-from gaitswarm.sim.kernel.compiled.structures import (
-    STRUCTURES,
-    Addresses,
-    CodingStructure,
-    SensorErrorsStructure,
-    Walker,
-)
+from gaitswarm.sim.compiler.compilation import Target, load_library
+from gaitswarm.sim.controllers.base import ControlLaw, JointPd, LookupTable, Response
+from gaitswarm.sim.errors import KernelBuildError, SimulationInputError
+from gaitswarm.sim.kernel.derivation import derived_source
 from gaitswarm.sim.kernel.dynamics.kinds import robot_constants
 from gaitswarm.sim.kernel.emitted.source import kernel_identity
-from gaitswarm.sim.kernel.gains import check_gains
+from gaitswarm.sim.kernel.lanes import plan_lanes
 from gaitswarm.sim.kernel.parameters import Layout, internal_state_size
 from gaitswarm.sim.kernel.walk import (
     Coding,
@@ -37,9 +30,220 @@ from gaitswarm.sim.kernel.walk import (
     WalkResult,
     WalkResults,
     WalkSetup,
+    check_gains,
 )
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import Robot
+
+Floats = NDArray[np.float64]
+
+
+class CodingStructure(ctypes.Structure):
+    """Sensors, PWM and rates of all walks of a call, with the robot's constants."""
+
+    _fields_ = [
+        ("angle_counts", ctypes.c_double),
+        ("current_counts", ctypes.c_double),
+        ("duty_per_count", ctypes.c_double),
+        ("angle_step", ctypes.c_int64),
+        ("current_step", ctypes.c_int64),
+        ("pwm_step", ctypes.c_int64),
+        ("pwm_counts", ctypes.c_int64),
+        ("substeps", ctypes.c_int64),
+        ("refinement", ctypes.c_int64),
+        ("inner_ticks", ctypes.c_int64),
+        ("robot", ctypes.c_void_p),
+    ]
+
+
+class _Table(ctypes.Structure):
+    _fields_ = [
+        ("values", ctypes.c_void_p),
+        ("n_error", ctypes.c_int64),
+        ("n_current", ctypes.c_int64),
+        ("n_velocity", ctypes.c_int64),
+        ("error_gain", ctypes.c_int64),
+        ("current_gain", ctypes.c_int64),
+        ("velocity_gain", ctypes.c_int64),
+        ("output_gain", ctypes.c_int64),
+    ]
+
+
+class _Law(ctypes.Structure):
+    _fields_ = [
+        ("proportional_gain", ctypes.c_int64),
+        ("integral_gain", ctypes.c_int64),
+        ("derivative_gain", ctypes.c_int64),
+        ("direct", _Table),
+        ("integrated", _Table),
+        ("stiffness", ctypes.c_double),
+        ("damping", ctypes.c_double),
+        ("feed_forward", ctypes.c_double),
+    ]
+
+
+class SensorErrorsStructure(ctypes.Structure):
+    """Noise and delay of angles and currents, and the seed of the noise."""
+
+    _fields_ = [
+        ("noise", 2 * ctypes.c_double),
+        ("delay", 2 * ctypes.c_int64),
+        ("seed", ctypes.c_uint64),
+    ]
+
+
+class Walker(ctypes.Structure):
+    """A walk as the kernel reads it, with where its results go and what they are."""
+
+    _fields_ = [
+        ("q0", ctypes.c_void_p),
+        ("internal_state", ctypes.c_void_p),
+        ("parameters", ctypes.c_void_p),
+        ("desired", ctypes.c_void_p),
+        ("disturbance", ctypes.c_void_p),
+        ("feed_forward", ctypes.c_void_p),
+        ("sensors", SensorErrorsStructure),
+        ("shove", 2 * ctypes.c_int64),
+        ("law", _Law),
+        ("ticks", ctypes.c_int64),
+        ("fall_height", ctypes.c_double),
+        ("fall_cosine", ctypes.c_double),
+        ("smoothing", 2 * ctypes.c_double),
+        ("sums", ctypes.c_void_p),
+        ("end", ctypes.c_void_p),
+        ("log", ctypes.c_void_p),
+        ("peak_current", ctypes.c_double),
+        ("status", ctypes.c_int64),
+    ]
+
+
+STRUCTURES: Final = {"coding": CodingStructure, "table": _Table, "walker": Walker}
+"""By their names in the library's functions that tell their sizes."""
+
+
+class Addresses:
+    """Addresses of arrays, which stay where they are as long as this object lives.
+
+    Walks share most of them: those of a scenario all but the law, those of a design the law.
+    """
+
+    def __init__(self) -> None:
+        self._arrays: dict[int, tuple[int, NDArray[Any], NDArray[Any]]] = {}
+        self._laws: dict[int, tuple[_Law, ControlLaw]] = {}
+
+    def of(self, array: NDArray[Any], dtype: Any) -> int:
+        """Where an array's numbers are."""
+        known = self._arrays.get(id(array))
+        if known is None:
+            contiguous = np.ascontiguousarray(array, dtype=dtype)
+            known = int(contiguous.ctypes.data), contiguous, array
+            self._arrays[id(array)] = known
+        return known[0]
+
+    def if_any(self, array: Floats | None) -> int | None:
+        """As `of`, for doubles."""
+        return None if array is None else self.of(array, np.float64)
+
+    def law(self, law: ControlLaw) -> _Law:
+        """A control law as the kernel reads it."""
+        known = self._laws.get(id(law))
+        if known is None:
+            packed = _Law(
+                law.proportional_gain,
+                law.integral_gain,
+                law.derivative_gain,
+                self._table(law.direct),
+                self._table(law.integrated),
+                *dataclasses.astuple(law.joint_pd or JointPd()),
+            )
+            known = self._laws[id(law)] = packed, law
+        return known[0]
+
+    def _table(self, table: Response | None) -> _Table:
+        if table is None:
+            return _Table()
+        if not isinstance(table, LookupTable):
+            raise SimulationInputError(
+                "the native kernel runs tables only; an inference needs backend='reference'"
+            )
+        return _Table(
+            self.of(table.values, np.int8),
+            *table.values.shape,
+            table.error_gain,
+            table.current_gain,
+            table.velocity_gain,
+            table.output_gain,
+        )
+
+
+class _Call(ctypes.Structure):
+    _fields_ = [
+        ("walkers", ctypes.c_void_p),
+        ("n", ctypes.c_int64),
+        ("begun", ctypes.c_int64),
+        ("left", ctypes.c_int64),
+        ("number", ctypes.c_int64),
+        ("following", ctypes.c_void_p),
+    ]
+
+
+class _Pool(ctypes.Structure):
+    _fields_ = [
+        ("busy", ctypes.c_int64),
+        ("calls", ctypes.c_int64),
+        ("first", ctypes.c_void_p),
+    ]
+
+
+class LaneCounts(ctypes.Structure):
+    """As `gaitswarm.sim.kernel.walk.LaneUse`, of the lanes of one thread."""
+
+    _fields_ = [(name, ctypes.c_int64) for name in ("walked", "computed", "timed", "control")]
+
+
+SHARED_STRUCTURES: Final = {"call": _Call, "pool": _Pool, "lane_use": LaneCounts}
+"""By their names in the library's functions that tell their sizes."""
+
+
+class Pool:
+    """Calls of one kernel and coding.
+
+    A thread first begins all walks of its own call. Lanes that become free then are filled with
+    walks of the other calls, so that all threads end at nearly the same time.
+    """
+
+    def __init__(self, library: ctypes.CDLL) -> None:
+        self._library = library
+        self._shared = _Pool()
+        self._walked = threading.Condition()
+        self._kept: list[tuple[_Call, object]] = []
+
+    def walk(
+        self, walkers: ctypes.Array[Any], coding: ctypes.Structure, memory: object
+    ) -> tuple[LaneCounts, float]:
+        """Compute walks, and perhaps some of other calls.
+
+        Returns:
+            How the lanes of this thread were used; and how long it then waited for walks that other
+            threads had taken over [s].
+        """
+        call = _Call(walkers=ctypes.addressof(walkers), n=len(walkers), left=len(walkers))
+        use = LaneCounts()
+        with self._walked:
+            self._kept.append((call, (walkers, memory)))
+        self._library.gaitswarm_walk(
+            ctypes.byref(self._shared), ctypes.byref(call), ctypes.byref(coding), ctypes.byref(use)
+        )
+        walked = time.perf_counter()
+        with self._walked:
+            self._walked.notify_all()
+            self._walked.wait_for(lambda: not self._left(call))
+            self._kept = [kept for kept in self._kept if self._left(kept[0])]
+        return use, time.perf_counter() - walked
+
+    def _left(self, call: _Call) -> int:
+        return int(self._library.gaitswarm_left(ctypes.byref(call)))
+
 
 _CODED: Final = tuple(field.name for field in dataclasses.fields(Coding))
 

@@ -1,4 +1,4 @@
-"""A kernel's C text for a robot by anybody, derived in a process that may be ended."""
+"""Derivation of a kernel's C source, in a process with limits for robots that do not ship."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MEMORY: Final = 4 << 30
 
 # Not kept: CasADi's symbols would take memory, and robots with a new kernel are rare.
 PROCESSES: Final = LimitedProcesses(
-    "gaitswarm.sim.kernel.compiled.derivation",
+    "gaitswarm.sim.kernel.derivation",
     count=2,
     seconds=SECONDS,
     cpu_seconds=CPU_SECONDS,

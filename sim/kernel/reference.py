@@ -14,9 +14,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from gaitswarm.sim.kernel.dynamics.physics_step import PhysicsModel, physics_model
-from gaitswarm.sim.kernel.gains import check_gains
-from gaitswarm.sim.kernel.readable.control_tick import (
+from gaitswarm.sim.kernel.control_tick import (
+    InnerLoop,
     Past,
     coded,
     control,
@@ -24,7 +23,7 @@ from gaitswarm.sim.kernel.readable.control_tick import (
     padded_states,
     status_of,
 )
-from gaitswarm.sim.kernel.readable.joint_pd import InnerLoop
+from gaitswarm.sim.kernel.dynamics.physics_step import PhysicsModel, physics_model
 from gaitswarm.sim.kernel.sensors import Sensors
 from gaitswarm.sim.kernel.walk import (
     INTEGRANDS,
@@ -33,6 +32,7 @@ from gaitswarm.sim.kernel.walk import (
     WalkResult,
     WalkResults,
     WalkSetup,
+    check_gains,
 )
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot import Robot

@@ -1,1 +1,0 @@
-"""The compiled kernel: loaded, called, and kept busy."""

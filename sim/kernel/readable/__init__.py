@@ -1,1 +1,0 @@
-"""The readable twin of the compiled kernel, over CasADi's interpreter."""

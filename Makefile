@@ -93,7 +93,7 @@ pictures: setup-dev ## Draw the pictures in docs/images anew: the page's, two wa
 
 lock: ## Choose versions anew, after a change of the dependencies in pyproject.toml (needs uv).
 	$(COMPILE) pyproject.toml --extra postgres --group build -o requirements/run.lock
-	$(COMPILE) pyproject.toml --extra postgres --extra search --extra rivals --extra mujoco --extra telemetry --group dev -c requirements/run.lock -o requirements/dev.lock
+	$(COMPILE) pyproject.toml --extra postgres --extra search --extra mujoco --extra telemetry --group dev --group research -c requirements/run.lock -o requirements/dev.lock
 	$(COMPILE) pyproject.toml --extra postgres --extra search --extra mujoco --extra telemetry --extra cluster --group build -c requirements/run.lock -o requirements/image.lock
 	sed -n 's/^compiler = \["\(.*\)"\]/\1/p' pyproject.toml | $(COMPILE) - -o requirements/compiler.lock
 	$(COMPILE) --group manual -c requirements/dev.lock -o requirements/manual.lock

@@ -53,7 +53,6 @@ from gaitswarm.api.routes import (
     robots,
     session,
     simulations,
-    tournaments,
 )
 from gaitswarm.services.monitoring.activity import Activity
 from gaitswarm.services.monitoring.collectors import QueueCollector
@@ -119,7 +118,6 @@ def create_app(
         reference,
         firmware,
         identification,
-        tournaments,
         simulations,
         catalogue,
         robots,

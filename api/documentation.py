@@ -41,10 +41,6 @@ TAGS: Final[list[dict[str, str]]] = [
     {"name": "jobs", "description": "Optimizations: submit, follow, pause, resume, cancel."},
     {"name": "history", "description": "What a job has committed: iterations and evaluations."},
     {"name": "analysis", "description": "Questions about all evaluations of a job at once."},
-    {
-        "name": "tournaments",
-        "description": "Search methods against each other on the same problems.",
-    },
     {"name": "recordings", "description": "Measured walks, to which a robot is fitted."},
     {"name": "simulations", "description": "One design walking on request, outside any job."},
     {"name": "robots", "description": "Robots of one's own, made of a URDF and looked at."},

@@ -10,7 +10,6 @@ _SOURCES: Final[dict[str, dict[str, str]]] = {
     "submit_job": {"job_id": "$response.body#/id"},
     "fork_job": {"job_id": "$response.body#/id"},
     "list_jobs": {"job_id": "$response.body#/items/0/id"},
-    "list_tournaments": {"job_id": "$response.body#/items/0/id"},
     "list_iterations": {
         "job_id": "$request.path.job_id",
         "iteration": "$response.body#/items/0/index",
@@ -24,7 +23,6 @@ _SOURCES: Final[dict[str, dict[str, str]]] = {
 _ONLY: Final = {
     "list_jobs": frozenset({"get_job", "list_iterations"}),
     "list_iterations": frozenset({"list_evaluations", "get_preference_for"}),
-    "list_tournaments": frozenset({"get_standings"}),
 }
 """Where an answer leads, if not to every operation that has one of its parameters in its path."""
 

@@ -20,7 +20,7 @@ from gaitswarm.views import PREFIX
 FOLDER: Final = Path(__file__).parent / "page"
 """`make page` builds it from web/; a wheel brings it."""
 
-PAGES: Final = ("/jobs", "/compare", "/tournaments", "/walk", "/controller")
+PAGES: Final = ("/jobs", "/compare", "/walk", "/controller")
 """With everything below them: the page itself tells its views apart by their paths."""
 
 _JOB_PAGE: Final = re.compile(r"/jobs/([a-z0-9]{12})")

@@ -58,7 +58,7 @@ from gaitswarm.cli.commands.robots import (
     synthesize,
     validate,
 )
-from gaitswarm.cli.commands.studies import bench, study, tournament
+from gaitswarm.cli.commands.studies import bench, study
 from gaitswarm.cli.exit_codes import ExitCode, exit_code, explanation
 from gaitswarm.cli.output import (
     OutputClosed,
@@ -84,8 +84,7 @@ PANELS: Final = {
         *("calibrate", "targets", "validate", "synthesize", "reconstruct"),
     ),
     "Installation": (
-        *("optimizers", "cases", "plugins", "token", "audit", "db", "bench"),
-        *("study", "tournament"),
+        *("optimizers", "cases", "plugins", "token", "audit", "db", "bench", "study"),
     ),
 }
 """Commands in the order of the help text, by heading."""
@@ -193,7 +192,6 @@ for _module in (
     synthesize,
     mjcf,
     gaits,
-    tournament,
     identify,
     recordings,
     calibrate,

@@ -55,7 +55,6 @@ if TYPE_CHECKING:
     from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
     from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
     from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
-    from gaitswarm.services.optimizer.jobs.kinds.tournament import TournamentSpec
     from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
     from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
     from gaitswarm.services.optimizer.jobs.labels import JobFilter
@@ -115,11 +114,6 @@ if TYPE_CHECKING:
     from gaitswarm.views.replay import WalkReplay
     from gaitswarm.views.robustness import RobustnessView
     from gaitswarm.views.surface import SurfaceView
-    from gaitswarm.views.tournament import (
-        ProblemRunsView,
-        TournamentStandingsView,
-        TournamentView,
-    )
     from gaitswarm.views.trade_offs import FrontView, PreferenceForView
     from gaitswarm.views.verification import VerificationView
 
@@ -186,7 +180,6 @@ __all__ = [
     "PatternSearchSettings",
     "Preference",
     "PreferenceForView",
-    "ProblemRunsView",
     "ProvenanceChanged",
     "PsoPsSettings",
     "PsoSettings",
@@ -215,9 +208,6 @@ __all__ = [
     "TargetsView",
     "TlboSettings",
     "TooManyRequests",
-    "TournamentSpec",
-    "TournamentStandingsView",
-    "TournamentView",
     "TuningWorlds",
     "Unauthorized",
     "Unavailable",
@@ -279,9 +269,6 @@ _MODULES: Final = {
     "gaitswarm.views.replay": ("WalkReplay",),
     "gaitswarm.views.robustness": ("RobustnessView",),
     "gaitswarm.views.surface": ("SurfaceView",),
-    "gaitswarm.views.tournament": (
-        "ProblemRunsView", "TournamentStandingsView", "TournamentView",
-    ),
     "gaitswarm.views.trade_offs": ("FrontView", "PreferenceForView"),
     "gaitswarm.views.verification": ("VerificationView",),
     "gaitswarm.services.optimizer.jobs.kinds.calibration": ("CalibrationSpec",),
@@ -289,7 +276,6 @@ _MODULES: Final = {
     "gaitswarm.services.optimizer.jobs.labels": ("JobFilter",),
     "gaitswarm.services.optimizer.jobs.kinds.identification": ("IdentificationSpec",),
     "gaitswarm.services.optimizer.jobs.preference": ("PREFERENCES", "Preference"),
-    "gaitswarm.services.optimizer.jobs.kinds.tournament": ("TournamentSpec",),
     "gaitswarm.services.optimizer.jobs.kinds.tuning": ("JobSpec",),
     "gaitswarm.services.optimizer.jobs.kinds.tuning_worlds": ("TuningWorlds",),
     "gaitswarm.services.optimizer.search.automatic": ("AutoSettings",),

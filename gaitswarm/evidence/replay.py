@@ -25,8 +25,6 @@ Table = tuple[AnySpec, EvaluationColumns]
 
 def why_no_replay(spec: AnySpec) -> tuple[bool | None, str] | None:
     """Say whether evaluations of a job can be compared here."""
-    if spec.unwalked is None:
-        return None, "what a run of a tournament comes to depends on more than what is simulated"
     if isinstance(spec, JobSpec) and spec.case is not None:
         return None, f"designs were put to {spec.case.name}, a plug-in's, which may have other bits"
     if provenance_of(*spec.described, precision=spec.precision).backend == "reference":

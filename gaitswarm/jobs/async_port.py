@@ -54,11 +54,6 @@ if TYPE_CHECKING:
     from gaitswarm.views.replay import WalkReplay
     from gaitswarm.views.robustness import RobustnessView
     from gaitswarm.views.surface import SurfaceView
-    from gaitswarm.views.tournament import (
-        ProblemRunsView,
-        TournamentStandingsView,
-        TournamentView,
-    )
     from gaitswarm.views.trade_offs import FrontView, PreferenceForView
     from gaitswarm.views.verification import HistoryVerificationView
 
@@ -256,20 +251,6 @@ class AsyncJobs(ABC):
         self, job_ids: Sequence[str], *, leave_out: LeaveOut | None = None
     ) -> TargetsView:
         """See how near runs of a calibration come to their targets."""
-
-    @abstractmethod
-    async def tournaments(self) -> list[TournamentView]:
-        """List tournaments: jobs that ran search methods on the same problems."""
-
-    @abstractmethod
-    async def standings(
-        self, job_id: str, *, compare_with: str | None = None
-    ) -> TournamentStandingsView:
-        """See what a tournament comes to, of all runs that have ended."""
-
-    @abstractmethod
-    async def problem_runs(self, job_id: str, problem: str) -> ProblemRunsView:
-        """See all runs of a tournament on one problem."""
 
     @abstractmethod
     async def certificate(

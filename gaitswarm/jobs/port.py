@@ -8,7 +8,6 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self, TypeAlias, Unpack
 
 from gaitswarm.jobs.findings import Findings
-from gaitswarm.jobs.tournaments import Tournaments
 from gaitswarm.jobs.walks import Walks
 from gaitswarm.services.optimizer.jobs.job import Command, JobOrder, JobState
 from gaitswarm.services.optimizer.jobs.labels import ANY_JOB, JobFilter
@@ -28,7 +27,7 @@ JobEvent: TypeAlias = IterationView | StateView
 """What happens to a job: an iteration was committed, or its state is another."""
 
 
-class Jobs(Findings, Tournaments, Walks, ABC):
+class Jobs(Findings, Walks, ABC):
     """Jobs, in a database (`gaitswarm.open`) or behind a server (`gaitswarm.connect`).
 
     Both answer alike and raise the same errors: every method raises Unavailable if the database or

@@ -27,7 +27,7 @@ from gaitswarm.views.evaluation import BestView, ObjectiveView
 from gaitswarm.views.links import job_links
 from gaitswarm.views.reference import ReferenceView
 
-JobKind = Literal["tuning", "identification", "calibration", "tournament", "certificate"]
+JobKind = Literal["tuning", "identification", "calibration", "certificate"]
 
 
 class JobSummaryView(View):

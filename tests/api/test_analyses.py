@@ -19,7 +19,7 @@ WHOLE_HISTORIES = {
     *("get_distribution", "get_particles", "rank_designs", "get_scenario_families", "get_front"),
     *("get_importance", "compare_jobs", "list_convergences"),
     *("get_preference_for", "get_certificate", "get_targets", "get_parameters"),
-    *("list_tournaments", "get_standings", "get_problem_runs", "get_evidence", "fork_job"),
+    *("get_evidence", "fork_job"),
 }
 
 

@@ -63,9 +63,6 @@ def test_the_routes_are_these(document: Document) -> None:
         f"get {job}/preference-for",
         f"get {job}/parameters",
         f"get {job}/targets",
-        "get /v1/tournaments",
-        "get /v1/tournaments/{job_id}",
-        "get /v1/tournaments/{job_id}/problems/{problem}",
         f"get {job}/certificate",
         "post /v1/estimates",
         "get /v1/recordings",
@@ -147,7 +144,7 @@ def test_every_error_is_a_problem(document: Document) -> None:
 def test_a_job_spec_is_one_schema_for_requests_and_answers(document: Document) -> None:
     schemas = document["components"]["schemas"]
 
-    named = ("Job", "Identification", "Calibration", "Tournament", "Certificate")
+    named = ("Job", "Identification", "Calibration", "Certificate")
     kinds = [f"{kind}Spec" for kind in named]
     assert not [name for name in schemas if name.startswith(tuple(f"{kind}-" for kind in kinds))]
     spec, null = schemas["JobView"]["properties"]["spec"]["anyOf"]
@@ -192,7 +189,7 @@ def test_links_lead_to_operations_that_there_are_and_fill_their_paths(document: 
                 assert set(link["parameters"]) == taken, path
                 followed.add(link["operationId"])
     of_paths = {name for name, (path, _) in known.items() if "{job_id}" in path}
-    assert of_paths - followed == {"get_problem_runs"}
+    assert of_paths - followed == set()
     assert "get_recording" in followed
 
 

@@ -65,10 +65,6 @@ def test_in_a_spec(gaitswarm: Gaitswarm, write_json: WriteJson, spec: Any, said:
         ),
         (("compare", "fuzzy-pi3"), "drive: unknown 'fuzzy-pi3'; did you mean 'fuzzy-pi-3'?"),
         (("gaits", "crwl"), "gait: unknown gait 'crwl'; did you mean 'crawl'?"),
-        (
-            ("tournament", "robot", "--methods", "psoo"),
-            "methods: unknown 'psoo'; did you mean 'pso'?",
-        ),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )

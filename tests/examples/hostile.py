@@ -274,8 +274,7 @@ def _specs() -> Iterator[Body]:
         field = None if robot == {} else "robot"
         yield spec(f"robot {json.dumps(robot)[:12]}", field, expected, robot=robot)
     robots = [{"toml": f"# {k}\n{TOML}", "urdf": URDF} for k in range(40)]
-    problems = [{"name": f"p{k}", "job": {"robot": robot}} for k, robot in enumerate(robots)]
-    yield spec("40 robots", "problems", kind="tournament", method="pso", problems=problems)
+    yield spec("40 robots", "robots", kind="calibration", robots=robots)
     nested: Any = {"toml": "", "urdf": ""}
     for _ in range(200):
         nested = {"robot": [nested]}

@@ -11,7 +11,6 @@ import pytest
 from gaitswarm.services.optimizer.errors import StoreUnavailable
 from gaitswarm.services.optimizer.jobs.iteration import Known
 from gaitswarm.services.optimizer.jobs.job import Job, JobState
-from gaitswarm.services.optimizer.jobs.kinds.tournament import TournamentSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
 from gaitswarm.services.optimizer.jobs.walk_keys import walk_keys
@@ -207,13 +206,7 @@ def test_a_store_that_does_not_answer_knows_nothing() -> None:
     assert (bits(outcomes), walked) == (bits(walk(asked)), keys_of(asked))
 
 
-def test_runs_of_a_tournament_depend_on_more_than_walks_and_have_no_keys() -> None:
-    problems = [{"function": "D7C0R0I1"}]
-    tournament = TournamentSpec.model_validate(
-        {"kind": "tournament", "method": "pso", "problems": problems, "iterations": 1}
-    ).resolved()
-    designs = np.zeros((1, len(tournament.design_space().names)))
-    assert walk_keys(tournament, HERE.simulation, designs) == ()
+def test_walks_without_keys_are_all_walked() -> None:
     asked, evaluator = request([[0.5, 0.1], [0.5, 0.1]]), CountingEvaluator()
     assert evaluate_unknown(evaluator, Knows({}), asked, (), lambda: False)[1] == ()
     assert evaluator.walked == 2

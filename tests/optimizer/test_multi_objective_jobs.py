@@ -23,11 +23,9 @@ from gaitswarm.services.optimizer.run.embedded import run_embedded
 from gaitswarm.services.optimizer.run.execution import Surroundings, run_claim
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store.port.base import Store
-from gaitswarm.services.optimizer.tournament.methods import method_names
 from tests.calibration.conftest import spec as calibration
 from tests.examples.jobs import history
 from tests.optimizer.formula import HERE, SPEC, TradeOff
-from tests.tournament.problems import tournament
 
 Floats = NDArray[np.float64]
 
@@ -187,10 +185,3 @@ def test_a_kind_of_job_without_objectives_to_trade_refuses_the_method_by_name() 
     document = json.loads(calibration().model_dump_json())
     with pytest.raises(ValidationError, match="optimizer: hype is multi-objective"):
         SPECS.validate_python(document | {"optimizer": "hype"})
-
-
-def test_a_tournament_refuses_it_and_says_why() -> None:
-    for method in ("hype", {"name": "hype"}):
-        with pytest.raises(ValidationError, match="hype is multi-objective; a tournament"):
-            tournament(method=method)
-    assert "hype" not in method_names()

@@ -20,9 +20,6 @@ from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
 from gaitswarm.services.optimizer.jobs.kinds.misfit import root_mean_square
-from gaitswarm.services.optimizer.jobs.kinds.problem import FunctionProblem
-from gaitswarm.services.optimizer.jobs.kinds.race_case import RaceCase
-from gaitswarm.services.optimizer.jobs.kinds.tournament import TournamentSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 from gaitswarm.services.optimizer.jobs.optimizer_choice import optimizer_settings
@@ -42,7 +39,6 @@ from gaitswarm.services.optimizer.run.execution import OnCommit, Surroundings, r
 from gaitswarm.services.optimizer.search.registry import create_search
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store.port.base import Store
-from gaitswarm.services.optimizer.tournament.race import race
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.outcome import OBJECTIVES
 from tests.optimizer.formula import HERE, SPEC, FormulaEvaluator, job
@@ -279,12 +275,12 @@ def test_a_refused_claim_sends_nothing() -> None:
 
 
 def test_all_code_that_asks_and_judges_is_in_the_digest() -> None:
-    kinds = (JobSpec, IdentificationSpec, CalibrationSpec, TournamentSpec, CertificateSpec)
+    kinds = (JobSpec, IdentificationSpec, CalibrationSpec, CertificateSpec)
     specs = (*kinds, Spec)
     used = (*specs, optimizer_settings, DesignSpace, Preference, root_mean_square, EarlierJobs)
-    runs = (FunctionProblem, RaceCase, TuningWorlds, case_choice)
+    runs = (TuningWorlds, case_choice)
     files = {Path(inspect.getfile(thing)) for thing in (*used, *runs)}
-    for room in (Path(inspect.getfile(thing)).parent for thing in (JobSpec, create_search, race)):
+    for room in (Path(inspect.getfile(thing)).parent for thing in (JobSpec, create_search)):
         files |= set(room.rglob("*.py"))
     assert files == set(optimizer_files())
 

@@ -8,9 +8,14 @@ import pytest
 
 from gaitswarm.services.optimizer.errors import IdempotencyConflict, InvalidRequest, NotFound
 from gaitswarm.services.optimizer.jobs.job import Command, Job, JobOrder, JobState
+from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from tests.store.examples import LEASE, Clock, ask, completed, spec
-from tests.tournament.problems import tournament
+
+
+def certificate(name: str) -> CertificateSpec:
+    design = {"P": 0.4, "I": 0.1}
+    return CertificateSpec(kind="certificate", name=name, design=design, controller="pi")
 
 
 def test_a_new_job_is_queued_and_reads_back_as_it_was_returned(
@@ -271,15 +276,15 @@ def test_jobs_of_one_kind_are_found_among_all_others_in_every_order(
 ) -> None:
     wanted: list[str] = []
     for number in range(3):
-        store.create_job(spec(name=f"tournament {number}"))
+        store.create_job(spec(name=f"certificate {number}"))
         clock.advance(0.001)
-        wanted.insert(0, store.create_job(tournament(name=str(number)))[0].id)
+        wanted.insert(0, store.create_job(certificate(name=str(number)))[0].id)
         clock.advance(0.001)
-    assert [job.id for job in store.jobs(kind="tournament").items] == wanted
-    named = store.jobs(kind="tournament", order=JobOrder.NAME).items
+    assert [job.id for job in store.jobs(kind="certificate").items] == wanted
+    named = store.jobs(kind="certificate", order=JobOrder.NAME).items
     assert [job.id for job in named] == wanted[::-1]
-    assert [job.id for job in store.jobs(kind="tournament", search="1").items] == [wanted[1]]
-    page = store.jobs(kind="tournament", limit=2)
+    assert [job.id for job in store.jobs(kind="certificate", search="1").items] == [wanted[1]]
+    page = store.jobs(kind="certificate", limit=2)
     assert [job.id for job in page.items] == wanted[:2]
-    (last,) = store.jobs(kind="tournament", limit=2, after=page.next).items
+    (last,) = store.jobs(kind="certificate", limit=2, after=page.next).items
     assert last.id == wanted[2]

@@ -120,7 +120,7 @@ def test_lists_show_it_among_the_others(store: SqlStore, clock: Clock, damaged: 
         assert {job.id for job in (*first.items, *second.items)} == {sound.id, damaged.id}
     assert [job.id for job in store.jobs(search="sound").items] == [sound.id]
     assert [job.id for job in store.jobs(search=damaged.id).items] == [damaged.id]
-    assert store.jobs(kind="tournament").items == ()
+    assert store.jobs(kind="certificate").items == ()
 
 
 @pytest.mark.variants("sqlite-*", "postgresql-newer")

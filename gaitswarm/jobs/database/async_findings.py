@@ -29,7 +29,6 @@ from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.identification import IdentifiabilityView
 from gaitswarm.views.importance import ImportanceView
 from gaitswarm.views.preferences import RobustPreferencesView
-from gaitswarm.views.tournament import ProblemRunsView, TournamentStandingsView, TournamentView
 from gaitswarm.views.trade_offs import FrontView, PreferenceForView
 from gaitswarm.views.verification import HistoryVerificationView
 
@@ -37,7 +36,7 @@ T = TypeVar("T")
 
 
 class AsyncDatabaseFindings(ABC):
-    """Findings and tournaments, read while the event loop goes on."""
+    """Findings, read while the event loop goes on."""
 
     @abstractmethod
     async def _jobs(self) -> DatabaseFindings:
@@ -165,21 +164,6 @@ class AsyncDatabaseFindings(ABC):
         jobs = await self._jobs()
         asked = partial(jobs.verify, job_id, replay=replay, seed=seed, head=head)
         return await to_thread.run_sync(asked)
-
-    async def tournaments(self) -> list[TournamentView]:
-        """Read which tournaments there are."""
-        return await to_thread.run_sync((await self._jobs()).tournaments)
-
-    async def standings(
-        self, job_id: str, *, compare_with: str | None = None
-    ) -> TournamentStandingsView:
-        """Judge a tournament from what is stored."""
-        jobs = await self._jobs()
-        return await to_thread.run_sync(partial(jobs.standings, job_id, compare_with=compare_with))
-
-    async def problem_runs(self, job_id: str, problem: str) -> ProblemRunsView:
-        """Read the runs on a problem."""
-        return await to_thread.run_sync((await self._jobs()).problem_runs, job_id, problem)
 
 
 async def iterated(items: Callable[[], Iterator[T]]) -> AsyncIterator[T]:

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 from gaitswarm.errors import NotFound
 from gaitswarm.jobs.database.news import PAGE
 from gaitswarm.jobs.findings import Findings
-from gaitswarm.jobs.tournaments import Tournaments
 from gaitswarm.requests import arguments
 from gaitswarm.requests.certificate import run_certificate
 from gaitswarm.requests.comparison import run_comparison
@@ -34,13 +33,12 @@ from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.identification import IdentifiabilityView
 from gaitswarm.views.importance import ImportanceView
 from gaitswarm.views.preferences import RobustPreferencesView
-from gaitswarm.views.tournament import ProblemRunsView, TournamentStandingsView, TournamentView
 from gaitswarm.views.trade_offs import FrontView, PreferenceForView
 from gaitswarm.views.verification import HistoryVerificationView
 
 
-class DatabaseFindings(Findings, Tournaments):
-    """Findings and tournaments, read from the database."""
+class DatabaseFindings(Findings):
+    """Findings, read from the database."""
 
     _service: JobService
 
@@ -161,21 +159,3 @@ class DatabaseFindings(Findings, Tournaments):
 
         request = arguments.verification(replay, seed, head)
         return run_verification(self._service, job_id, request)
-
-    def tournaments(self) -> list[TournamentView]:
-        """Read which tournaments there are."""
-        from gaitswarm.requests.tournament import run_tournaments
-
-        return run_tournaments(self._service)
-
-    def standings(self, job_id: str, *, compare_with: str | None = None) -> TournamentStandingsView:
-        """Judge a tournament from what is stored."""
-        from gaitswarm.requests.tournament import run_standings
-
-        return run_standings(self._service, job_id, compare_with)
-
-    def problem_runs(self, job_id: str, problem: str) -> ProblemRunsView:
-        """Read the runs on a problem."""
-        from gaitswarm.requests.tournament import run_problem
-
-        return run_problem(self._service, job_id, problem)

@@ -36,7 +36,6 @@ from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.identification import IdentifiabilityView
 from gaitswarm.views.importance import ImportanceView
 from gaitswarm.views.preferences import RobustPreferencesView
-from gaitswarm.views.tournament import ProblemRunsView, TournamentStandingsView, TournamentView
 from gaitswarm.views.trade_offs import FrontView, PreferenceForView
 from gaitswarm.views.verification import HistoryVerificationView
 
@@ -45,7 +44,7 @@ V = TypeVar("V", bound=BaseModel)
 
 
 class AsyncServerFindings(ABC):
-    """Findings and tournaments, computed by the server."""
+    """Findings, computed by the server."""
 
     @property
     @abstractmethod
@@ -172,17 +171,3 @@ class AsyncServerFindings(ABC):
         """Let the server compute a job's chain again, and walk."""
         request = arguments.verification(replay, seed, head)
         return await self._send(calls.verify(job_id, request))
-
-    async def tournaments(self) -> list[TournamentView]:
-        """Ask the server which tournaments there are."""
-        return (await self._send(calls.tournaments())).items
-
-    async def standings(
-        self, job_id: str, *, compare_with: str | None = None
-    ) -> TournamentStandingsView:
-        """Let the server judge a tournament."""
-        return await self._send(calls.standings(job_id, compare_with))
-
-    async def problem_runs(self, job_id: str, problem: str) -> ProblemRunsView:
-        """Ask the server for the runs on a problem."""
-        return await self._send(calls.problem_runs(job_id, problem))

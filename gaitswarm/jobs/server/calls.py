@@ -32,11 +32,6 @@ from gaitswarm.views.identification import (
     RecordingEntryView,
     RecordingView,
 )
-from gaitswarm.views.tournament import (
-    ProblemRunsView,
-    TournamentStandingsView,
-    TournamentsView,
-)
 from gaitswarm.views.verification import HistoryVerificationView, VerificationRequest
 
 
@@ -199,34 +194,6 @@ def targets(job_ids: Sequence[str], leave_out: LeaveOut | None) -> Call[TargetsV
     if leave_out is not None:
         asked["leave_out"] = leave_out
     return Call("GET", f"{job_path(first)}/targets", TargetsView.model_validate_json, asked)
-
-
-def tournaments() -> Call[TournamentsView]:
-    """List tournaments."""
-    return got("/tournaments", TournamentsView)
-
-
-def standings(job_id: str, compare_with: str | None) -> Call[TournamentStandingsView]:
-    """See what a tournament comes to.
-
-    Args:
-        job_id: Identifier of one of its jobs.
-        compare_with: That of a job of another tournament, or None.
-    """
-    asked = {} if compare_with is None else {"compare_with": compare_with}
-    read = TournamentStandingsView.model_validate_json
-    return Call("GET", f"/tournaments/{segment(job_id, 'job')}", read, asked)
-
-
-def problem_runs(job_id: str, problem: str) -> Call[ProblemRunsView]:
-    """See all runs of a tournament on a problem.
-
-    Args:
-        job_id: Identifier of one of its jobs.
-        problem: Name of the problem.
-    """
-    path = f"/tournaments/{segment(job_id, 'job')}/problems/{segment(problem, 'problem')}"
-    return got(path, ProblemRunsView)
 
 
 def certificate(job_id: str, worlds: int | None, most: int) -> Call[CertificateView]:

@@ -16,7 +16,6 @@ from gaitswarm.jobs.server.attempts import (
     unreachable,
 )
 from gaitswarm.jobs.server.call import Call
-from gaitswarm.jobs.tournaments import Tournaments
 from gaitswarm.requests import arguments
 from gaitswarm.services.optimizer.analysis.fits.targets import LeaveOut
 from gaitswarm.sim.kernel.walk import Precision
@@ -38,7 +37,6 @@ from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.identification import IdentifiabilityView
 from gaitswarm.views.importance import ImportanceView
 from gaitswarm.views.preferences import RobustPreferencesView
-from gaitswarm.views.tournament import ProblemRunsView, TournamentStandingsView, TournamentView
 from gaitswarm.views.trade_offs import FrontView, PreferenceForView
 from gaitswarm.views.verification import HistoryVerificationView
 
@@ -46,8 +44,8 @@ T = TypeVar("T")
 V = TypeVar("V", bound=BaseModel)
 
 
-class ServerFindings(Findings, Tournaments, ABC):
-    """Findings and tournaments, computed by the server."""
+class ServerFindings(Findings, ABC):
+    """Findings, computed by the server."""
 
     @property
     @abstractmethod
@@ -166,15 +164,3 @@ class ServerFindings(Findings, Tournaments, ABC):
         """Let the server compute a job's chain again, and walk."""
         request = arguments.verification(replay, seed, head)
         return self._send(calls.verify(job_id, request))
-
-    def tournaments(self) -> list[TournamentView]:
-        """Ask the server which tournaments there are."""
-        return self._send(calls.tournaments()).items
-
-    def standings(self, job_id: str, *, compare_with: str | None = None) -> TournamentStandingsView:
-        """Let the server judge a tournament."""
-        return self._send(calls.standings(job_id, compare_with))
-
-    def problem_runs(self, job_id: str, problem: str) -> ProblemRunsView:
-        """Ask the server for the runs on a problem."""
-        return self._send(calls.problem_runs(job_id, problem))

@@ -11,14 +11,12 @@ from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
-from gaitswarm.services.optimizer.jobs.kinds.tournament import TournamentSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.sim.input.wording import message_of
 
 _TUNING: Final = "<tuning>"
 _IDENTIFICATION: Final = "<identification>"
 _CALIBRATION: Final = "<calibration>"
-_TOURNAMENT: Final = "<tournament>"
 _CERTIFICATE: Final = "<certificate>"
 
 
@@ -32,19 +30,17 @@ AnySpec = Annotated[
     Annotated[JobSpec, Tag(_TUNING)]
     | Annotated[IdentificationSpec, Tag(_IDENTIFICATION)]
     | Annotated[CalibrationSpec, Tag(_CALIBRATION)]
-    | Annotated[TournamentSpec, Tag(_TOURNAMENT)]
     | Annotated[CertificateSpec, Tag(_CERTIFICATE)],
     Discriminator(
         _kind,
         custom_error_type="unknown_kind",
-        custom_error_message="kind: must be tuning, identification, calibration, tournament or"
-        " certificate",
+        custom_error_message="kind: must be tuning, identification, calibration or certificate",
     ),
 ]
 
-SPECS: Final[
-    TypeAdapter[JobSpec | IdentificationSpec | CalibrationSpec | TournamentSpec | CertificateSpec]
-] = TypeAdapter(AnySpec)
+SPECS: Final[TypeAdapter[JobSpec | IdentificationSpec | CalibrationSpec | CertificateSpec]] = (
+    TypeAdapter(AnySpec)
+)
 """Reads a document with a spec of any kind; raises ValidationError for what is none."""
 
 

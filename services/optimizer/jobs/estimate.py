@@ -17,7 +17,6 @@ from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
-from gaitswarm.services.optimizer.jobs.kinds.tournament import TournamentSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.spec import Spec, create_optimizer
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
@@ -203,8 +202,6 @@ def _alike(job: Job, spec: Spec, asked: int) -> bool:
 
 def _kind_of_walk(spec: Spec) -> str:
     """What a walk's speed depends on: robot, controller, precision, case; the method."""
-    if isinstance(spec, TournamentSpec):
-        return spec.model_dump_json(include={"method", "problems", "evaluations"})
     if isinstance(spec, CertificateSpec):
         fields = {"controller", "robot", "precision", "engines"}
         return f"world {spec.model_dump_json(include=fields)}"

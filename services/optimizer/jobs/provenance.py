@@ -28,7 +28,7 @@ _JUDGING: Final = (
 )
 """Files that judge designs of all kinds of jobs."""
 
-_ROOMS: Final = ("jobs/kinds", "search", "tournament")
+_ROOMS: Final = ("jobs/kinds", "search")
 """Folders in which every file judges designs or asks for them."""
 
 

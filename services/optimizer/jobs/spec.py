@@ -5,8 +5,7 @@ Spec
 │   ├── JobSpec          (kind `tuning`) a drive is tuned to walk well
 │   └── CertificateSpec  (kind `certificate`) a design walks in many worlds that differ
 ├── IdentificationSpec   (kind `identification`) a robot's parameters are fitted to measured walks
-├── CalibrationSpec      (kind `calibration`) robot and conventions are fitted to tables of results
-└── TournamentSpec       (kind `tournament`) a search method is run many times on several problems
+└── CalibrationSpec      (kind `calibration`) robot and conventions are fitted to tables of results
 """
 
 from __future__ import annotations
@@ -54,7 +53,7 @@ class Spec(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    unwalked: ClassVar[frozenset[str] | None] = frozenset(
+    unwalked: ClassVar[frozenset[str]] = frozenset(
         {
             "schema_version",
             "name",
@@ -66,8 +65,7 @@ class Spec(BaseModel):
             "start",
         }
     )
-    """Fields on which no outcome of a given design depends. None: outcomes depend on more than
-    what is simulated, and are not looked for elsewhere."""
+    """Fields on which no outcome of a given design depends."""
 
     searches: ClassVar[bool] = True
     """Whether designs are searched for, so that the best ones of another job are a start. Else they

@@ -25,8 +25,6 @@ def walk_keys(
     fields of the spec that are not in `Spec.unwalked`; and what is simulated. It does not depend on
     whether a variable is searched or fixed, nor on the order of variables.
     """
-    if spec.unwalked is None:
-        return ()
     names = spec.design_space().names
     order = sorted(range(len(names)), key=names.__getitem__)
     document = spec.model_dump_json(exclude=set(spec.unwalked))

@@ -66,7 +66,7 @@ class CertificateSpec(WalksSpec):
         },
     )
 
-    unwalked = (WalksSpec.unwalked or frozenset()) | {"preference", "worlds", "engines", "held_out"}
+    unwalked = WalksSpec.unwalked | {"preference", "worlds", "engines", "held_out"}
 
     searches = False
 

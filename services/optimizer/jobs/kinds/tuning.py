@@ -61,7 +61,7 @@ class JobSpec(WalksSpec):
 
     has_objective_vectors = True
 
-    unwalked = (WalksSpec.unwalked or frozenset()) | {"preference"}
+    unwalked = WalksSpec.unwalked | {"preference"}
 
     kind: Literal["tuning"] = Field(default="tuning", description="Tune a drive to walk well.")
     controller: ControllerName = Field(

@@ -12,7 +12,7 @@ from gaitswarm.services.optimizer.store.port.reading import Queue
 from gaitswarm.services.optimizer.store.rows.tables import EXISTING, jobs
 from gaitswarm.services.optimizer.store.statements.labels import spec_field
 
-_KINDS: Final = ("tuning", "certificate", "identification", "calibration", "tournament")
+_KINDS: Final = ("tuning", "certificate", "identification", "calibration")
 
 _BEGINNING: Final = 300
 """Characters of an error, which may quote much."""

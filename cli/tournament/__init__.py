@@ -1,1 +1,0 @@
-"""Tournaments between search methods: plan, runs, report."""

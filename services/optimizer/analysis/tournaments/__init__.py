@@ -1,1 +1,0 @@
-"""Which search method is better, from the runs of tournaments."""

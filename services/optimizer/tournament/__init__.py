@@ -1,1 +1,0 @@
-"""Runs of one search method on one problem, with its rivals."""

@@ -1,7 +1,7 @@
 """What happens to the jobs that this process runs: iterations, tasks by worker, and messages.
 
 Kept in memory, a bounded part of it, and gone with the process: nothing that a job comes to depends
-on it (docs/decisions/0052).
+on it (docs/decisions/0023-monitoring.md).
 """
 
 from __future__ import annotations

@@ -1,11 +1,4 @@
-"""How texts name a design of a job: `8.12` is design 12 of iteration 8, both counted from 0.
-
-| text    | iteration | number | written by                    |
-| ------- | --------- | ------ | ----------------------------- |
-| `8.12`  | 8         | 12     | this version                  |
-| `8.120` | 8         | 120    | this version: it is no decimal |
-| `8/12`  | 8         | 12     | former versions               |
-"""
+"""How texts name a design of a job: `8.12` is design 12 of iteration 8, both counted from 0."""
 
 from __future__ import annotations
 
@@ -20,8 +13,8 @@ def place_of(iteration: int, particle: int) -> str:
 
 
 def read_place(text: str, *, field: str) -> tuple[int, int]:
-    """Read what `place_of` wrote, or a former version."""
-    found = re.fullmatch(r"(\d{1,9})[./](\d{1,9})", text, re.ASCII)
+    """Read what `place_of` wrote."""
+    found = re.fullmatch(r"(\d{1,9})\.(\d{1,9})", text, re.ASCII)
     if found is None:
         raise InvalidRequest(
             "must be the iteration and the number of a design in it, such as 24.7", field=field

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -47,31 +46,6 @@ def test_a_state_of_another_swarm_size_is_refused() -> None:
     larger = asked(0, job({"particles": 7}))
     with pytest.raises(ValueError, match="positions: expected 6 rows"):
         create_optimizer(SPEC).load(larger.dump())
-
-
-def first_version(state: dict[str, Any], *, told: bool) -> dict[str, Any]:
-    """The same state as jobs of before stored it: whole swarms, without pieces."""
-    kept = ("optimizer", "iteration", "positions", "velocities", "best_positions", "best_fitness")
-    return {name: state[name] for name in kept} | {"schema_version": 1, "asked": not told}
-
-
-@pytest.mark.parametrize("told", [False, True])
-@pytest.mark.parametrize("iterations", [0, 3])
-def test_a_stored_state_of_the_first_version_goes_on_with_the_same_bits(
-    iterations: int, told: bool
-) -> None:
-    optimizer = asked(iterations)
-    if told:
-        optimizer.tell(np.arange(6.0))
-    stored = json.loads(json.dumps(first_version(optimizer.dump(), told=told)))
-    loaded = create_optimizer(SPEC)
-    loaded.load(stored)
-    assert (loaded.iteration, loaded.evaluations) == (optimizer.iteration, optimizer.evaluations)
-    for _ in range(3):
-        positions = optimizer.ask()
-        assert loaded.ask().tobytes() == positions.tobytes()
-        for each in (optimizer, loaded):
-            each.tell(np.square(positions).sum(axis=1))
 
 
 @given(

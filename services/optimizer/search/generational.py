@@ -153,7 +153,7 @@ class Generational(ABC, Generic[S, G]):
     def load(self, state: dict[str, Any]) -> None:
         """Take on a state."""
         name = self.settings.name
-        dumped = parse_state(self.upgrade(state), name, self.state_model)
+        dumped = parse_state(state, name, self.state_model)
         for field, expected in (("optimizer", name), ("schema_version", self.schema_version)):
             if getattr(dumped, field) != expected:
                 raise ValueError(
@@ -219,10 +219,6 @@ class Generational(ABC, Generic[S, G]):
     @abstractmethod
     def recall(self, state: G) -> None:
         """Check and take on the method's own fields of a state."""
-
-    def upgrade(self, state: dict[str, Any]) -> dict[str, Any]:
-        """Bring a state of an older version to this one."""
-        return state
 
 
 def worth(fitness: Floats | list[float]) -> Worth:

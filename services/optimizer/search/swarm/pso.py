@@ -168,22 +168,6 @@ class ParticleSwarm(Generational[SwarmSettings, _SwarmState]):
         self._velocities, self.best_fitness = velocities, of_worth(state.best_fitness)
         self._informed_since = state.informed_since
 
-    def upgrade(self, state: dict[str, Any]) -> dict[str, Any]:
-        """Bring a state of version 1, which knew whole swarms only, to this one."""
-        if state.get("schema_version") != 1 or not isinstance(state.get("asked"), bool):
-            return state
-        iteration, asked = state["iteration"], state["asked"]
-        particles = self.settings.particles
-        return {
-            **state,
-            "schema_version": self.schema_version,
-            "evaluations": iteration * particles,
-            "generations": iteration,
-            "positions": state["positions"] if asked or iteration else [],
-            "fitness": [] if asked or not iteration else [None] * particles,
-            "asked": particles if asked else 0,
-        }
-
     def _scattered(self) -> NDArray[np.float64]:
         """Uniform in the box, with small random velocities.
 

@@ -199,7 +199,7 @@ class Dispatcher:
             self._hand_out(work)
             return work
 
-    def complete(self, work: Work, answer: Answer | Outcome) -> None:
+    def complete(self, work: Work, answer: Answer) -> None:
         """The chunk has its result; a second one of the same chunk is the same and ignored.
 
         Args:
@@ -211,16 +211,10 @@ class Dispatcher:
         expected = batch.request.provenance
         with self._changed:
             self._settled(work)
-            if isinstance(answer, Answer):
-                self._report(work, answer.seconds, answer.host)
+            self._report(work, answer.seconds, answer.host)
             if not batch.awaits(chunk):
                 return
-            # A worker of an earlier version answers with the bare outcome.
-            if (
-                not isinstance(answer, Answer)
-                or answer.outcomes is None
-                or answer.provenance != expected
-            ):
+            if answer.outcomes is None or answer.provenance != expected:
                 self._end(batch, unlike(expected, answer))
                 return
             shapes = [outcome.objectives.shape for outcome in answer.outcomes]

@@ -8,7 +8,6 @@ from gaitswarm.services.optimizer.errors import KilledWorker, ProvenanceChanged
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
 from gaitswarm.services.worker.cutting import Chunk
 from gaitswarm.services.worker.tasks import Answer
-from gaitswarm.sim.outcome import Outcome
 from gaitswarm.sim.provenance import Provenance
 
 
@@ -56,21 +55,18 @@ def misshapen(shapes: Sequence[tuple[int, ...]], wanted: Sequence[tuple[int, int
     )
 
 
-def unlike(expected: Provenance, answer: Answer | Outcome) -> ProvenanceChanged:
+def unlike(expected: Provenance, answer: Answer) -> ProvenanceChanged:
     """The error for an answer that comes from other code, libraries or backend.
 
     Args:
         expected: By the request.
-        answer: As the worker gave it; one of an earlier version gives the bare outcome.
+        answer: As the worker gave it.
 
     Returns:
         The error, which names the worker and what differs.
     """
-    worker, why = "a worker", "its gaitswarm does not say what it computes"
-    if isinstance(answer, Answer):
-        worker += f" on {answer.host}"
-        why = "; ".join(expected.changes(answer.provenance))
+    why = "; ".join(expected.changes(answer.provenance))
     return ProvenanceChanged(
-        f"{worker} does not compute what this job's numbers depend on: {why}. Its walks were not"
-        " used; give all workers the same gaitswarm and a C compiler, and resume the job"
+        f"a worker on {answer.host} does not compute what this job's numbers depend on: {why}. Its"
+        " walks were not used; give all workers the same gaitswarm and a C compiler, and resume the job"
     )

@@ -272,15 +272,6 @@ def test_a_worker_without_a_compiler_fails_the_request_and_is_named(
         results.result(PATIENCE)
 
 
-def test_a_worker_that_does_not_say_what_it_computes_fails_the_request(
-    dispatcher: Dispatcher, results: Future[Results]
-) -> None:
-    work, *_ = taken(dispatcher)
-    dispatcher.complete(work, results_of(work)[0])
-    with pytest.raises(ProvenanceChanged, match="does not say what it computes"):
-        results.result(PATIENCE)
-
-
 def test_a_task_is_not_run_by_a_process_that_computes_something_else() -> None:
     wanted = request(2)
     task = Task.of(wanted.cases, wanted.designs, [Part(0, 0, 2), Part(1, 0, 2)], HERE)

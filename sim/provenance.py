@@ -73,10 +73,9 @@ class Provenance(BaseModel):
         examples=["double"],
     )
     objectives: int = Field(
-        default=1,
+        default=OBJECTIVES_VERSION,
         ge=1,
-        description="What objectives of walks mean: 2, `height_loss` is positive when the body"
-        " sinks; 1, or none in what was stored before, when it rises.",
+        description="Version of the objectives' definitions.",
         examples=[OBJECTIVES_VERSION],
     )
 

@@ -18,7 +18,7 @@ from gaitswarm.services.optimizer.jobs.job import (
 )
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.labels import preference_name, robot_name
-from gaitswarm.services.optimizer.jobs.provenance import ProvenanceRecord, as_stored
+from gaitswarm.services.optimizer.jobs.provenance import ProvenanceRecord
 from gaitswarm.services.optimizer.jobs.time_left import time_left
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.views.base import View, finite
@@ -240,15 +240,13 @@ class JobView(JobSummaryView):
     provenance: list[ProvenanceRecord] = Field(
         description="What its numbers depend on beside the spec: code, libraries, content of the"
         " robot, backend, precision. One entry since submission, and one for every change that was"
-        " accepted, the last of an iteration counting; empty for a job that was stored before this"
-        " was recorded."
+        " accepted, the last of an iteration counting."
     )
     head: str | None = Field(
         default=None,
         description="Digest of the last committed iteration, which is chained to all before it and"
         " the spec: noted down, it shows later that none of it was changed"
-        " (POST /v1/jobs/{job_id}/verify). Null before the first, and for jobs that were stored"
-        " before histories were chained.",
+        " (POST /v1/jobs/{job_id}/verify). Null before the first.",
         examples=["9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08"],
     )
 
@@ -275,10 +273,7 @@ class JobView(JobSummaryView):
         if job.readable:
             spec = job.spec
             view = None if best is None else BestView.from_evaluation(best, spec)
-            objectives = [
-                ObjectiveView.from_objective(o)
-                for o in as_stored(spec.objectives, job.provenance, job.progress.iterations)
-            ]
+            objectives = [ObjectiveView.from_objective(o) for o in spec.objectives]
         return cls.model_validate(
             {
                 **_summary(job),

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import inspect
-import sqlite3
-from collections.abc import Callable
-from contextlib import closing, suppress
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -26,8 +24,6 @@ from gaitswarm.services.optimizer.jobs.optimizer_choice import optimizer_setting
 from gaitswarm.services.optimizer.jobs.preference import Preference
 from gaitswarm.services.optimizer.jobs.provenance import (
     JobProvenance,
-    ProvenanceRecord,
-    as_stored,
     job_provenance,
     optimizer_files,
 )
@@ -40,7 +36,6 @@ from gaitswarm.services.optimizer.search.registry import create_search
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store.port.base import Store
 from gaitswarm.sim.errors import RobotFileError
-from gaitswarm.sim.outcome import OBJECTIVES
 from tests.optimizer.formula import HERE, SPEC, FormulaEvaluator, job
 
 
@@ -64,17 +59,6 @@ CHANGES = [
     ),
     (HERE.model_copy(update={"search_libraries": {"cmaes": "0.13"}}), "cmaes 0.13 instead of none"),
 ]
-
-
-@pytest.fixture
-def forget_provenance(store: Store, tmp_path: Path) -> Callable[[], None]:
-    """Leave all jobs as a gaitswarm left them that recorded none."""
-
-    def forget() -> None:
-        with closing(sqlite3.connect(tmp_path / "jobs.db")) as connection, connection:
-            connection.execute("UPDATE jobs SET provenance = NULL, accepts_changes = NULL")
-
-    return forget
 
 
 def run(
@@ -197,31 +181,6 @@ def test_a_job_is_not_taken_over_by_a_runner_that_computes_something_else(store:
     assert store.job(made.id).progress.iterations == 0
 
 
-def test_a_job_that_was_stored_before_provenance_was_goes_on_with_consent_alone(
-    store: Store, forget_provenance: Callable[[], None]
-) -> None:
-    job_id = paused(store).id
-    forget_provenance()
-    assert recorded(store, job_id) == []
-    store.command(job_id, Command.RESUME)
-    refused = run(store, HERE)
-    assert (refused.state, refused.progress.iterations) == (JobState.FAILED, 2)
-    assert refused.error is not None
-    assert "it was stored before gaitswarm recorded what numbers depend on" in refused.error
-    store.command(job_id, Command.RESUME, accept_changes=True)
-    assert run(store, HERE).state is JobState.SUCCEEDED
-    assert recorded(store, job_id) == [(2, HERE)]
-
-
-def test_a_job_that_was_stored_before_provenance_was_and_never_begun_has_nothing_to_mix(
-    store: Store, forget_provenance: Callable[[], None]
-) -> None:
-    made, _ = store.create_job(SPEC, provenance=HERE)
-    forget_provenance()
-    assert run(store, OTHER_CODE).state is JobState.SUCCEEDED
-    assert recorded(store, made.id) == [(0, OTHER_CODE)]
-
-
 def test_a_submitted_job_has_the_provenance_of_the_process_that_submits_it(store: Store) -> None:
     submitted, _ = JobService(store).submit(SPEC)
     cloned, _ = JobService(store).submit(store.job(submitted.id).spec)
@@ -283,20 +242,3 @@ def test_all_code_that_asks_and_judges_is_in_the_digest() -> None:
     for room in (Path(inspect.getfile(thing)).parent for thing in (JobSpec, create_search)):
         files |= set(room.rglob("*.py"))
     assert files == set(optimizer_files())
-
-
-def test_a_job_says_which_of_its_losses_of_height_have_the_former_sign() -> None:
-    def since(iteration: int, version: int) -> ProvenanceRecord:
-        simulation = HERE.simulation.model_copy(update={"objectives": version})
-        now = HERE.model_copy(update={"simulation": simulation})
-        return ProvenanceRecord(from_iteration=iteration, provenance=now)
-
-    def said(*records: ProvenanceRecord, iterations: int = 5) -> str:
-        told = as_stored(OBJECTIVES, records, iterations)
-        assert told[:5] == OBJECTIVES[:5]
-        return told[5].description.removeprefix(OBJECTIVES[5].description)
-
-    assert HERE.simulation.objectives == 1  # a provenance that was stored without it
-    assert said(since(0, 2)) == said(iterations=0) == said(since(0, 1), iterations=0) == ""
-    assert "iterations 0 to 4," in said(since(0, 1)) == said()
-    assert "iterations 0 to 2," in said(since(0, 1), since(3, 2))

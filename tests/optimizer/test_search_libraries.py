@@ -10,11 +10,11 @@ from importlib import metadata
 import pytest
 
 from gaitswarm.services.optimizer.errors import InvalidRequest
-from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
+from gaitswarm.services.optimizer.jobs.provenance import job_provenance
 from gaitswarm.services.optimizer.search.registry import METHODS, OPTIMIZERS
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store.port.base import Store
-from tests.optimizer.formula import HERE, SPEC
+from tests.optimizer.formula import SPEC
 
 OPTIONAL = ("pymoo", "PyNomad", "scipy.stats", "sklearn")
 """Modules that take long to import, or may be missing."""
@@ -40,11 +40,6 @@ def test_a_job_keeps_the_versions_of_the_libraries_of_its_search() -> None:
     other = kept.model_copy(update={"search_libraries": {"scipy": "0.1"}})
     assert kept.changes(other) == (f"scipy 0.1 instead of {kept.search_libraries['scipy']}",)
     assert kept.changes(kept) == ()
-
-
-def test_a_provenance_that_was_stored_without_them_is_read() -> None:
-    stored = HERE.model_dump(exclude={"search_libraries"})
-    assert JobProvenance.model_validate(stored) == HERE
 
 
 def test_methods_that_need_an_extra_say_which_libraries_it_brings() -> None:

@@ -224,7 +224,7 @@ def _check_budget(spec: AnySpec, evaluations: int) -> None:
 
 
 def _check_unchanged(parent: Parent, taken: TakenHistory, now: JobProvenance) -> None:
-    changes = changes_since(taken.provenance, 1, now)
+    changes = changes_since(taken.provenance, now)
     if changes and not taken.accepts_changes:
         raise ProvenanceChanged(
             f"job {parent.job.id} cannot be forked here: what its numbers depend on is not what it"

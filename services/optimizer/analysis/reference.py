@@ -72,7 +72,7 @@ def with_reference(store: Store, job: Job) -> tuple[Job, str | None]:
         if job.progress.best_fitness is None:
             return job, "it has found no design yet that walks in every scenario"
         try:
-            if changes_since(job.provenance, job.progress.iterations, job_provenance(job.spec)):
+            if changes_since(job.provenance, job_provenance(job.spec)):
                 return job, "its numbers come of other code, or of other libraries, than there are"
             reference = walked_reference(job.spec)
         except (SimulationError, OSError) as error:

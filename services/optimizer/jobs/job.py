@@ -266,8 +266,7 @@ class Job:
 
 def refusal(job: Job, now: JobProvenance) -> str | None:
     """Why a job must not go on without its user's consent, and how it does with it."""
-    iterations = job.progress.iterations
-    changes = changes_since(job.provenance, iterations, now)
+    changes = changes_since(job.provenance, now)
     if not changes:
         return None
     return (
@@ -275,7 +274,7 @@ def refusal(job: Job, now: JobProvenance) -> str | None:
         f" is as before, or accept the change: `gaitswarm optimize --resume {job.id}"
         f" --accept-changes`, `gaitswarm resume {job.id} --accept-changes`, `accept_changes=True`"
         ' in Python, or {"accept_changes": true} over HTTP'
-        f" goes on and records it from iteration {iterations} on"
+        f" goes on and records it from iteration {job.progress.iterations} on"
     )
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import lru_cache
 from importlib import metadata
 from pathlib import Path
@@ -12,7 +11,6 @@ from typing import Final
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
 from gaitswarm.services.optimizer.jobs.spec import Spec
-from gaitswarm.sim.outcome import OBJECTIVES_VERSION, Objective
 from gaitswarm.sim.plugins import source_digest
 from gaitswarm.sim.provenance import LIBRARIES, Provenance, provenance_of, version_changes
 
@@ -75,7 +73,7 @@ class ProvenanceRecord(BaseModel):
 
 
 ProvenanceRecords = tuple[ProvenanceRecord, ...]
-"""Of one job, only ever appended to; empty for one that was stored before there were any."""
+"""Of one job, only ever appended to."""
 
 RECORDS: Final = TypeAdapter(ProvenanceRecords)
 
@@ -94,34 +92,9 @@ def job_provenance(spec: Spec) -> JobProvenance:
     )
 
 
-def changes_since(
-    records: Sequence[ProvenanceRecord], iterations: int, now: JobProvenance
-) -> tuple[str, ...]:
+def changes_since(records: Sequence[ProvenanceRecord], now: JobProvenance) -> tuple[str, ...]:
     """What keeps a job from going on without its user's consent."""
-    if records:
-        return records[-1].provenance.changes(now)
-    if iterations:
-        return ("it was stored before gaitswarm recorded what numbers depend on",)
-    return ()
-
-
-def as_stored(
-    objectives: Sequence[Objective], records: Sequence[ProvenanceRecord], iterations: int
-) -> tuple[Objective, ...]:
-    """What a job's objectives mean in what is stored of it: earlier versions had f6's other sign"""
-    begins = (
-        r.from_iteration
-        for r in records
-        if r.provenance.simulation.objectives >= OBJECTIVES_VERSION
-    )
-    former = min(next(begins, iterations), iterations)
-    if not former:
-        return tuple(objectives)
-    said = f"; of the opposite sign in iterations 0 to {former - 1}, of an earlier version"
-    return tuple(
-        replace(o, description=o.description + said) if o.name == "height_loss" else o
-        for o in objectives
-    )
+    return records[-1].provenance.changes(now) if records else ()
 
 
 def first_record(provenance: JobProvenance | None) -> ProvenanceRecords:

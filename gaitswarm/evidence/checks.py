@@ -62,8 +62,6 @@ def _tables(evidence: Evidence) -> Iterator[tuple[AnySpec, EvaluationColumns]]:
 
 def _robot(evidence: Evidence, members: Mapping[str, bytes]) -> Answer:
     """The robots' files are those of which the provenance has the digest."""
-    if not evidence.provenance.records:
-        return None, "the job was stored before digests of robots were recorded"
     content = b""
     for number in range(len(evidence.spec.described)):
         folder = f"robots/{number}"
@@ -142,8 +140,6 @@ def _search(evidence: Evidence) -> Answer:
 def _chain(evidence: Evidence) -> Answer:
     """The history is the one that its digests are of."""
     said = evidence.chain
-    if said is None:
-        return None, "the file was written before histories were chained"
     if said.version != CHAIN_VERSION:
         return None, f"it is of version {said.version}, which this gaitswarm does not compute"
     stored = (SPECS.validate_python(said.spec), said.lineage, said.provenance)
@@ -160,7 +156,7 @@ def _chain(evidence: Evidence) -> Answer:
             found.extend(link, Outcomes.read(columns, anew.get(index)))
     except BrokenChain as error:
         return False, str(error)
-    check = chain_check(found.iterations, found.chained_from, found.head)
+    check = chain_check(found.iterations, found.head)
     return check.passed, check.detail
 
 
@@ -210,8 +206,6 @@ def changes_of_provenance(evidence: Evidence) -> Iterator[str]:
             f"from iteration {record.from_iteration} on: {change}"
             for change in record.provenance.changes(here)
         ]
-    if not evidence.provenance.records:
-        found.append("the job was stored before gaitswarm recorded what numbers depend on")
     yield from found
     if not found:
         return

@@ -58,7 +58,6 @@ def run_verification(
         job=job.id,
         verified=True,
         iterations=history.iterations,
-        chained_from=history.chained_from,
         head=history.head,
         broken_at=history.broken_at,
         checks=checks,
@@ -76,18 +75,14 @@ def _chain(history: HistoryCheck) -> CheckView:
     if history.problem:
         where = "" if history.broken_at is None else f"iteration {history.broken_at}: "
         return CheckView(name="chain", passed=False, detail=f"{where}{history.problem}")
-    return chain_check(history.iterations, history.chained_from, history.head)
+    return chain_check(history.iterations, history.head)
 
 
-def chain_check(iterations: int, chained_from: int | None, head: str | None) -> CheckView:
+def chain_check(iterations: int, head: str | None) -> CheckView:
     """Say that a chain is whole."""
-    if chained_from is None:
-        what = "no iteration is committed yet"
-        if iterations:
-            what = f"its {iterations} iterations were stored before histories were chained"
-        return CheckView(name="chain", passed=None, detail=what)
-    before = f", not chained before iteration {chained_from}" if chained_from else ""
-    detail = f"{iterations - chained_from} iterations chained{before}, head {head}"
+    if head is None:
+        return CheckView(name="chain", passed=None, detail="no iteration is committed yet")
+    detail = f"{iterations} iterations chained, head {head}"
     return CheckView(name="chain", passed=True, detail=detail)
 
 

@@ -77,7 +77,7 @@ class JobDocument(_Read):
 class ProvenanceDocument(_Read):
     """What the numbers depend on, and by what the file was written."""
 
-    records: tuple[ProvenanceRecord, ...]
+    records: tuple[ProvenanceRecord, ...] = Field(min_length=1)
     written_by: JobProvenance
     kernels: tuple[str, ...]
 
@@ -105,7 +105,7 @@ class Evidence:
         asked: (n, d) positions that the search asked for, by iteration.
         reevaluated: Designs that were evaluated anew in double; None of a search in double.
         recordings: Recorded walks that its cases need.
-        chain: Of its history; None in a file that was written before histories were chained.
+        chain: Of its history.
     """
 
     job: JobDocument
@@ -115,7 +115,7 @@ class Evidence:
     asked: tuple[Floats, ...]
     reevaluated: EvaluationColumns | None
     recordings: Recordings
-    chain: ChainDocument | None
+    chain: ChainDocument
 
 
 def read_evidence(members: Mapping[str, bytes]) -> Evidence:
@@ -137,7 +137,7 @@ def read_evidence(members: Mapping[str, bytes]) -> Evidence:
             name: _parsed(RecordedWalk, members, f"recordings/{name}.json")
             for name in spec.recording_ids
         },
-        _parsed(ChainDocument, members, CHAIN) if CHAIN in members else None,
+        _parsed(ChainDocument, members, CHAIN),
     )
     _check_order(evidence)
     return evidence

@@ -133,7 +133,7 @@ def _check(content: bytes, found: _Found, replay: int, seed: int, head: str | No
     evidence = _check_run(members, found, replay, np.random.default_rng(seed))
     found.job = evidence.job.id
     if head is not None:
-        digests = () if evidence.chain is None else evidence.chain.digests
+        digests = evidence.chain.digests
         at = digests.index(head) if head in digests else None
         found.checks.append(head_check(head, at, len(evidence.asked)))
     certificates = by_certificate(members)

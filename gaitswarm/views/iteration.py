@@ -41,8 +41,7 @@ class IterationView(View):
     committed_at: datetime = Field(description="When it was committed, UTC.")
     digest: str | None = Field(
         default=None,
-        description="SHA-256 of it, the spec and all iterations before it; null where it was stored"
-        " before histories were chained.",
+        description="SHA-256 of it, the spec and all iterations before it.",
         examples=["9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08"],
     )
 

@@ -85,13 +85,8 @@ class HistoryVerificationView(View):
         description="Iterations that are as they were committed, from the first on [1].",
         examples=[25],
     )
-    chained_from: int | None = Field(
-        description="Index of the first that is chained; null if none is. Those before were stored"
-        " before histories were chained, and are not checked.",
-        examples=[0],
-    )
     head: str | None = Field(
-        description="Digest of the last of these iterations; null if none is chained.",
+        description="Digest of the last of these iterations; null if there is none.",
         examples=["9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08"],
     )
     broken_at: int | None = Field(

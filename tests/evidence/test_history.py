@@ -52,7 +52,7 @@ def digests(db: Path, job_id: str) -> list[str]:
 def test_an_untouched_history_is_verified_and_replayed(proved: Proved) -> None:
     found = verified(proved.db, proved.id, replay=5, seed=3)
     assert found.verified and found.differences == []
-    assert (found.iterations, found.chained_from, found.broken_at) == (3, 0, None)
+    assert (found.iterations, found.broken_at) == (3, None)
     assert found.replayed in (5, 6), "those that were drawn, and the best one"
     head = digests(proved.db, proved.id)[-1]
     assert found.head == head
@@ -209,15 +209,6 @@ def test_a_chain_that_is_not_of_the_file_fails(proved: Proved, change: dict[str,
     found = gaitswarm.verify(tampered(proved.content, changed), replay=0)
     assert not found.verified
     assert next(c.name for c in found.checks if c.passed is False) in ("chain", "contents")
-
-
-def test_evidence_that_was_written_before_is_read_as_ever(proved: Proved) -> None:
-    earlier = tampered(proved.content, {}, without=[CHAIN])
-    found = gaitswarm.verify(earlier, replay=2)
-    assert found.verified
-    passed, detail = of("chain", found.checks)
-    assert passed is None and "before histories were chained" in detail
-    assert not gaitswarm.verify(earlier, replay=0, head="0" * 64).verified
 
 
 def test_a_fork_certifies_the_history_that_it_was_forked_from(copy: Path, proved: Proved) -> None:

@@ -245,28 +245,6 @@ def test_a_design_that_was_evaluated_anew_is_chained_too(
     assert checked(store, claim.job.id).broken_at == 0
 
 
-def as_stored_before(database_url: str) -> None:
-    """What is there as if it had been stored before histories were chained."""
-    execute(database_url, "UPDATE iterations SET digest = NULL, ask_digest = NULL")
-    execute(database_url, "UPDATE jobs SET head = NULL")
-
-
-def test_a_job_that_was_begun_before_is_chained_from_its_next_iteration_on(
-    store: SqlStore, database_url: str
-) -> None:
-    claim = begun(store)
-    store.commit(claim, completed(0), ask(1))
-    as_stored_before(database_url)
-    found = checked(store, claim.job.id)
-    assert (found.iterations, found.chained_from, found.problem) == (1, None, "")
-    store.commit(claim, completed(1), ask(2))
-    store.commit(claim, completed(2), None)
-    found = checked(store, claim.job.id)
-    assert (found.iterations, found.chained_from, found.problem) == (3, 1, "")
-    execute(database_url, "UPDATE evaluations SET fitness = 1 WHERE iteration = 1")
-    assert checked(store, claim.job.id).broken_at == 1
-
-
 def other(provenance: JobProvenance) -> JobProvenance:
     return provenance.model_copy(update={"optimizer_digest": "0" * 32})
 
@@ -350,7 +328,7 @@ def test_a_fork_chains_what_it_takes_over_under_its_own_lineage(
     fork = claim.job.id
     assert set(digests(store, fork)).isdisjoint(digests(store, parent))
     found = checked(store, fork)
-    assert (found.iterations, found.chained_from, found.problem) == (2, 0, "")
+    assert (found.iterations, found.problem) == (2, "")
     store.begin(claim, ask(2))
     store.commit(claim, completed(2), None)
     assert checked(store, fork).iterations == 3
@@ -361,12 +339,3 @@ def test_a_fork_chains_what_it_takes_over_under_its_own_lineage(
     )
     assert checked(store, fork).broken_at == 0
     assert checked(store, parent).problem == ""
-
-
-def test_a_fork_of_a_job_that_was_stored_before_is_chained_as_a_whole(
-    store: SqlStore, database_url: str
-) -> None:
-    parent = finished(store)
-    as_stored_before(database_url)
-    found = checked(store, forked(store, parent).job.id)
-    assert (found.iterations, found.chained_from, found.problem) == (2, 0, "")

@@ -57,7 +57,6 @@ def fork(
 
 
 def _submission(key: str, priority: int, notify_url: str | None) -> dict[str, str]:
-    """Headers; servers of before priorities are asked for nothing that they do not know."""
     headers = {IDEMPOTENCY_KEY: key}
     if priority != DEFAULT:
         headers[JOB_PRIORITY] = str(arguments.priority(priority))

@@ -59,15 +59,13 @@ class Chain:
         documents: Of the job.
         spec: Of the job, to say what is wrong; None if it cannot be read.
         iterations: How many were looked at.
-        chained_from: Index of the first that has a digest; None while none has.
-        head: Digest of the last; None while none has one.
+        head: Digest of the last; None before the first.
         places: Index of each digest.
     """
 
     documents: ChainDocuments
     spec: AnySpec | None
     iterations: int = 0
-    chained_from: int | None = None
     head: str | None = None
     places: dict[str, int] = field(default_factory=dict)
 
@@ -76,20 +74,15 @@ class Chain:
         index = self.iterations
         if link.iteration != index:
             raise BrokenChain(index, "it is missing")
-        if link.digest is None and self.head is not None:
-            raise BrokenChain(index, "it has no digest, although the one before it has")
-        if link.digest is not None:
-            try:
-                before = self.head or self.documents.digest
-                digest = iteration_digest(before, self.documents, link, outcomes)
-            except _UNREADABLE as error:
-                raise BrokenChain(index, f"it cannot be read: {str(error)[:200]}") from error
-            if digest != link.digest:
-                raise BrokenChain(index, _why(self.spec, link, outcomes))
-            if self.chained_from is None:
-                self.chained_from = index
-            self.head = digest
-            self.places[digest] = index
+        try:
+            before = self.head or self.documents.digest
+            digest = iteration_digest(before, self.documents, link, outcomes)
+        except _UNREADABLE as error:
+            raise BrokenChain(index, f"it cannot be read: {str(error)[:200]}") from error
+        if digest != link.digest:
+            raise BrokenChain(index, _why(self.spec, link, outcomes))
+        self.head = digest
+        self.places[digest] = index
         self.iterations += 1
 
 
@@ -99,8 +92,7 @@ class HistoryCheck:
 
     Attributes:
         iterations: How many are as they were committed, from the first on.
-        chained_from: Index of the first that has a digest; None if none has.
-        head: Digest of the last of them; None if none has one.
+        head: Digest of the last of them; None if there is none.
         broken_at: The first that is not as it was committed; None if all are.
         problem: What is wrong with it or with the job, for people; empty if nothing is.
         head_found_at: Where the digest that was looked for is; None if it is nowhere.
@@ -108,7 +100,6 @@ class HistoryCheck:
     """
 
     iterations: int
-    chained_from: int | None
     head: str | None
     broken_at: int | None = None
     problem: str = ""
@@ -138,7 +129,6 @@ def check_history(store: Store, job: Job, *, head: str | None = None) -> History
         broken_at, problem = broken.iteration, broken.problem
     return HistoryCheck(
         len(sizes),
-        chain.chained_from,
         chain.head,
         broken_at,
         problem,

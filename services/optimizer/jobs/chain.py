@@ -72,8 +72,7 @@ class Link:
         iteration: Its index, from 0.
         positions: (n, d) that the search asked for.
         ask_digest: Of the positions with the optimizer's state; None where that is not known.
-        digest: Of the iteration; None before it is committed, and where it was stored before
-            histories were chained.
+        digest: Of the iteration; None before it is committed.
     """
 
     iteration: int

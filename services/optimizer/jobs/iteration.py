@@ -70,8 +70,7 @@ class Iteration:
         failed: designs that failed in at least one case.
         evaluate_seconds: time that its evaluation took [s].
         committed_at: when it was committed, UTC.
-        digest: of it and all before it, see `jobs.chain`; None where it was stored before there
-            were any.
+        digest: of it and all before it, see `jobs.chain`.
     """
 
     index: int

@@ -163,9 +163,9 @@ jobs: Final = Table(
     Column("compute_seconds", Double, nullable=False),
     # Iterations to run, where the job was extended; the spec stays what was submitted.
     Column("budget", Integer),
-    # Of the request that the idempotency key came with; NULL without a key, and for older jobs.
+    # Of the request that the idempotency key came with; NULL without a key.
     Column("request_digest", Text),
-    # `ProvenanceRecords`; NULL for a job that was stored before there were any.
+    # `ProvenanceRecords`.
     Column("provenance", Document(none_as_null=True)),
     # From a resumption that accepts changes to the next claim; NULL is false.
     Column("accepts_changes", Boolean),
@@ -182,7 +182,7 @@ jobs: Final = Table(
     Column("waiting", Text),
     # That a design took in the last iterations, these the more the later; NULL before the first.
     Column("recent_seconds", Double),
-    # Digest of its last committed iteration; NULL before the first, and for older jobs.
+    # Digest of its last committed iteration; NULL before the first.
     Column("head", Text),
     # Where its end is told; NULL for nowhere.
     Column("notify_url", Text),
@@ -253,7 +253,7 @@ iterations: Final = Table(
     Column("failed", Integer),
     Column("evaluate_seconds", Double),
     # Of positions and state, from the ask on; and of the iteration, chained to that of the one
-    # before. NULL where they were stored before there were any.
+    # before; NULL until it is committed.
     Column("ask_digest", Text),
     Column("digest", Text),
     PrimaryKeyConstraint("job_id", "iteration"),
@@ -271,7 +271,7 @@ evaluations: Final = Table(
     Column("objectives", JSON, nullable=False),
     Column("statuses", JSON, nullable=False),
     Column("fitness", Double),
-    # Of what it was walked for; NULL for what was taken from another row, or stored before.
+    # Of what it was walked for; NULL for what was taken from another row.
     Column("walk_key", LargeBinary),
     PrimaryKeyConstraint("job_id", "iteration", "particle"),
     ForeignKeyConstraint(["job_id", "iteration"], ["iterations.job_id", "iterations.iteration"]),

@@ -12,7 +12,6 @@ from gaitswarm.services.optimizer.jobs.chain import (
     ChainDocuments,
     Link,
     Outcomes,
-    ask_digest,
     iteration_digest,
 )
 from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration, Reevaluation
@@ -30,7 +29,6 @@ _OF_IT: Final = (
     iterations.c.iteration == bindparam("at"),
 )
 _ASKED: Final = select(iterations.c.positions, iterations.c.ask_digest).where(*_OF_IT)
-_STATE: Final = select(iterations.c.optimizer_state).where(*_OF_IT)
 
 
 def chained_columns(connection: Connection, job: Row, done: CompletedIteration) -> dict[str, Any]:
@@ -42,21 +40,17 @@ def chained_columns(connection: Connection, job: Row, done: CompletedIteration) 
         done: What the iteration came to.
 
     Returns:
-        Values of its columns `digest` and `ask_digest`; none where it was not asked.
+        Value of its column `digest`; none where it was not asked.
     """
     of_it = {"job": job["id"], "at": done.iteration}
     row = connection.execute(_ASKED, of_it).first()
     if row is None:
         return {}
-    positions, digest = np.array(row.positions, dtype=np.float64), row.ask_digest
-    if digest is None:
-        # Asked by a version that did not say so yet.
-        digest = ask_digest(positions, connection.execute(_STATE, of_it).scalar_one())
     documents = chain_documents(job)
-    link = Link(done.iteration, positions, digest)
+    link = Link(done.iteration, np.array(row.positions, dtype=np.float64), row.ask_digest)
     before = job["head"] or documents.digest
     chained = iteration_digest(before, documents, link, Outcomes.of(done))
-    return {"digest": chained, "ask_digest": digest}
+    return {"digest": chained}
 
 
 def chain_taken(connection: Connection, job_id: str, documents: ChainDocuments, count: int) -> str:

@@ -68,5 +68,6 @@ def unlike(expected: Provenance, answer: Answer) -> ProvenanceChanged:
     why = "; ".join(expected.changes(answer.provenance))
     return ProvenanceChanged(
         f"a worker on {answer.host} does not compute what this job's numbers depend on: {why}. Its"
-        " walks were not used; give all workers the same gaitswarm and a C compiler, and resume the job"
+        " walks were not used; give all workers the same gaitswarm and a C compiler, and resume"
+        " the job"
     )

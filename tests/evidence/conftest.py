@@ -6,7 +6,7 @@ import io
 import json
 import shutil
 import zipfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -97,9 +97,9 @@ def certified(proved: Proved, tmp_path_factory: pytest.TempPathFactory) -> Certi
 Change = Callable[[bytes], bytes]
 
 
-def tampered(content: bytes, changes: Mapping[str, Change], without: Sequence[str] = ()) -> bytes:
-    """Evidence with other members, without some, and a manifest that says so."""
-    members = {n: m for n, m in unzipped(content).items() if n not in (MANIFEST, *without)}
+def tampered(content: bytes, changes: Mapping[str, Change]) -> bytes:
+    """Evidence with other members and a manifest that says so."""
+    members = {n: m for n, m in unzipped(content).items() if n != MANIFEST}
     return archived(
         {name: changes[name](m) if name in changes else m for name, m in members.items()}
     )

@@ -12,6 +12,7 @@ import pytest
 
 import gaitswarm
 from gaitswarm.cli.exit_codes import ExitCode
+from gaitswarm.evidence.archive import MANIFEST, archived
 from gaitswarm.views.verification import CheckView, HistoryVerificationView
 from gaitswarm.zip_archive import unzipped
 from tests.evidence.conftest import CHAIN, EVALUATIONS, JOB, Proved, tampered, with_cells
@@ -236,3 +237,11 @@ def test_the_command_line_names_the_first_iteration_that_differs(
     assert done.json["broken_at"] == 2
     done = run_command(*arguments)
     assert "iteration 2: the fitness of design 3" in " ".join(done.out.split())
+
+
+def test_evidence_without_a_chain_is_refused(proved: Proved) -> None:
+    members = {name: m for name, m in unzipped(proved.content).items() if name != CHAIN}
+    del members[MANIFEST]
+    found = gaitswarm.verify(archived(members), replay=0)
+    assert not found.verified
+    assert of("contents", found.checks) == (False, f"it has no {CHAIN}")

@@ -74,6 +74,8 @@ class Chain:
         index = self.iterations
         if link.iteration != index:
             raise BrokenChain(index, "it is missing")
+        if link.digest is None:
+            raise BrokenChain(index, "it has no digest")
         try:
             before = self.head or self.documents.digest
             digest = iteration_digest(before, self.documents, link, outcomes)

@@ -16,7 +16,7 @@ from fastapi.exceptions import RequestValidationError
 from pydantic import TypeAdapter, ValidationError, WrapValidator
 
 from gaitswarm.sim.errors import RobotFileError
-from gaitswarm.sim.input.wording import with_known_keys
+from gaitswarm.sim.input import with_known_keys
 from gaitswarm.sim.robot.check import MOST_ROBOTS, Location, check_files, files_of, objects_in
 
 MOST_NAMES: Final = 10_000

@@ -10,11 +10,11 @@ from gaitswarm.cli.atomic_file import replacing
 from gaitswarm.cli.tables.validation import alignment, confidence, percent, remarks
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.sim.measurement.measured_log import Quantity
-from gaitswarm.sim.validation.measures import Tolerance
+from gaitswarm.sim.validation import Tolerance
 
 if TYPE_CHECKING:
     from gaitswarm.sim.measurement.synchronise import Synchronised
-    from gaitswarm.sim.validation.comparison import Agreement, Comparison, QuantityComparison
+    from gaitswarm.sim.validation import Agreement, Comparison, QuantityComparison
 
 REPORT: Final = "report.md"
 

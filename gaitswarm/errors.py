@@ -85,7 +85,7 @@ class Interrupted(KeyboardInterrupt):
 
 def invalid_request(error: ValidationError, model: Any = None) -> InvalidRequest:
     """What pydantic found wrong, in the words of the input."""
-    from gaitswarm.sim.input.wording import with_known_keys
+    from gaitswarm.sim.input import with_known_keys
     from gaitswarm.views import field_errors
 
     found = with_known_keys(error.errors(include_url=False), model)

@@ -21,7 +21,7 @@ from gaitswarm.sim.robot import Robot, RobotFiles, load_robot
 from gaitswarm.sim.robot.identifiable import identifiable_variables
 from gaitswarm.sim.robot.legs import ChainLeg
 from gaitswarm.sim.robot.posture import feet_and_centre_of_mass, leg_points
-from gaitswarm.sim.robot.unphysical import unphysical
+from gaitswarm.sim.robot.urdf import unphysical
 from gaitswarm.sim.scenario import Scenario
 from gaitswarm.sim.simulate import simulate
 from gaitswarm.views.robot_check import CheckedLegView, MeshView, RobotCheckView, StandingStillView

@@ -29,7 +29,7 @@ from gaitswarm.sim.proposal.document import Proposal
 from gaitswarm.sim.proposal.drive import ActuatorChoice
 from gaitswarm.sim.proposal.frame import Axis, Frame
 from gaitswarm.sim.robot.bounds import LONGEST_URDF, check_urdf
-from gaitswarm.sim.robot.mesh_bounds import mesh_bounds
+from gaitswarm.sim.robot.shapes import mesh_bounds
 
 _NAME: Final = re.compile(r"\w[^/\\]{0,99}")
 

@@ -14,7 +14,7 @@ from gaitswarm.services.optimizer.errors import InvalidRequest, StoreUnavailable
 from gaitswarm.services.optimizer.jobs.job import LONGEST_LEASE_SECONDS, QUARANTINE_AFTER
 from gaitswarm.services.worker import EvaluatorKind
 from gaitswarm.sim.compiler.cache import DEFAULT_SIZE
-from gaitswarm.sim.input.wording import message_of
+from gaitswarm.sim.input import message_of
 
 LogLevel = Annotated[Literal["DEBUG", "INFO", "WARNING", "ERROR"], BeforeValidator(str.upper)]
 

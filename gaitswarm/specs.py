@@ -22,7 +22,7 @@ from gaitswarm.sim.case_registry import CaseSettings
 from gaitswarm.sim.controllers import ControllerName
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.robot import RobotFiles, RobotVariant
-from gaitswarm.sim.robot.shipped import SHIPPED
+from gaitswarm.sim.robot.variant import SHIPPED
 from gaitswarm.sim.scenario import Scenario
 from gaitswarm.sim.variables import Variable
 from gaitswarm.start import StartFile, start_from

@@ -26,7 +26,7 @@ from gaitswarm.sim.compiler.compilation import (
 from gaitswarm.sim.controllers.quantisation import inference_source
 from gaitswarm.sim.kernel.emitted.source import kernel_identity, kernel_source
 from gaitswarm.sim.kernel.walk import Precision
-from gaitswarm.sim.robot.shipped import SHIPPED, shipped_robot
+from gaitswarm.sim.robot.variant import SHIPPED, shipped_robot
 
 TARGETS: Final[Mapping[str, Target]] = {
     **{aim.level: aim for aim in X86_TARGETS},

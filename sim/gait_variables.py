@@ -8,7 +8,7 @@ from typing import Any, Final
 from pydantic import ValidationError
 
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.input.wording import message_of
+from gaitswarm.sim.input import message_of
 from gaitswarm.sim.scenario import GAIT_NAMES, Scenario
 from gaitswarm.sim.variables import Variable, VariableCatalogue, split_name
 

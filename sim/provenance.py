@@ -32,7 +32,7 @@ _NOT_IN_A_CASE: Final = (
     "replay.py",
     "robot/shapes.py",
     "studies",
-    "validation",
+    "validation.py",
 )
 """Modules and packages of `sim` that no case runs through."""
 

@@ -27,7 +27,7 @@ from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.gait.gaits import LegGait, leg_gaits
 from gaitswarm.sim.gait.trajectory import desired_angles, require_reachable
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
-from gaitswarm.sim.input.near_names import instead_of
+from gaitswarm.sim.input import instead_of
 from gaitswarm.sim.kernel.observation import WalkLog, walk_log
 from gaitswarm.sim.kernel.walk import (
     NO_JOINT_PD,

@@ -23,7 +23,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from gaitswarm.sim.input.choice import NAME, OWN, alternatives
+from gaitswarm.sim.input import NAME, OWN, alternatives
 
 VariableName = Annotated[
     str,

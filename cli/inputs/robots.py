@@ -22,7 +22,7 @@ def chosen_robot(text: str | None) -> str | RobotVariant | RobotFiles:
     from pydantic import TypeAdapter, ValidationError
 
     from gaitswarm.sim.robot import RobotSource
-    from gaitswarm.sim.robot.shipped import SHIPPED
+    from gaitswarm.sim.robot.variant import SHIPPED
 
     data = robot_data(text)
     if isinstance(data, str) and data not in SHIPPED:

@@ -173,8 +173,7 @@ def _checked(
     """columns: of the fields that are called otherwise in the table."""
     from pydantic import ValidationError
 
-    from gaitswarm.sim.input.choice import without_tags
-    from gaitswarm.sim.input.wording import message_of
+    from gaitswarm.sim.input import message_of, without_tags
 
     try:
         return model.model_validate(document)

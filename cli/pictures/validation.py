@@ -9,8 +9,7 @@ import numpy as np
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.measurement.measured_log import Quantity
 from gaitswarm.sim.robot.description import JOINTS_PER_LEG
-from gaitswarm.sim.validation.comparison import channels_of_link, columns_of
-from gaitswarm.sim.validation.measures import Tolerance, amplitude_spectrum
+from gaitswarm.sim.validation import Tolerance, amplitude_spectrum, channels_of_link, columns_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,7 +17,7 @@ if TYPE_CHECKING:
 
     from gaitswarm.sim.measurement.measured_log import MeasuredLog
     from gaitswarm.sim.measurement.synchronise import Synchronised
-    from gaitswarm.sim.validation.comparison import Comparison
+    from gaitswarm.sim.validation import Comparison
 
 _MEASURED: Final = "#1f3a5f"
 _SIMULATED: Final = "#d1495b"

@@ -10,7 +10,7 @@ from typing import Any, Final
 from gaitswarm.cli.inputs.spec_file import parse_spec
 from gaitswarm.cli.inputs.target_file import read_targets
 from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
-from gaitswarm.sim.robot.shipped import DEFAULT_ROBOT
+from gaitswarm.sim.robot.variant import DEFAULT_ROBOT
 
 TARGETS: Final = Path(__file__).parent / "targets.csv"
 """The given rows of the thesis's tables."""

@@ -22,7 +22,7 @@ from gaitswarm.simulation_result import SimulationResult
 
 if TYPE_CHECKING:
     from gaitswarm.cli.tables.fitted import Table
-    from gaitswarm.sim.robot.shipped import RobotName
+    from gaitswarm.sim.robot.variant import RobotName
 
 Floats = NDArray[np.float64]
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Final
 from rich.text import Text
 
 from gaitswarm.cli.tables.fitted import Table
-from gaitswarm.sim.validation.measures import Tolerance
+from gaitswarm.sim.validation import Tolerance
 
 if TYPE_CHECKING:
-    from gaitswarm.sim.validation.comparison import Agreement, Comparison, QuantityComparison
+    from gaitswarm.sim.validation import Agreement, Comparison, QuantityComparison
 
 STYLES: Final = {
     Tolerance.GREEN: "green",

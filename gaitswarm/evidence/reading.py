@@ -26,7 +26,7 @@ from gaitswarm.services.optimizer.jobs.fork import Lineage
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, ProvenanceRecord
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.identification.recorded_walk import RecordedWalk, Recordings
-from gaitswarm.sim.input.wording import message_of
+from gaitswarm.sim.input import message_of
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.robot.check import MOST_ROBOTS, check_files, files_of, objects_in
 from gaitswarm.tables import EvaluationTable

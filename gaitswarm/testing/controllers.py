@@ -14,7 +14,7 @@ from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE
 from gaitswarm.sim.kernel.walk import check_gains
 from gaitswarm.sim.robot import RobotSource, load_robot
-from gaitswarm.sim.robot.shipped import DEFAULT_ROBOT
+from gaitswarm.sim.robot.variant import DEFAULT_ROBOT
 from gaitswarm.sim.scenario import find_scenario
 from gaitswarm.sim.simulate import simulate
 from gaitswarm.testing.refusals import refused

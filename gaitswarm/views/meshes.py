@@ -5,7 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from gaitswarm.mesh_library import FoundMesh, MeshFormat
-from gaitswarm.sim.robot.visual_meshes import VisualMesh
+from gaitswarm.sim.robot.shapes import VisualMesh
 from gaitswarm.views.base import View
 from gaitswarm.views.links import PREFIX
 

@@ -8,8 +8,7 @@ from typing import Any, Final
 
 from pydantic import Field
 
-from gaitswarm.sim.input.choice import without_tags
-from gaitswarm.sim.input.wording import message_of
+from gaitswarm.sim.input import message_of, without_tags
 from gaitswarm.views.base import View
 
 _LEADING_FIELD: Final = re.compile(r"^([a-z_]+(?:\.\w+)*): (.*)$", re.DOTALL)

@@ -21,7 +21,7 @@ from gaitswarm.sim.controllers import CONTROLLERS, ControllerName, names_of
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.errors import MeasuredLogError, SimulationInputError
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE
-from gaitswarm.sim.input.wording import message_of
+from gaitswarm.sim.input import message_of
 from gaitswarm.sim.robot import RobotSource, load_robot
 from gaitswarm.sim.scenario import Scenario
 from gaitswarm.sim.simulate import check_reach

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.proposal.xml_text import fixed_joint
+from gaitswarm.sim.robot.shapes import visual_meshes
 from gaitswarm.sim.robot.urdf import Solid, Urdf
-from gaitswarm.sim.robot.visual_meshes import visual_meshes
 
 Floats = NDArray[np.float64]
 

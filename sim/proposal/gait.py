@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from gaitswarm.sim.errors import BeyondJointLimit, RobotFileError, UnreachablePose
 from gaitswarm.sim.gait.gaits import GAITS, lags_of
 from gaitswarm.sim.gait.trajectory import require_reachable
-from gaitswarm.sim.input.wording import message_of
+from gaitswarm.sim.input import message_of
 from gaitswarm.sim.proposal.drive import GRAVITY
 from gaitswarm.sim.proposal.stance import Stance
 from gaitswarm.sim.robot import Robot

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from gaitswarm.sim.robot.robot import Robot, parse_robot
-from gaitswarm.sim.robot.shipped import DEFAULT_ROBOT, SHIPPED, RobotName
 from gaitswarm.sim.robot.variant import (
+    DEFAULT_ROBOT,
+    SHIPPED,
     RobotChoice,
     RobotFiles,
+    RobotName,
     RobotSource,
     RobotVariant,
     load_robot,

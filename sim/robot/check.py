@@ -8,10 +8,10 @@ from typing import Any, Final
 from gaitswarm.sim.errors import ProcessEnded, RobotFileError, SimulationInputError
 from gaitswarm.sim.limited_process import Document, LimitedProcesses, serve
 from gaitswarm.sim.robot import bounds
-from gaitswarm.sim.robot.digests import PASSED, digest_of
 from gaitswarm.sim.robot.limbs import limbs_of
 from gaitswarm.sim.robot.robot import parse_robot
 from gaitswarm.sim.robot.shapes import visible_links
+from gaitswarm.sim.robot.variant import PASSED, digest_of
 
 SECONDS: Final = 20.0
 """That a check may take; it takes some hundredths of a second, the first a second."""

@@ -14,7 +14,7 @@ from typing import Final, TypeVar, get_args
 from pydantic import BaseModel, ValidationError
 
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.input.wording import message_of
+from gaitswarm.sim.input import message_of
 from gaitswarm.sim.robot.actuators import Actuator, TorqueActuator
 from gaitswarm.sim.robot.description import (
     ContactLaw,

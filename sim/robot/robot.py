@@ -3,26 +3,150 @@
 from __future__ import annotations
 
 import math
+import re
 import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
-from gaitswarm.sim.errors import RobotFileError
-from gaitswarm.sim.robot.actuators import Actuator, TorqueActuator
-from gaitswarm.sim.robot.bounds import check_toml
+from gaitswarm.sim.errors import RobotFileError, SimulationInputError
+from gaitswarm.sim.input import message_of, with_known_keys
+from gaitswarm.sim.robot.actuators import Actuator, Gearhead, Motor, TorqueActuator, TorqueCommand
+from gaitswarm.sim.robot.bounds import check_toml, shortened
 from gaitswarm.sim.robot.chain import chain_of, check_joints, check_owners
-from gaitswarm.sim.robot.description import JOINTS_PER_LEG, Contact, Leg, RobotDescription
+from gaitswarm.sim.robot.description import (
+    JOINTS_PER_LEG,
+    Contact,
+    Leg,
+    Pwm,
+    RobotDescription,
+    Sensors,
+    Supply,
+)
 from gaitswarm.sim.robot.elements import MOST_TURNED
 from gaitswarm.sim.robot.inertia import BodyInertia
 from gaitswarm.sim.robot.legs import ChainLeg, KneeUpLeg, LegKinematics
-from gaitswarm.sim.robot.toml_errors import by_leg, first_problem
 from gaitswarm.sim.robot.urdf import Urdf, parse_urdf
 from gaitswarm.sim.robot.urdf_errors import by_line
+
+_TABLE: Final = re.compile(r"(\[\[?)([^\[\]]++)\]\]?(?:\s*+#.*)?")
+_KEY: Final = re.compile(r"([^=#\[\]\s][^=]*+)=")
+"""Of a line without blanks around it. Possessive: no line takes longer than its length asks for."""
+
+_FIELD: Final = re.compile(r"`(\w+)`")
+"""Of a leg, as messages name it."""
+
+_PARTS: Final[tuple[type[BaseModel], ...]] = (
+    RobotDescription,
+    Motor,
+    Gearhead,
+    Actuator,
+    TorqueActuator,
+    TorqueCommand,
+    Supply,
+    Pwm,
+    Sensors,
+    Contact,
+    Leg,
+)
+
+
+def first_problem(error: ValidationError, text: str) -> str:
+    """The first thing that is wrong."""
+    first = with_known_keys(error.errors(), RobotDescription)[0]
+    location = _without_kind(first["loc"])
+    where = shortened(".".join(str(part) for part in location))
+    line = line_of(text, [part for part in location if not _is_class(part)])
+    message = message_of(first)
+    meaning = _meaning(first["loc"])
+    return (
+        "robot.toml"
+        + (f", line {line}" if line else "")
+        + (f": {where}" if where else "")
+        + f": {message}"
+        + (f" ({meaning})" if meaning else "")
+    )
+
+
+@contextmanager
+def by_leg(text: str, legs: Sequence[str]) -> Iterator[None]:
+    """Add the line to errors that name a leg or the held joints of a robot.toml."""
+    try:
+        yield
+    except RobotFileError as error:
+        said = str(error)
+        named = [k for k, leg in enumerate(legs) if said.startswith(f"robot.toml: leg {leg!r}: ")]
+        line = None
+        if named:
+            line = line_of(text, ["legs", named[0], *_FIELD.findall(said)[-1:]])
+        elif said.startswith("robot.toml: held_joints"):
+            line = line_of(text, ["held_joints"])
+        if line is None:
+            raise
+        raise RobotFileError(said.replace("robot.toml: ", f"robot.toml, line {line}: ", 1)) from (
+            error.__cause__ or error
+        )
+
+
+def line_of(text: str, path: Sequence[str | int]) -> int | None:
+    """Line of a field in a TOML file.
+
+    Follows tables, arrays of tables and dotted keys as robot files use them; inline tables count
+    as one line.
+    """
+    found, depth = None, 0
+    table: list[str | int] = []
+    counts: dict[str, int] = {}
+    for number, line in enumerate(map(str.strip, text.splitlines()), start=1):
+        if match := _TABLE.fullmatch(line):
+            name = match[2].strip()
+            table = list(_split(name))
+            if match[1] == "[[":
+                index = counts.get(name, -1) + 1
+                counts[name] = index
+                table.append(index)
+            here = table
+        elif match := _KEY.match(line):
+            here = [*table, *_split(match[1])]
+        else:
+            continue
+        if len(here) > depth and list(path[: len(here)]) == here:
+            found, depth = number, len(here)
+    return found
+
+
+def _split(key: str) -> list[str]:
+    return [part.strip().strip("\"'") for part in re.findall(r'"[^"]*"|\'[^\']*\'|[^.]+', key)]
+
+
+def _without_kind(location: tuple[str | int, ...]) -> tuple[str | int, ...]:
+    """Pydantic names the kind of an actuator behind its name."""
+    if len(location) > 2 and location[0] == "actuators":
+        return (*location[:2], *location[3:])
+    return location
+
+
+def _is_class(part: str | int) -> bool:
+    """Pydantic names the members of unions among the keys."""
+    return isinstance(part, str) and part[:1].isupper() and part.isidentifier()
+
+
+def _meaning(location: tuple[str | int, ...]) -> str | None:
+    """Description, with unit, of a field of any part of a robot description."""
+    own = (TorqueActuator,) if "torque" in location[2:3] else ()
+    field = str(location[-1]) if location else ""
+    parts: tuple[type[BaseModel], ...] = (*own, *_PARTS)
+    for part in parts:
+        if field in part.model_fields:
+            return part.model_fields[field].description
+    return None
+
 
 Floats = NDArray[np.float64]
 
@@ -289,3 +413,56 @@ def _check_stance(leg: Leg, stance: Floats, limits: Floats) -> None:
                 f" but robot.urdf limits it to {lower:g} to {upper:g} rad"
                 + (_DEGREES if abs(angle) > MOST_TURNED else "")
             )
+
+
+def rows_of(legs: Sequence[LegKinematics]) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Legs of both sides."""
+    of_sides: tuple[list[int], list[int]] = [], []
+    for number, leg in enumerate(legs):
+        of_sides[leg.side < 0.0].append(number)
+    left, right = (tuple(sorted(row, key=lambda k: -legs[k].hip[0])) for row in of_sides)
+    return left, right
+
+
+def leg_groups(robot: Robot) -> dict[str, tuple[int, ...]]:
+    """The groups that a robot's legs are in."""
+    rows = rows_of(robot.legs)
+    first = {row[0] for row in rows if row}
+    last = {row[-1] for row in rows if row} - first
+    members = {
+        "all": set(range(len(robot.legs))),
+        "left": set(rows[0]),
+        "right": set(rows[1]),
+        "front": first if last else set[int](),
+        "middle": {leg for row in rows for leg in row} - first - last if last else set[int](),
+        "hind": last,
+    }
+    groups = {name: tuple(sorted(group)) for name, group in members.items() if group}
+    names = [leg.name for leg in robot.legs]
+    groups |= {name: (number,) for number, name in enumerate(names)}
+    for name, group in robot.description.leg_groups.items():
+        groups[name] = tuple(sorted(names.index(leg) for leg in group))
+    return groups
+
+
+def values_by_leg(robot: Robot, values: Mapping[str, float], parameter: str) -> dict[int, float]:
+    """What single legs have of a parameter that groups have values of."""
+    groups = leg_groups(robot)
+    for name in values:
+        if name not in groups:
+            raise SimulationInputError(
+                f"{parameter}[{name}]: {robot.description.name} has no such group of legs; it has"
+                f" {', '.join(groups)}"
+            )
+    found: dict[int, tuple[int, str]] = {}
+    for name in sorted(values, key=lambda name: len(groups[name])):
+        group = groups[name]
+        for leg in group:
+            size, other = found.setdefault(leg, (len(group), name))
+            if size == len(group) and other != name:
+                raise SimulationInputError(
+                    f"{parameter}[{name}]: leg {robot.legs[leg].name!r} is in {other!r}, too, and"
+                    " both are of one size; give the leg a value of its own, or name a smaller"
+                    " group"
+                )
+    return {leg: values[name] for leg, (_, name) in found.items()}

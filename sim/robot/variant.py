@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
+import threading
+import tomllib
+from collections import OrderedDict
 from dataclasses import replace
 from functools import lru_cache
-from typing import Annotated, Any, Final
+from importlib import resources
+from typing import Annotated, Any, Final, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, Tag, model_validator
 
-from gaitswarm.sim.input.choice import NAME, alternatives
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.input import NAME, alternatives
 from gaitswarm.sim.robot.actuators import AnyActuator
 from gaitswarm.sim.robot.bounds import (
     DEEPEST,
@@ -21,9 +27,77 @@ from gaitswarm.sim.robot.bounds import (
     MOST_VALUES,
 )
 from gaitswarm.sim.robot.description import ContactLaw, Leg, PlannedSoles
-from gaitswarm.sim.robot.digests import PASSED, READ, digest_of
+from gaitswarm.sim.robot.identifiable import with_parameters
 from gaitswarm.sim.robot.robot import Robot, parse_robot
-from gaitswarm.sim.robot.shipped import DEFAULT_ROBOT, RobotName, shipped_robot
+
+_REMEMBERED: Final = 1024
+
+
+def digest_of(toml: str, urdf: str) -> bytes:
+    """What two files are told from others by."""
+    # Texts that are no Unicode are refused later, by name.
+    texts = (text.encode(errors="surrogatepass") for text in (toml, urdf))
+    return hashlib.sha256(b"%d " % len(toml) + b"".join(texts)).digest()
+
+
+class _Digests:
+    """Digests, those that were asked for last at the end. Thread-safe."""
+
+    def __init__(self) -> None:
+        self._digests: OrderedDict[bytes, None] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def has(self, digest: bytes) -> bool:
+        with self._lock:
+            known = digest in self._digests
+            if known:
+                self._digests.move_to_end(digest)
+            return known
+
+    def add(self, digest: bytes) -> None:
+        with self._lock:
+            self._digests[digest] = None
+            if len(self._digests) > _REMEMBERED:
+                self._digests.popitem(last=False)
+
+
+PASSED: Final = _Digests()
+"""Files that passed `gaitswarm.sim.robot.check.check_files`, in this process."""
+
+READ: Final = _Digests()
+"""Files that this process has made a robot of."""
+
+RobotName = Literal["szabadka2", "szabadka2-identified", "szabadka2-reconstructed"]
+"""Robots that ship with gaitswarm."""
+
+DEFAULT_ROBOT: Final[RobotName] = "szabadka2-reconstructed"
+"""The robot that walks where none is named: the one that published results speak of."""
+
+SHIPPED: Final[tuple[RobotName, ...]] = get_args(RobotName)
+
+
+@lru_cache(maxsize=8)
+def shipped_robot(name: str) -> Robot:
+    """A robot that ships with gaitswarm.
+
+    Its folder holds robot.toml and robot.urdf; or parameters.toml, which names another shipped
+    robot as its base and gives some of `identifiable_variables` other values.
+    """
+    if name not in SHIPPED:
+        raise SimulationInputError(f"robot: unknown {name!r}; known are {', '.join(SHIPPED)}")
+    folder = resources.files("gaitswarm.sim.robot") / name
+    parameters = folder / "parameters.toml"
+    if not parameters.is_file():
+        robot = parse_robot(
+            (folder / "robot.toml").read_text(encoding="utf-8"),
+            (folder / "robot.urdf").read_text(encoding="utf-8"),
+        )
+        return replace(robot, ships=True)
+    document = tomllib.loads(parameters.read_text(encoding="utf-8"))
+    robot = with_parameters(shipped_robot(document["base"]), document["parameters"])
+    said = {field: document[field] for field in ("name", "description")}
+    return replace(robot, description=robot.description.model_copy(update=said))
+
 
 Degrees = tuple[float, float, float]
 

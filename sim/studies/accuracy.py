@@ -16,7 +16,7 @@ from gaitswarm.sim.controllers.base import ControlLaw
 from gaitswarm.sim.controllers.fuzzy_pi import FuzzyPi
 from gaitswarm.sim.controllers.quantisation import Axis
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.input.wording import message_of
+from gaitswarm.sim.input import message_of
 from gaitswarm.sim.kernel.reference import reference_kernel
 from gaitswarm.sim.noise import LinkNoise
 from gaitswarm.sim.outcome import Status

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from gaitswarm.sim.scenario import HELD_OUT
-from gaitswarm.sim.worlds.engine_walk import EngineWalk
 from gaitswarm.sim.worlds.perturbations import PERTURBATIONS, check_worlds, sample_worlds
-from gaitswarm.sim.worlds.perturbed_walk import MeasuredPerturbedWalk, PerturbedWalk
-from gaitswarm.sim.worlds.world_walk import WorldWalk
+from gaitswarm.sim.worlds.walks import EngineWalk, MeasuredPerturbedWalk, PerturbedWalk, WorldWalk
 
 __all__ = [
     "HELD_OUT",

@@ -7,8 +7,7 @@ from typing import Annotated, Any, Literal
 import pytest
 from pydantic import BaseModel, ConfigDict, Field, Tag, TypeAdapter, ValidationError
 
-from gaitswarm.sim.input.choice import NAME, OWN, alternatives
-from gaitswarm.sim.input.wording import message_of, with_known_keys
+from gaitswarm.sim.input import NAME, OWN, alternatives, message_of, with_known_keys
 
 
 class Foot(BaseModel):

@@ -9,8 +9,7 @@ import pytest
 from gaitswarm.cli.main import run
 from gaitswarm.sim.measurement.measured_csv import format_measured_log
 from gaitswarm.sim.robot import DEFAULT_ROBOT
-from gaitswarm.sim.validation.comparison import compare
-from gaitswarm.sim.validation.measures import Tolerance
+from gaitswarm.sim.validation import Tolerance, compare
 from tests.examples.commands import Result, run_command
 from tests.examples.paths import QUADRUPED
 from tests.validation.conftest import TwoWalks

@@ -8,10 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gaitswarm.sim import validation as measures
 from gaitswarm.sim.measurement.measured_log import Quantity
-from gaitswarm.sim.validation import measures
-from gaitswarm.sim.validation.comparison import N_HARMONICS, compare
-from gaitswarm.sim.validation.measures import Tolerance
+from gaitswarm.sim.validation import N_HARMONICS, Tolerance, compare
 from tests.validation.walks import CYCLE_TIME, szabadka, walking_log, without_supplements
 
 LOG = walking_log(szabadka())

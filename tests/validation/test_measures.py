@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from gaitswarm.sim import validation as measures
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.validation import measures
-from gaitswarm.sim.validation.measures import Tolerance
+from gaitswarm.sim.validation import Tolerance
 
 X = np.array([1.0, -2.0, 3.0, -2.0])
 Y = np.array([2.0, -2.0, 1.0, -1.0])

@@ -17,8 +17,7 @@ from gaitswarm.sim.measurement.synthetic import (
     perturbed,
     synthetic_log,
 )
-from gaitswarm.sim.validation.comparison import compare
-from gaitswarm.sim.validation.measures import Tolerance
+from gaitswarm.sim.validation import Tolerance, compare
 from tests.examples.walks import PUBLISHED_A, logged_walk
 from tests.validation.conftest import TwoWalks
 

@@ -56,7 +56,7 @@ def validate(
         remarks,
     )
     from gaitswarm.cli.validation_report import write_report
-    from gaitswarm.sim.validation.comparison import compare_synchronised
+    from gaitswarm.sim.validation import compare_synchronised
 
     walk = read_walk(scenario, controller, design, trajectory, cycles, robot, server=server, db=db)
     logs = {path: read_measured(path, walk.robot) for path in (measured, *(repeat or ()))}

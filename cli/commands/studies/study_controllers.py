@@ -45,7 +45,7 @@ def controllers(
     from gaitswarm.cli.output import note, print_text, stdout_console
     from gaitswarm.cli.studies.controllers import Budget, comparisons, study_document, study_table
     from gaitswarm.services.optimizer.errors import InvalidRequest
-    from gaitswarm.sim.robot.shipped import SHIPPED
+    from gaitswarm.sim.robot.variant import SHIPPED
 
     names = SHIPPED if robots is None else robots.split(",")
     chosen = [chapter.strip() for chapter in chapters.split(",")]

@@ -39,7 +39,7 @@ def precision(
     from gaitswarm.cli.studies.precision import compare, study_document, study_tables, variants
     from gaitswarm.services.optimizer.errors import InvalidRequest
     from gaitswarm.sim.robot import DEFAULT_ROBOT
-    from gaitswarm.sim.robot.shipped import SHIPPED
+    from gaitswarm.sim.robot.variant import SHIPPED
 
     name = robot or DEFAULT_ROBOT
     if name not in SHIPPED:

@@ -20,7 +20,7 @@ from gaitswarm.services.optimizer.store.port.base import Store
 from gaitswarm.sim.case import Walk, run_together
 from gaitswarm.sim.errors import SimulationError
 from gaitswarm.sim.outcome import Status
-from gaitswarm.sim.worlds.perturbed_walk import PerturbedWalk
+from gaitswarm.sim.worlds.walks import PerturbedWalk
 
 NONE: Final = Reference(None, None)
 """Of a job of a shipped robot for which nothing was published."""

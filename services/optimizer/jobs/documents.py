@@ -12,7 +12,7 @@ from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.sim.input.wording import message_of
+from gaitswarm.sim.input import message_of
 
 _TUNING: Final = "<tuning>"
 _IDENTIFICATION: Final = "<identification>"

@@ -23,7 +23,7 @@ from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.sim.case import Case, LongCase, Walk
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.simulate import prepare
-from gaitswarm.sim.worlds.perturbed_walk import PerturbedWalk
+from gaitswarm.sim.worlds.walks import PerturbedWalk
 
 _MOST_JOBS: Final = 5
 """Jobs whose rates are averaged, so that one on a busy machine does not count for all."""

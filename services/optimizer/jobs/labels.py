@@ -13,7 +13,7 @@ from typing import Annotated, Any, Final
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
-from gaitswarm.sim.robot.shipped import SHIPPED
+from gaitswarm.sim.robot.variant import SHIPPED
 
 OWN: Final = "own"
 """What a preference is called that is none of those shipped, and a robot that says no name."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, Tag, model_validator
 
 from gaitswarm.services.optimizer.jobs.judgement import Judgement, exponential
-from gaitswarm.sim.input.choice import NAME, OWN, alternatives
+from gaitswarm.sim.input import NAME, OWN, alternatives
 
 _FIELDS: Final = (
     "torque",

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from gaitswarm.services.optimizer.search.space import Space
-from gaitswarm.sim.input.wording import message_of
+from gaitswarm.sim.input import message_of
 
 
 class SearchSettings(BaseModel):

@@ -32,7 +32,7 @@ from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, orders_searched
 from gaitswarm.sim.identification.recorded_walk import Recordings
 from gaitswarm.sim.outcome import Objective
 from gaitswarm.sim.robot import RobotSource
-from gaitswarm.sim.robot.shipped import RobotName
+from gaitswarm.sim.robot.variant import RobotName
 from gaitswarm.sim.scenario import Scenario
 from gaitswarm.sim.simulate import check_drives, check_gait, check_reach
 from gaitswarm.sim.variables import Variable

@@ -28,7 +28,7 @@ from gaitswarm.sim.scenario import SCENARIOS, ScenarioChoice
 from gaitswarm.sim.simulate import check_reach
 from gaitswarm.sim.variables import Variable, split_name
 from gaitswarm.sim.worlds import check_worlds
-from gaitswarm.sim.worlds.perturbed_walk import PerturbedWalk
+from gaitswarm.sim.worlds.walks import PerturbedWalk
 
 Floats = NDArray[np.float64]
 

@@ -20,7 +20,7 @@ from gaitswarm.services.optimizer.jobs.reference import Reference
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.store.rows.evaluation_rows import Row
 from gaitswarm.services.optimizer.store.rows.tables import UnparsedText
-from gaitswarm.sim.input.wording import message_of
+from gaitswarm.sim.input import message_of
 
 _KEPT: Final = (
     "what is stored stays as it is: run the gaitswarm that wrote it, or a newer one, and resume the"

@@ -1,16 +1,71 @@
-"""What pydantic finds wrong, in plain words and with the way out."""
+"""What people write: choices, names and fields, and what they are told where one is wrong."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from difflib import get_close_matches
 from types import UnionType
 from typing import Annotated, Any, Final, Union, get_args, get_origin
 
-from pydantic import BaseModel, Tag
+from pydantic import BaseModel, Discriminator, Tag
 
-from gaitswarm.sim.input.choice import is_tag
-from gaitswarm.sim.input.near_names import instead_of, nearest
+_LONGEST_NAME: Final = 100
+"""That is compared with the known ones; comparing takes time by its length."""
+
+_ALIKE: Final = 0.7
+"""Share of their characters that a name and the one that may be meant have in common, at least."""
+
+
+def nearest(name: str, known: Iterable[str]) -> str | None:
+    """The name that may have been meant."""
+    if len(name) > _LONGEST_NAME or name.isdigit():
+        return None
+    plain = {one.lower(): one for one in known}
+    near = get_close_matches(name.lower(), plain, n=1, cutoff=_ALIKE)
+    return plain[near[0]] if near else None
+
+
+def instead_of(name: str, known: Iterable[str], listed: Iterable[str] | None = None) -> str:
+    """What to write in place of a name that is none."""
+    names = list(known)
+    near = nearest(name, names)
+    if near is not None:
+        return f"did you mean {near!r}?"
+    return f"known are {', '.join(names if listed is None else listed) or 'none'}"
+
+
+Location = Sequence[str | int]
+
+NAME: Final = "<name>"
+OWN: Final = "<own>"
+
+_KEY: Final = "[key]"
+"""What pydantic appends where the key of a dictionary is wrong, not its value."""
+
+
+def alternatives(
+    expected: str, *, among_own: Callable[[Any], str] = lambda _: OWN
+) -> Discriminator:
+    """A discriminator between a name and objects."""
+
+    def tag(value: Any) -> str | None:
+        if isinstance(value, str):
+            return NAME
+        return among_own(value) if isinstance(value, Mapping | BaseModel) else None
+
+    return Discriminator(tag, custom_error_type="no_choice", custom_error_message=expected)
+
+
+def without_tags(location: Location) -> tuple[str | int, ...]:
+    """The part of a location of a validation error that is in the document."""
+    return tuple(part for part in location if not is_tag(part))
+
+
+def is_tag(part: str | int) -> bool:
+    """Whether a part of a location says which alternative was validated."""
+    return isinstance(part, str) and (part == _KEY or (part[:1] == "<" and part[-1:] == ">"))
+
 
 _PLAIN: Final = {
     "missing": "is missing",

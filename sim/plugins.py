@@ -1,0 +1,375 @@
+"""What other packages bring: found by entry points, loaded when it is named."""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import metadata
+from importlib.util import find_spec
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Final, Generic, Literal, Protocol, TypeVar, get_args
+
+from pydantic import BaseModel, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+from gaitswarm.sim.input import instead_of, nearest
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+Kind = Literal["controller", "case", "optimizer"]
+
+KINDS: Final[tuple[Kind, ...]] = get_args(Kind)
+
+GROUPS: Final[Mapping[Kind, str]] = MappingProxyType({kind: f"gaitswarm.{kind}s" for kind in KINDS})
+"""Group of entry points by what they bring."""
+
+
+class PluginError(Exception):
+    """A plug-in that cannot be used; the message names it, its distribution and the reason."""
+
+
+@dataclass(frozen=True, slots=True)
+class Plugin:
+    """One entry point.
+
+    Attributes:
+        kind: What it brings.
+        name: By which jobs name it.
+        distribution: That brings it.
+        version: Of the distribution.
+        place: `module:attribute` of what it brings.
+    """
+
+    kind: Kind
+    name: str
+    distribution: str
+    version: str
+    place: str
+
+    @property
+    def module(self) -> str:
+        """The module that is imported for it."""
+        return self.place.partition(":")[0].strip()
+
+    def __str__(self) -> str:
+        return f"{self.kind} {self.name!r} of {self.distribution} {self.version}"
+
+    def load(self) -> object:
+        """Import what it brings."""
+        try:
+            return metadata.EntryPoint(self.name, self.place, GROUPS[self.kind]).load()
+        except (Exception, SystemExit) as error:
+            raise PluginError(
+                f"{self} cannot be loaded: {type(error).__name__}: {error}"
+            ) from error
+
+
+@lru_cache(maxsize=1)
+def find_plugins() -> tuple[Plugin, ...]:
+    """All entry points for gaitswarm that are installed, as they are at the first call."""
+    # Asked for at once: each question reads the metadata of all distributions.
+    points = metadata.entry_points()
+    found = {
+        Plugin(
+            kind,
+            point.name,
+            "unknown" if point.dist is None else point.dist.name,
+            "0" if point.dist is None else point.dist.version,
+            point.value,
+        )
+        for kind, group in GROUPS.items()
+        for point in points.select(group=group)
+    }
+    return tuple(sorted(found, key=lambda p: (KINDS.index(p.kind), p.name, p.distribution)))
+
+
+MISSING: Final = "none"
+"""In place of the version of a distribution that is not installed."""
+
+_DIGITS: Final = 32
+
+_SHOWN: Final = 12
+"""Digits of the digest of a plug-in's code."""
+
+_SUFFIXES: Final = (".py", ".c", ".h", ".so")
+
+
+def source_digest(root: Path, files: Iterable[Path]) -> str:
+    """Digest of source files."""
+    digest = hashlib.sha256()
+    for file in files:
+        content = file.read_bytes()
+        digest.update(f"{file.relative_to(root).as_posix()}\0{len(content)}\0".encode())
+        digest.update(content)
+    return digest.hexdigest()[:_DIGITS]
+
+
+def version_of(distribution: str) -> str:
+    """The version of a distribution here."""
+    known = plugin_versions()
+    if distribution in known:
+        return known[distribution]
+    try:
+        return _installed(distribution)
+    except metadata.PackageNotFoundError:
+        return MISSING
+
+
+@lru_cache(maxsize=256)
+def _installed(distribution: str) -> str:
+    """As it is at the first call: every job asks, and to read it takes a millisecond."""
+    return metadata.version(distribution)
+
+
+@lru_cache(maxsize=1)
+def plugin_versions() -> dict[str, str]:
+    """Versions of all distributions with plug-ins, by name, as they are at the first call."""
+    by_name: dict[str, list[Plugin]] = {}
+    for plugin in find_plugins():
+        by_name.setdefault(plugin.distribution, []).append(plugin)
+    return {
+        name: f"{plugins[0].version} (code {_code(plugins)})"
+        for name, plugins in sorted(by_name.items())
+    }
+
+
+def _code(plugins: Iterable[Plugin]) -> str:
+    """Digest of the top-level packages that plug-ins lie in; nothing is imported for it."""
+    digest = hashlib.sha256()
+    for package in sorted({plugin.module.partition(".")[0] for plugin in plugins}):
+        try:
+            for root in _roots(package):
+                files = [root] if root.is_file() else sorted(root.rglob("*"))
+                sources = [f for f in files if f.suffix in _SUFFIXES and f.is_file()]
+                digest.update(source_digest(root.parent, sources).encode())
+        except (ImportError, OSError, ValueError):
+            # Whoever loads it is told why it cannot be read.
+            digest.update(b"unreadable")
+    return digest.hexdigest()[:_SHOWN]
+
+
+def _roots(package: str) -> tuple[Path, ...]:
+    """The folders of a package, or the file of a module."""
+    spec = find_spec(package)
+    if spec is None:
+        return ()
+    if spec.submodule_search_locations is not None:
+        return tuple(Path(folder) for folder in spec.submodule_search_locations)
+    return () if spec.origin is None else (Path(spec.origin),)
+
+
+T = TypeVar("T")
+
+_LOG = logging.getLogger(__name__)
+
+
+class Registry(MutableMapping[str, T]):
+    """Things by name. A plug-in is imported when it is looked up, or when all are listed.
+
+    A name of gaitswarm's is answered without a look at what is installed. A plug-in that is broken,
+    or whose name is taken, is logged and left out: to its users it is an unknown name, with the
+    reason beside it.
+    """
+
+    def __init__(
+        self, kind: Kind, built_in: Mapping[str, T], accept: Callable[[Plugin, object], T]
+    ) -> None:
+        self._kind: Kind = kind
+        self._built_in = dict(built_in)
+        self._accept = accept
+        self._loaded: dict[Plugin, T] = {}
+        self._broken: dict[Plugin, str] = {}
+
+    @property
+    def kind(self) -> Kind:
+        """Of the things."""
+        return self._kind
+
+    @property
+    def built_in(self) -> Mapping[str, T]:
+        """Those of gaitswarm, by name."""
+        return self._built_in
+
+    def __getitem__(self, name: str) -> T:
+        if name in self._built_in:
+            return self._built_in[name]
+        for plugin in self.plugins():
+            if plugin.name == name and self.problem(plugin) is None:
+                return self._loaded[plugin]
+        raise KeyError(name)
+
+    def __setitem__(self, name: str, thing: T) -> None:
+        self._built_in[name] = thing
+
+    def __delitem__(self, name: str) -> None:
+        del self._built_in[name]
+
+    def __iter__(self) -> Iterator[str]:
+        yield from self._built_in
+        yield from (p.name for p in self.plugins() if self.problem(p) is None)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+    def plugins(self) -> tuple[Plugin, ...]:
+        """Entry points of this kind that are installed, those that cannot be used among them."""
+        return tuple(plugin for plugin in find_plugins() if plugin.kind == self._kind)
+
+    def problem(self, plugin: Plugin) -> str | None:
+        """Why a plug-in cannot be used; it is imported to find out, once."""
+        if plugin not in self._loaded and plugin not in self._broken:
+            try:
+                self._check_name(plugin)
+                self._loaded[plugin] = self._accepted(plugin)
+            except PluginError as error:
+                _LOG.warning("%s", error)
+                self._broken[plugin] = str(error)
+        return self._broken.get(plugin)
+
+    def distribution(self, name: str) -> tuple[str, ...]:
+        """The distribution that a name's plug-in is of."""
+        if name in self._built_in:
+            return ()
+        return tuple(
+            p.distribution for p in self.plugins() if p.name == name and self.problem(p) is None
+        )
+
+    def unknown(self, name: str) -> str:
+        """Say that a name is none."""
+        return f"unknown {self._kind} {name!r}; {self.instead_of(name, self)}"
+
+    def instead_of(self, name: str, known: Iterable[str]) -> str:
+        """What may help whoever gave a name that is none."""
+        known = list(known)
+        found = [self.problem(plugin) for plugin in self.plugins() if plugin.name == name]
+        reasons = [reason for reason in found if reason is not None]
+        if not reasons and nearest(name, known) is None:
+            reasons = [
+                "that of a plug-in is known where its package is installed (gaitswarm plugins)"
+            ]
+        return "; ".join([instead_of(name, known), *reasons])
+
+    def _check_name(self, plugin: Plugin) -> None:
+        if plugin.name in self._built_in:
+            raise PluginError(f"{plugin} is left out: the name is one of gaitswarm's own")
+        others = [o for o in self.plugins() if o.name == plugin.name and o != plugin]
+        if others:
+            # None of them: which one is first depends on the order of sys.path.
+            named = ", ".join(f"{o.distribution} {o.version}" for o in others)
+            raise PluginError(f"{plugin} is left out: {named} has one of that name, too")
+
+    def _accepted(self, plugin: Plugin) -> T:
+        brought = plugin.load()
+        try:
+            return self._accept(plugin, brought)
+        except PluginError:
+            raise
+        except Exception as error:
+            raise PluginError(
+                f"{plugin} cannot be used: {type(error).__name__}: {error}"
+            ) from error
+
+
+class Names(Protocol):
+    """Names that there are, which may become more when plug-ins are looked at."""
+
+    def __contains__(self, name: object, /) -> bool: ...
+
+    def __iter__(self) -> Iterator[str]: ...
+
+    def unknown(self, name: str) -> str:
+        """Say that a name is none."""
+
+
+class KnownName:
+    """Annotation of a `str` that is to be a known name, a plug-in's among them."""
+
+    def __init__(self, names: Names) -> None:
+        self._names = names
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Checks a name when it is read."""
+        return core_schema.no_info_after_validator_function(self._known, handler(source))
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """The names that there are where the schema is asked for."""
+        return {**handler(schema), "enum": list(self._names)}
+
+    def _known(self, name: str) -> str:
+        if name not in self._names:
+            raise PydanticCustomError("unknown_name", "{why}", {"why": self._names.unknown(name)})
+        return name
+
+
+def check_is(plugin: Plugin, brought: object, wanted: type[T]) -> T:
+    """Check the type of what a plug-in brings, and that its own name is the entry point's."""
+    if isinstance(brought, type) or not isinstance(brought, wanted):
+        raise PluginError(
+            f"{plugin} cannot be used: {plugin.place} is a {type(brought).__name__},"
+            f" not a {wanted.__name__}"
+        )
+    return brought
+
+
+def check_name(plugin: Plugin, own: object) -> None:
+    """Check that a thing has the name that its entry point gives it."""
+    if own != plugin.name:
+        raise PluginError(f"{plugin} cannot be used: it calls itself {own!r}")
+
+
+class PluginSettings(Generic[T]):
+    """Annotation of settings that may be a plug-in's: what is annotated is read if they are not."""
+
+    def __init__(
+        self, registry: Registry[T], model: Callable[[T], type[BaseModel]], seen: str
+    ) -> None:
+        self._registry, self._model, self._seen = registry, model, seen
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Reads settings by the model of their name; writes all that a model has."""
+        return core_schema.no_info_wrap_validator_function(
+            self._read, handler(source), serialization=core_schema.simple_ser_schema("any")
+        )
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """What is annotated, or settings with one of the names that plug-ins have here."""
+        found = handler(schema)
+        names = [name for name in self._registry if name not in self._registry.built_in]
+        if not names:
+            return found
+        own = {
+            "title": "PluginSettings",
+            "type": "object",
+            "properties": {"name": {"type": "string", "enum": names}},
+            "required": ["name"],
+            "description": f"Settings of a plug-in's {self._registry.kind}; {self._seen} has them.",
+        }
+        for union in ("oneOf", "anyOf"):
+            if union in found:
+                return {**found, union: [*found[union], own]}
+        return {"anyOf": [found, own]}
+
+    def _read(self, value: Any, otherwise: Callable[[Any], Any]) -> Any:
+        if isinstance(value, Mapping):
+            name = value.get("name")
+        else:
+            name = getattr(value, "name", None) if isinstance(value, BaseModel) else None
+        if not isinstance(name, str) or name in self._registry.built_in:
+            return otherwise(value)
+        if name not in self._registry:
+            return otherwise(value)
+        return self._model(self._registry[name]).model_validate(value)

@@ -1,1 +1,0 @@
-"""Validation: how far a simulated walk is from a measured one (thesis 2.3)."""

@@ -1,0 +1,518 @@
+"""Designs in perturbed worlds, by our engine and by others"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaitswarm.sim.assembly import control_steps, judge, kernel_of, measure, plan_walk
+from gaitswarm.sim.controllers import ControlLaw, ControllerName, control_law
+from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
+from gaitswarm.sim.kernel.observation import WalkLog, walk_log
+from gaitswarm.sim.kernel.parameters import Layout, gravity_on
+from gaitswarm.sim.kernel.sensors import DEVIATION, SensorErrors, byte_sums
+from gaitswarm.sim.kernel.walk import (
+    Kernel,
+    Precision,
+    Walking,
+    WalkSetup,
+    WantedWalk,
+    walk_together,
+)
+from gaitswarm.sim.mujoco.engines import ENGINES, check_installed
+from gaitswarm.sim.mujoco.mjcf import Soles
+from gaitswarm.sim.outcome import (
+    MEASUREMENTS,
+    N_MEASUREMENTS,
+    N_OBJECTIVES,
+    OBJECTIVES,
+    Measurements,
+    Objective,
+    Outcome,
+    Status,
+)
+from gaitswarm.sim.robot import Robot, RobotSource, load_robot
+from gaitswarm.sim.robot.posture import feet_in_body, height_on_soles
+from gaitswarm.sim.scenario import Scenario
+from gaitswarm.sim.simulate import Simulation
+from gaitswarm.sim.worlds.perturbations import NOMINAL, check_worlds
+
+Floats = NDArray[np.float64]
+
+_SCALED: Final[Mapping[str, tuple[str, ...]]] = {
+    "friction_factor": ("friction",),
+    "stiffness_factor": ("stiffness", "stick_stiffness"),
+    "damping_factor": ("damping", "stick_damping"),
+    "sole_factor": ("sole",),
+    "backlash_factor": ("backlash",),
+    "battery_voltage_factor": ("supply_voltage",),
+    "battery_resistance_factor": ("supply_resistance",),
+}
+"""Fields of the kernel's parameters that are a factor's, where a robot has them."""
+
+_START: Final = 1
+"""Stream of a world's seed for the angles at the start."""
+
+
+def perturbed_setups(
+    robot: Robot,
+    scenario: Scenario,
+    nominal: WalkSetup,
+    variables: Sequence[str],
+    worlds: Floats,
+) -> list[WalkSetup]:
+    """What walks in every world; the robot's controller and gait know nothing of it.
+
+    Args:
+        worlds: (n, len(variables)), as `check_worlds` wants them.
+    """
+    columns = dict(zip(variables, worlds.T, strict=True))
+    values = {
+        name: columns.get(name, np.full(len(worlds), default)) for name, default in NOMINAL.items()
+    }
+    parameters = _parameters(robot, scenario, nominal.parameters, values)
+    starts = _starts(robot, scenario, nominal, parameters, values)
+    internal_states = np.tile(nominal.internal_state, (len(worlds), 1))
+    if robot.has_backlash:
+        internal_states[:, : robot.n_joints] = starts[:, 7:]
+    drops = nominal.drop + values["start_height"]
+    errors = _sensor_errors(values)
+    rows = zip(starts, internal_states, parameters, drops.tolist(), errors, strict=True)
+    return [
+        replace(
+            nominal,
+            start=start,
+            internal_state=internal_state,
+            parameters=packed,
+            drop=drop,
+            sensors=sensors,
+        )
+        for start, internal_state, packed, drop, sensors in rows
+    ]
+
+
+def _parameters(
+    robot: Robot, scenario: Scenario, nominal: Floats, values: Mapping[str, Floats]
+) -> Floats:
+    """The kernel's parameters in every world, (n, P)."""
+    slices = Layout(robot).slices
+    packed = np.tile(nominal, (len(values["load_added"]), 1))
+    for factor, fields in _SCALED.items():
+        for field in fields:
+            if field in slices:
+                packed[:, slices[field]] *= values[factor][:, np.newaxis]
+    actuators = robot.actuators()
+    efficiency = np.minimum(actuators.efficiency * values["efficiency_factor"][:, np.newaxis], 1.0)
+    packed[:, slices["viscous"]] = values["viscous_friction_factor"][:, np.newaxis] * (
+        actuators.motor_friction + (1.0 - efficiency) * actuators.gear_friction
+    )
+    _add_masses(robot, scenario, packed, values)
+    slopes = zip(values["slope_added"], values["slope_added_direction"], strict=True)
+    for row, (slope, direction) in zip(packed, slopes, strict=True):
+        if slope > 0.0:
+            row[slices["gravity"]] = _gravity(scenario, float(slope), float(direction))
+    return packed
+
+
+def _add_masses(
+    robot: Robot, scenario: Scenario, packed: Floats, values: Mapping[str, Floats]
+) -> None:
+    """The body's other mass and the load's other mass and place, in place."""
+    slices, body = Layout(robot).slices, robot.body
+    further = values["body_mass_factor"][:, np.newaxis] - 1.0
+    load = (scenario.load + values["load_added"])[:, np.newaxis]
+    at = np.array([[0.0, 0.0, robot.description.load_height]])
+    moved = at + np.stack([values[f"load_{way}"] for way in ("ahead", "left", "raised")], axis=1)
+    packed[:, slices["base_mass"]] += further * body.mass + (load - scenario.load)
+    packed[:, slices["base_moment"]] += further * (body.mass * body.centre) + (
+        load * moved - scenario.load * at
+    )
+    own = body.rotational[_ROWS, _COLUMNS] + body.mass * _parallel_axes(body.centre[np.newaxis])
+    packed[:, slices["base_inertia"]] += further * own + (
+        load * _parallel_axes(moved) - scenario.load * _parallel_axes(at)
+    )
+
+
+_ROWS, _COLUMNS = [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]
+"""Of an inertia xx, yy, zz, xy, xz, yz."""
+
+
+def _parallel_axes(offset: Floats) -> Floats:
+    """Rotational inertia of unit point masses, (n, 3) [m] -> (n, 6) [m2]."""
+    x, y, z = offset.T
+    return np.stack([y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z], axis=1)
+
+
+def _gravity(scenario: Scenario, slope: float, direction: float) -> Floats:
+    """On two slopes at once, which add as vectors along which the ground rises, (3,) [m/s2]."""
+    x = y = 0.0
+    for angle, towards in ((scenario.slope, scenario.slope_direction), (slope, direction)):
+        x += angle * math.cos(math.radians(towards))
+        y += angle * math.sin(math.radians(towards))
+    return gravity_on(math.hypot(x, y), math.degrees(math.atan2(y, x)))
+
+
+def _starts(
+    robot: Robot,
+    scenario: Scenario,
+    nominal: WalkSetup,
+    parameters: Floats,
+    values: Mapping[str, Floats],
+) -> Floats:
+    """Positions at which the world's soles carry its weight, and above, (n, 7+J)."""
+    slices = Layout(robot).slices
+    starts = np.tile(nominal.start, (len(parameters), 1))
+    seeds = values["world_seed"].astype(np.uint64)
+    deviates = byte_sums(seeds, 0, robot.n_joints, _START)[..., 0] / DEVIATION
+    offsets = values["start_angle"][:, np.newaxis] * deviates
+    starts[:, 7:] += offsets
+    # A jammed leg is held where it begins.
+    jammed = parameters[:, slices["jam_stiffness"]] > 0.0
+    parameters[:, slices["jam_angle"]] += jammed * offsets
+    further = (values["body_mass_factor"] - 1.0) * robot.body.mass
+    mass = robot.mass + further + (scenario.load + values["load_added"])
+    weight = mass * -parameters[:, slices["gravity"]][:, 2]
+    tilts = np.radians(np.stack([values["start_roll"], values["start_pitch"]], axis=1))
+    for start, packed, carried, tilt in zip(
+        starts, parameters, weight.tolist(), tilts, strict=True
+    ):
+        start[3:7], up = _attitude(*tilt.tolist())
+        reach = packed[slices["sole"]] - feet_in_body(robot, start[7:]) @ up
+        start[2] = height_on_soles(reach, packed[slices["stiffness"]], carried)
+    starts[:, 2] += nominal.drop + values["start_height"]
+    return starts
+
+
+def _attitude(roll: float, pitch: float) -> tuple[Floats, Floats]:
+    """Rolled, then pitched [rad]: quaternion x y z w, and the world's z in the body's frame."""
+    x, a = math.sin(0.5 * roll), math.cos(0.5 * roll)
+    y, b = math.sin(0.5 * pitch), math.cos(0.5 * pitch)
+    up = [-math.sin(pitch), math.cos(pitch) * math.sin(roll), math.cos(pitch) * math.cos(roll)]
+    return np.array([b * x, y * a, 0.0 - y * x, a * b]), np.array(up)
+
+
+def _sensor_errors(values: Mapping[str, Floats]) -> list[SensorErrors]:
+    names = ("angle_noise", "current_noise", "angle_delay", "current_delay", "world_seed")
+    columns = zip(*(values[name].tolist() for name in names), strict=True)
+    return [
+        SensorErrors(angle, current, round(late_angle), round(late_current), round(seed))
+        for angle, current, late_angle, late_current, seed in columns
+    ]
+
+
+_PLANS_KEPT: Final = 16
+"""Scenarios whose walks are planned once for all worlds of them."""
+
+
+@dataclass(frozen=True, slots=True)
+class PerturbedWalk:
+    """Designs of a controller walk through a scenario of one world, of which they know nothing.
+
+    Attributes:
+        name: unique in its job.
+        robot: as described.
+        controller: name of the motor controller.
+        scenario: that is walked through.
+        world: names and values of perturbations; what is not named is nominal.
+        variables: columns of the designs.
+        precision: of the physics' numbers.
+    """
+
+    name: str
+    robot: RobotSource
+    controller: ControllerName
+    scenario: Scenario
+    world: tuple[tuple[str, float], ...]
+    variables: tuple[str, ...]
+    precision: Precision = "double"
+
+    @property
+    def robots(self) -> tuple[RobotSource, ...]:
+        """The robot as described."""
+        return (self.robot,)
+
+    @property
+    def duration(self) -> float:
+        """Simulated time of one walk [s]."""
+        return self.scenario.duration
+
+    @property
+    def objectives(self) -> tuple[Objective, ...]:
+        """f1 to f6 of table 4.1."""
+        return OBJECTIVES
+
+    def run(self, designs: Floats) -> Outcome:
+        """Let every design walk."""
+        (outcome,) = walk_together([self.walking(designs)])
+        return outcome
+
+    def walking(self, designs: Floats) -> Walking[Outcome]:
+        """Let every design walk, beside walks of other cases."""
+        walked = yield from self._simulating(designs, log=False)
+        return walked.outcome
+
+    def simulate(self, designs: Floats, *, log: bool = False) -> Simulation:
+        """Let every design walk, to be looked at.
+
+        Args:
+            designs: (n, len(variables)), in the variables' units.
+        """
+        (simulation,) = walk_together([self._simulating(designs, log=log)])
+        return simulation
+
+    def _simulating(self, designs: Floats, *, log: bool) -> Walking[Simulation]:
+        robot = load_robot(self.robot)
+        kernel = kernel_of(robot, precision=self.precision)
+        coding, timestep = control_steps(robot)
+        statuses = np.full(len(designs), Status.UNREACHABLE, dtype=np.uint8)
+        objectives = np.full((len(designs), N_OBJECTIVES), np.nan)
+        measured = np.full((len(designs), N_MEASUREMENTS), np.nan)
+        logs: list[WalkLog | None] = [None] * len(designs)
+        setups = self._setups(robot, designs, timestep)
+        results = yield [WantedWalk(kernel, coding, setup, log) for setup in setups.values()]
+        for (index, setup), result in zip(setups.items(), results, strict=True):
+            statuses[index], objectives[index] = judge(setup, result, coding.substeps, timestep)
+            measured[index] = measure(setup, result, coding.substeps)
+            if result.states is not None:
+                logs[index] = walk_log(robot, setup, result.states)
+        return Simulation(
+            Outcome(objectives, statuses), Measurements.of(measured), tuple(logs) if log else ()
+        )
+
+    def _setups(self, robot: Robot, designs: Floats, timestep: float) -> dict[int, WalkSetup]:
+        """By index of the design; without those whose gait is out of the legs' reach."""
+        of_gait: dict[tuple[float, ...], WalkSetup | None] = {}
+        setups = {}
+        for index, row in enumerate(designs.tolist()):
+            design = dict(zip(self.variables, row, strict=True))
+            gait = {name: design.pop(name) for name in self.variables if name in GAIT_CATALOGUE}
+            law = control_law(self.controller, tuple(design.items()))
+            key = tuple(gait.values())
+            if key not in of_gait:
+                of_gait[key] = self._in_world(robot, gait, law, timestep)
+            setup = of_gait[key]
+            if setup is not None:
+                setups[index] = replace(setup, control_law=law)
+        return setups
+
+    def _in_world(
+        self, robot: Robot, gait: dict[str, float], law: ControlLaw, timestep: float
+    ) -> WalkSetup | None:
+        """What all designs of one gait walk in, but for their control laws."""
+        scenario = with_gait(self.scenario, gait)
+        plan = (plan_walk if gait else _plan_of_scenario)(robot, scenario, timestep)
+        if plan is None:
+            return None
+        names, values = tuple(name for name, _ in self.world), [v for _, v in self.world]
+        worlds = np.array([values], dtype=np.float64)
+        check_worlds(names, worlds)
+        (setup,) = perturbed_setups(robot, scenario, plan(law), names, worlds)
+        return setup
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredPerturbedWalk(PerturbedWalk):
+    """The same walk with its measurements, as further columns behind its objectives."""
+
+    @property
+    def objectives(self) -> tuple[Objective, ...]:
+        """f1 to f6 of table 4.1, then `MEASUREMENTS`."""
+        measured = (Objective(m.name, m.unit, m.description) for m in MEASUREMENTS)
+        return (*OBJECTIVES, *measured)
+
+    def walking(self, designs: Floats) -> Walking[Outcome]:
+        """Let every design walk, beside walks of other cases."""
+        walked = yield from self._simulating(designs, log=False)
+        columns = [walked.outcome.objectives, walked.measurements.array()]
+        return Outcome(np.concatenate(columns, axis=1), walked.outcome.statuses)
+
+
+@lru_cache(maxsize=_PLANS_KEPT)
+def _plan_of_scenario(
+    robot: Robot, scenario: Scenario, timestep: float
+) -> Callable[[ControlLaw], WalkSetup] | None:
+    return plan_walk(robot, scenario, timestep)
+
+
+@dataclass(frozen=True, slots=True)
+class WorldWalk:
+    """One design walks through one scenario; what is varied is the world.
+
+    Desired angles and control law are those of the robot as described: its controller knows
+    nothing of the world. All worlds share the robot's kernel.
+
+    Attributes:
+        robot: as described.
+        controller: name of the motor controller.
+        design: names and numbers of the design.
+        scenario: that is walked through.
+        variables: columns of the worlds, names of `PERTURBATIONS`; what is not named is nominal.
+        precision: of the physics' numbers.
+    """
+
+    robot: RobotSource
+    controller: ControllerName
+    design: tuple[tuple[str, float], ...]
+    scenario: Scenario
+    variables: tuple[str, ...]
+    precision: Precision = "double"
+
+    @property
+    def name(self) -> str:
+        """Name of the scenario."""
+        return self.scenario.name
+
+    @property
+    def robots(self) -> tuple[RobotSource, ...]:
+        """The robot as described."""
+        return (self.robot,)
+
+    @property
+    def duration(self) -> float:
+        """Simulated time of one world [s], with the design's cycle time if it gives one."""
+        cycle_time = dict(self.design).get("cycle_time", self.scenario.cycle_time)
+        return self.scenario.cycles * cycle_time
+
+    @property
+    def objectives(self) -> tuple[Objective, ...]:
+        """f1 to f6 of table 4.1."""
+        return OBJECTIVES
+
+    def run(self, designs: Floats) -> Outcome:
+        """Let the design walk in every world."""
+        (outcome,) = walk_together([self.walking(designs)])
+        return outcome
+
+    def run_with(self, kernel: Kernel | None, worlds: Floats) -> Outcome:
+        """Let the design walk in every world, by a kernel of one's choice.
+
+        Args:
+            worlds: (n, len(variables)), in the variables' units.
+        """
+        (simulation,) = walk_together([self._simulating(worlds, log=False, kernel=kernel)])
+        return simulation.outcome
+
+    def walking(self, designs: Floats) -> Walking[Outcome]:
+        """Let the design walk in every world, beside walks of other cases."""
+        walked = yield from self._simulating(designs, log=False)
+        return walked.outcome
+
+    def simulate(self, worlds: Floats, *, log: bool = False) -> Simulation:
+        """Let the design walk in every world, to be looked at.
+
+        Args:
+            worlds: (n, len(variables)), in the variables' units.
+        """
+        (simulation,) = walk_together([self._simulating(worlds, log=log)])
+        return simulation
+
+    def _simulating(
+        self, worlds: Floats, *, log: bool, kernel: Kernel | None = None
+    ) -> Walking[Simulation]:
+        check_worlds(self.variables, worlds)
+        robot = load_robot(self.robot)
+        kernel = kernel or kernel_of(robot, precision=self.precision)
+        coding, timestep = control_steps(robot)
+        statuses = np.full(len(worlds), Status.UNREACHABLE, dtype=np.uint8)
+        objectives = np.full((len(worlds), N_OBJECTIVES), np.nan)
+        measured = np.full((len(worlds), N_MEASUREMENTS), np.nan)
+        logs: list[WalkLog | None] = [None] * len(worlds)
+        setups = self._setups(worlds, timestep)
+        results = yield [WantedWalk(kernel, coding, setup, log) for setup in setups]
+        for index, (setup, result) in enumerate(zip(setups, results, strict=True)):
+            statuses[index], objectives[index] = judge(setup, result, coding.substeps, timestep)
+            measured[index] = measure(setup, result, coding.substeps)
+            if result.states is not None:
+                logs[index] = walk_log(robot, setup, result.states)
+        return Simulation(
+            Outcome(objectives, statuses), Measurements.of(measured), tuple(logs) if log else ()
+        )
+
+    def _setups(self, worlds: Floats, timestep: float) -> list[WalkSetup]:
+        """One a world; none at all for a gait out of the legs' reach."""
+        robot = load_robot(self.robot)
+        gait = {name: value for name, value in self.design if name in GAIT_CATALOGUE}
+        gains = tuple((n, value) for n, value in self.design if n not in GAIT_CATALOGUE)
+        scenario = with_gait(self.scenario, gait)
+        law = control_law(self.controller, gains)
+        plan = plan_walk(robot, scenario, timestep)
+        if plan is None:
+            return []
+        return perturbed_setups(robot, scenario, plan(law), self.variables, worlds)
+
+
+@dataclass(frozen=True, slots=True)
+class EngineWalk:
+    """Worlds that say which engine computes them.
+
+    A walk in another engine takes some hundred times as long, so that it can be broken off.
+
+    Attributes:
+        walk: that is walked, whose worlds are without the column of the engine.
+        engine_column: index of that column: 0 for our own engine, k for the k-th of `ENGINES`.
+    """
+
+    walk: WorldWalk
+    engine_column: int
+
+    @property
+    def name(self) -> str:
+        """Name of the scenario."""
+        return self.walk.name
+
+    @property
+    def robots(self) -> tuple[RobotSource, ...]:
+        """The robot as described."""
+        return self.walk.robots
+
+    @property
+    def duration(self) -> float:
+        """Simulated time of one world [s]."""
+        return self.walk.duration
+
+    @property
+    def precision(self) -> Precision:
+        """Of our own engine's numbers; the others have double precision alone."""
+        return self.walk.precision
+
+    @property
+    def objectives(self) -> tuple[Objective, ...]:
+        """f1 to f6 of table 4.1."""
+        return self.walk.objectives
+
+    def run(self, designs: Floats) -> Outcome:
+        """Let the design walk in every world."""
+        return self.run_until(designs, lambda: False)
+
+    def run_until(self, designs: Floats, should_stop: Callable[[], bool]) -> Outcome:
+        """Let the design walk in every world, unless nobody waits for it any more.
+
+        Args:
+            designs: (n, v) worlds, with the column of the engine.
+        """
+        engines = designs[:, self.engine_column].astype(np.intp)
+        worlds = np.delete(designs, self.engine_column, axis=1)
+        objectives = np.full((len(designs), N_OBJECTIVES), np.nan)
+        statuses = np.zeros(len(designs), dtype=np.uint8)
+        for engine in np.unique(engines).tolist():
+            rows = np.flatnonzero(engines == engine)
+            kernel = self._kernel(engine, should_stop) if engine else None
+            found = self.walk.run_with(kernel, worlds[rows])
+            objectives[rows], statuses[rows] = found.objectives, found.statuses
+        return Outcome(objectives, statuses)
+
+    def _kernel(self, engine: int, should_stop: Callable[[], bool]) -> Kernel:
+        check_installed()
+        # Whoever has none of these walks need not have MuJoCo.
+        from gaitswarm.sim.mujoco.kernel import MujocoKernel  # noqa: PLC0415
+
+        robot = load_robot(self.walk.robot)
+        own_contacts = tuple(ENGINES)[engine - 1] == "mujoco-contacts"
+        soles: Soles = "spheres" if own_contacts else "none"
+        return MujocoKernel(robot, soles=soles, should_stop=should_stop)

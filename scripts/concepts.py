@@ -1,4 +1,4 @@
-"""Draw docs/images/concepts.svg, how the main concepts hang together: python -m scripts.concepts
+"""Draw docs/images/concepts.svg, how the main concepts relate: python -m scripts.concepts
 
 What a box says of its concept is the beginning of its entry in docs/glossary.md.
 """
@@ -33,12 +33,12 @@ ROWS: Final = (
 ARROWS: Final[dict[Edge, str]] = {
     ("certificate", "job"): "is a",
     ("certificate", "world"): "draws many a",
-    ("job", "iteration"): "goes on by",
-    ("iteration", "design"): "tries some",
-    ("world", "scenario"): "changes what is met in a",
-    ("design", "walk"): "takes a",
+    ("job", "iteration"): "consists of",
+    ("iteration", "design"): "tries a",
+    ("world", "scenario"): "perturbs a",
+    ("design", "walk"): "is simulated in a",
     ("scenario", "walk"): "is the task of a",
-    ("walk", "objective"): "comes to each",
+    ("walk", "objective"): "yields each",
     ("objective", "utility"): "goes into the",
     ("preference", "utility"): "weighs for the",
     ("utility", "fitness"): "averages to the",
@@ -60,7 +60,7 @@ def drawn() -> str:
     """The picture as SVG."""
     known = entries()
     boxes = {concept: _box(concept, known[concept]) for row in ROWS for concept in row}
-    return Picture("How the concepts hang together", ROWS, boxes).drawn(ARROWS, words=True)
+    return Picture("How the concepts relate", ROWS, boxes).drawn(ARROWS, words=True)
 
 
 def _box(concept: str, entry: str) -> Box:

@@ -17,7 +17,6 @@ from gaitswarm.services.optimizer.store.schema.backup import backup, restore
 from gaitswarm.services.optimizer.store.schema.maintenance import check
 from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
 from tests.store.examples import ask, begun, completed, spec
-from tests.store.test_upgrades import JOB, store_older
 
 Content = dict[str, list[tuple[Any, ...]]]
 
@@ -125,17 +124,6 @@ def test_a_database_in_use_is_not_restored_over(
     with pytest.raises(Conflict, match="in use"):
         restore(database_url, file, overwrite=True)
     assert content(database_url) == filled
-
-
-def test_a_backup_of_an_older_version_comes_in_the_newest_schema(
-    fresh_url: str, tmp_path: Path
-) -> None:
-    file, older = tmp_path / "backup.db", f"sqlite:///{tmp_path / 'older.db'}"
-    store_older(older)
-    backup(older, file)
-    restore(fresh_url, file)
-    with closing(open_store(fresh_url)) as store:
-        assert store.job(JOB).spec.iterations == 7
 
 
 @pytest.mark.parametrize(

@@ -9,15 +9,13 @@ import numpy as np
 import pytest
 
 from gaitswarm.services.optimizer.errors import BudgetChanged, Conflict, InvalidRequest, NotFound
-from gaitswarm.services.optimizer.jobs.job import Command, JobState
+from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.search.registry import OPTIMIZERS
-from gaitswarm.services.optimizer.store.schema.migrate import upgrade
-from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from tests.certificate.examples import small
 from tests.store.examples import LEASE, Clock, ask, begun, completed, spec
 from tests.store.test_job_states import in_state
-from tests.store.test_upgrades import JOB, store_older
 
 
 @pytest.mark.parametrize("state", [s for s in JobState if s is not JobState.CANCELLED])
@@ -109,13 +107,3 @@ def test_the_same_key_still_means_the_job_as_it_was_submitted(store: SqlStore) -
     assert not new and again == store.job(job.id)
     with pytest.raises(Conflict):
         store.create_job(spec(iterations=40), idempotency_key="k1")
-
-
-def test_a_job_of_an_older_schema_has_the_budget_of_its_spec(fresh_url: str) -> None:
-    store_older(fresh_url)
-    upgrade(fresh_url)
-    store = open_store(fresh_url)
-    job = store.command(JOB, Command.PAUSE)
-    assert (job.spec.iterations, job.state) == (7, JobState.PAUSED)
-    assert store.extend(JOB, 9).spec.iterations == 9
-    store.close()

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
+from collections.abc import Callable
 from contextlib import closing
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 
 import pytest
 from alembic import command
@@ -15,6 +18,7 @@ from gaitswarm.services.optimizer.errors import Conflict, StoreUnavailable
 from gaitswarm.services.optimizer.jobs.job import LONGEST_LEASE_SECONDS
 from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
 from gaitswarm.services.optimizer.store.rows.tables import metadata
+from gaitswarm.services.optimizer.store.schema import migrate, revisions
 from gaitswarm.services.optimizer.store.schema.in_use import exclusive
 from gaitswarm.services.optimizer.store.schema.migrate import create, upgrade
 from gaitswarm.services.optimizer.store.schema.revisions import MIGRATIONS, head, read_revision
@@ -24,9 +28,6 @@ from tests.examples.processes import output
 from tests.store import worker_process
 from tests.store.examples import spec
 from tests.store.test_opening import edit
-from tests.store.worker_process import OLDER
-
-JOB = "bcdfghjkmnpq"
 
 
 def alembic(connection: Connection) -> Config:
@@ -59,26 +60,39 @@ _POSTGRESQL_SCHEMA = [
 ]
 
 
-def store_older(url: str, *, state: str = "queued", lease_expires_at: str | None = None) -> None:
-    """Make a database of an older revision, with a job in it."""
-    database = connect(parse_url(url), for_migration=True)
-    with database.transaction(write=True) as connection:
-        command.upgrade(alembic(connection), OLDER)
-        connection.execute(
-            text(
-                "INSERT INTO jobs (id, state, spec, created_at, updated_at, lease_owner,"
-                " lease_expires_at, lease_token, iterations, evaluations, compute_seconds) VALUES"
-                " (:id, :state, :spec, '2026-01-01 00:00:00', '2026-01-01 00:00:00', 'elsewhere:7',"
-                " :expires, 0, 0, 0, 0.0)"
-            ),
-            {
-                "id": JOB,
-                "state": state,
-                "spec": spec(iterations=7).resolved().model_dump_json(),
-                "expires": lease_expires_at,
-            },
-        )
-    database.close()
+def store_job(url: str) -> str:
+    """Make a database of the newest revision, with a job in it."""
+    with closing(open_store(url)) as store:
+        job, _ = store.create_job(spec(iterations=7))
+    return job.id
+
+
+@pytest.fixture
+def release_next(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
+    """Let a revision follow the newest one, as in a later version of gaitswarm."""
+
+    def release() -> None:
+        folder = tmp_path / "migrations"
+        shutil.copytree(MIGRATIONS, folder)
+        (folder / "versions" / f"r{NEXT}_next.py").write_text(_NEXT_MIGRATION)
+        for module in (revisions, migrate):
+            monkeypatch.setattr(module, "MIGRATIONS", folder)
+
+    return release
+
+
+FIRST = "0020"
+NEXT = "0021"
+_NEXT_MIGRATION = f"""
+import sqlalchemy as sa
+from alembic import op
+
+revision, down_revision = "{NEXT}", "{FIRST}"
+
+
+def upgrade():
+    op.create_table("next", sa.Column("id", sa.Text))
+"""
 
 
 def revision(url: str) -> str | None:
@@ -104,32 +118,48 @@ def test_a_new_database_is_as_all_migrations_make_one(fresh_url: str) -> None:
             assert read_revision(connection) == revision == head()
 
 
-def test_a_database_whose_migrations_were_all_taken_back_is_made_ready(fresh_url: str) -> None:
+def test_a_database_of_the_first_revision_is_opened_as_it_is(fresh_url: str) -> None:
     with (
         closing(connect(parse_url(fresh_url), for_migration=True)) as database,
         database.transaction(write=True) as connection,
     ):
-        command.upgrade(alembic(connection), "head")
-        command.downgrade(alembic(connection), "base")
-        assert read_revision(connection) is None
-    open_store(fresh_url).close()
+        command.upgrade(alembic(connection), FIRST)
+    with closing(open_store(fresh_url)) as store:
+        job, _ = store.create_job(spec())
+        assert store.jobs().items[0].id == job.id
+    assert revision(fresh_url) == FIRST
 
 
-def test_an_older_database_is_refused_and_left_as_it_is(fresh_url: str) -> None:
-    store_older(fresh_url)
-    with pytest.raises(StoreUnavailable, match=f"{OLDER}.* needs {head()}.*gaitswarm db upgrade"):
+@pytest.mark.parametrize("opened", [open_store, upgrade])
+def test_a_database_of_a_version_before_the_first_release_is_refused(
+    fresh_url: str, opened: Callable[[str], object]
+) -> None:
+    store_job(fresh_url)
+    edit(fresh_url, "UPDATE alembic_version SET version_num = '0019'")
+    with pytest.raises(StoreUnavailable, match=r"0019 .* before 0\.1\.0.*name another database"):
+        opened(fresh_url)
+    assert revision(fresh_url) == "0019"
+
+
+def test_an_older_database_is_refused_and_left_as_it_is(
+    fresh_url: str, release_next: Callable[[], None]
+) -> None:
+    store_job(fresh_url)
+    release_next()
+    with pytest.raises(StoreUnavailable, match=f"{FIRST}.* needs {NEXT}.*gaitswarm db upgrade"):
         open_store(fresh_url)
-    assert revision(fresh_url) == OLDER
+    assert revision(fresh_url) == FIRST
 
 
 def test_an_upgrade_brings_an_older_database_to_the_newest_schema_with_its_jobs(
-    fresh_url: str,
+    fresh_url: str, release_next: Callable[[], None]
 ) -> None:
-    store_older(fresh_url)
-    assert upgrade(fresh_url) == OLDER
-    assert upgrade(fresh_url) == head()
+    job_id = store_job(fresh_url)
+    release_next()
+    assert upgrade(fresh_url) == FIRST
+    assert upgrade(fresh_url) == NEXT
     with closing(open_store(fresh_url)) as store:
-        assert store.job(JOB).spec.iterations == 7
+        assert store.job(job_id).spec.iterations == 7
 
 
 def test_an_upgrade_makes_the_tables_of_an_empty_database(fresh_url: str) -> None:
@@ -145,13 +175,16 @@ def test_no_upgrade_touches_what_a_newer_gaitswarm_has_made(fresh_url: str) -> N
 
 
 @pytest.mark.slow
-def test_a_database_that_an_idle_process_has_open_is_not_upgraded(fresh_url: str) -> None:
-    store_older(fresh_url)
+def test_a_database_that_an_idle_process_has_open_is_not_upgraded(
+    fresh_url: str, release_next: Callable[[], None]
+) -> None:
+    store_job(fresh_url)
     process = ForkedCommand(
         fresh_url, program=worker_process.stay_open, stdin=subprocess.PIPE, stderr=None
     )
     with process:
         assert output(process.stdout).readline() == "ready\n"
+        release_next()
         with pytest.raises(Conflict, match=r"in use by .*end all that use it first") as refused:
             upgrade(fresh_url)
         if fresh_url.startswith("postgresql"):
@@ -159,18 +192,22 @@ def test_a_database_that_an_idle_process_has_open_is_not_upgraded(fresh_url: str
         output(process.stdin).write("end\n")
         output(process.stdin).flush()
         process.wait(timeout=30.0)
-    assert upgrade(fresh_url) == OLDER
+    assert upgrade(fresh_url) == FIRST
 
 
 @pytest.mark.parametrize("year", ["2026", "2126"])
-def test_a_database_with_a_job_under_way_is_not_upgraded(fresh_url: str, year: str) -> None:
+def test_a_database_with_a_job_under_way_is_not_upgraded(
+    fresh_url: str, year: str, release_next: Callable[[], None]
+) -> None:
+    job_id = store_job(fresh_url)
     expires = datetime.now(UTC) + timedelta(seconds=LONGEST_LEASE_SECONDS / 2)
-    store_older(fresh_url, state="running", lease_expires_at=f"{expires:%Y-%m-%d %H:%M:%S}")
-    with pytest.raises(Conflict, match=f"job {JOB} is run by elsewhere:7"):
+    lease = "UPDATE jobs SET state = 'running', lease_owner = 'elsewhere:7', lease_expires_at = "
+    edit(fresh_url, f"{lease}'{expires:%Y-%m-%d %H:%M:%S}'")
+    release_next()
+    with pytest.raises(Conflict, match=f"job {job_id} is run by elsewhere:7"):
         upgrade(fresh_url)
-    given_up = "UPDATE jobs SET lease_expires_at = 'YEAR-01-01 00:00:00'"
-    edit(fresh_url, given_up.replace("YEAR", year))
-    assert upgrade(fresh_url) == OLDER
+    edit(fresh_url, f"{lease}'{year}-01-01 00:00:00'")
+    assert upgrade(fresh_url) == FIRST
 
 
 def test_a_process_that_outlived_an_upgrade_is_refused_when_it_connects_again(
@@ -198,11 +235,14 @@ def test_nobody_comes_in_during_an_upgrade(fresh_url: str, monkeypatch: pytest.M
         assert store.jobs().items == ()
 
 
-def test_an_upgrade_that_fails_on_its_way_changes_nothing(fresh_url: str) -> None:
-    store_older(fresh_url)
-    edit(fresh_url, "CREATE TABLE tokens (theirs TEXT)")
-    with pytest.raises(StoreUnavailable, match=r"tokens.*already exists"):
+def test_an_upgrade_that_fails_on_its_way_changes_nothing(
+    fresh_url: str, release_next: Callable[[], None]
+) -> None:
+    store_job(fresh_url)
+    edit(fresh_url, "CREATE TABLE next (theirs TEXT)")
+    release_next()
+    with pytest.raises(StoreUnavailable, match=r"next.*already exists"):
         upgrade(fresh_url)
-    assert revision(fresh_url) == OLDER
-    edit(fresh_url, "DROP TABLE tokens")
-    assert upgrade(fresh_url) == OLDER
+    assert revision(fresh_url) == FIRST
+    edit(fresh_url, "DROP TABLE next")
+    assert upgrade(fresh_url) == FIRST

@@ -8,15 +8,11 @@ from __future__ import annotations
 import sys
 
 from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
-from gaitswarm.services.optimizer.store.schema import revisions
 from gaitswarm.services.optimizer.store.schema.in_use import admit
 from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
 from tests.store.examples import ask, completed
 
 PARTICLES = 25
-
-OLDER = "0002"
-"""A revision that is not the newest."""
 
 
 def say(word: object) -> None:
@@ -63,8 +59,7 @@ def open_when_told() -> None:
 
 
 def stay_open() -> None:
-    """Have the database of an older revision open, and do nothing, until a line comes."""
-    revisions.head = lambda: OLDER
+    """Have a database open, and do nothing, until a line comes."""
     database = connect(parse_url(sys.argv[1]))
     admit(database)
     with database.transaction(write=False):

@@ -83,7 +83,7 @@ def _lock_out(connection: Connection, name: str) -> None:
 
 
 def _require_no_lease(connection: Connection, name: str) -> None:
-    """Refuse a database with a job under way: what runs it may be older than the locks above."""
+    """Refuse a database with a job under way, whose runner may be cut off from the server."""
     if not inspect(connection).has_table("jobs"):
         return
     columns = (jobs.c.id, jobs.c.lease_owner)

@@ -118,8 +118,7 @@ def _explained(database: Database) -> Iterator[None]:
 def _make(connection: Connection) -> None:
     """The newest tables at once: importing Alembic and migrating takes ten times as long."""
     metadata.create_all(connection, checkfirst=False)
-    # Alembic itself leaves it, empty, where all migrations were taken back.
-    _alembic_version.create(connection, checkfirst=True)
+    _alembic_version.create(connection)
     connection.execute(_alembic_version.insert().values(version_num=head()))
 
 

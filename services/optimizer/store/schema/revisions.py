@@ -54,7 +54,7 @@ def require_newest(revision: str | None, name: str) -> None:
 
 
 def require_known(revision: str, name: str) -> None:
-    """Refuse what a newer gaitswarm has made.
+    """Refuse what a newer gaitswarm has made, or one before the first release.
 
     Args:
         revision: Of a database or of a backup.
@@ -63,11 +63,19 @@ def require_known(revision: str, name: str) -> None:
     Raises:
         StoreUnavailable: This program does not know the revision; names both.
     """
-    if revision not in _known_revisions():
+    known = _known_revisions()
+    if revision in known:
+        return
+    if revision < known[0]:
         raise StoreUnavailable(
-            f"database {name} has schema revision {revision}, which this gaitswarm (up to"
-            f" {head()}) does not know; upgrade gaitswarm, or name another database"
+            f"database {name} has schema revision {revision} of a version before 0.1.0, which this"
+            f" gaitswarm cannot read; name another database, or run `gaitswarm db upgrade` of a"
+            f" version whose schema revision is {known[0]} first"
         )
+    raise StoreUnavailable(
+        f"database {name} has schema revision {revision}, which this gaitswarm (up to {known[-1]})"
+        " does not know; upgrade gaitswarm, or name another database"
+    )
 
 
 def head() -> str:

@@ -19,7 +19,7 @@ from typing import Final
 
 
 class ExitCode(IntEnum):
-    """What the shell sees; a contract, documented in docs/cli.md."""
+    """What the shell sees; a contract, documented in docs/reference/commands.md."""
 
     OK = 0
     JOB_FAILED = 1

@@ -24,6 +24,7 @@ RULES: list[dict[str, Any]] = [
     for rule in group["rules"]
 ]
 OPERATIONS = (ROOT / "docs" / "operations.md").read_text(encoding="utf-8")
+METRICS = (ROOT / "docs" / "reference" / "metrics.md").read_text(encoding="utf-8")
 
 TARGET_LABELS = {"job", "instance", "le"}
 """Prometheus adds the first two to all that it reads; the third is of every histogram."""
@@ -51,9 +52,9 @@ def labels_of(query: str) -> set[str]:
 
 
 def documented() -> dict[str, set[str]]:
-    """Labels of every metric of the table in docs/operations.md, by name."""
+    """Labels of every metric of the table in docs/reference/metrics.md, by name."""
     found: dict[str, set[str]] = {}
-    rows = re.findall(r"^\| (`gaitswarm_[^|]*)\|([^|]*)\|", OPERATIONS, re.MULTILINE)
+    rows = re.findall(r"^\| (`gaitswarm_[^|]*)\|([^|]*)\|", METRICS, re.MULTILINE)
     for names, labels in rows:
         first, *others = re.findall(r"`([a-z_]+)`", names)
         for name in (first, *(f"{first.removesuffix('_slots')}{other}" for other in others)):

@@ -9,7 +9,11 @@ from collections.abc import Iterator
 from tests.documents.reader import BLOCK, SHELL
 from tests.examples.paths import ROOT
 
-DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+DOCUMENTS = [
+    ROOT / "README.md",
+    *sorted((ROOT / "docs").glob("*.md")),
+    *sorted((ROOT / "docs" / "reference").glob("*.md")),
+]
 
 _ENDS = ("|", "||", "&&", ";", "&", ">", ">>", "2>", "<", "#")
 

@@ -19,7 +19,7 @@ from typing import Final
 
 import numpy as np
 
-from gaitswarm.robot_checks import standing_scenario
+from gaitswarm.robots import standing_scenario
 from gaitswarm.sim.assembly import PHYSICS_RATE
 from gaitswarm.sim.kernel.walk import walk_together
 from gaitswarm.sim.outcome import Status

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gaitswarm.requests.walk import SimulationRequest, run_simulation
+from gaitswarm.requests.simulations import SimulationRequest, run_simulation
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.reference import on_the_jobs_terms, published_study
 from gaitswarm.services.optimizer.jobs.spec import Spec

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from gaitswarm.jobs.port import Jobs
     from gaitswarm.views import StateView
-    from gaitswarm.views.budget import Spent
+    from gaitswarm.views.job import Spent
 
 _LINE_SECONDS: Final = 2.0
 """Plain lines come at most this often, and for the last iteration."""
@@ -149,7 +149,7 @@ class _Pace:
 
     @property
     def spent(self) -> Spent:
-        from gaitswarm.views.budget import budget_spent
+        from gaitswarm.views.job import budget_spent
 
         return budget_spent(
             self._iterations,

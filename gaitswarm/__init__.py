@@ -103,17 +103,19 @@ if TYPE_CHECKING:
         RankingView,
         StateView,
     )
+    from gaitswarm.views.analysis import (
+        ImportanceView,
+        RobustPreferencesView,
+        ScenarioFamiliesView,
+        SurfaceView,
+    )
     from gaitswarm.views.calibration import TargetsView
     from gaitswarm.views.certificate import CertificateView
     from gaitswarm.views.comparison import JobComparisonView
-    from gaitswarm.views.families import ScenarioFamiliesView
     from gaitswarm.views.firmware import FirmwareView
     from gaitswarm.views.identification import IdentifiabilityView
-    from gaitswarm.views.importance import ImportanceView
-    from gaitswarm.views.preferences import RobustPreferencesView
     from gaitswarm.views.replay import WalkReplay
     from gaitswarm.views.robustness import RobustnessView
-    from gaitswarm.views.surface import SurfaceView
     from gaitswarm.views.trade_offs import FrontView, PreferenceForView
     from gaitswarm.views.verification import VerificationView
 
@@ -260,15 +262,14 @@ _MODULES: Final = {
     ),
     "gaitswarm.views.calibration": ("TargetsView",),
     "gaitswarm.views.comparison": ("JobComparisonView",),
-    "gaitswarm.views.families": ("ScenarioFamiliesView",),
     "gaitswarm.views.firmware": ("FirmwareView",),
     "gaitswarm.views.certificate": ("CertificateView",),
-    "gaitswarm.views.importance": ("ImportanceView",),
+    "gaitswarm.views.analysis": (
+        "ImportanceView", "RobustPreferencesView", "ScenarioFamiliesView", "SurfaceView",
+    ),
     "gaitswarm.views.identification": ("IdentifiabilityView",),
-    "gaitswarm.views.preferences": ("RobustPreferencesView",),
     "gaitswarm.views.replay": ("WalkReplay",),
     "gaitswarm.views.robustness": ("RobustnessView",),
-    "gaitswarm.views.surface": ("SurfaceView",),
     "gaitswarm.views.trade_offs": ("FrontView", "PreferenceForView"),
     "gaitswarm.views.verification": ("VerificationView",),
     "gaitswarm.services.optimizer.jobs.kinds.calibration": ("CalibrationSpec",),

@@ -2,12 +2,206 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import Final
+from typing import Final, Literal
 from urllib.parse import unquote
 from xml.etree import ElementTree as ET
+
+from gaitswarm.services.optimizer.errors import NotFound
+from gaitswarm.sim.errors import RobotFileError
+from gaitswarm.sim.robot.bounds import LONGEST_URDF, check_urdf
+
+MeshFormat = Literal["stl", "obj", "dae"]
+
+LARGEST_MESH: Final = 32 * 1024 * 1024
+"""Of a file that is given out [B]; a link of a well-known quadruped has 0.1 to 10 MB."""
+
+FORMS: Final[Mapping[str, MeshFormat]] = {".stl": "stl", ".obj": "obj", ".dae": "dae"}
+"""By a file's ending."""
+
+TOO_LARGE: Final = f"it has more than {LARGEST_MESH // 2**20} MiB; simplify it"
+"""Why a mesh is not given out."""
+
+NOT_A_MESH: Final = "it is none of STL, OBJ and DAE"
+
+NOT_FOUND: Final = "its file was not found"
+
+_MOST_ROBOTS: Final = 200
+"""Folders that are looked at."""
+
+
+@dataclass(frozen=True, slots=True)
+class FoundMesh:
+    """A mesh that a URDF names.
+
+    Attributes:
+        name: as the URDF has it.
+        path: of its file, without links; None if it is not given out.
+        form: of its file, by its ending.
+        problem: why it is not given out; None if it is.
+    """
+
+    name: str
+    path: Path | None
+    form: MeshFormat | None
+    problem: str | None
+
+
+def urdf_digest(urdf: str) -> str:
+    """What a robot's meshes are asked for by."""
+    text = urdf.replace("\r\n", "\n").replace("\r", "\n")
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+class MeshLibrary:
+    """Meshes of the robots in some folders. Whoever asks never names a file.
+
+    Only files that a robot's own URDF names are found, with an ending of a mesh, in the robot's
+    folder or in that of the package that it names, wherever links may lead.
+    """
+
+    def __init__(self, folders: Sequence[Path]) -> None:
+        """Remember the folders; they are read when something is asked."""
+        self._folders = tuple(folders)
+
+    def of(self, digest: str) -> tuple[FoundMesh, ...]:
+        """Meshes of a robot."""
+        for folder, text in self._robots():
+            if urdf_digest(text) == digest:
+                return tuple(_found(name, folder) for name in mesh_names(text))
+        return ()
+
+    def content(self, digest: str, number: int) -> bytes:
+        """A mesh."""
+        meshes = self.of(digest)
+        if number >= len(meshes):
+            raise NotFound(f"the robot has no mesh {number}, but {len(meshes)} in all")
+        mesh = meshes[number]
+        if mesh.path is None:
+            raise NotFound(f"mesh {mesh.name[:200]}: {mesh.problem}")
+        try:
+            with mesh.path.open("rb") as file:
+                content = file.read(LARGEST_MESH + 1)
+        except OSError as error:
+            raise NotFound(f"mesh {mesh.name[:200]}: {error.strerror}") from error
+        if len(content) > LARGEST_MESH:
+            raise NotFound(f"mesh {mesh.name[:200]}: {TOO_LARGE}")
+        return content
+
+    def _robots(self) -> Iterator[tuple[Path, str]]:
+        """Folders with the text of their robot.urdf, of those that can be read."""
+        folders = [place for folder in self._folders for place in (folder, *_inside(folder))]
+        for folder in folders[:_MOST_ROBOTS]:
+            try:
+                with (folder / "robot.urdf").open(encoding="utf-8") as file:
+                    text = file.read(LONGEST_URDF + 1)
+                check_urdf(text)
+            except (OSError, ValueError, RobotFileError):
+                continue
+            yield folder, text
+
+
+def _inside(folder: Path) -> list[Path]:
+    try:
+        return sorted(place for place in folder.iterdir() if place.is_dir())
+    except OSError:
+        return []
+
+
+def _found(name: str, folder: Path) -> FoundMesh:
+    form = FORMS.get(Path(name).suffix.lower())
+    if form is None:
+        return FoundMesh(name, None, None, NOT_A_MESH)
+    outside = False
+    for root, path in mesh_places(name, folder):
+        try:
+            real = path.resolve(strict=True)
+            if not real.is_file() or FORMS.get(real.suffix.lower()) != form:
+                continue
+            if not real.is_relative_to(root.resolve(strict=True)):
+                outside = True
+                continue
+            if real.stat().st_size > LARGEST_MESH:
+                return FoundMesh(name, None, form, TOO_LARGE)
+        except (OSError, ValueError, RuntimeError):  # not there, or a loop of links
+            continue
+        return FoundMesh(name, real, form, None)
+    said = "its file is outside of the robot's folder" if outside else NOT_FOUND
+    return FoundMesh(name, None, form, said)
+
+
+LARGEST_COPY: Final = 256 * 1024 * 1024
+"""Of all meshes of a robot together [B]; a well-known quadruped's have 2 to 60 MB."""
+
+
+@dataclass(frozen=True, slots=True)
+class MeshCopies:
+    """What became of the meshes that a URDF names.
+
+    Attributes:
+        copied: names of those that were copied, as the URDF has them.
+        size: of their files together [B].
+        left_out: names of the others, each with the reason.
+    """
+
+    copied: tuple[str, ...] = ()
+    size: int = 0
+    left_out: tuple[tuple[str, str], ...] = ()
+
+
+def copy_meshes(urdf: str, folder: Path, output: Path, packages: Sequence[Path] = ()) -> MeshCopies:
+    """Copy the meshes that a URDF names to where they are found beside its copy.
+
+    No simulation needs them: one that is missing, no mesh or too large is left out.
+    """
+    sources: dict[Path, Path] = {}
+    copied, left_out, size = [], [], 0
+    for name in mesh_names(urdf):
+        found = _source(name, folder, packages)
+        content = found if isinstance(found, str) else _content(found)
+        place = own_place(name)
+        if isinstance(found, str) or isinstance(content, str):
+            left_out.append((name, str(content)))
+        elif place is None:
+            left_out.append((name, "its name is absolute, or leads out of its package"))
+        elif sources.setdefault(place, found) != found:
+            left_out.append((name, f"another one is {place.as_posix()} in the folder"))
+        elif size + len(content) > LARGEST_COPY:
+            left_out.append((name, f"all have more than {LARGEST_COPY // 2**20} MiB"))
+        else:
+            target = output / place
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_bytes(content)
+            copied.append(name)
+            size += len(content)
+    return MeshCopies(tuple(copied), size, tuple(left_out))
+
+
+def _source(name: str, folder: Path, packages: Sequence[Path]) -> Path | str:
+    """The file of a mesh, without links, or why there is none."""
+    form = FORMS.get(Path(name).suffix.lower())
+    if form is None:
+        return NOT_A_MESH
+    found = find_mesh(name, folder, packages)
+    if found is None:
+        return NOT_FOUND
+    real = found.resolve()
+    return real if FORMS.get(real.suffix.lower()) == form else NOT_A_MESH
+
+
+def _content(path: Path) -> bytes | str:
+    """Of a mesh, or why it is not copied."""
+    try:
+        with path.open("rb") as file:
+            content = file.read(LARGEST_MESH + 1)
+    except OSError as error:
+        return f"cannot read {path}: {error.strerror}"
+    return TOO_LARGE if len(content) > LARGEST_MESH else content
+
 
 _VARIABLE: Final = "ROS_PACKAGE_PATH"
 

@@ -8,12 +8,12 @@ import numpy as np
 
 from gaitswarm.jobs.port import Jobs
 from gaitswarm.requests import arguments
-from gaitswarm.requests.preferences import ranked_preferences, tuning_spec
+from gaitswarm.requests.analysis import ranked_preferences, tuning_spec
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.outcome import Status
 from gaitswarm.tables import EvaluationTable
-from gaitswarm.views.preferences import RobustPreferencesView
+from gaitswarm.views.analysis import RobustPreferencesView
 
 
 def robust_preferences(

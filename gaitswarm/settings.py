@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from ipaddress import ip_address, ip_network
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -15,6 +16,22 @@ from gaitswarm.services.optimizer.jobs.job import LONGEST_LEASE_SECONDS, QUARANT
 from gaitswarm.services.worker import EvaluatorKind
 from gaitswarm.sim.compiler.cache import DEFAULT_SIZE
 from gaitswarm.sim.input import message_of
+
+
+def place_of(iteration: int, particle: int) -> str:
+    """The place of a design as texts have it."""
+    return f"{iteration}.{particle}"
+
+
+def read_place(text: str, *, field: str) -> tuple[int, int]:
+    """Read what `place_of` wrote."""
+    found = re.fullmatch(r"(\d{1,9})\.(\d{1,9})", text, re.ASCII)
+    if found is None:
+        raise InvalidRequest(
+            "must be the iteration and the number of a design in it, such as 24.7", field=field
+        )
+    return int(found[1]), int(found[2])
+
 
 LogLevel = Annotated[Literal["DEBUG", "INFO", "WARNING", "ERROR"], BeforeValidator(str.upper)]
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from gaitswarm.errors import InvalidRequest, simulation_errors
 from gaitswarm.requests import design_arguments
 from gaitswarm.requests.robustness import Progress, RobustnessOptions, run_robustness
-from gaitswarm.requests.walk import SimulationRequest
+from gaitswarm.requests.simulations import SimulationRequest
 from gaitswarm.services.optimizer.jobs.preference import judge
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
 from gaitswarm.services.runtime import open_evaluator

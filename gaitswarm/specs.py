@@ -10,7 +10,7 @@ from typing import Any, TypeAlias, TypedDict, cast
 from pydantic import ValidationError
 
 from gaitswarm.errors import InvalidRequest, invalid_request
-from gaitswarm.robot_defaults import robot_defaults
+from gaitswarm.robots import robot_defaults
 from gaitswarm.services.optimizer.jobs.documents import SPECS, AnySpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 from gaitswarm.services.optimizer.jobs.optimizer_choice import with_settings

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Query
 from gaitswarm.api.dependencies import JobActivities, JobId, Service
 from gaitswarm.api.documentation import problems
 from gaitswarm.views import PREFIX
-from gaitswarm.views.activity import ActivityView, Level
+from gaitswarm.views.operations import ActivityView, Level
 
 router = APIRouter(prefix=PREFIX, tags=["jobs"])
 

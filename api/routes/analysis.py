@@ -20,14 +20,16 @@ from gaitswarm.api.dependencies import (
     check_sampled_length,
 )
 from gaitswarm.api.documentation import binary, problems
-from gaitswarm.requests.families import TOLERANCE, run_scenario_families
-from gaitswarm.requests.importance import run_importance
-from gaitswarm.requests.preferences import PreferencesRequest, run_preferences
-from gaitswarm.requests.trade_offs import (
+from gaitswarm.requests.analysis import (
     DESIGNS,
-    MOST_DESIGNS,
+    MOST_FRONT_DESIGNS,
+    TOLERANCE,
+    PreferencesRequest,
     run_front,
+    run_importance,
     run_preference_for,
+    run_preferences,
+    run_scenario_families,
 )
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.job import Job
@@ -39,10 +41,8 @@ from gaitswarm.views import (
     View,
     encoded_particles,
 )
+from gaitswarm.views.analysis import ImportanceView, RobustPreferencesView, ScenarioFamiliesView
 from gaitswarm.views.base import MEDIA_TYPE
-from gaitswarm.views.families import ScenarioFamiliesView
-from gaitswarm.views.importance import ImportanceView
-from gaitswarm.views.preferences import RobustPreferencesView
 from gaitswarm.views.trade_offs import FrontView, PreferenceForView
 
 PreferencesBody = Annotated[PreferencesRequest, Depends(validated(PreferencesRequest, "request"))]
@@ -190,7 +190,7 @@ def get_front(
         int,
         Query(
             ge=1,
-            le=MOST_DESIGNS,
+            le=MOST_FRONT_DESIGNS,
             description="Most designs; of more, those with a mark and others that cover the front"
             " evenly.",
         ),

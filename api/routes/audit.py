@@ -10,7 +10,7 @@ from gaitswarm.api.access import may_administer
 from gaitswarm.api.dependencies import JobIdText, Service
 from gaitswarm.api.documentation import problems
 from gaitswarm.views import PREFIX, PageView
-from gaitswarm.views.audit import AuditEntryView
+from gaitswarm.views.operations import AuditEntryView
 
 router = APIRouter(prefix=PREFIX, tags=["jobs"])
 

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query
 
 from gaitswarm.api.dependencies import Analysing, ExistingJob, JobIdText, Service
 from gaitswarm.api.documentation import problems
-from gaitswarm.requests.targets import run_targets
+from gaitswarm.requests.identification import run_targets
 from gaitswarm.services.optimizer.analysis.fits.targets import LeaveOut
 from gaitswarm.views import PREFIX
 from gaitswarm.views.calibration import TargetsView

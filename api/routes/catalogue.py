@@ -31,7 +31,7 @@ from gaitswarm.views import (
     robot_views,
     scenario_views,
 )
-from gaitswarm.views.surface import SurfaceView
+from gaitswarm.views.analysis import SurfaceView
 
 router = APIRouter(prefix=PREFIX, tags=["catalogue"])
 

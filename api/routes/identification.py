@@ -20,7 +20,7 @@ from gaitswarm.api.dependencies import (
     check_length,
 )
 from gaitswarm.api.documentation import problems
-from gaitswarm.requests.measured_walk import MeasuredWalkRequest, read_measured_walk
+from gaitswarm.requests.identification import MeasuredWalkRequest, read_measured_walk
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.sim.identification.recorded_walk import RecordedWalk
 from gaitswarm.views import PREFIX, PageView

@@ -12,7 +12,7 @@ from gaitswarm.api.documentation import problems
 from gaitswarm.api.reads import job_in_full
 from gaitswarm.services.optimizer.jobs.labels import LabelsChange
 from gaitswarm.views import PREFIX, JobView
-from gaitswarm.views.labels import JobFacetsView
+from gaitswarm.views.job import JobFacetsView
 
 router = APIRouter(prefix=PREFIX, tags=["jobs"])
 

@@ -10,9 +10,9 @@ from fastapi import APIRouter, Header, Path, Response, status
 from gaitswarm.api.dependencies import ServerSettings
 from gaitswarm.api.documentation import binary, problems
 from gaitswarm.api.routes.simulations import BinaryResponse
-from gaitswarm.mesh_library import MeshLibrary
+from gaitswarm.meshes import MeshLibrary
 from gaitswarm.views import PREFIX, CatalogueView
-from gaitswarm.views.meshes import MeshFileView
+from gaitswarm.views.robots import MeshFileView
 
 router = APIRouter(prefix=PREFIX, tags=["catalogue"])
 

@@ -7,7 +7,7 @@ from fastapi import APIRouter
 from gaitswarm.api.dependencies import JobId, Service
 from gaitswarm.api.documentation import problems
 from gaitswarm.views import PREFIX
-from gaitswarm.views.notification import NotificationView
+from gaitswarm.views.operations import NotificationView
 
 router = APIRouter(prefix=f"{PREFIX}/jobs/{{job_id}}", tags=["jobs"])
 

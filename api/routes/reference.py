@@ -9,7 +9,7 @@ from fastapi import APIRouter
 from gaitswarm.api.dependencies import JobId, Service, Slots
 from gaitswarm.api.documentation import problems
 from gaitswarm.views import PREFIX
-from gaitswarm.views.reference import JobReferenceView
+from gaitswarm.views.catalogue import JobReferenceView
 
 router = APIRouter(prefix=PREFIX, tags=["analysis"])
 

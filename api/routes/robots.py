@@ -10,12 +10,10 @@ from fastapi import APIRouter, Depends
 from gaitswarm.api.bodies import validated
 from gaitswarm.api.dependencies import Slots
 from gaitswarm.api.documentation import problems
-from gaitswarm.requests.robot_draft import RobotDraftRequest, run_robot_draft
-from gaitswarm.robot_checks import check_robot
+from gaitswarm.robots import RobotDraftRequest, check_robot, run_robot_draft
 from gaitswarm.sim.robot import RobotFiles
 from gaitswarm.views import PREFIX
-from gaitswarm.views.robot_check import RobotCheckView
-from gaitswarm.views.robot_draft import RobotDraftView
+from gaitswarm.views.robots import RobotCheckView, RobotDraftView
 
 router = APIRouter(prefix=f"{PREFIX}/robots", tags=["robots"])
 

@@ -11,9 +11,13 @@ from gaitswarm.api.bodies import validated
 from gaitswarm.api.dependencies import ServerSettings, Slots, check_length, check_sampled_length
 from gaitswarm.api.documentation import binary, problems
 from gaitswarm.requests.design import resolved
-from gaitswarm.requests.replay import ReplayRequest, run_replay
 from gaitswarm.requests.robustness import RobustnessRequest, run_robustness
-from gaitswarm.requests.walk import SimulationRequest, run_simulation
+from gaitswarm.requests.simulations import (
+    ReplayRequest,
+    SimulationRequest,
+    run_replay,
+    run_simulation,
+)
 from gaitswarm.views import PREFIX, SimulationView
 from gaitswarm.views.base import MEDIA_TYPE
 from gaitswarm.views.robustness import RobustnessView

@@ -12,7 +12,7 @@ from gaitswarm.sim.robot import DEFAULT_ROBOT
 if TYPE_CHECKING:
     from pydantic import ValidationError
 
-    from gaitswarm.robot_defaults import RobotDefaults
+    from gaitswarm.robots import RobotDefaults
     from gaitswarm.sim.robot import RobotFiles, RobotVariant
     from gaitswarm.sim.scenario import Scenario
 
@@ -71,8 +71,8 @@ def robot_defaults(text: str | None) -> RobotDefaults:
 
     text: as the option names it.
     """
-    from gaitswarm.robot_defaults import RobotDefaults
-    from gaitswarm.robot_defaults import robot_defaults as defaults_of
+    from gaitswarm.robots import RobotDefaults
+    from gaitswarm.robots import robot_defaults as defaults_of
 
     if text is None or text.lstrip().startswith("{") or not Path(text).is_dir():
         return RobotDefaults()

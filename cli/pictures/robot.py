@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from gaitswarm.views.robot_check import RobotCheckView
+    from gaitswarm.views.robots import RobotCheckView
 
 _INK: Final = "#1f3a5f"
 _ACCENT: Final = "#d1495b"

@@ -48,7 +48,7 @@ def show_world(spec: CertificateSpec, world: int, log: Path | None, *, as_json: 
     """Let a certificate's design walk in one world, and print its results."""
     from gaitswarm.cli.tables.views import results_table, worth
     from gaitswarm.cli.walk_log import write_walk_logs
-    from gaitswarm.requests.walk import SimulationRequest, run_simulation
+    from gaitswarm.requests.simulations import SimulationRequest, run_simulation
 
     request = SimulationRequest(
         robot=spec.robot,

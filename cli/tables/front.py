@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from gaitswarm.cli.tables.views import SHORT, number
-from gaitswarm.places import place_of
+from gaitswarm.settings import place_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

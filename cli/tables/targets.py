@@ -14,7 +14,7 @@ def show_targets(reached: TargetsView, parameters: IdentifiabilityView) -> None:
     """The result of the commands `calibrate` and `targets`."""
     from gaitswarm.cli.output import note, stdout_console
     from gaitswarm.cli.tables.parameters import parameters_table
-    from gaitswarm.places import place_of
+    from gaitswarm.settings import place_of
 
     console = stdout_console()
     console.print(targets_table(reached))

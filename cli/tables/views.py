@@ -234,7 +234,7 @@ def search_line(best: BestView) -> str | None:
 
 def ranking_table(ranking: RankingView) -> Table:
     """The best designs by another preference, best first, beside their ranks before."""
-    from gaitswarm.places import place_of
+    from gaitswarm.settings import place_of
 
     table = Table(box=None)
     columns = ["rank", "before", "design", "fitness", "before"]

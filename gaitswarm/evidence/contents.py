@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from gaitswarm.errors import Conflict
 from gaitswarm.evidence.archive import archived
 from gaitswarm.evidence.certificates import FOLDER, SUMMARY, certificates_of, summary
-from gaitswarm.evidence.page import CertificateOnPage, page
-from gaitswarm.evidence.pictures import bars, convergence, heat_map
+from gaitswarm.evidence.page import CertificateOnPage, bars, convergence, heat_map, page
 from gaitswarm.requests.surface import SurfaceRequest, run_surface
 from gaitswarm.services.optimizer.analysis.fork import budgets_of
 from gaitswarm.services.optimizer.errors import InvalidRequest

@@ -39,21 +39,23 @@ if TYPE_CHECKING:
         JobView,
         RankingView,
     )
+    from gaitswarm.views.analysis import (
+        ImportanceView,
+        RobustPreferencesView,
+        ScenarioFamiliesView,
+        SurfaceView,
+    )
     from gaitswarm.views.calibration import TargetsView
     from gaitswarm.views.certificate import CertificateView
     from gaitswarm.views.comparison import JobComparisonView
-    from gaitswarm.views.families import ScenarioFamiliesView
     from gaitswarm.views.firmware import FirmwareView
     from gaitswarm.views.identification import (
         IdentifiabilityView,
         RecordingEntryView,
         RecordingView,
     )
-    from gaitswarm.views.importance import ImportanceView
-    from gaitswarm.views.preferences import RobustPreferencesView
     from gaitswarm.views.replay import WalkReplay
     from gaitswarm.views.robustness import RobustnessView
-    from gaitswarm.views.surface import SurfaceView
     from gaitswarm.views.trade_offs import FrontView, PreferenceForView
     from gaitswarm.views.verification import HistoryVerificationView
 

@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from gaitswarm.requests.robustness import RobustnessOptions
     from gaitswarm.simulation_result import SimulationResult
     from gaitswarm.specs import PreferenceInput, RobotInput, ScenarioInput
+    from gaitswarm.views.analysis import SurfaceView
     from gaitswarm.views.firmware import FirmwareView
     from gaitswarm.views.replay import WalkReplay
     from gaitswarm.views.robustness import RobustnessView
-    from gaitswarm.views.surface import SurfaceView
 
 
 class Walks(ABC):

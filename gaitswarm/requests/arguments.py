@@ -13,7 +13,7 @@ from typing import Any, TypeVar, cast, get_args
 from pydantic import BaseModel, ValidationError
 
 from gaitswarm.errors import InvalidRequest, NotFound, invalid_request
-from gaitswarm.requests.preferences import PreferencesRequest
+from gaitswarm.requests.analysis import PreferencesRequest
 from gaitswarm.services.optimizer.analysis.fits.targets import LeaveOut
 from gaitswarm.services.optimizer.analysis.robustness.certificate import MOST_WORST
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest

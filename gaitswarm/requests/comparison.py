@@ -15,6 +15,7 @@ from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.sim.scenario import Scenario
 from gaitswarm.sim.variables import Variable
 from gaitswarm.views.base import finite
+from gaitswarm.views.catalogue import ReferenceView
 from gaitswarm.views.comparison import (
     ComparedJobView,
     ConvergencesView,
@@ -22,7 +23,6 @@ from gaitswarm.views.comparison import (
     JobComparisonView,
     SpecDifferenceView,
 )
-from gaitswarm.views.reference import ReferenceView
 
 MOST_JOBS: Final = 12
 """Jobs that are compared at once."""

@@ -8,7 +8,7 @@ from typing import Self
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from gaitswarm.errors import simulation_errors
-from gaitswarm.robot_defaults import DEFAULT_CONTROLLER
+from gaitswarm.robots import DEFAULT_CONTROLLER
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.sim.catalogue import check_design, design_numbers
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName

@@ -15,10 +15,9 @@ from gaitswarm.requests.firmware import (
     FirmwareRequest,
     firmware_request_of_best,
 )
-from gaitswarm.requests.replay import ReplayRequest
 from gaitswarm.requests.robustness import RobustnessOptions, RobustnessRequest
+from gaitswarm.requests.simulations import ReplayRequest, SimulationRequest
 from gaitswarm.requests.surface import SurfaceRequest
-from gaitswarm.requests.walk import SimulationRequest
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.sim.controllers import ControllerName
 from gaitswarm.sim.kernel.walk import Precision

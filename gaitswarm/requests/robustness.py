@@ -9,7 +9,7 @@ from typing import Final, TypedDict
 import numpy as np
 from pydantic import Field
 
-from gaitswarm.requests.walk import WalksRequest
+from gaitswarm.requests.simulations import WalksRequest
 from gaitswarm.services.optimizer.analysis.robustness.index import (
     LocalSample,
     local_sample,

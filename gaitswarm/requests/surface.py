@@ -12,7 +12,7 @@ from gaitswarm.sim.catalogue import check_design, design_numbers
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName, Inference
 from gaitswarm.sim.controllers.surface import surface
 from gaitswarm.sim.variables import VariableName, VariableValue
-from gaitswarm.views.surface import SurfaceView
+from gaitswarm.views.analysis import SurfaceView
 
 
 class SurfaceRequest(BaseModel):

@@ -12,8 +12,15 @@ from gaitswarm.views.analysis import (
     RankingRequest,
     RankingView,
 )
-from gaitswarm.views.base import PageView, View, finite
-from gaitswarm.views.budget import EstimateView
+from gaitswarm.views.base import (
+    PREFIX,
+    FieldErrorView,
+    PageView,
+    ProblemView,
+    View,
+    field_errors,
+    finite,
+)
 from gaitswarm.views.catalogue import (
     CaseView,
     CatalogueView,
@@ -31,24 +38,28 @@ from gaitswarm.views.catalogue import (
     robot_views,
     scenario_views,
 )
-from gaitswarm.views.commands import ExtensionRequest, PriorityRequest, ResumeRequest
-from gaitswarm.views.evaluation import (
+from gaitswarm.views.history import (
     BestView,
     EvaluationView,
+    HistoryIterationView,
+    IterationView,
     ObjectiveView,
+    ParticlesHeaderView,
     ScenarioResultView,
     encoded_evaluations,
+    encoded_iterations,
+    encoded_particles,
     evaluation_views,
 )
-from gaitswarm.views.iteration import HistoryIterationView, IterationView, encoded_iterations
 from gaitswarm.views.job import (
+    EstimateView,
+    ExtensionRequest,
     JobSummaryView,
     JobView,
+    PriorityRequest,
+    ResumeRequest,
     StateView,
 )
-from gaitswarm.views.links import PREFIX
-from gaitswarm.views.particles import ParticlesHeaderView, encoded_particles
-from gaitswarm.views.problem import FieldErrorView, ProblemView, field_errors
 from gaitswarm.views.simulation import (
     MeasurementsView,
     PlannedGaitView,

@@ -24,7 +24,7 @@ from gaitswarm.services.optimizer.jobs.preference import Preference
 from gaitswarm.sim.mujoco.engines import ENGINES
 from gaitswarm.sim.robot import RobotSource
 from gaitswarm.views.base import View, finite
-from gaitswarm.views.evaluation import StatusName
+from gaitswarm.views.history import StatusName
 
 
 class ProportionView(View):

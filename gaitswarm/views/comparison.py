@@ -6,7 +6,7 @@ from pydantic import Field
 
 from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.views.base import View
-from gaitswarm.views.reference import ReferenceView
+from gaitswarm.views.catalogue import ReferenceView
 
 
 class ConvergenceView(View):

@@ -2,30 +2,98 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field
 
 from gaitswarm.services.optimizer.errors import Unreadable
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
+from gaitswarm.services.optimizer.jobs.estimate import Estimate
 from gaitswarm.services.optimizer.jobs.fork import Lineage
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation
 from gaitswarm.services.optimizer.jobs.job import (
+    LARGEST_BUDGET,
     Job,
     JobState,
     UnreadableSpec,
 )
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.labels import preference_name, robot_name
+from gaitswarm.services.optimizer.jobs.labels import FacetCounts, preference_name, robot_name
+from gaitswarm.services.optimizer.jobs.priority import HIGHEST, LOWEST
 from gaitswarm.services.optimizer.jobs.provenance import ProvenanceRecord
 from gaitswarm.services.optimizer.jobs.time_left import time_left
 from gaitswarm.sim.kernel.walk import Precision
-from gaitswarm.views.base import View, finite
-from gaitswarm.views.budget import Spent, budget_spent
-from gaitswarm.views.evaluation import BestView, ObjectiveView
-from gaitswarm.views.links import job_links
-from gaitswarm.views.reference import ReferenceView
+from gaitswarm.views.base import View, finite, job_links
+from gaitswarm.views.catalogue import ReferenceView
+from gaitswarm.views.history import BestView, ObjectiveView
+
+
+@dataclass(frozen=True, slots=True)
+class Spent:
+    """How much of a budget is spent. Its text is `12 of 25 iterations`.
+
+    Attributes:
+        done: Units that are committed.
+        planned: Units of the whole budget.
+        unit: `iterations` where each of them has as many designs as it may have; else `designs`,
+            as there may be many more and smaller iterations than the budget names.
+    """
+
+    done: int
+    planned: int
+    unit: Literal["iterations", "designs"]
+
+    def __str__(self) -> str:
+        return f"{self.done} of {self.planned} {self.unit}"
+
+
+def budget_spent(
+    iterations: int,
+    evaluations: int,
+    *,
+    particles: int,
+    iterations_planned: int,
+    evaluations_planned: int,
+) -> Spent:
+    """Say how much of a job's budget is spent."""
+    whole = iterations <= iterations_planned and evaluations == iterations * particles
+    if particles == 0 or whole:
+        return Spent(iterations, iterations_planned, "iterations")
+    return Spent(evaluations, evaluations_planned, "designs")
+
+
+class EstimateView(View):
+    """What a job would cost if it were submitted."""
+
+    evaluations: int = Field(description="Designs that are judged [1].", examples=[625])
+    walks: int = Field(description="Each design in each scenario [1].", examples=[3750])
+    simulated_seconds: float = Field(
+        description="Length of all walks together [s]; less for designs that fall.",
+        examples=[20250.0],
+    )
+    seconds: float | None = Field(
+        description="How long it will take, once it runs and has the machine for itself [s]; null"
+        " if that is unknown.",
+        examples=[21.5],
+    )
+    basis: str = Field(
+        description="What that is derived from.",
+        examples=["the rate of 2 earlier jobs with the same kind of walks: 942 simulated s/s"],
+    )
+
+    @classmethod
+    def from_estimate(cls, estimate: Estimate) -> EstimateView:
+        """Make a view of an estimate."""
+        return cls(
+            evaluations=estimate.evaluations,
+            walks=estimate.walks,
+            simulated_seconds=estimate.simulated_seconds,
+            seconds=estimate.seconds,
+            basis=estimate.basis,
+        )
+
 
 JobKind = Literal["tuning", "identification", "calibration", "certificate"]
 
@@ -386,3 +454,63 @@ def _asked(spec: AnySpec | UnreadableSpec) -> dict[str, object]:
         if isinstance(spec, UnreadableSpec)
         else spec.budget,
     }
+
+
+class ExtensionRequest(BaseModel):
+    """Another budget for a job."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    iterations: int = Field(
+        ge=1,
+        le=LARGEST_BUDGET,
+        description="Budget in all, in iterations of `particles` designs each: more than the job"
+        " has spent [1].",
+        examples=[50],
+    )
+
+
+class ResumeRequest(BaseModel):
+    """How a job goes on."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    accept_changes: bool = Field(
+        default=False,
+        description="Whether it goes on although what its numbers depend on has changed, which is"
+        " then recorded in its `provenance`. Otherwise such a job fails and says what has changed.",
+        examples=[True],
+    )
+
+
+class PriorityRequest(BaseModel):
+    """Another priority for a job."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    priority: int = Field(
+        ge=LOWEST, le=HIGHEST, description="The higher, the sooner; 0 is usual [1].", examples=[5]
+    )
+
+
+class JobFacetsView(View):
+    """Counts of jobs; those that have no robot, controller or preference are in the total alone."""
+
+    total: int = Field(description="Jobs in all [1].", examples=[1000])
+    states: dict[str, int] = Field(description="By state [1].", examples=[{"succeeded": 12}])
+    robots: dict[str, int] = Field(description="By name of the robot [1].")
+    controllers: dict[str, int] = Field(description="By motor controller [1].")
+    preferences: dict[str, int] = Field(description="By preference, `own` for any other [1].")
+    tags: dict[str, int] = Field(description="By tag [1].", examples=[{"thesis": 3}])
+
+    @classmethod
+    def from_counts(cls, counts: FacetCounts) -> JobFacetsView:
+        """Make a view of counts."""
+        return cls(
+            total=counts.total,
+            states=counts.states,
+            robots=counts.robots,
+            controllers=counts.controllers,
+            preferences=counts.preferences,
+            tags=counts.tags,
+        )

@@ -19,8 +19,8 @@ from gaitswarm.sim.robot.shapes import Role, Shape, VisibleLink
 from gaitswarm.sim.robot.urdf import SolidKind
 from gaitswarm.sim.scenario import Scenario
 from gaitswarm.views.base import View, finite, framed, unframed
-from gaitswarm.views.evaluation import StatusName
-from gaitswarm.views.meshes import LinkMeshView
+from gaitswarm.views.history import StatusName
+from gaitswarm.views.robots import LinkMeshView
 from gaitswarm.views.simulation import QUANTITIES
 
 VERSION: Final = 1

@@ -20,7 +20,7 @@ from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.robot import RobotSource
 from gaitswarm.sim.variables import Variable
 from gaitswarm.views.base import View, finite
-from gaitswarm.views.evaluation import ObjectiveView
+from gaitswarm.views.history import ObjectiveView
 
 _NAMES = tuple(objective.name for objective in NORMALISED_OBJECTIVES)
 

@@ -17,7 +17,7 @@ from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.outcome import MEASUREMENT_NAMES, OBJECTIVES, Status
 from gaitswarm.sim.robot import RobotSource
 from gaitswarm.views.base import View, finite
-from gaitswarm.views.evaluation import ScenarioResultView, case_results
+from gaitswarm.views.history import ScenarioResultView, case_results
 
 LOG_RATE: Final = 500
 """Rows of a log per second of simulated time [Hz]."""

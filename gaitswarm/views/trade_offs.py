@@ -17,7 +17,7 @@ from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.preference import Preference
 from gaitswarm.views.base import View, finite
-from gaitswarm.views.evaluation import ObjectiveView
+from gaitswarm.views.history import ObjectiveView
 
 OBJECTIVE_NAMES: Final = tuple(objective.name for objective in NORMALISED_OBJECTIVES)
 

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from gaitswarm import mesh_library
-from gaitswarm.mesh_library import urdf_digest
-from gaitswarm.requests.replay import ReplayRequest, run_replay
+from gaitswarm import meshes
+from gaitswarm.meshes import urdf_digest
+from gaitswarm.requests.simulations import ReplayRequest, run_replay
 from tests.examples.commands import run_command
 from tests.examples.meshes import tetrahedron, with_mesh
 from tests.examples.paths import QUADRUPED
@@ -87,7 +87,7 @@ def test_files_that_the_urdf_names_are_given_out_with_a_tag_of_their_content(
 def test_files_outside_of_the_robots_folder_are_never_given_out(
     server: Server, digest: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(mesh_library, "LARGEST_MESH", 63)
+    monkeypatch.setattr(meshes, "LARGEST_MESH", 63)
     found = listed(server, digest)
     assert list(found) == list(NAMES)
     said = {

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from gaitswarm.api.dependencies import check_length
-from gaitswarm.requests.walk import SimulationRequest, run_simulation
+from gaitswarm.requests.simulations import SimulationRequest, run_simulation
 from gaitswarm.services.optimizer.access import Scope as TokenScope
 from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from gaitswarm.sim.outcome import OBJECTIVE_NAMES, Status

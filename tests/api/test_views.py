@@ -23,7 +23,7 @@ from gaitswarm.views import (
     WalkLogView,
     evaluation_views,
 )
-from gaitswarm.views.evaluation import StatusName
+from gaitswarm.views.history import StatusName
 from tests.api.conftest import Commit
 from tests.examples.processes import loaded_by
 
@@ -149,5 +149,5 @@ def test_a_best_that_was_found_in_single_is_shown_in_double_with_the_difference(
 
 @pytest.mark.slow
 def test_views_can_be_had_without_a_web_framework() -> None:
-    statements = "import gaitswarm.views, gaitswarm.requests.walk"
+    statements = "import gaitswarm.views, gaitswarm.requests.simulations"
     assert loaded_by(statements, ["fastapi", "starlette", "uvicorn"]) == set()

@@ -199,7 +199,7 @@ def test_other_code_is_reported_and_equal_bits_verify_all_the_same(
         code = here.simulation.model_copy(update={"code_digest": "0" * 32})
         return here.model_copy(update={"simulation": code})
 
-    monkeypatch.setattr("gaitswarm.evidence.checks.job_provenance", other)
+    monkeypatch.setattr("gaitswarm.evidence.verify.job_provenance", other)
     found = gaitswarm.verify(proved.content, replay=2, seed=1)
     assert found.verified
     assert found.provenance[0] == "from iteration 0 on: other simulation code"

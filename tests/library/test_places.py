@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from gaitswarm.errors import InvalidRequest
-from gaitswarm.places import place_of, read_place
+from gaitswarm.settings import place_of, read_place
 
 
 @pytest.mark.parametrize("place", [(8, 12), (0, 0), (8, 1), (8, 10)])

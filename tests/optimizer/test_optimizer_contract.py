@@ -7,9 +7,9 @@ import platform
 import pytest
 
 from gaitswarm.services.optimizer.search.registry import METHODS
-from gaitswarm.testing.optimizers import SearchContract
-from gaitswarm.testing.searches import (
+from gaitswarm.testing.optimizers import (
     BUDGET,
+    SearchContract,
     bits,
     path,
     paths_of_another_process,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pinocchio as pin
 import pytest
 
-from gaitswarm.robot_checks import check_robot
+from gaitswarm.robots import check_robot
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.proposal.document import Proposal, propose_robot
 from gaitswarm.sim.robot import RobotFiles, parse_robot

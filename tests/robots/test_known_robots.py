@@ -12,8 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from gaitswarm.cli.main import run
-from gaitswarm.robot_checks import standing_drive, standing_scenario
-from gaitswarm.robots import init_robot
+from gaitswarm.robots import init_robot, standing_drive, standing_scenario
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.gait.trajectory import require_reachable
 from gaitswarm.sim.kernel.dynamics.physics_step import PhysicsModel, physics_model

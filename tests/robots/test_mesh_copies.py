@@ -7,11 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from gaitswarm import mesh_copies, mesh_library
+from gaitswarm import meshes
 from gaitswarm.cli.main import run
-from gaitswarm.mesh_copies import copy_meshes
-from gaitswarm.mesh_library import MeshLibrary, urdf_digest
-from gaitswarm.meshes import own_place
+from gaitswarm.meshes import MeshLibrary, copy_meshes, own_place, urdf_digest
 from tests.robots.test_proposal import dog
 
 
@@ -73,12 +71,12 @@ def test_what_is_too_large_or_in_anothers_place_is_left_out(
     folder.mkdir()
     for name, size in sizes.items():
         (folder / name).write_bytes(b"x" * size)
-    monkeypatch.setattr(mesh_copies, "LARGEST_MESH", 10)
-    monkeypatch.setattr(mesh_copies, "LARGEST_COPY", 10)
+    monkeypatch.setattr(meshes, "LARGEST_MESH", 10)
+    monkeypatch.setattr(meshes, "LARGEST_COPY", 10)
     made = copy_meshes(named(*sizes, "a.stl"), folder, output)
     assert made.copied == ("a.stl", "d.stl") and made.size == 10
     why = dict(made.left_out)
-    assert why["b.stl"] == mesh_library.TOO_LARGE
+    assert why["b.stl"] == meshes.TOO_LARGE
     assert "a.stl in the folder" in why["../a.stl"]
     assert why["c.stl"].startswith("all have more than")
     assert sorted(p.name for p in output.iterdir()) == ["a.stl", "d.stl"]

@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gaitswarm.robot_checks import check_robot
+from gaitswarm.robots import check_robot
 from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.gait.trajectory import require_reachable
 from gaitswarm.sim.outcome import Status

@@ -10,7 +10,7 @@ import typer
 from gaitswarm.cli.inputs.options import Db, JobId, Json, Server
 
 if TYPE_CHECKING:
-    from gaitswarm.views.importance import (
+    from gaitswarm.views.analysis import (
         ImportanceView,
         IndexIntervalView,
         VariableImportanceView,

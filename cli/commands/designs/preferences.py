@@ -11,7 +11,7 @@ from gaitswarm.cli.inputs.options import Db, JobId, Json, Precision, Server
 
 if TYPE_CHECKING:
     from gaitswarm.sim.kernel.walk import Precision as PhysicsPrecision
-    from gaitswarm.views.preferences import RobustPreferencesView
+    from gaitswarm.views.analysis import RobustPreferencesView
 
 
 def register(app: typer.Typer) -> None:
@@ -79,7 +79,7 @@ def _suit(
     from gaitswarm.cli.output import print_json, stdout_console
     from gaitswarm.cli.tables.front import fits_table, verdict
     from gaitswarm.jobs.open import open_jobs
-    from gaitswarm.places import read_place
+    from gaitswarm.settings import read_place
 
     iteration, particle = read_place(for_design, field="for")
     with open_jobs(server, db) as jobs:
@@ -96,7 +96,7 @@ def _print(view: RobustPreferencesView) -> None:
     from gaitswarm.cli.output import stdout_console
     from gaitswarm.cli.tables.fitted import Table
     from gaitswarm.cli.tables.views import MISSING, number
-    from gaitswarm.places import place_of
+    from gaitswarm.settings import place_of
 
     table = Table(box=None, padding=(0, 2, 0, 0))
     heads = ("design", "index", "95 %", "wins under", "fitness", "loss %", "bias", "exponent")

@@ -9,7 +9,7 @@ import typer
 from gaitswarm.cli.inputs.options import Db, JobId, Json, Server
 
 if TYPE_CHECKING:
-    from gaitswarm.views.families import LossView, ScenarioFamiliesView
+    from gaitswarm.views.analysis import LossView, ScenarioFamiliesView
 
 
 def register(app: typer.Typer) -> None:

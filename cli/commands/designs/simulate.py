@@ -74,7 +74,7 @@ def simulate(
     from gaitswarm.cli.inputs.spec_file import json_object
     from gaitswarm.cli.output import note
     from gaitswarm.errors import invalid_request
-    from gaitswarm.requests.walk import SimulationRequest, run_simulation
+    from gaitswarm.requests.simulations import SimulationRequest, run_simulation
 
     given = given_design(design, controller, trajectory, robot=robot, server=server, db=db)
     data: dict[str, Any] = {

@@ -38,7 +38,7 @@ def audit(
     from gaitswarm.jobs.open import database_to_write
     from gaitswarm.services.runtime import open_store
     from gaitswarm.settings import read_settings
-    from gaitswarm.views.audit import AuditEntryView
+    from gaitswarm.views.operations import AuditEntryView
 
     settings = read_settings(db=db or None)
     with closing(open_store(database_to_write(settings))) as store:

@@ -131,7 +131,7 @@ def _print(found: VerificationView | HistoryVerificationView) -> None:
     from gaitswarm.cli.output import stdout_console
     from gaitswarm.cli.tables.fitted import Table
     from gaitswarm.cli.tables.views import number
-    from gaitswarm.places import place_of
+    from gaitswarm.settings import place_of
     from gaitswarm.views.verification import VerificationView
 
     console = stdout_console()

@@ -41,7 +41,7 @@ def best(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = Fa
     from gaitswarm.cli.output import print_json, stdout_console
     from gaitswarm.cli.tables.views import print_best, worth
     from gaitswarm.jobs.open import open_jobs
-    from gaitswarm.places import place_of
+    from gaitswarm.settings import place_of
 
     with open_jobs(server, db) as jobs:
         found = jobs.best(job_id)

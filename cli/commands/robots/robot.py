@@ -11,11 +11,11 @@ import typer
 from gaitswarm.cli.inputs.options import Json
 
 if TYPE_CHECKING:
-    from gaitswarm.mesh_copies import MeshCopies
+    from gaitswarm.meshes import MeshCopies
     from gaitswarm.sim.proposal.drive import ActuatorChoice
     from gaitswarm.sim.proposal.frame import Axis
     from gaitswarm.sim.robot import RobotFiles
-    from gaitswarm.views.robot_check import RobotCheckView
+    from gaitswarm.views.robots import RobotCheckView
 
 _Choice = TypeVar("_Choice", bound=str)
 
@@ -138,7 +138,7 @@ def check(
 ) -> None:
     """Load a robot, let it stand for a second, and say what there is to it."""
     from gaitswarm.cli.output import note, print_json, print_text
-    from gaitswarm.robot_checks import check_robot
+    from gaitswarm.robots import check_robot
 
     view = check_robot(_files(folder), folder=folder, packages=package_path or [])
     if draw is not None:

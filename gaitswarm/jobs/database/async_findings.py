@@ -22,13 +22,11 @@ from gaitswarm.views import (
     IterationView,
     RankingView,
 )
+from gaitswarm.views.analysis import ImportanceView, RobustPreferencesView, ScenarioFamiliesView
 from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.certificate import CertificateView
 from gaitswarm.views.comparison import JobComparisonView
-from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.identification import IdentifiabilityView
-from gaitswarm.views.importance import ImportanceView
-from gaitswarm.views.preferences import RobustPreferencesView
 from gaitswarm.views.trade_offs import FrontView, PreferenceForView
 from gaitswarm.views.verification import HistoryVerificationView
 

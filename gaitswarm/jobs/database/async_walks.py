@@ -16,9 +16,9 @@ from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.robot import DEFAULT_ROBOT
 from gaitswarm.simulation_result import SimulationResult
 from gaitswarm.specs import PreferenceInput, RobotInput, ScenarioInput
+from gaitswarm.views.analysis import SurfaceView
 from gaitswarm.views.replay import WalkReplay
 from gaitswarm.views.robustness import RobustnessView
-from gaitswarm.views.surface import SurfaceView
 
 
 class AsyncLocalWalks(ABC):

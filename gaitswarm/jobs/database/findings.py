@@ -8,13 +8,17 @@ from gaitswarm.errors import NotFound
 from gaitswarm.jobs.database.news import PAGE
 from gaitswarm.jobs.findings import Findings
 from gaitswarm.requests import arguments
-from gaitswarm.requests.certificate import run_certificate
+from gaitswarm.requests.analysis import (
+    DESIGNS,
+    run_certificate,
+    run_front,
+    run_importance,
+    run_preference_for,
+    run_preferences,
+    run_scenario_families,
+)
 from gaitswarm.requests.comparison import run_comparison
-from gaitswarm.requests.families import run_scenario_families
-from gaitswarm.requests.importance import run_importance
-from gaitswarm.requests.preferences import run_preferences
-from gaitswarm.requests.targets import run_targets
-from gaitswarm.requests.trade_offs import DESIGNS, run_front, run_preference_for
+from gaitswarm.requests.identification import run_targets
 from gaitswarm.services.optimizer.analysis.fits.targets import LeaveOut
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.sim.kernel.walk import Precision
@@ -26,13 +30,11 @@ from gaitswarm.views import (
     IterationView,
     RankingView,
 )
+from gaitswarm.views.analysis import ImportanceView, RobustPreferencesView, ScenarioFamiliesView
 from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.certificate import CertificateView
 from gaitswarm.views.comparison import JobComparisonView
-from gaitswarm.views.families import ScenarioFamiliesView
 from gaitswarm.views.identification import IdentifiabilityView
-from gaitswarm.views.importance import ImportanceView
-from gaitswarm.views.preferences import RobustPreferencesView
 from gaitswarm.views.trade_offs import FrontView, PreferenceForView
 from gaitswarm.views.verification import HistoryVerificationView
 

@@ -8,8 +8,8 @@ from typing import Unpack
 from gaitswarm.errors import simulation_errors
 from gaitswarm.jobs.walks import Walks
 from gaitswarm.requests import arguments, design_arguments
-from gaitswarm.requests.replay import run_replay
 from gaitswarm.requests.robustness import RobustnessOptions, run_robustness
+from gaitswarm.requests.simulations import run_replay
 from gaitswarm.requests.surface import run_surface
 from gaitswarm.sim.controllers import ControllerName
 from gaitswarm.sim.kernel.walk import Precision
@@ -17,9 +17,9 @@ from gaitswarm.sim.robot import DEFAULT_ROBOT
 from gaitswarm.simulation import simulate_request
 from gaitswarm.simulation_result import SimulationResult
 from gaitswarm.specs import PreferenceInput, RobotInput, ScenarioInput
+from gaitswarm.views.analysis import SurfaceView
 from gaitswarm.views.replay import WalkReplay, decoded_replay
 from gaitswarm.views.robustness import RobustnessView
-from gaitswarm.views.surface import SurfaceView
 
 
 class LocalWalks(Walks):

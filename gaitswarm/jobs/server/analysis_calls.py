@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from gaitswarm.jobs.server.call import Call, got, job_path, posted
-from gaitswarm.requests.preferences import PreferencesRequest
+from gaitswarm.requests.analysis import PreferencesRequest
 from gaitswarm.views import (
     RankingRequest,
     RankingView,
 )
+from gaitswarm.views.analysis import ImportanceView, RobustPreferencesView, ScenarioFamiliesView
 from gaitswarm.views.comparison import JobComparisonView
-from gaitswarm.views.families import ScenarioFamiliesView
-from gaitswarm.views.importance import ImportanceView
-from gaitswarm.views.preferences import RobustPreferencesView
 from gaitswarm.views.trade_offs import FrontView, PreferenceForView
 
 

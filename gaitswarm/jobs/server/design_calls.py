@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from gaitswarm.jobs.server.call import Call, posted, segment
 from gaitswarm.requests.firmware import FirmwareRequest
-from gaitswarm.requests.replay import ReplayRequest
 from gaitswarm.requests.robustness import RobustnessRequest
+from gaitswarm.requests.simulations import ReplayRequest, SimulationRequest
 from gaitswarm.requests.surface import SurfaceRequest
-from gaitswarm.requests.walk import SimulationRequest
 from gaitswarm.sim.controllers import ControllerName
 from gaitswarm.simulation_result import SimulationResult
 from gaitswarm.views import SimulationView
+from gaitswarm.views.analysis import SurfaceView
 from gaitswarm.views.firmware import FirmwareView
 from gaitswarm.views.replay import WalkReplay, decoded_replay
 from gaitswarm.views.robustness import RobustnessView
-from gaitswarm.views.surface import SurfaceView
 from gaitswarm.zip_archive import unzipped
 
 

@@ -1,9 +1,10 @@
-"""Designs and what they are worth."""
+"""Committed iterations and their evaluations"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from datetime import datetime
 from typing import Final, Literal
 
 import numpy as np
@@ -11,12 +12,18 @@ from numpy.typing import NDArray
 from pydantic import Field, TypeAdapter
 from pydantic_core import to_json
 
-from gaitswarm.services.optimizer.jobs.iteration import Evaluation
+from gaitswarm.services.optimizer.analysis.distribution import thinned
+from gaitswarm.services.optimizer.analysis.robustness.index import NORMALISED_OBJECTIVES
+from gaitswarm.services.optimizer.analysis.utilities import objective_vectors, utilities
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Iteration
+from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.judgement import exponential
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.outcome import OBJECTIVES, Objective, Status
-from gaitswarm.views.base import View, finite
+from gaitswarm.views.base import View, finite, framed
 
 StatusName = Literal["ok", "diverged", "fell", "unreachable", "stalled"]
 _EXAMPLE: Final = {
@@ -232,3 +239,194 @@ def _finite_all(row: Sequence[float]) -> list[float | None]:
 def utility(log_utility: float) -> float | None:
     """Make a utility of its logarithm."""
     return finite(exponential(log_utility))
+
+
+class IterationView(View):
+    """One committed iteration of a job: the fitness of its designs at a glance."""
+
+    index: int = Field(description="Index of the iteration, from 0.", examples=[24])
+    designs: int = Field(
+        description="Designs judged in it [1]: those that the method asked for at once.",
+        examples=[25],
+    )
+    best: float | None = Field(
+        description="Least fitness of this iteration [1]; null if every design failed.",
+        examples=[21.3],
+    )
+    mean: float | None = Field(description="Mean of its finite fitnesses [1].", examples=[25.2])
+    median: float | None = Field(description="Median of them [1].", examples=[23.9])
+    worst: float | None = Field(description="Greatest of them [1].", examples=[41.7])
+    best_so_far: float | None = Field(
+        description="Least fitness of this and all earlier iterations [1].", examples=[20.9]
+    )
+    failed: int = Field(
+        description="Designs that failed in at least one scenario [1].", examples=[2]
+    )
+    evaluate_seconds: float = Field(
+        description="Time that its evaluation took [s].", examples=[1.23]
+    )
+    committed_at: datetime = Field(description="When it was committed, UTC.")
+    digest: str | None = Field(
+        default=None,
+        description="SHA-256 of it, the spec and all iterations before it.",
+        examples=["9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08"],
+    )
+
+    @classmethod
+    def from_iteration(cls, iteration: Iteration) -> IterationView:
+        """Make a view of an iteration.
+
+        Args:
+            iteration: as the store lists it.
+        """
+        return cls.model_validate(_at_a_glance(iteration))
+
+
+class HistoryIterationView(IterationView):
+    """One committed iteration with every design."""
+
+    evaluations: list[EvaluationView] = Field(description="Every design, in order.")
+
+    @classmethod
+    def from_iteration_and_evaluations(
+        cls, iteration: Iteration, evaluations: tuple[Evaluation, ...], spec: Spec
+    ) -> HistoryIterationView:
+        """Make a view of an iteration with its designs.
+
+        Args:
+            iteration: as the store lists it.
+            evaluations: of its designs.
+            spec: of the job.
+        """
+        particles = evaluation_views(evaluations, spec)
+        return cls.model_validate({**_at_a_glance(iteration), "evaluations": particles})
+
+
+def encoded_iterations(iterations: Sequence[Iteration]) -> Iterator[bytes]:
+    """Encode views of iterations, of which none is made."""
+    return (to_json(_at_a_glance(iteration)) for iteration in iterations)
+
+
+def _at_a_glance(iteration: Iteration) -> dict[str, object]:
+    """Fields of `IterationView`, in its order."""
+    return {
+        "index": iteration.index,
+        "designs": iteration.designs,
+        "best": finite(iteration.best),
+        "mean": finite(iteration.mean),
+        "median": finite(iteration.median),
+        "worst": finite(iteration.worst),
+        "best_so_far": finite(iteration.best_so_far),
+        "failed": iteration.failed,
+        "evaluate_seconds": iteration.evaluate_seconds,
+        "committed_at": iteration.committed_at,
+        "digest": iteration.digest,
+    }
+
+
+class ParticleColumnView(View):
+    """What one column of numbers is."""
+
+    name: str = Field(
+        description="`iteration`, `particle`, `fitness`, a searched variable's name,"
+        " `utility:<scenario>`, or `objective:<name>`.",
+        examples=["FI1R"],
+    )
+    unit: str = Field(description="Unit of its numbers.", examples=["counts"])
+    low: float | None = Field(description="Lower bound of a variable; else null.")
+    high: float | None = Field(description="Upper bound of a variable; else null.")
+    kind: Literal[
+        "index", "fitness", "continuous", "integer", "categorical", "utility", "objective"
+    ] = Field(
+        description="What its numbers are; `continuous`, `integer` and `categorical` are variables,"
+        " `objective` is an objective's geometric mean over the scenarios."
+    )
+    choices: list[str] = Field(
+        description="Names of a categorical variable's choices, whose indices its numbers are;"
+        " else none.",
+        examples=[["linear_zone", "karnopp", "stick"]],
+    )
+
+
+class ParticlesHeaderView(View):
+    """What the numbers after it are."""
+
+    job_id: str = Field(description="Identifier of the job.", examples=["k2q7zr5dm9xw"])
+    rows: int = Field(description="Evaluations that follow: numbers of each column [1].")
+    total: int = Field(description="Evaluations there are, of which the rows are chosen [1].")
+    iterations: tuple[int, int] | None = Field(
+        description="First and last iteration among the rows; null without any.",
+        examples=[(0, 24)],
+    )
+    columns: list[ParticleColumnView] = Field(description="The columns, in order.")
+
+
+def encoded_particles(
+    job: Job,
+    columns: EvaluationColumns,
+    *,
+    after: int | None,
+    most: int,
+    objectives: bool = False,
+) -> bytes:
+    """Encode evaluations for pictures of the whole search."""
+    wanted = columns.after(after)
+    chosen = wanted.rows(thinned(wanted, most))
+    rows = len(chosen)
+    header = ParticlesHeaderView(
+        job_id=job.id,
+        rows=rows,
+        total=len(wanted),
+        iterations=(int(chosen.iteration[0]), int(chosen.iteration[-1])) if rows else None,
+        columns=[*_described(job), *(_objectives_described(job) if objectives else ())],
+    )
+    numbers = _numbers(job, chosen)
+    if objectives and isinstance(job.spec, JobSpec):
+        vectors = objective_vectors(chosen, worlds=job.spec.worlds).T
+        numbers = np.concatenate([numbers, np.where(np.isfinite(vectors), vectors, np.nan)])
+    return framed(header, numbers)
+
+
+def _described(job: Job) -> list[ParticleColumnView]:
+    unit = "A" if job.spec.kind == "identification" else "1"
+    plain = [("iteration", "1", "index"), ("particle", "1", "index"), ("fitness", unit, "fitness")]
+    worth = [(f"utility:{name}", unit, "utility") for name in job.spec.case_names]
+    variables = [
+        {name: getattr(v, name) for name in ParticleColumnView.model_fields}
+        for v in job.spec.design_space().variables
+    ]
+    nothing: dict[str, object] = {"low": None, "high": None, "choices": []}
+    unbounded = [
+        [{"name": n, "unit": u, "kind": kind, **nothing} for n, u, kind in group]
+        for group in (plain, worth)
+    ]
+    described = [*unbounded[0], *variables, *unbounded[1]]
+    return [ParticleColumnView.model_validate(column) for column in described]
+
+
+def _objectives_described(job: Job) -> list[ParticleColumnView]:
+    return [
+        ParticleColumnView(
+            name=f"objective:{objective.name}",
+            unit=objective.unit,
+            low=None,
+            high=None,
+            kind="objective",
+            choices=[],
+        )
+        for objective in (NORMALISED_OBJECTIVES if isinstance(job.spec, JobSpec) else ())
+    ]
+
+
+def _numbers(job: Job, chosen: EvaluationColumns) -> NDArray[np.float64]:
+    """(columns, rows)."""
+    searched = len(job.spec.design_space().variables)
+    numbers = np.concatenate(
+        [
+            [chosen.iteration, chosen.particle, chosen.fitness],
+            chosen.designs[:, :searched].T,
+            utilities(chosen, job.spec).T,
+        ]
+    )
+    numbers[~np.isfinite(numbers)] = np.nan
+    return numbers

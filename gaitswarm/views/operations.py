@@ -1,9 +1,10 @@
-"""What happens to a job while it runs."""
+"""What an operator of a server sees: activity, audit log, notifications"""
 
 from __future__ import annotations
 
 from datetime import UTC, datetime
-from typing import Literal
+from typing import Any, Literal
+from urllib.parse import urlsplit
 
 from pydantic import Field
 
@@ -14,6 +15,8 @@ from gaitswarm.services.monitoring.activity import (
     TaskSpan,
     WorkerHealth,
 )
+from gaitswarm.services.optimizer.jobs.audit import AuditAction, AuditEntry
+from gaitswarm.services.optimizer.jobs.notification import Notification
 from gaitswarm.views.base import View
 
 Level = Literal["DEBUG", "INFO", "WARNING", "ERROR", "CRITICAL"]
@@ -172,3 +175,81 @@ def _why_nothing(*, runs_jobs: bool) -> str:
 
 def _time(seconds: float) -> datetime:
     return datetime.fromtimestamp(seconds, UTC)
+
+
+class AuditEntryView(View):
+    """One change: who did what to which job, when."""
+
+    index: int = Field(description="The later, the greater.", examples=[42])
+    at: datetime = Field(description="When, UTC.")
+    actor: str = Field(
+        description="Name of the token that asked for it; `local` for whoever asked without one, on"
+        " the machine itself.",
+        examples=["ci"],
+    )
+    action: AuditAction = Field(description="What they did.", examples=["cancel"])
+    job_id: str | None = Field(
+        description="To which job; null for what is about none. The job may be gone since.",
+        examples=["k2q7zr5dm9xw"],
+    )
+    details: dict[str, Any] = Field(
+        description="What else tells the change from others like it: `iterations` of an extension,"
+        " `parent` of a fork, `name` and `scope` of a token.",
+        examples=[{"iterations": 50}],
+    )
+
+    @classmethod
+    def from_entry(cls, entry: AuditEntry) -> AuditEntryView:
+        """Make the view of an entry."""
+        return cls(
+            index=entry.index,
+            at=entry.at,
+            actor=entry.actor,
+            action=entry.action,
+            job_id=entry.job_id,
+            details=entry.details,
+        )
+
+
+class NotificationView(View):
+    """A notification of a job's end."""
+
+    id: str = Field(
+        description="The same at every attempt; the header `webhook-id`.",
+        examples=["msg_6a09e667f3bcc908b2fb1366"],
+    )
+    host: str = Field(
+        description="Where it is sent; paths may be secrets.", examples=["ci.example"]
+    )
+    event: str = Field(
+        description="What it tells: `job.succeeded`, `job.failed` or `job.cancelled`.",
+        examples=["job.succeeded"],
+    )
+    state: Literal["waiting", "delivered", "given up"] = Field(
+        description="Whether it was taken; one that was not is sent again, for some hours."
+    )
+    attempts: int = Field(description="How often it was sent [1].", examples=[1])
+    created_at: datetime = Field(description="When the job ended, UTC.")
+    next_attempt_at: datetime | None = Field(
+        description="When it is sent next, UTC; null once it was delivered or given up."
+    )
+    delivered_at: datetime | None = Field(description="When it was taken, UTC.")
+    error: str | None = Field(
+        description="Why the last attempt failed.", examples=["the receiver answered 500"]
+    )
+
+    @classmethod
+    def from_notification(cls, found: Notification) -> NotificationView:
+        """Make the view of a notification."""
+        waits = found.next_attempt_at is not None
+        return cls(
+            id=found.id,
+            host=urlsplit(found.url).hostname or "",
+            event=found.document["type"],
+            state="delivered" if found.delivered_at else "waiting" if waits else "given up",
+            attempts=found.attempts,
+            created_at=found.created_at,
+            next_attempt_at=found.next_attempt_at,
+            delivered_at=found.delivered_at,
+            error=found.error,
+        )

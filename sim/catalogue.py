@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.gait_variables import GAIT_VARIABLES
-from gaitswarm.sim.input import instead_of
+from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.variables import VariableCatalogue
 
 

@@ -3,36 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from difflib import get_close_matches
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from types import UnionType
 from typing import Annotated, Any, Final, Union, get_args, get_origin
 
 from pydantic import BaseModel, Discriminator, Tag
 
-_LONGEST_NAME: Final = 100
+from gaitswarm.sim.near_names import instead_of, nearest
+
 """That is compared with the known ones; comparing takes time by its length."""
 
-_ALIKE: Final = 0.7
 """Share of their characters that a name and the one that may be meant have in common, at least."""
-
-
-def nearest(name: str, known: Iterable[str]) -> str | None:
-    """The name that may have been meant."""
-    if len(name) > _LONGEST_NAME or name.isdigit():
-        return None
-    plain = {one.lower(): one for one in known}
-    near = get_close_matches(name.lower(), plain, n=1, cutoff=_ALIKE)
-    return plain[near[0]] if near else None
-
-
-def instead_of(name: str, known: Iterable[str], listed: Iterable[str] | None = None) -> str:
-    """What to write in place of a name that is none."""
-    names = list(known)
-    near = nearest(name, names)
-    if near is not None:
-        return f"did you mean {near!r}?"
-    return f"known are {', '.join(names if listed is None else listed) or 'none'}"
 
 
 Location = Sequence[str | int]

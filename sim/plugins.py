@@ -17,7 +17,7 @@ from pydantic import BaseModel, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from gaitswarm.sim.input import instead_of, nearest
+from gaitswarm.sim.near_names import instead_of, nearest
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

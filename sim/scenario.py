@@ -20,7 +20,8 @@ from pydantic import (
 )
 
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.input import NAME, OWN, alternatives, instead_of, message_of
+from gaitswarm.sim.input import NAME, OWN, alternatives, message_of
+from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.variables import VariableName, split_name
 
 USUAL_SUPPORT: Final[Mapping[str, float]] = MappingProxyType(

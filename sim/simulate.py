@@ -27,7 +27,6 @@ from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.gait.gaits import LegGait, leg_gaits
 from gaitswarm.sim.gait.trajectory import desired_angles, require_reachable
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
-from gaitswarm.sim.input import instead_of
 from gaitswarm.sim.kernel.observation import WalkLog, walk_log
 from gaitswarm.sim.kernel.walk import (
     NO_JOINT_PD,
@@ -38,6 +37,7 @@ from gaitswarm.sim.kernel.walk import (
     WantedWalk,
     walk_together,
 )
+from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.noise import LinkNoise
 from gaitswarm.sim.outcome import N_MEASUREMENTS, N_OBJECTIVES, Measurements, Outcome, Status
 from gaitswarm.sim.robot import DEFAULT_ROBOT, Robot, RobotChoice, load_robot

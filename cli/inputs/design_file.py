@@ -13,7 +13,7 @@ from gaitswarm.cli.inputs.spec_file import json_object, read_json_object
 from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
 from gaitswarm.sim.controllers import CONTROLLERS, Controller, ControllerName
 from gaitswarm.sim.gait_variables import GAIT_VARIABLES
-from gaitswarm.sim.input import instead_of
+from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.variables import Variable, VariableCatalogue
 
 if TYPE_CHECKING:

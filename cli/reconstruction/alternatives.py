@@ -15,7 +15,7 @@ from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from gaitswarm.sim.calibration.targets import TargetWalk
 from gaitswarm.sim.calibration.walk import RESULTS, ROBOT, CalibrationWalk
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
-from gaitswarm.sim.input import instead_of
+from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.outcome import Outcome
 from gaitswarm.sim.robot import load_robot
 from gaitswarm.sim.scenario import SCENARIOS, Scenario, find_scenario

@@ -20,8 +20,8 @@ from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
 from gaitswarm.sim.case import Walk
 from gaitswarm.sim.catalogue import design_catalogue
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
-from gaitswarm.sim.input import instead_of
 from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.outcome import Outcome, Status
 from gaitswarm.sim.provenance import provenance_of
 from gaitswarm.sim.variables import Variable, VariableChoice

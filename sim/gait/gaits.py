@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.input import instead_of
+from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.legs import LegKinematics
 from gaitswarm.sim.robot.robot import rows_of, values_by_leg

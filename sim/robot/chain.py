@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaitswarm.sim.errors import RobotFileError
-from gaitswarm.sim.input import nearest
+from gaitswarm.sim.near_names import nearest
 from gaitswarm.sim.robot.description import Leg
 from gaitswarm.sim.robot.elements import MOST_TURNED
 from gaitswarm.sim.robot.inertia import BodyInertia, product

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.input import instead_of
 from gaitswarm.sim.kernel.sensors import LARGEST_DELAY
+from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.variables import Variable
 
 Floats = NDArray[np.float64]

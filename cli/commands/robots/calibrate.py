@@ -17,7 +17,7 @@ from gaitswarm.cli.inputs.options import (
     WorkerOptions,
     with_groups,
 )
-from gaitswarm.sim.input import instead_of
+from gaitswarm.sim.near_names import instead_of
 
 if TYPE_CHECKING:
     from gaitswarm.jobs.port import Jobs

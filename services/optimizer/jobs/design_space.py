@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.search.space import Axis, Space
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.input import instead_of
+from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.variables import Variable, VariableCatalogue
 
 

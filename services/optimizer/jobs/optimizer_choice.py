@@ -18,7 +18,7 @@ from gaitswarm.services.optimizer.search.automatic import (
 from gaitswarm.services.optimizer.search.method import settings_of
 from gaitswarm.services.optimizer.search.optimizer import SearchSettings
 from gaitswarm.services.optimizer.search.registry import DEFAULT_METHOD, METHODS
-from gaitswarm.sim.input import instead_of, nearest
+from gaitswarm.sim.near_names import instead_of, nearest
 from gaitswarm.sim.plugins import PluginSettings
 
 _BUILT_IN: Final[dict[str, type[SearchSettings]]] = {

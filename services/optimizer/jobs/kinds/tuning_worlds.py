@@ -13,7 +13,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from gaitswarm.services.optimizer.jobs.judgement import Judgement
 from gaitswarm.services.optimizer.jobs.preference import Preference, geometric_mean, log_utilities
-from gaitswarm.sim.input import instead_of, message_of
+from gaitswarm.sim.input import message_of
+from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.variables import Variable, VariableChoice
 from gaitswarm.sim.worlds import PERTURBATIONS, sample_worlds
 

@@ -1,4 +1,4 @@
-"""A walk as bytes, read as docs/api.md says."""
+"""A walk as bytes, read as docs/reference/http.md says."""
 
 from __future__ import annotations
 

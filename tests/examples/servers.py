@@ -167,7 +167,7 @@ def operations(app: FastAPI) -> list[APIRoute]:
 
 
 def unframed(content: bytes) -> tuple[dict[str, Any], NDArray[np.float32]]:
-    """Header and numbers of a binary answer, as docs/api.md says."""
+    """Header and numbers of a binary answer, as docs/reference/http.md says."""
     (length,) = struct.unpack_from("<I", content)
     assert length % 4 == 0
     header = json.loads(content[4 : 4 + length])

@@ -7,8 +7,8 @@ an iteration   ["gaitswarm iteration", 1, digest before, index, positions, desig
                statuses, fitness, digest of the ask, provenance in force, reevaluation]
 
 "Before" the first iteration is the job. All of it is encoded as CBOR (RFC 8949) with the choices
-that docs/evidence.md names, so that equal contents are equal bytes wherever they were stored. A
-digest of another version than 1 is to begin with that version and a colon.
+that docs/reference/evidence-file.md names, so that equal contents are equal bytes wherever they
+were stored. A digest of another version than 1 is to begin with that version and a colon.
 """
 
 from __future__ import annotations

@@ -81,7 +81,7 @@ class Introduction:
         if self.arithmetic != here.arithmetic:
             return (
                 f"its NumPy computes other bits on {self.level} than this runner's on {here.level};"
-                " set NPY_DISABLE_CPU_FEATURES to the same on all nodes (docs/operations.md)"
+                " set NPY_DISABLE_CPU_FEATURES to the same on all nodes (docs/cluster.md)"
             )
         return None
 

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from benchmarks.large_store import fill
 from gaitswarm.services.optimizer.analysis.distribution import distribution
-from gaitswarm.services.optimizer.analysis.history_cache import HistoryCache
+from gaitswarm.services.optimizer.analysis.history import HistoryCache
 from gaitswarm.services.optimizer.analysis.ranking import rank
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.job import Job, JobOrder

@@ -26,7 +26,7 @@ from gaitswarm.services.optimizer.jobs.job import Claim
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.provenance import job_provenance
 from gaitswarm.services.optimizer.jobs.spec import judge_outcomes
-from gaitswarm.services.optimizer.jobs.walk_keys import walk_keys
+from gaitswarm.services.optimizer.run.coordinator import walk_keys
 from gaitswarm.services.optimizer.store.port.base import Store
 from gaitswarm.services.optimizer.store.sql_store import open_store
 

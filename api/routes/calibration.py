@@ -9,7 +9,7 @@ from fastapi import APIRouter, Query
 from gaitswarm.api.dependencies import Analysing, ExistingJob, JobIdText, Service
 from gaitswarm.api.documentation import problems
 from gaitswarm.requests.identification import run_targets
-from gaitswarm.services.optimizer.analysis.fits.targets import LeaveOut
+from gaitswarm.services.optimizer.analysis.targets import LeaveOut
 from gaitswarm.views import PREFIX
 from gaitswarm.views.calibration import TargetsView
 

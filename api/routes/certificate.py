@@ -9,7 +9,7 @@ from fastapi import APIRouter, Query
 from gaitswarm.api.dependencies import Analysing, ExistingJob, Service
 from gaitswarm.api.documentation import problems
 from gaitswarm.requests.analysis import run_certificate
-from gaitswarm.services.optimizer.analysis.robustness.certificate import MOST_WORST
+from gaitswarm.services.optimizer.analysis.certificate import MOST_WORST
 from gaitswarm.views import PREFIX
 from gaitswarm.views.certificate import CertificateView
 

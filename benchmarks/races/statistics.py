@@ -13,8 +13,12 @@ import numpy as np
 
 from benchmarks.races.plans import CHECKPOINTS, Plan
 from benchmarks.races.records import Record
-from gaitswarm.services.optimizer.analysis.interval import Interval, percentile_interval
-from gaitswarm.services.optimizer.analysis.ranks import average_ranks, spearman
+from gaitswarm.services.optimizer.analysis.statistics import (
+    Interval,
+    average_ranks,
+    percentile_interval,
+    spearman,
+)
 from gaitswarm.services.optimizer.analysis.tournaments.tournament import (
     Results,
     Runs,

@@ -31,12 +31,12 @@ from gaitswarm.cli.reconstruction.optimality import (
     walk_all,
 )
 from gaitswarm.cli.reconstruction.plan import Size
-from gaitswarm.services.optimizer.analysis.fits.identifiability import (
+from gaitswarm.services.optimizer.analysis.identifiability import (
     Identifiability,
     ParameterIdentifiability,
     identifiability,
 )
-from gaitswarm.services.optimizer.analysis.fits.targets import TargetResults, target_results
+from gaitswarm.services.optimizer.analysis.targets import TargetResults, target_results
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES

@@ -12,11 +12,11 @@ import numpy as np
 from gaitswarm.cli.atomic_file import replacing
 from gaitswarm.cli.reconstruction.evidence import PRINTED, Evidence, Found
 from gaitswarm.cli.reconstruction.optimality import OPTIMA
-from gaitswarm.services.optimizer.analysis.fits.identifiability import (
+from gaitswarm.services.optimizer.analysis.identifiability import (
     ParameterIdentifiability,
     Trust,
 )
-from gaitswarm.services.optimizer.analysis.fits.targets import Reached
+from gaitswarm.services.optimizer.analysis.targets import Reached
 
 REPORT: Final = "report.md"
 

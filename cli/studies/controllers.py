@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Final
 
-from gaitswarm.services.optimizer.analysis.ratio import (
+from gaitswarm.services.optimizer.analysis.statistics import (
     MedianInterval,
     median_interval,
     median_ratio,

@@ -11,7 +11,7 @@ from rich.text import Text
 from gaitswarm.cli.tables.fitted import Table
 
 if TYPE_CHECKING:
-    from gaitswarm.services.optimizer.analysis.ratio import MedianInterval
+    from gaitswarm.services.optimizer.analysis.statistics import MedianInterval
     from gaitswarm.services.optimizer.jobs.fork import Lineage
     from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
     from gaitswarm.services.optimizer.jobs.spec import Spec

@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from gaitswarm.evidence.archive import parsed_json
-from gaitswarm.services.optimizer.analysis.robustness.certificate import certificate
+from gaitswarm.services.optimizer.analysis.certificate import certificate
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.job import Job, JobState

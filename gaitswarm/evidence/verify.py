@@ -33,7 +33,7 @@ from gaitswarm.evidence.replay import (
     simulated_differences,
     why_no_replay,
 )
-from gaitswarm.services.optimizer.analysis.search_path import retraced
+from gaitswarm.services.optimizer.analysis.fork import retraced
 from gaitswarm.services.optimizer.analysis.verification import BrokenChain, Chain, judged
 from gaitswarm.services.optimizer.jobs.chain import VERSION as CHAIN_VERSION
 from gaitswarm.services.optimizer.jobs.chain import ChainDocuments, Link, Outcomes

@@ -18,7 +18,7 @@ from gaitswarm.sim.robot import DEFAULT_ROBOT
 if TYPE_CHECKING:
     from gaitswarm.requests.firmware import FirmwareOptions
     from gaitswarm.requests.robustness import RobustnessOptions
-    from gaitswarm.services.optimizer.analysis.fits.targets import LeaveOut
+    from gaitswarm.services.optimizer.analysis.targets import LeaveOut
     from gaitswarm.sim.identification.recorded_walk import RecordedWalk
     from gaitswarm.simulation_result import SimulationResult
     from gaitswarm.specs import (

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from gaitswarm.services.optimizer.analysis.fits.targets import LeaveOut
+    from gaitswarm.services.optimizer.analysis.targets import LeaveOut
     from gaitswarm.sim.kernel.walk import Precision
     from gaitswarm.specs import PreferenceInput
     from gaitswarm.tables import EvaluationTable, TableFormat

@@ -13,24 +13,24 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from gaitswarm.errors import invalid_request, simulation_errors
 from gaitswarm.requests.identification import Histories
 from gaitswarm.requests.robustness import RobustnessRequest, run_robustness
+from gaitswarm.services.optimizer.analysis.certificate import certificate
 from gaitswarm.services.optimizer.analysis.distribution import thinned
+from gaitswarm.services.optimizer.analysis.front import pareto_front
 from gaitswarm.services.optimizer.analysis.importance import (
     MOST_DESIGNS,
     companions,
     first_order_indices,
 )
-from gaitswarm.services.optimizer.analysis.interval import Interval
-from gaitswarm.services.optimizer.analysis.robustness.certificate import certificate
-from gaitswarm.services.optimizer.analysis.robustness.index import NORMALISED_OBJECTIVES
-from gaitswarm.services.optimizer.analysis.robustness.preference_winners import (
+from gaitswarm.services.optimizer.analysis.preference_winners import (
     Winner,
     drawn_preferences,
     winners,
 )
-from gaitswarm.services.optimizer.analysis.robustness.scenario_families import scenario_families
-from gaitswarm.services.optimizer.analysis.trade_offs.front import pareto_front
-from gaitswarm.services.optimizer.analysis.trade_offs.winning_preference import preference_fits
+from gaitswarm.services.optimizer.analysis.robustness_index import NORMALISED_OBJECTIVES
+from gaitswarm.services.optimizer.analysis.scenario_families import scenario_families
+from gaitswarm.services.optimizer.analysis.statistics import Interval
 from gaitswarm.services.optimizer.analysis.utilities import log_utilities, objective_vectors
+from gaitswarm.services.optimizer.analysis.winning_preference import preference_fits
 from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, NotFound
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.documents import AnySpec

@@ -10,8 +10,8 @@ from pydantic import Field
 
 from gaitswarm.errors import simulation_errors
 from gaitswarm.requests.design import DesignRequest, resolved
-from gaitswarm.services.optimizer.analysis.fits.identifiability import check_comparable
-from gaitswarm.services.optimizer.analysis.fits.targets import LeaveOut, target_results
+from gaitswarm.services.optimizer.analysis.identifiability import check_comparable
+from gaitswarm.services.optimizer.analysis.targets import LeaveOut, target_results
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from gaitswarm.requests.simulations import WalksRequest
-from gaitswarm.services.optimizer.analysis.robustness.index import (
+from gaitswarm.services.optimizer.analysis.robustness_index import (
     LocalSample,
     local_sample,
     robustness,

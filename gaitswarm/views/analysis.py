@@ -10,13 +10,13 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from gaitswarm.services.optimizer.analysis.distribution import QUANTILES, Distribution
-from gaitswarm.services.optimizer.analysis.interval import Interval
 from gaitswarm.services.optimizer.analysis.ranking import RankedDesign, RankedJob
-from gaitswarm.services.optimizer.analysis.robustness.scenario_families import (
+from gaitswarm.services.optimizer.analysis.scenario_families import (
     Family,
     LeftOut,
     ScenarioFamilies,
 )
+from gaitswarm.services.optimizer.analysis.statistics import Interval
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from gaitswarm.services.optimizer.analysis.fits.targets import Reached, TargetResult, TargetResults
+from gaitswarm.services.optimizer.analysis.targets import Reached, TargetResult, TargetResults
 from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from gaitswarm.views.base import View, finite
 

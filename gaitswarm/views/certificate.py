@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from gaitswarm.services.optimizer.analysis.robustness.certificate import (
+from gaitswarm.services.optimizer.analysis.certificate import (
     LEVEL,
     QUANTILES,
     CaseResult,
     Certificate,
+    Compared,
+    ComparedCase,
+    ComparedEngine,
     Influence,
     Proportion,
     Spread,
     WorldOutcome,
-)
-from gaitswarm.services.optimizer.analysis.robustness.engines import (
-    Compared,
-    ComparedCase,
-    ComparedEngine,
 )
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 from gaitswarm.services.optimizer.jobs.preference import Preference

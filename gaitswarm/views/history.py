@@ -13,7 +13,7 @@ from pydantic import Field, TypeAdapter
 from pydantic_core import to_json
 
 from gaitswarm.services.optimizer.analysis.distribution import thinned
-from gaitswarm.services.optimizer.analysis.robustness.index import NORMALISED_OBJECTIVES
+from gaitswarm.services.optimizer.analysis.robustness_index import NORMALISED_OBJECTIVES
 from gaitswarm.services.optimizer.analysis.utilities import objective_vectors, utilities
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Iteration

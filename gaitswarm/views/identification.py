@@ -6,7 +6,7 @@ from datetime import datetime
 
 from pydantic import Field
 
-from gaitswarm.services.optimizer.analysis.fits.identifiability import (
+from gaitswarm.services.optimizer.analysis.identifiability import (
     THRESHOLDS,
     ChoiceEvidence,
     Identifiability,

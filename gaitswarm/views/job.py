@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from gaitswarm.services.optimizer.errors import Unreadable
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
-from gaitswarm.services.optimizer.jobs.estimate import Estimate
+from gaitswarm.services.optimizer.jobs.estimate import Estimate, time_left
 from gaitswarm.services.optimizer.jobs.fork import Lineage
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation
 from gaitswarm.services.optimizer.jobs.job import (
@@ -23,7 +23,6 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.labels import FacetCounts, preference_name, robot_name
 from gaitswarm.services.optimizer.jobs.priority import HIGHEST, LOWEST
 from gaitswarm.services.optimizer.jobs.provenance import ProvenanceRecord
-from gaitswarm.services.optimizer.jobs.time_left import time_left
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.views.base import View, finite, job_links
 from gaitswarm.views.catalogue import ReferenceView

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gaitswarm.services.optimizer.analysis.interval import Interval
-from gaitswarm.services.optimizer.analysis.robustness.index import (
+from gaitswarm.services.optimizer.analysis.robustness_index import (
     NORMALISED_OBJECTIVES,
     LocalSample,
     Robustness,
     Sensitivity,
 )
+from gaitswarm.services.optimizer.analysis.statistics import Interval
 from gaitswarm.sim.catalogue import design_shown
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.robot import RobotSource

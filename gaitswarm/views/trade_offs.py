@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gaitswarm.services.optimizer.analysis.robustness.index import NORMALISED_OBJECTIVES
-from gaitswarm.services.optimizer.analysis.trade_offs.front import Front
-from gaitswarm.services.optimizer.analysis.trade_offs.winning_preference import PreferenceFit
+from gaitswarm.services.optimizer.analysis.front import Front
+from gaitswarm.services.optimizer.analysis.robustness_index import NORMALISED_OBJECTIVES
 from gaitswarm.services.optimizer.analysis.utilities import objective_vectors
+from gaitswarm.services.optimizer.analysis.winning_preference import PreferenceFit
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.preference import Preference

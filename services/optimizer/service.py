@@ -9,10 +9,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from gaitswarm.services.optimizer.analysis.fork import Parent, check_begun, forked
-from gaitswarm.services.optimizer.analysis.questions import Questions
-from gaitswarm.services.optimizer.analysis.start import started
-from gaitswarm.services.optimizer.commands import Commands
+from gaitswarm.services.optimizer.analysis.fork import Parent, check_begun, forked, started
+from gaitswarm.services.optimizer.analysis.history import Questions
 from gaitswarm.services.optimizer.deletion import Deletion
 from gaitswarm.services.optimizer.errors import ProvenanceChanged
 from gaitswarm.services.optimizer.jobs.audit import LOCAL
@@ -24,17 +22,88 @@ from gaitswarm.services.optimizer.jobs.estimate import (
 )
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Iteration
-from gaitswarm.services.optimizer.jobs.job import Claim, Job, refusal
+from gaitswarm.services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState, refusal
+from gaitswarm.services.optimizer.jobs.labels import ANY_JOB, FacetCounts, JobFilter, LabelsChange
 from gaitswarm.services.optimizer.jobs.priority import check_priority
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from gaitswarm.services.optimizer.jobs.quota import Quota
 from gaitswarm.services.optimizer.jobs.spec import Spec
-from gaitswarm.services.optimizer.labelling import Labelling
 from gaitswarm.services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS
 from gaitswarm.services.optimizer.run.runner import runner_name
+from gaitswarm.services.optimizer.store.port.base import Store
 from gaitswarm.services.optimizer.store.port.reading import Page
 from gaitswarm.services.optimizer.store.port.recordings import RecordingEntry
 from gaitswarm.sim.identification.recorded_walk import RecordedWalk
+
+
+class Commands:
+    """Commands jobs. Thread-safe, as the store is."""
+
+    __slots__ = ()
+
+    store: Store
+
+    def command(
+        self,
+        job_id: str,
+        command: Command,
+        *,
+        accept_changes: bool = False,
+        actor: str = LOCAL,
+        quota: Quota | None = None,
+    ) -> Job:
+        """Pause, resume or cancel a job."""
+        return self.store.command(
+            job_id, command, accept_changes=accept_changes, actor=actor, quota=quota
+        )
+
+    def prioritize(self, job_id: str, priority: int, *, actor: str = LOCAL) -> Job:
+        """Change a job's priority; nothing of its results depends on it."""
+        check_priority(priority)
+        return self.store.prioritize(job_id, priority, actor=actor)
+
+
+class Labelling:
+    """Lists, labels and counts jobs. Thread-safe, as the store is."""
+
+    __slots__ = ()
+
+    store: Store
+
+    def jobs(
+        self,
+        *,
+        state: JobState | None = None,
+        kind: str | None = None,
+        parent: str | None = None,
+        search: str = "",
+        where: JobFilter = ANY_JOB,
+        order: JobOrder = JobOrder.CREATED,
+        after: str | None = None,
+        limit: int = 50,
+        reverse: bool = False,
+    ) -> Page[Job]:
+        """List jobs, page by page. Jobs submitted meanwhile do not shift later pages."""
+        return self.store.jobs(
+            state=state,
+            kind=kind,
+            parent=parent,
+            search=search,
+            where=where,
+            order=order,
+            after=after,
+            limit=limit,
+            reverse=reverse,
+        )
+
+    def facets(self, *, archived: bool | None = None) -> FacetCounts:
+        """Count jobs by what they are found by."""
+        return self.store.facets(archived=archived)
+
+    def label(self, job_id: str, change: LabelsChange, *, actor: str = LOCAL) -> Job:
+        """Change what is written on a job; nothing that determines results."""
+        return self.store.label(job_id, change, actor=actor)
+
 
 _EARLIER: Final = 50
 """Newest jobs among which one like a new job is looked for."""

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gaitswarm.services.optimizer.analysis.fits.identifiability import Trust, identifiability
-from gaitswarm.services.optimizer.analysis.fits.targets import target_results
+from gaitswarm.services.optimizer.analysis.identifiability import Trust, identifiability
+from gaitswarm.services.optimizer.analysis.targets import target_results
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Reevaluation
 from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec

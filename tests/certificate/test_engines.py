@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import gaitswarm
-from gaitswarm.services.optimizer.analysis.robustness.certificate import certificate
+from gaitswarm.services.optimizer.analysis.certificate import certificate
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.documents import SPECS
 from gaitswarm.services.optimizer.jobs.job import JobState

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from gaitswarm.services.optimizer.analysis.robustness.certificate import (
+from gaitswarm.services.optimizer.analysis.certificate import (
     Certificate,
     certificate,
     conditional_value_at_risk,

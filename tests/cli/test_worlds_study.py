@@ -16,7 +16,7 @@ from gaitswarm.cli.studies.worlds import (
     study_document,
     study_table,
 )
-from gaitswarm.services.optimizer.analysis.robustness.certificate import (
+from gaitswarm.services.optimizer.analysis.certificate import (
     QUANTILES,
     Proportion,
     Spread,

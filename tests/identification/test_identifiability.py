@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gaitswarm.services.optimizer.analysis.fits.identifiability import (
+from gaitswarm.services.optimizer.analysis.identifiability import (
     THRESHOLDS,
     Trust,
     identifiability,

@@ -7,7 +7,7 @@ import threading
 import numpy as np
 import pytest
 
-from gaitswarm.services.optimizer.analysis.fits.identifiability import Trust
+from gaitswarm.services.optimizer.analysis.identifiability import Trust
 from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest
 from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.services.optimizer.jobs.judgement import Judgement

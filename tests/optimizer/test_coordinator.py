@@ -10,13 +10,13 @@ import pytest
 from gaitswarm.services.optimizer.jobs.iteration import Ask, CompletedIteration
 from gaitswarm.services.optimizer.jobs.job import Claim, JobState, Progress
 from gaitswarm.services.optimizer.jobs.spec import judge_outcomes
-from gaitswarm.services.optimizer.run.coordinator import Coordination, Phase, handle
-from gaitswarm.services.optimizer.run.events import (
+from gaitswarm.services.optimizer.run.coordinator import (
     Action,
     Begin,
     Claimed,
     Commit,
     Committed,
+    Coordination,
     Evaluate,
     Evaluated,
     EvaluationFailed,
@@ -24,10 +24,12 @@ from gaitswarm.services.optimizer.run.events import (
     Event,
     LeaseWasLost,
     PauseSeen,
+    Phase,
     Release,
     StopRequested,
     Wait,
     Waited,
+    handle,
 )
 from gaitswarm.services.optimizer.run.outage import Backoff
 from tests.optimizer.formula import HERE, SPEC, job, walk

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gaitswarm.services.optimizer.analysis.trade_offs import dominance
-from gaitswarm.services.optimizer.analysis.trade_offs.dominance import non_dominated
+from gaitswarm.services.optimizer.analysis import front
+from gaitswarm.services.optimizer.analysis.front import non_dominated
 
 
 def by_definition(points: np.ndarray) -> np.ndarray:
@@ -34,7 +34,7 @@ def test_it_is_what_the_definition_says(
     # Few values make many that are equal, and small leaves divide few points.
     points = np.random.default_rng(seed).integers(0, values, (rows, objectives)).astype(np.float64)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(dominance, "_LEAF", leaf)
+        patch.setattr(front, "_LEAF", leaf)
         assert non_dominated(points).tolist() == by_definition(points).tolist()
 
 

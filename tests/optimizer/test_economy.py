@@ -13,10 +13,9 @@ from gaitswarm.services.optimizer.jobs.iteration import Known
 from gaitswarm.services.optimizer.jobs.job import Job, JobState
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
-from gaitswarm.services.optimizer.jobs.walk_keys import walk_keys
-from gaitswarm.services.optimizer.run.economy import evaluate_unknown
+from gaitswarm.services.optimizer.run.coordinator import walk_keys
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
-from gaitswarm.services.optimizer.run.execution import Surroundings, run_claim
+from gaitswarm.services.optimizer.run.execution import Surroundings, evaluate_unknown, run_claim
 from gaitswarm.services.optimizer.store.port.base import Store
 from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from gaitswarm.sim.outcome import Outcome

@@ -16,8 +16,15 @@ from gaitswarm.services.optimizer.jobs.job import (
     JobState,
     extended,
 )
-from gaitswarm.services.optimizer.run.coordinator import Coordination, handle
-from gaitswarm.services.optimizer.run.events import Claimed, Commit, Evaluate, Evaluated, Extended
+from gaitswarm.services.optimizer.run.coordinator import (
+    Claimed,
+    Commit,
+    Coordination,
+    Evaluate,
+    Evaluated,
+    Extended,
+    handle,
+)
 from gaitswarm.services.optimizer.run.execution import OnCommit, Surroundings, run_claim
 from gaitswarm.services.optimizer.store.port.base import Store
 from tests.examples.jobs import Bits, history

@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from gaitswarm.services.optimizer.analysis.front import Front, knees, pareto_front
 from gaitswarm.services.optimizer.analysis.ranking import rank
-from gaitswarm.services.optimizer.analysis.trade_offs.front import Front, knees, pareto_front
 from gaitswarm.services.optimizer.analysis.utilities import objective_vectors
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gaitswarm.services.optimizer.analysis.trade_offs.hypervolume import hypervolume_curve
+from gaitswarm.services.optimizer.analysis.front import hypervolume_curve
 
 
 def by_inclusion_and_exclusion(points: np.ndarray) -> float:

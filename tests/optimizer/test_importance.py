@@ -10,7 +10,7 @@ from gaitswarm.services.optimizer.analysis.importance import (
     companions,
     first_order_indices,
 )
-from gaitswarm.services.optimizer.analysis.interval import Interval
+from gaitswarm.services.optimizer.analysis.statistics import Interval
 from gaitswarm.sim.variables import Variable
 
 

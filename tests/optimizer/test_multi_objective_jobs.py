@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from gaitswarm.services.optimizer.analysis.search_path import retraced
+from gaitswarm.services.optimizer.analysis.fork import retraced
 from gaitswarm.services.optimizer.jobs.documents import SPECS
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
 from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gaitswarm.services.optimizer.analysis.robustness.certificate import certificate
+from gaitswarm.services.optimizer.analysis.certificate import certificate
 from gaitswarm.services.optimizer.jobs.judgement import Judgement
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, geometric_mean, judge
 from tests.certificate.examples import columns, small

@@ -13,20 +13,22 @@ from gaitswarm.services.optimizer.jobs.iteration import Ask, CompletedIteration
 from gaitswarm.services.optimizer.jobs.job import Claim, JobState, Progress
 from gaitswarm.services.optimizer.jobs.provenance import with_record
 from gaitswarm.services.optimizer.jobs.spec import judge_outcomes
-from gaitswarm.services.optimizer.run.coordinator import Coordination, Phase, handle
-from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
-from gaitswarm.services.optimizer.run.events import (
+from gaitswarm.services.optimizer.run.coordinator import (
     Begin,
     Claimed,
     Commit,
     Committed,
+    Coordination,
     Evaluate,
     Evaluated,
     EvaluatorLost,
     Event,
+    Phase,
     Wait,
     Waited,
+    handle,
 )
+from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
 from gaitswarm.services.optimizer.store.port.base import Store
 from gaitswarm.sim.outcome import Outcome, Status
 from tests.optimizer.formula import HERE, SINGLE, SPEC, FormulaEvaluator, job, queue, walk

@@ -7,7 +7,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from gaitswarm.services.optimizer.analysis.robustness.preference_winners import (
+from gaitswarm.services.optimizer.analysis.preference_winners import (
     drawn_preferences,
     winners,
 )

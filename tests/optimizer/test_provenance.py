@@ -10,14 +10,12 @@ from typing import Any
 import pytest
 
 from gaitswarm.services.optimizer.errors import ProvenanceChanged
-from gaitswarm.services.optimizer.jobs import case_choice
 from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
 from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
 from gaitswarm.services.optimizer.jobs.job import Claim, Command, Job, JobState
-from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
+from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec, root_mean_square
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
-from gaitswarm.services.optimizer.jobs.kinds.misfit import root_mean_square
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 from gaitswarm.services.optimizer.jobs.optimizer_choice import optimizer_settings
@@ -29,8 +27,15 @@ from gaitswarm.services.optimizer.jobs.provenance import (
 )
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.jobs.start import EarlierJobs
-from gaitswarm.services.optimizer.run.coordinator import Coordination, handle
-from gaitswarm.services.optimizer.run.events import Begin, Claimed, Evaluate, Record, Release
+from gaitswarm.services.optimizer.run.coordinator import (
+    Begin,
+    Claimed,
+    Coordination,
+    Evaluate,
+    Record,
+    Release,
+    handle,
+)
 from gaitswarm.services.optimizer.run.execution import OnCommit, Surroundings, run_claim
 from gaitswarm.services.optimizer.search.registry import create_search
 from gaitswarm.services.optimizer.service import JobService
@@ -237,7 +242,7 @@ def test_all_code_that_asks_and_judges_is_in_the_digest() -> None:
     kinds = (JobSpec, IdentificationSpec, CalibrationSpec, CertificateSpec)
     specs = (*kinds, Spec)
     used = (*specs, optimizer_settings, DesignSpace, Preference, root_mean_square, EarlierJobs)
-    runs = (TuningWorlds, case_choice)
+    runs = (TuningWorlds,)
     files = {Path(inspect.getfile(thing)) for thing in (*used, *runs)}
     for room in (Path(inspect.getfile(thing)).parent for thing in (JobSpec, create_search)):
         files |= set(room.rglob("*.py"))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gaitswarm.services.optimizer.analysis.ratio import (
+from gaitswarm.services.optimizer.analysis.statistics import (
     MedianInterval,
     median_interval,
     median_ratio,

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from gaitswarm.services.optimizer.analysis.robustness.index import (
+from gaitswarm.services.optimizer.analysis.robustness_index import (
     LocalSample,
     local_sample,
     robustness,

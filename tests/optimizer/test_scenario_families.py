@@ -8,7 +8,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from gaitswarm.services.optimizer.analysis.robustness.scenario_families import (
+from gaitswarm.services.optimizer.analysis.scenario_families import (
     Family,
     scenario_families,
 )

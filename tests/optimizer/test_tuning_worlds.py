@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from gaitswarm.services.optimizer.analysis.robustness.certificate import conditional_value_at_risk
+from gaitswarm.services.optimizer.analysis.certificate import conditional_value_at_risk
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.documents import SPECS
 from gaitswarm.services.optimizer.jobs.job import JobState

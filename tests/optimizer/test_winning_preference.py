@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gaitswarm.services.optimizer.analysis.ranking import fitness_by
-from gaitswarm.services.optimizer.analysis.trade_offs.winning_preference import preference_fits
+from gaitswarm.services.optimizer.analysis.winning_preference import preference_fits
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference
 from tests.examples.columns import columns_of

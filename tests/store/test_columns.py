@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from gaitswarm.services.optimizer.analysis.history_cache import HistoryCache, HistoryMemory
+from gaitswarm.services.optimizer.analysis.history import HistoryCache, HistoryMemory
 from gaitswarm.services.optimizer.errors import Conflict, EvaluatorUnavailable, NotFound
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration

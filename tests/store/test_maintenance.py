@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from gaitswarm.services.optimizer.analysis.all_histories import check_histories
+from gaitswarm.services.optimizer.analysis.verification import check_histories
 from gaitswarm.services.optimizer.errors import NotFound, StoreUnavailable
 from gaitswarm.services.optimizer.jobs.job import Command, JobState
 from gaitswarm.services.optimizer.store.schema.maintenance import Pruned, check, prune

@@ -53,7 +53,7 @@ def check(
 
     from gaitswarm.cli.exit_codes import CheckFailed
     from gaitswarm.cli.output import note, print_text
-    from gaitswarm.services.optimizer.analysis.all_histories import check_histories
+    from gaitswarm.services.optimizer.analysis.verification import check_histories
     from gaitswarm.services.optimizer.store.schema import maintenance
     from gaitswarm.services.optimizer.store.sql_store import open_store
 

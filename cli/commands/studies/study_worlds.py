@@ -77,7 +77,7 @@ def worlds(
         study_document,
         study_table,
     )
-    from gaitswarm.services.optimizer.analysis.interval import CONFIDENCE
+    from gaitswarm.services.optimizer.analysis.statistics import CONFIDENCE
     from gaitswarm.services.optimizer.search.registry import DEFAULT_METHOD
 
     judged_in = HeldOut(held_out, held_out_seed)

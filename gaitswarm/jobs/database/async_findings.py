@@ -10,7 +10,7 @@ from typing import TypeVar
 from anyio import to_thread
 
 from gaitswarm.jobs.database.findings import DatabaseFindings
-from gaitswarm.services.optimizer.analysis.fits.targets import LeaveOut
+from gaitswarm.services.optimizer.analysis.targets import LeaveOut
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.specs import (
     PreferenceInput,

@@ -19,7 +19,7 @@ from gaitswarm.requests.analysis import (
 )
 from gaitswarm.requests.comparison import run_comparison
 from gaitswarm.requests.identification import run_targets
-from gaitswarm.services.optimizer.analysis.fits.targets import LeaveOut
+from gaitswarm.services.optimizer.analysis.targets import LeaveOut
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.specs import PreferenceInput

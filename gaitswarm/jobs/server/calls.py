@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 
 from gaitswarm.jobs.server.call import Call, got, job_path, page, posted, segment
-from gaitswarm.services.optimizer.analysis.fits.targets import LeaveOut
+from gaitswarm.services.optimizer.analysis.targets import LeaveOut
 from gaitswarm.services.optimizer.jobs.job import JobOrder, JobState
 from gaitswarm.services.optimizer.jobs.labels import JobFilter
 from gaitswarm.services.optimizer.jobs.spec import Spec

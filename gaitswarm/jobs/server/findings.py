@@ -17,7 +17,7 @@ from gaitswarm.jobs.server.attempts import (
 )
 from gaitswarm.jobs.server.call import Call
 from gaitswarm.requests import arguments
-from gaitswarm.services.optimizer.analysis.fits.targets import LeaveOut
+from gaitswarm.services.optimizer.analysis.targets import LeaveOut
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.specs import (
     PreferenceInput,

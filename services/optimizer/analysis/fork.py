@@ -16,17 +16,22 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain, zip_longest
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gaitswarm.services.optimizer.analysis.search_path import retraced
-from gaitswarm.services.optimizer.analysis.start import best_designs
-from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, ProvenanceChanged
+from gaitswarm.services.optimizer.errors import (
+    Conflict,
+    GaitswarmError,
+    InvalidRequest,
+    ProvenanceChanged,
+)
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
 from gaitswarm.services.optimizer.jobs.documents import AnySpec, checked_spec
 from gaitswarm.services.optimizer.jobs.fork import (
     Fork,
@@ -38,9 +43,108 @@ from gaitswarm.services.optimizer.jobs.fork import (
 )
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, changes_since
+from gaitswarm.services.optimizer.jobs.spec import Spec, create_optimizer
+from gaitswarm.services.optimizer.jobs.start import EarlierJobs
 from gaitswarm.services.optimizer.search.optimizer import Optimizer, Rejudging
 
 Floats = NDArray[np.float64]
+
+
+def retraced(
+    spec: Spec,
+    budgets: Sequence[int],
+    asked: Sequence[Floats],
+    told: Sequence[Floats],
+    *,
+    until: float = math.inf,
+) -> Optimizer:
+    """Take a search along a path, up to its last ask, which is not answered.
+
+    Args:
+        asked: (n, d) positions of every iteration, at least one.
+        until: When `time.monotonic` is past this, it is given up [s].
+    """
+    searches = [create_optimizer(spec.model_copy(update={"iterations": n})) for n in budgets]
+    search = searches.pop(0)
+    for index, positions in enumerate(asked):
+        if index:
+            search.tell(told[index - 1])
+        if time.monotonic() > until:
+            raise TimeoutError(f"it came to iteration {index} of {len(asked)}")
+        # Of some methods as long as all that they were told.
+        state = search.dump() if searches else {}
+        while not _asks_for(search, positions):
+            if not searches:
+                raise ValueError(f"its search would ask for other designs in iteration {index}")
+            search = searches.pop(0)
+            search.load(state)
+    return search
+
+
+def _asks_for(search: Optimizer, positions: Floats) -> bool:
+    found = search.ask(len(positions))
+    return found.shape == positions.shape and found.tobytes() == positions.tobytes()
+
+
+Design = dict[str, float | str]
+
+
+def started(
+    spec: Spec,
+    job_of: Callable[[str], Job],
+    columns_of: Callable[[Job], EvaluationColumns],
+) -> Spec:
+    """Look up the designs that a job starts from, if it names earlier jobs."""
+    if not isinstance(spec.start, EarlierJobs):
+        return spec
+    searched = tuple(variable.name for variable in spec.design_space().variables)
+    ranked = []
+    for index, job_id in enumerate(spec.start.jobs):
+        try:
+            job = job_of(job_id)
+            space, count = job.spec.design_space(), spec.start.count
+            found = list(best_designs(space, columns_of(job), searched, count))
+            if not found:
+                raise InvalidRequest(f"job {job_id} has no design that has not failed")
+            _check(spec, found)
+        except (GaitswarmError, ValueError) as error:
+            raise InvalidRequest(str(error), field=f"start.jobs.{index}") from error
+        ranked.append(found)
+    designs = [design for design in chain(*zip_longest(*ranked)) if design is not None]
+    different = list({tuple(design.items()): design for design in designs}.values())
+    start = tuple(different[: spec.start.count])
+    if len(start) > spec.budget:
+        raise InvalidRequest(
+            f"{len(start)} designs are more than the budget of {spec.budget}; lower it, or give"
+            " more iterations",
+            field="start.count",
+        )
+    return spec.model_copy(update={"start": start})
+
+
+def best_designs(
+    space: DesignSpace, columns: EvaluationColumns, searched: tuple[str, ...], count: int
+) -> Iterator[Design]:
+    """Choose the best different designs of a job."""
+    seen = set[tuple[float | str, ...]]()
+    for row in np.argsort(columns.fitness, kind="stable").tolist():
+        if len(seen) == count or not np.isfinite(columns.fitness[row]):
+            return
+        shown = space.shown(columns.designs[row].tolist())
+        design = {name: shown[name] for name in searched if name in shown}
+        if tuple(design.values()) not in seen:
+            seen.add(tuple(design.values()))
+            yield design
+
+
+def _check(spec: Spec, designs: list[Design]) -> None:
+    try:
+        spec.design_space().positions(designs)
+    except ValueError as error:
+        place, _, problem = str(error).partition(": ")
+        number, _, name = place.partition(".")
+        raise ValueError(f"{name} of its best design no. {int(number) + 1}: {problem}") from error
+
 
 _HOLD: Final = frozenset({"preference", "optimizer"})
 """Fields of a spec without which outcomes stay what they are."""

@@ -23,8 +23,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from gaitswarm.services.optimizer.analysis.interval import Interval, percentile_interval
-from gaitswarm.services.optimizer.analysis.ranks import average_ranks
+from gaitswarm.services.optimizer.analysis.statistics import (
+    Interval,
+    average_ranks,
+    percentile_interval,
+)
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.sim.variables import Variable
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gaitswarm.services.optimizer.analysis.ranks import spearman
+from gaitswarm.services.optimizer.analysis.statistics import spearman
 from gaitswarm.services.optimizer.analysis.utilities import fitness_of, log_utilities
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns

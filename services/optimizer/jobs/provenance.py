@@ -17,7 +17,6 @@ from gaitswarm.sim.provenance import LIBRARIES, Provenance, provenance_of, versi
 _OPTIMIZER: Final = Path(__file__).parents[1]
 
 _JUDGING: Final = (
-    "jobs/case_choice.py",
     "jobs/design_space.py",
     "jobs/optimizer_choice.py",
     "jobs/preference.py",

@@ -9,10 +9,12 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Final, TypeVar
+
+import numpy as np
 
 from gaitswarm.services.optimizer.errors import (
     BudgetChanged,
@@ -24,25 +26,19 @@ from gaitswarm.services.optimizer.errors import (
     StoreUnavailable,
     Unavailable,
 )
-from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
+from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration, Known
 from gaitswarm.services.optimizer.jobs.job import Claim, Job, JobState
 from gaitswarm.services.optimizer.jobs.priority import weight
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.log_context import log_context
-from gaitswarm.services.optimizer.run.coordinator import Coordination, Phase, handle
-from gaitswarm.services.optimizer.run.economy import evaluate_unknown
-from gaitswarm.services.optimizer.run.evaluator import (
-    EvaluationRequest,
-    EvaluationStopped,
-    Evaluator,
-)
-from gaitswarm.services.optimizer.run.events import (
+from gaitswarm.services.optimizer.run.coordinator import (
     Action,
     Begin,
     Claimed,
     Commit,
     Committed,
+    Coordination,
     Evaluate,
     Evaluated,
     EvaluationFailed,
@@ -51,16 +47,94 @@ from gaitswarm.services.optimizer.run.events import (
     Extended,
     LeaseWasLost,
     PauseSeen,
+    Phase,
     Record,
     Release,
     StopRequested,
     Wait,
     Waited,
+    handle,
     iteration_of,
+)
+from gaitswarm.services.optimizer.run.evaluator import (
+    EvaluationRequest,
+    EvaluationStopped,
+    Evaluator,
 )
 from gaitswarm.services.optimizer.run.heartbeat import Heartbeat
 from gaitswarm.services.optimizer.run.outage import Backoff, Outage, is_infrastructure
 from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.sim.outcome import Outcome, Status
+
+_NEW: Final = -1
+
+Keys = tuple[bytes | None, ...]
+
+_log = logging.getLogger(__name__)
+
+
+def evaluate_unknown(
+    evaluator: Evaluator,
+    store: Store | None,
+    request: EvaluationRequest,
+    keys: Sequence[bytes],
+    should_stop: Callable[[], bool],
+) -> tuple[tuple[Outcome, ...], Keys]:
+    """Evaluate a request, but for what the store knows and what occurs in it twice.
+
+    The outcomes are those of evaluating all of it, to the bit, because a walk's outcome depends on
+    design and case alone. A store that does not answer knows nothing.
+    """
+    if store is None or not keys:
+        return evaluator.evaluate(request, should_stop), tuple(keys)
+    first = {key: index for index, key in reversed(list(enumerate(keys)))}
+    known = _known(store, request, tuple(first))
+    walked = sorted(index for key, index in first.items() if key not in known)
+    if len(walked) == len(keys):
+        return evaluator.evaluate(request, should_stop), tuple(keys)
+    found: tuple[Outcome, ...] | None = None
+    if walked:
+        found = evaluator.evaluate(replace(request, designs=request.designs[walked]), should_stop)
+    row_of = {index: row for row, index in enumerate(walked)}
+    rows = np.array([row_of.get(first[key], _NEW) for key in keys])
+    outcomes = []
+    for number, case in enumerate(request.cases):
+        objectives = np.empty((len(keys), len(case.objectives)))
+        statuses = np.empty(len(keys), dtype=np.uint8)
+        if found is not None:
+            here = rows != _NEW
+            objectives[here] = found[number].objectives[rows[here]]
+            statuses[here] = found[number].statuses[rows[here]]
+        for index in np.flatnonzero(rows == _NEW).tolist():
+            earlier = known[keys[index]]
+            objectives[index] = earlier.objectives[number]
+            statuses[index] = earlier.statuses[number]
+        outcomes.append(Outcome(objectives, statuses))
+    new = set(walked)
+    return tuple(outcomes), tuple(key if i in new else None for i, key in enumerate(keys))
+
+
+def _known(store: Store, request: EvaluationRequest, keys: tuple[bytes, ...]) -> dict[bytes, Known]:
+    """What the store has of these keys, as far as it is fit for use."""
+    try:
+        found = store.known(keys)
+    except StoreUnavailable as error:
+        _log.warning("job %s: all is walked anew: %s", request.job_id, error)
+        return {}
+    widths = {len(case.objectives) for case in request.cases}
+    shapes = {(len(request.cases), width) for width in widths}
+    return {
+        key: known
+        for key, known in found.items()
+        if known.objectives.shape in shapes and _complete(known)
+    }
+
+
+def _complete(known: Known) -> bool:
+    """Not so where a number was stored as null, as infinities are."""
+    ok = known.statuses == Status.OK
+    return bool(np.isfinite(known.objectives[ok]).all())
+
 
 OnCommit = Callable[[CompletedIteration, JobState], None]
 """Called after an iteration is stored, in the thread that runs the job."""
@@ -75,8 +149,6 @@ _STORE: Final = Backoff(first=0.1, longest=5.0)
 """Pauses while the store does not answer; an evaluated iteration may wait to be stored."""
 
 T = TypeVar("T")
-
-_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)

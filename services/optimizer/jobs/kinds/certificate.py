@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Final, Literal, Self
 
 import numpy as np
@@ -12,11 +13,6 @@ from pydantic import ConfigDict, Field, TypeAdapter, ValidationError, model_vali
 
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
-from gaitswarm.services.optimizer.jobs.kinds.certified_worlds import (
-    with_engine,
-    world_positions,
-    world_space,
-)
 from gaitswarm.services.optimizer.jobs.kinds.held_out import certificate_scenarios
 from gaitswarm.services.optimizer.jobs.kinds.walks import WalksSpec
 from gaitswarm.services.optimizer.jobs.optimizer_choice import OptimizerChoice
@@ -29,13 +25,62 @@ from gaitswarm.sim.catalogue import check_design, design_numbers, design_shown
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.identification.recorded_walk import Recordings
-from gaitswarm.sim.mujoco.engines import ENGINES, LIBRARY, EngineName, check_installed
+from gaitswarm.sim.mujoco.engines import (
+    ENGINES,
+    LIBRARY,
+    EngineName,
+    check_installed,
+    engine_variable,
+)
 from gaitswarm.sim.scenario import HELD_OUT, ScenarioChoice, ScenarioName
 from gaitswarm.sim.simulate import check_reach
-from gaitswarm.sim.variables import VariableName, VariableValue
-from gaitswarm.sim.worlds import EngineWalk, WorldWalk, check_worlds, sample_worlds
+from gaitswarm.sim.variables import Variable, VariableName, VariableValue
+from gaitswarm.sim.worlds import PERTURBATIONS, EngineWalk, WorldWalk, check_worlds, sample_worlds
+from gaitswarm.sim.worlds.perturbations import NOMINAL
 
 Floats = NDArray[np.float64]
+
+
+def world_space(
+    variables: Sequence[str | Variable] | None, fixed: Mapping[str, float | str]
+) -> DesignSpace:
+    """The perturbations that are drawn or held."""
+    if variables is None:
+        variables = tuple(v for v in PERTURBATIONS if v.name not in fixed)
+    return DesignSpace.build(required=(), optional=PERTURBATIONS, chosen=variables, fixed=fixed)
+
+
+def with_engine(space: DesignSpace, engines: Sequence[EngineName]) -> DesignSpace:
+    """The same worlds, each with the engine that computes its walks."""
+    if not engines:
+        return space
+    drawn = len(space.variables)
+    return replace(
+        space,
+        variables=(*space.variables, engine_variable(engines)),
+        catalogue=(*space.catalogue[:drawn], engine_variable(), *space.catalogue[drawn:]),
+    )
+
+
+def world_positions(
+    space: DesignSpace, engines: Sequence[EngineName], seed: int
+) -> Callable[[int, int], Floats]:
+    """The order of a certificate's walks."""
+    first = [[min(max(NOMINAL[v.name], v.low), v.high) for v in space.variables]]
+    nominal = np.array(first * (1 + len(engines)))
+    box = with_engine(space, engines).box
+
+    def positions(start: int, stop: int) -> Floats:
+        drawn = sample_worlds(max(0, stop - len(nominal)), seed, space.variables)
+        worlds = np.concatenate([nominal, drawn])[:stop]
+        if engines:
+            engine = np.zeros((len(worlds), 1))
+            engine[: len(nominal), 0] = np.arange(len(nominal))[: len(worlds)]
+            worlds = box.positions(np.hstack([worlds, engine]))
+        return worlds[start:]
+
+    return positions
+
 
 BATCH: Final = 50
 """Worlds of an iteration: with eight scenarios 400 walks, half a second or so of two cores."""

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import product
-from typing import Final, Literal
+from typing import TYPE_CHECKING, Annotated, Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import BeforeValidator, ConfigDict, Field, GetJsonSchemaHandler, model_validator
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
 
 from gaitswarm.services.optimizer.errors import InvalidRequest
-from gaitswarm.services.optimizer.jobs.case_choice import CaseChoice
 from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
 from gaitswarm.services.optimizer.jobs.judgement import Judgement
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
@@ -19,16 +20,56 @@ from gaitswarm.services.optimizer.jobs.kinds.walks import WalksSpec
 from gaitswarm.services.optimizer.jobs.preference import PreferenceChoice, objective_vectors
 from gaitswarm.services.optimizer.search.registry import METHODS
 from gaitswarm.sim.case import Case, Walk
-from gaitswarm.sim.case_registry import CASES, create_case
+from gaitswarm.sim.case_registry import CASES, CaseFamily, CaseSettings, create_case
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
 from gaitswarm.sim.errors import BeyondJointLimit, SimulationInputError, UnreachablePose
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, GAIT_VARIABLES, orders_searched, with_gait
 from gaitswarm.sim.identification.recorded_walk import Recordings
+from gaitswarm.sim.plugins import PluginSettings
 from gaitswarm.sim.scenario import SCENARIOS, ScenarioChoice
 from gaitswarm.sim.simulate import check_reach
 from gaitswarm.sim.variables import Variable, split_name
 from gaitswarm.sim.worlds import check_worlds
 from gaitswarm.sim.worlds.walks import PerturbedWalk
+
+
+def _case_settings(choice: object) -> object:
+    """Settings of a name, and a refusal of one that is none."""
+    if isinstance(choice, str):
+        choice = {"name": choice}
+    if isinstance(choice, Mapping):
+        name = choice.get("name")
+        if isinstance(name, str) and name not in CASES:
+            raise ValueError(CASES.unknown(name))
+    elif choice is not None and not isinstance(choice, CaseSettings):
+        raise ValueError("must be a name or an object: settings of a plug-in's case")
+    return choice
+
+
+def _model(family: CaseFamily) -> type[CaseSettings]:
+    return family.settings
+
+
+class _OrName:
+    """A case's name in place of its settings, in schemas."""
+
+    @staticmethod
+    def __get_pydantic_json_schema__(
+        schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        found, names = handler(schema), list(CASES)
+        if not names:
+            return found
+        return {"anyOf": [{"type": "string", "enum": names}, *found["anyOf"]]}
+
+
+if TYPE_CHECKING:
+    CaseChoice: TypeAlias = CaseSettings | None
+else:
+    CaseChoice = Annotated[
+        None, PluginSettings(CASES, _model, "/v1/cases"), BeforeValidator(_case_settings), _OrName()
+    ]
+"""What a job may say; once it is read, a name has become settings."""
 
 Floats = NDArray[np.float64]
 

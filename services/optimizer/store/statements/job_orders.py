@@ -14,9 +14,9 @@ from typing import Any, Final
 
 from sqlalchemy import Connection, select
 
+from gaitswarm.services.optimizer.jobs.estimate import time_left
 from gaitswarm.services.optimizer.jobs.job import JobOrder, JobState
 from gaitswarm.services.optimizer.jobs.labels import JobFilter
-from gaitswarm.services.optimizer.jobs.time_left import time_left
 from gaitswarm.services.optimizer.store.rows.job_views import (
     SHOWN,
     shown_job,

@@ -12,10 +12,10 @@ from sqlalchemy import Connection, Select, bindparam, insert, select, update
 from sqlalchemy import Row as SqlRow
 
 from gaitswarm.services.optimizer.errors import Conflict, NotFound
+from gaitswarm.services.optimizer.jobs.estimate import recent_pace
 from gaitswarm.services.optimizer.jobs.iteration import Answered, Ask, CompletedIteration
 from gaitswarm.services.optimizer.jobs.job import Job, JobState
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, with_record
-from gaitswarm.services.optimizer.jobs.time_left import recent_pace
 from gaitswarm.services.optimizer.store.connections.changes import announce
 from gaitswarm.services.optimizer.store.rows.columns import select_columns
 from gaitswarm.services.optimizer.store.rows.evaluation_rows import (

@@ -16,8 +16,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from gaitswarm.services.optimizer.analysis.interval import Interval, percentile_interval
 from gaitswarm.services.optimizer.analysis.ranking import rank_correlation
+from gaitswarm.services.optimizer.analysis.statistics import Interval, percentile_interval
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers, uniform
 
 Floats = NDArray[np.float64]

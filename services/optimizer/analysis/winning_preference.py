@@ -13,8 +13,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from gaitswarm.services.optimizer.analysis.preference_winners import NAMED
 from gaitswarm.services.optimizer.analysis.ranking import fitness_by
-from gaitswarm.services.optimizer.analysis.robustness.preference_winners import NAMED
 from gaitswarm.services.optimizer.analysis.utilities import objective_vectors
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from gaitswarm.services.optimizer.analysis.interval import CONFIDENCE, Interval
+from gaitswarm.services.optimizer.analysis.statistics import CONFIDENCE, Interval
 from gaitswarm.services.optimizer.search.random_stream import swarm_uniform
 from gaitswarm.sim.outcome import OBJECTIVES
 from gaitswarm.sim.variables import Variable

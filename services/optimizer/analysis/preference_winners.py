@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaitswarm.services.optimizer.analysis.ranking import fitness_by
-from gaitswarm.services.optimizer.analysis.robustness.index import NORMALISED_OBJECTIVES
+from gaitswarm.services.optimizer.analysis.robustness_index import NORMALISED_OBJECTIVES
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference

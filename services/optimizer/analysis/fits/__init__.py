@@ -1,1 +1,0 @@
-"""How far fitted parameters can be trusted."""

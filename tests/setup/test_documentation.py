@@ -82,6 +82,13 @@ def test_every_route_that_is_written_exists() -> None:
     assert [path for path in written if path.rstrip("/") not in paths] == []
 
 
+def test_every_file_that_is_written_exists() -> None:
+    folders = "benchmarks|deploy|docs|examples|research|scripts|services|sim|tests|web"
+    written = set(re.findall(rf"`((?:{folders})/[\w./-]+)`", documentation()))
+    assert len(written) > 20
+    assert [path for path in written if not (ROOT / path).exists()] == []
+
+
 def test_pages_of_the_manual_that_the_page_leads_to_exist() -> None:
     sources = [*(ROOT / "web" / "src").rglob("*.tsx"), *(ROOT / "web" / "src").rglob("*.ts")]
     texts = [source.read_text(encoding="utf-8") for source in sources]

@@ -82,11 +82,6 @@ def test_all_that_is_not_finite_is_the_same_as_it_is_stored_as_none() -> None:
     assert len({encoded(np.array([value])) for value in kinds}) == 1
 
 
-def test_what_json_has_not_is_refused() -> None:
-    with pytest.raises(TypeError, match="set has no encoding"):
-        encoded({"a": {1}})
-
-
 DOCUMENTS = ChainDocuments(
     {"controller": "pi", "seed": 3},
     None,

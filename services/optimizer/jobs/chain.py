@@ -14,13 +14,13 @@ were stored. A digest of another version than 1 is to begin with that version an
 from __future__ import annotations
 
 import hashlib
-import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import chain
 from typing import Any, Final
 
+import cbor2
 import numpy as np
+from cbor2 import CBOREncoder, CBORTag
 from numpy.typing import NDArray
 
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
@@ -32,11 +32,8 @@ VERSION: Final = 1
 
 Floats = NDArray[np.float64]
 
-_UNSIGNED, _NEGATIVE, _BYTES, _TEXT, _ARRAY, _MAP, _TAG = range(7)
-_SIMPLE: Final = {None: b"\xf6", False: b"\xf4", True: b"\xf5"}
-_FLOAT: Final = 0xFB
-_POSITIVE_BIG, _NEGATIVE_BIG, _DIMENSIONS, _UINT8, _FLOAT64 = 2, 3, 40, 64, 86
-"""Tags: bignums of RFC 8949, arrays of RFC 8746."""
+_DIMENSIONS, _UINT8, _FLOAT64 = 40, 64, 86
+"""Tags of arrays, RFC 8746."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,93 +158,37 @@ def _digest(value: Any) -> str:
 
 def encoded(value: Any) -> bytes:
     """Encode as CBOR: equal values are equal bytes."""
-    out = bytearray()
-    _write(out, value)
-    return bytes(out)
+    return cbor2.dumps(value, encoders=_ENCODERS)
 
 
-def _write(out: bytearray, value: Any) -> None:
-    match value:
-        case None | True | False:
-            out += _SIMPLE[value]
-        case str():
-            # Documents may hold halves of surrogate pairs, which are no Unicode.
-            _write_bytes(out, _TEXT, value.encode(errors="surrogatepass"))
-        case float():
-            out += struct.pack(">Bd", _FLOAT, value)
-        case int():
-            _write_integer(out, value)
-        case list() | tuple():
-            _write_list(out, value)
-        case dict():
-            _head(out, _MAP, len(value))
-            for key, part in sorted((encoded(key), part) for key, part in value.items()):
-                out += key
-                _write(out, part)
-        case np.ndarray():
-            _write_floats(out, value)
-        case _Statuses():
-            _write_statuses(out, value.values)
-        case _:
-            raise TypeError(f"{type(value).__name__} has no encoding")
+def _encode_map(encoder: CBOREncoder, value: dict[str, Any]) -> None:
+    """In the order of the keys' bytes."""
+    encoder.encode_map(dict(sorted(value.items(), key=lambda item: cbor2.dumps(item[0]))))
 
 
-def _head(out: bytearray, major: int, argument: int) -> None:
-    """In the fewest bytes, as deterministic encoding wants."""
-    if argument < 24:
-        out.append(major << 5 | argument)
-        return
-    size = next(n for n in (1, 2, 4, 8) if argument < 1 << 8 * n)
-    out.append(major << 5 | 23 + size.bit_length())
-    out += argument.to_bytes(size)
-
-
-def _write_bytes(out: bytearray, major: int, content: bytes) -> None:
-    _head(out, major, len(content))
-    out += content
-
-
-def _write_integer(out: bytearray, value: int) -> None:
-    major, rest = (_UNSIGNED, value) if value >= 0 else (_NEGATIVE, -1 - value)
-    if rest < 1 << 64:
-        _head(out, major, rest)
-        return
-    _head(out, _TAG, _POSITIVE_BIG if value >= 0 else _NEGATIVE_BIG)
-    _write_bytes(out, _BYTES, rest.to_bytes((rest.bit_length() + 7) // 8))
-
-
-def _write_list(out: bytearray, values: Sequence[Any]) -> None:
-    _head(out, _ARRAY, len(values))
-    if len(values) > 1 and set(map(type, values)) == {float}:
-        # A state is mostly floats: at once they take a tenth of the time.
-        pairs = chain.from_iterable((_FLOAT, value) for value in values)
-        out += struct.pack(">" + "Bd" * len(values), *pairs)
-        return
-    for value in values:
-        _write(out, value)
-
-
-def _write_floats(out: bytearray, values: Floats) -> None:
+def _encode_floats(encoder: CBOREncoder, values: Floats) -> None:
     """All that is not finite is one NaN, as all of it is stored as none."""
     numbers = np.where(np.isfinite(values), values, np.nan).astype("<f8")
-    _write_array(out, numbers.shape, _FLOAT64, numbers.tobytes())
+    encoder.encode(_array(numbers.shape, _FLOAT64, numbers.tobytes()))
 
 
-def _write_statuses(out: bytearray, values: NDArray[np.uint8]) -> None:
+def _encode_statuses(encoder: CBOREncoder, statuses: _Statuses) -> None:
     """Labels that occur, sorted, and for each status its place among them."""
+    values = statuses.values
     labels = {value: Status(value).label for value in np.unique(values).tolist()}
     ranked = sorted(labels.values())
     places = np.zeros(256, dtype=np.uint8)
     for value, label in labels.items():
         places[value] = ranked.index(label)
-    _head(out, _ARRAY, 2)
-    _write(out, ranked)
-    _write_array(out, values.shape, _UINT8, places[values].tobytes())
+    encoder.encode([ranked, _array(values.shape, _UINT8, places[values].tobytes())])
 
 
-def _write_array(out: bytearray, shape: Sequence[int], tag: int, content: bytes) -> None:
-    _head(out, _TAG, _DIMENSIONS)
-    _head(out, _ARRAY, 2)
-    _write(out, list(shape))
-    _head(out, _TAG, tag)
-    _write_bytes(out, _BYTES, content)
+def _array(shape: Sequence[int], tag: int, content: bytes) -> CBORTag:
+    return CBORTag(_DIMENSIONS, [list(shape), CBORTag(tag, content)])
+
+
+_ENCODERS: Final[Mapping[type, Callable[[CBOREncoder, Any], None]]] = {
+    dict: _encode_map,
+    np.ndarray: _encode_floats,
+    _Statuses: _encode_statuses,
+}

@@ -37,13 +37,9 @@ def average_ranks(values: Floats) -> Floats:
     Returns:
         (n,).
     """
-    order = np.argsort(values)
-    ordered = values[order]
-    begins = np.flatnonzero(np.append(True, ordered[1:] != ordered[:-1]))[: len(values)]
-    sizes = np.diff(begins, append=len(values))
-    ranks = np.empty(len(values))
-    ranks[order] = np.repeat(begins + 0.5 * (sizes + 1.0), sizes)
-    return ranks
+    _, places, sizes = np.unique(values, return_inverse=True, return_counts=True)
+    means = np.cumsum(sizes) - 0.5 * (sizes - 1.0)
+    return np.asarray(means[places])
 
 
 CONFIDENCE: Final = 0.95

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
-from gaitswarm.sim.errors import SimulationInputError, UnreachablePose
-from gaitswarm.sim.gait.driving_2011 import SPEEDS, driven_as_in_2011, scenario_2011
+from gaitswarm.sim.errors import UnreachablePose
+from gaitswarm.sim.gait.driving_2011 import driven_as_in_2011
 from gaitswarm.sim.gait.half_ellipse import half_ellipse
 from gaitswarm.sim.gait.inverse_kinematics import leg_angles
 from gaitswarm.sim.gait.quadratic_spline import quadratic_spline
@@ -271,6 +271,12 @@ def test_whatever_a_trajectory_depends_on_makes_it_another(
     assert usual.columns.shape != other.columns.shape or (usual.columns != other.columns).any()
 
 
+def scenario_2011(w_s: float, turn: float = 0.0) -> Scenario:
+    """A level walk by the commands of 2011 (appendix .2.1); w_s sets the cycle's length."""
+    walk = Scenario(name="2011", cycle_time=25.2 / w_s, radius=0.16, hip_height=0.15, turn=turn)
+    return driven_as_in_2011(walk)
+
+
 @pytest.mark.parametrize(
     ("w_s", "cycle_time", "rate"), [(7.5, 3.36, 12.5), (10, 2.52, 16.7), (20, 1.26, 33.3)]
 )
@@ -282,7 +288,7 @@ def test_the_robot_of_2011_was_sent_42_targets_a_cycle(
     assert scenario.trajectory_rate == pytest.approx(rate, abs=0.05)
 
 
-@pytest.mark.parametrize("w_s", SPEEDS)
+@pytest.mark.parametrize("w_s", [7.5, 10.0, 12.0, 15.0, 20.0])
 def test_twenty_of_them_are_of_swing_twenty_of_support_and_two_end_the_stride(
     robot: Robot, w_s: float
 ) -> None:
@@ -306,13 +312,6 @@ def test_in_2011_a_turn_shortened_one_sides_stride_and_lengthened_the_others() -
     scenario = scenario_2011(10, 0.25)
     assert scenario.stride_of(-1) == 0.75 * scenario.stride
     assert scenario.stride_of(1) == 1.25 * scenario.stride
-
-
-def test_only_commands_that_there_were_make_a_scenario_of_2011() -> None:
-    with pytest.raises(SimulationInputError, match=r"w_s: 11 is none of 7\.5, 10, 12, 15, 20"):
-        scenario_2011(11)
-    with pytest.raises(SimulationInputError, match=r"w_d: 1\.5 is not between -1 and 1"):
-        scenario_2011(10, 1.5)
 
 
 def test_any_scenario_may_be_driven_as_in_2011_in_its_own_cycle() -> None:

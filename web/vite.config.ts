@@ -1,19 +1,19 @@
 import { loadEnv } from 'vite'
 import { defineConfig } from 'vitest/config'
 
-// The API that `npm run dev` shows: GAITSWARM_SERVER, else where `gaitswarm serve` listens.
+// API used by `npm run dev`; by default where `gaitswarm serve` listens.
 const { GAITSWARM_SERVER: API = 'http://127.0.0.1:8000' } = loadEnv('', '.', 'GAITSWARM_')
 
 export default defineConfig({
   oxc: { jsx: { runtime: 'automatic', importSource: 'preact' } },
   build: {
-    // The API serves what lies there.
+    // The API serves this folder.
     outDir: '../api/page',
     emptyOutDir: true,
     target: 'es2022',
-    // Assets as data: URLs would need a laxer content security policy.
+    // Assets as data: URLs would require a laxer content security policy.
     assetsInlineLimit: 0,
-    // The 3D chunk is large on purpose, and loaded with the first walk.
+    // The 3D chunk is large, but loaded only with the first walk.
     chunkSizeWarningLimit: 900,
   },
   server: {
@@ -22,9 +22,9 @@ export default defineConfig({
   },
   test: {
     include: ['tests/**/*.test.ts'],
-    // Stylesheets are read by the test of their classes.
+    // Stylesheets are read by tests/styles.
     css: true,
-    // Files share modules: a process for each of them takes twenty times what its tests take.
+    // One process for all files; a process per file would take twenty times as long.
     isolate: false,
     pool: 'threads',
     unstubGlobals: true,

@@ -1,4 +1,4 @@
-"""The machine's own Chromium, quiet and drawing in software."""
+"""The installed Chromium, with software rendering and without background traffic."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 SHELL: Final = "chromium-headless-shell"
-"""Chromium's engine without the windows around it, which take a fifth of what the tests take."""
+"""Chromium without a user interface, which saves a fifth of the test time."""
 
 BROWSERS: Final = ("chromium", "chromium-browser", "google-chrome")
 
@@ -20,22 +20,22 @@ ARGUMENTS: Final = (
     "--no-first-run",
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
-    # On an emulated graphics card, to put a page together is a third of what it takes.
+    # Compositing on an emulated GPU would take a third of the time.
     "--disable-gpu-compositing",
 )
 
 
 def find_shell() -> Path | None:
-    """The headless shell, or a browser where there is none."""
+    """Find the headless shell, or else a browser."""
     return _first_of(SHELL, *BROWSERS)
 
 
 def find_browser() -> Path | None:
-    """The one that people use, or the headless shell where there is none."""
+    """Find a regular browser, or else the headless shell."""
     return _first_of(*BROWSERS, SHELL)
 
 
 def _first_of(*names: str) -> Path | None:
-    """The first that is on the path."""
-    found = next(filter(None, map(shutil.which, names)), None)
-    return Path(found) if found else None
+    """Find the first executable on the path."""
+    path = next(filter(None, map(shutil.which, names)), None)
+    return Path(path) if path else None

@@ -1,4 +1,4 @@
-"""A real browser before a real server: processes, contexts, and what every visit must keep to."""
+"""Fixtures for tests of the page in a real browser against a real server."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tests.web.chromium import ARGUMENTS, SHELL, find_shell
 from tests.web.pages import Pages
 from tests.web.visit import Visit
 
-# Read here: the tests themselves see none of the user's settings.
+# Read at import: tests do not see the user's environment.
 SCREENSHOTS = os.environ.get("GAITSWARM_SCREENSHOTS", "")
 
 HERE = Path(__file__).parent
@@ -33,27 +33,27 @@ SMALL_JOB: dict[str, Any] = SMALL_SPEC | {
     "iterations": 6,
     "seed": 5,
 }
-"""Walked to its end within seconds."""
+"""Finishes within seconds."""
 
 
 @pytest.fixture(scope="session")
 def _chromium() -> str:
-    """Path of the browser; skips all tests of the page where browser or page are missing."""
-    found = find_shell()
+    """Path of the browser; skips the tests if browser or page are missing."""
+    shell = find_shell()
     requirements.PAGE.check(
-        "" if found else f"Chromium is not installed (Debian: apt install {SHELL})",
+        "" if shell else f"Chromium is not installed (Debian: apt install {SHELL})",
         "" if is_built() else "the page is not built (make page)",
     )
-    return str(found)
+    return str(shell)
 
 
 _opened = ExitStack()
-"""Closes the browser, if one is open."""
+"""Closes the open browser."""
 
 
 @pytest.fixture(scope="session")
 def _open_browser(_chromium: str) -> Iterator[Callable[[], Pages]]:
-    """Start a browser, or go on with the one that is open; its pages."""
+    """Pages of the open browser, which is started if necessary."""
     opened: list[Pages] = []
 
     def pages() -> Pages:
@@ -71,16 +71,13 @@ def _open_browser(_chromium: str) -> Iterator[Callable[[], Pages]]:
 
 @pytest.fixture
 def pages(_open_browser: Callable[[], Pages]) -> Pages:
-    """Of one browser for all tests of this folder that follow each other."""
+    """Pages of a browser shared by consecutive tests of this folder."""
     return _open_browser()
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_teardown(nextitem: pytest.Item | None) -> Iterator[None]:
-    """After a test of this folder: close the browser before one of another folder begins.
-
-    Its event loop must not outlast them, other tests run loops of their own.
-    """
+    """Close the browser before tests of other folders, which run their own event loops."""
     try:
         yield
     finally:
@@ -90,7 +87,7 @@ def pytest_runtest_teardown(nextitem: pytest.Item | None) -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def robots(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Folder of robots whose meshes the server gives out."""
+    """Folder of robots whose meshes are served."""
     return tmp_path_factory.mktemp("robots")
 
 
@@ -98,7 +95,7 @@ def robots(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def server(
     tmp_path_factory: pytest.TempPathFactory, robots: Path, _chromium: str
 ) -> Iterator[ServerProcess]:
-    """`gaitswarm serve` with a runner, on a database of its own."""
+    """`gaitswarm serve` with a runner and a separate database."""
     folder = tmp_path_factory.mktemp("server")
     environment = {**QUICK_EVENTS, "GAITSWARM_ROBOTS": str(robots)}
     server = ServerProcess(folder / "jobs.db", environment=environment)
@@ -108,8 +105,8 @@ def server(
 
 @pytest.fixture(scope="session")
 def finished_job(server: ServerProcess) -> str:
-    """A job that the server has walked to its end, whatever other tests have run before."""
-    # Designs of another job that is the same would not walk again.
+    """A finished job, independent of other tests."""
+    # The evaluations of an identical job would be reused.
     job_id = server.submit(SMALL_JOB | {"seed": 7})
     server.wait_for(job_id, "succeeded")
     return job_id
@@ -117,7 +114,7 @@ def finished_job(server: ServerProcess) -> str:
 
 @pytest.fixture(scope="session")
 def idle_server(_chromium: str) -> Iterator[Server]:
-    """One server for most tests of `start_server`, which tell it whose jobs it serves."""
+    """A server shared by the tests of `start_server`, each with its own store."""
     server = Server(None, page_folder=FOLDER)
     yield server
     server.close()
@@ -127,10 +124,10 @@ def idle_server(_chromium: str) -> Iterator[Server]:
 def start_server(
     store: SqlStore, idle_server: Server, _chromium: str
 ) -> Iterator[Callable[..., Server]]:
-    """For a server that has no jobs but the test's own, and runs none.
+    """Start a server for the test's store, without a runner.
 
-    settings: of `Server`; with any it is one of the test's own. To be asked for before `visit`,
-    which ends first then.
+    settings: of `Server`; with any, a separate server is started. Request this fixture before
+    `visit`, which must be torn down first.
     """
     with ExitStack() as stack:
 
@@ -147,7 +144,7 @@ def start_server(
 
 @pytest.fixture
 def visit(pages: Pages) -> Iterator[Callable[..., Visit]]:
-    """Open the page of a server; at the end nothing may have gone wrong in the browser."""
+    """Visit the page of a server; the test fails on errors in the browser."""
     with ExitStack() as stack:
 
         def start(url: str, **options: Any) -> Visit:

@@ -1,10 +1,10 @@
-"""What the page of a job tells tests by its data- attributes."""
+"""State of a job's page, from its data attributes."""
 
 from __future__ import annotations
 
 from playwright.sync_api import Locator, Page, expect
 
-_REACHED = "wanted => Number(document.querySelector('[data-stream]')?.dataset.iteration) >= wanted"
+_REACHED = "index => Number(document.querySelector('[data-stream]')?.dataset.iteration) >= index"
 
 
 def job_element(page: Page) -> Locator:
@@ -12,13 +12,13 @@ def job_element(page: Page) -> Locator:
 
 
 def shown_iteration(page: Page) -> int:
-    """Index of the last iteration that is shown; -1 before the first."""
+    """Index of the last iteration shown; -1 before the first."""
     text = job_element(page).get_attribute("data-iteration")
     return int(text) if text else -1
 
 
 def wait_for_iteration(page: Page, index: int) -> None:
-    """Until this iteration is shown, or a later one."""
+    """Wait until this iteration or a later one is shown."""
     page.wait_for_function(_REACHED, arg=index)
 
 

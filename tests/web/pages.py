@@ -1,4 +1,4 @@
-"""Pages of one browser that visits take and give back: a new one costs more than most visits."""
+"""Pool of browser pages, since creating a page costs more than most visits."""
 
 from __future__ import annotations
 
@@ -7,20 +7,19 @@ from typing import Final
 
 from playwright.sync_api import Browser, BrowserContext, Error, Page
 
-# Machines of continuous integration have little to spare.
+# Machines of continuous integration are slow.
 TIMEOUT_MS: Final = 30_000
 
-FORGET = "() => { localStorage.clear(); sessionStorage.clear() }"
+CLEAR_STORAGE = "() => { localStorage.clear(); sessionStorage.clear() }"
 
 Kind = tuple[str, bool]
-"""What a context is made for: a server's address, and whether its content policy is bypassed."""
+"""Key of a context: server address, and whether the content security policy is bypassed."""
 
 
 class Pages:
-    """Hands out pages that know nothing of the visits before, save the cached files of the page.
+    """Pages without state from previous visits except cached files.
 
-    A page of a new context is drawn by a new process, which takes five times what it takes to load
-    another view in one that runs.
+    A new context starts a renderer process, which takes five times as long as loading another view.
     """
 
     def __init__(self, browser: Browser) -> None:
@@ -29,7 +28,7 @@ class Pages:
         self._kinds: dict[Page, Kind] = {}
 
     def take(self, url: str, *, bypass_csp: bool = False, fresh: bool = False) -> Page:
-        """A blank page. fresh: with nothing in its cache, and closed when it is given back."""
+        """Get a blank page. fresh: with an empty cache; closed when given back."""
         kind = (url, bypass_csp)
         if self._idle[kind] and not fresh:
             return self._idle[kind].pop()
@@ -40,9 +39,9 @@ class Pages:
         return page
 
     def give_back(self, page: Page, *, failed: bool = False) -> None:
-        """failed: the page is in no known state and is closed."""
+        """failed: the state of the page is unknown, so it is closed."""
         kind = self._kinds.get(page)
-        if kind is None or failed or not _forgets(page):
+        if kind is None or failed or not _reset(page):
             self._kinds.pop(page, None)
             page.context.close()
         else:
@@ -56,14 +55,14 @@ class Pages:
         return context
 
 
-def _forgets(page: Page) -> bool:
-    """Whether a page could be emptied of all that its visit has left."""
+def _reset(page: Page) -> bool:
+    """Reset a page; returns whether that succeeded."""
     try:
         page.unroute_all(behavior="ignoreErrors")
         for other in page.context.pages:
             if other is not page:
                 other.close()
-        page.evaluate(FORGET)
+        page.evaluate(CLEAR_STORAGE)
         page.context.clear_cookies()
         page.goto("about:blank")
         page.mouse.move(0, 0)

@@ -1,4 +1,4 @@
-"""What a picture of the page shows, as far as numbers can say."""
+"""Numeric checks of screenshots."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Image = NDArray[np.uint8]
 
 
 def pixels(element: Locator) -> Image:
-    """An element as it is painted: (height, width, 3)."""
+    """Screenshot of an element: (height, width, 3)."""
     from matplotlib.image import imread
 
     image = imread(BytesIO(element.screenshot()), format="png")
@@ -24,28 +24,26 @@ def pixels(element: Locator) -> Image:
 
 
 def painted(element: Locator, holds: Callable[[Image], bool]) -> Image:
-    """The element's picture once it is as it is to be: a canvas is painted after its element is
-    there, and after what it shows has changed.
-    """
+    """Screenshot of an element once a condition holds, since a canvas is painted asynchronously."""
     ends = time.monotonic() + TIMEOUT_MS / 1000.0
     while not holds(image := pixels(element)):
-        assert time.monotonic() < ends, f"not painted so: {colours(image)} colours"
+        assert time.monotonic() < ends, f"condition not met: {colours(image)} colours"
         element.page.wait_for_timeout(50)
     return image
 
 
 def colourful(least: int) -> Callable[[Image], bool]:
-    """Whether a picture has more colours than that."""
+    """Condition: more colours than `least`."""
     return lambda image: colours(image) > least
 
 
 def other_than(before: Image) -> Callable[[Image], bool]:
-    """Whether a picture differs from another one."""
+    """Condition: differs from a previous screenshot."""
     return lambda image: not np.array_equal(image, before)
 
 
 def colours(image: Image) -> int:
-    """How many colours there are; a blank picture has a handful."""
+    """Number of colours; a blank picture has just a few."""
     red, green, blue = (image[..., k].astype(np.uint32) for k in range(3))
-    # As numbers: to sort triples takes fifty times as long.
+    # Combined into numbers, since sorting triples takes fifty times as long.
     return len(np.unique(red << 16 | green << 8 | blue))

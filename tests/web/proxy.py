@@ -1,4 +1,4 @@
-"""A connection that can be cut: bytes are passed on until they are not."""
+"""TCP proxy whose connections can be cut."""
 
 from __future__ import annotations
 
@@ -9,10 +9,7 @@ from urllib.parse import urlsplit
 
 
 class CuttableProxy:
-    """Listens on a free port and passes everything on to a server.
-
-    url: of the proxy.
-    """
+    """Forwards connections on a free port to a server."""
 
     def __init__(self, target: str) -> None:
         parts = urlsplit(target)
@@ -25,7 +22,7 @@ class CuttableProxy:
         threading.Thread(target=self._accept, daemon=True).start()
 
     def cut(self) -> None:
-        """Break every connection, and every new one until `mend`."""
+        """Close all connections, and new ones until `mend`."""
         with self._lock:
             self._is_cut = True
             for end in self._open:
@@ -33,13 +30,13 @@ class CuttableProxy:
                     end.shutdown(socket.SHUT_RDWR)
 
     def mend(self) -> None:
-        """Let new connections through again."""
+        """Accept new connections again."""
         with self._lock:
             self._is_cut = False
 
     def close(self) -> None:
         self.cut()
-        # Closing alone does not wake a thread that accepts.
+        # Closing alone does not wake the accepting thread.
         with contextlib.suppress(OSError):
             self._listener.shutdown(socket.SHUT_RDWR)
         self._listener.close()

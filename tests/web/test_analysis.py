@@ -1,4 +1,4 @@
-"""Which variables matter, and bounds that hold the winner, on a job's page."""
+"""Analysis tab: variable importance and active bounds."""
 
 from __future__ import annotations
 
@@ -21,36 +21,36 @@ def importance_of(server: ServerProcess, job_id: str) -> Any:
     return server.client.get(f"/v1/jobs/{job_id}/importance").json()
 
 
-def test_variables_stand_in_the_order_of_what_they_do_to_the_chosen_output(
+def test_variables_are_sorted_by_importance_for_the_chosen_output(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
-    found = importance_of(server, finished_job)
+    importance = importance_of(server, finished_job)
     page = visit(server.url).go(f"/jobs/{finished_job}")
     page.get_by_role("link", name="Analysis").click()
     bars = page.locator("[data-output] [data-variable]")
-    expect(bars).to_have_count(len(found["variables"]))
+    expect(bars).to_have_count(len(importance["variables"]))
     for output in ("fitness", "energy"):
         page.get_by_role("main").get_by_role("combobox").select_option(output)
         expect(page.locator(f"[data-output='{output}']")).to_be_visible()
         values = {
             v["name"]: v["fitness"] if output == "fitness" else v["objectives"][output]
-            for v in found["variables"]
+            for v in importance["variables"]
         }
         most = max(values, key=lambda name: values[name]["value"])
         expect(bars.first).to_have_attribute("data-variable", most)
         expect(bars.first).to_contain_text("%")
     assert parse_qs(urlsplit(page.url).query)["of"] == ["energy"]
 
-    page.get_by_role("button", name=re.compile("^Show as table.*Which variables")).click()
+    page.get_by_role("button", name=re.compile("^Show as table.*Variable importance")).click()
     table = page.get_by_role("table", name="Importance of every variable")
-    expect(table.locator("tbody tr")).to_have_count(len(found["variables"]))
+    expect(table.locator("tbody tr")).to_have_count(len(importance["variables"]))
     expect(table.get_by_role("columnheader", name="energy")).to_be_visible()
 
 
-def test_bounds_that_hold_the_winner_are_widened_in_the_form(
+def test_active_bounds_are_widened_in_the_form(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:
-    # All of its designs are at the upper bound of P.
+    # All designs are at the upper bound of P.
     narrow = SMALL_JOB | {
         "controller": "pi",
         "variables": [{"name": "P", "low": 0.05, "high": 0.1}, "I"],
@@ -60,15 +60,19 @@ def test_bounds_that_hold_the_winner_are_widened_in_the_form(
     }
     job_id = server.submit(narrow)
     server.wait_for(job_id, "succeeded")
-    found = {v["name"]: v for v in importance_of(server, job_id)["variables"]}
-    assert found["P"]["at"] == "high"
+    importance = {v["name"]: v for v in importance_of(server, job_id)["variables"]}
+    assert importance["P"]["at"] == "high"
     page = visit(server.url).go(f"/jobs/{job_id}/analysis")
-    held = page.locator("[data-held]")
-    expect(held).to_have_attribute("data-held", re.compile(r"\bP\b"))
-    row = page.get_by_role("table", name="Variables in which").get_by_role("row", name="P ")
+    active = page.locator("[data-active-bounds]")
+    expect(active).to_have_attribute("data-active-bounds", re.compile(r"\bP\b"))
+    row = page.get_by_role("table", name="Variables with the winner at a bound").get_by_role(
+        "row", name="P "
+    )
     expect(row).to_contain_text("0.05 to 0.1")
     page.get_by_role("link", name="Widen and run again").click()
-    expect(page.get_by_label("Upper bound of P")).to_have_value(str(found["P"]["widened"]["high"]))
+    expect(page.get_by_label("Upper bound of P")).to_have_value(
+        str(importance["P"]["widened"]["high"])
+    )
     expect(page.get_by_label("Lower bound of P")).to_have_value("0.05")
 
 
@@ -80,7 +84,7 @@ def test_before_the_first_iteration_there_is_nothing_to_analyse(
     expect(page.get_by_role("heading", name="Nothing to analyse yet")).to_be_visible()
 
 
-def test_an_answer_that_fails_is_told_with_a_way_to_ask_again(
+def test_an_error_can_be_retried(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
     visited = visit(server.url, allowed="status of 503")
@@ -88,7 +92,7 @@ def test_an_answer_that_fails_is_told_with_a_way_to_ask_again(
     broken = {"status": 503, "content_type": "application/problem+json", "body": problem}
     visited.page.route("**/importance", lambda route: route.fulfill(**broken))
     page = visited.go(f"/jobs/{finished_job}/analysis")
-    expect(page.get_by_role("alert")).to_contain_text("Which variables matter cannot be told.")
+    expect(page.get_by_role("alert")).to_contain_text("Could not load the variable importance.")
     visited.page.unroute("**/importance")
     page.get_by_role("button", name="Try again").click()
     expect(page.locator("[data-output='fitness']")).to_be_visible()

@@ -1,4 +1,4 @@
-"""A calibration on the page: targets, choices by their names, and no part that it does not have."""
+"""Calibration jobs on the page: targets, named choices, and applicable tabs."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ CALIBRATION: Final[dict[str, Any]] = {
 
 @pytest.fixture(scope="module")
 def calibration(server: ServerProcess) -> str:
-    """A calibration that the server has run to its end."""
+    """A succeeded calibration."""
     job_id = server.submit(CALIBRATION)
     server.wait_for(job_id, "succeeded")
     return job_id
 
 
-def test_the_list_of_jobs_says_what_it_is(
+def test_the_list_shows_its_kind_and_its_page_the_applicable_tabs(
     server: ServerProcess, calibration: str, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url).go("/jobs")
@@ -74,14 +74,14 @@ def test_the_list_of_jobs_says_what_it_is(
     expect(page.get_by_role("definition").filter(has_text=best.replace("_", " "))).to_be_visible()
 
 
-def test_targets_show_how_far_they_are_off_and_what_they_are_for(
+def test_targets_show_deviation_and_use(
     server: ServerProcess, calibration: str, visit: Callable[..., Visit]
 ) -> None:
-    found = server.client.get(f"/v1/jobs/{calibration}/targets").json()["targets"]
+    targets = server.client.get(f"/v1/jobs/{calibration}/targets").json()["targets"]
     page = visit(server.url).go(f"/jobs/{calibration}/targets")
 
     rows = [page.locator(f'[data-target="stiff {name}"]') for name in ("speed", "energy")]
-    for row, target, use in zip(rows, found, ("fitted", "predicted"), strict=True):
+    for row, target, use in zip(rows, targets, ("fitted", "predicted"), strict=True):
         expect(row).to_contain_text(use)
         numbers = [
             float(text.replace("\u2212", "-").split("\u00a0")[0].split(" ")[0])
@@ -90,16 +90,16 @@ def test_targets_show_how_far_they_are_off_and_what_they_are_for(
         expected = [target["value"], target["simulated"], target["difference"]]
         assert numbers == pytest.approx(expected, rel=1e-2)
 
-    # A single target leaves nothing to fit without it.
+    # With a single target, nothing is left to fit.
     page.get_by_label("Predict each target without").select_option("target")
-    expect(page.get_by_role("columnheader", name="Left out")).to_be_visible()
+    expect(page.get_by_role("columnheader", name="Left out", exact=True)).to_be_visible()
 
 
-def test_choices_have_their_names_wherever_variables_are_shown(
+def test_choices_are_shown_by_name_everywhere(
     server: ServerProcess, calibration: str, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url).go(f"/jobs/{calibration}/parameters")
-    choices = page.get_by_role("table", name="Least fitness by choice")
+    choices = page.get_by_role("table", name="Best fitness by choice")
     expect(choices.get_by_role("rowheader")).to_have_text(["linear zone", "stick"])
 
     page.goto(f"/jobs/{calibration}/variables")
@@ -116,21 +116,21 @@ def test_choices_have_their_names_wherever_variables_are_shown(
     expect(particles.get_by_role("row").filter(has_text="linear zone")).not_to_have_count(0)
 
 
-def test_no_part_has_to_be_scrolled_sideways(
+def test_no_tab_scrolls_horizontally(
     server: ServerProcess, calibration: str, visit: Callable[..., Visit]
 ) -> None:
     visited = visit(server.url, viewport=PHONE)
-    found = {}
+    overflows = {}
     for part in ("", "/targets", "/scenarios", "/parameters", "/variables"):
         page = visited.go(f"/jobs/{calibration}{part}")
         page.wait_for_load_state("networkidle")
         expect(page.get_by_role("main").get_by_role("heading", level=2).first).to_be_visible()
         if too_wide := page.evaluate(TOO_WIDE):
-            found[part] = too_wide
-    assert found == {}
+            overflows[part] = too_wide
+    assert overflows == {}
 
 
-def test_it_is_cloned_as_a_spec(
+def test_it_is_cloned_as_json(
     server: ServerProcess, calibration: str, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url).go(f"/jobs/{calibration}")

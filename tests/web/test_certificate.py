@@ -1,4 +1,4 @@
-"""A certificate on the page: its tables, its empty state, and a world that is walked again."""
+"""Certificate jobs on the page: tables, empty state, and replay of a world."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ CERTIFICATE: Final[dict[str, Any]] = {
 
 @pytest.fixture(scope="module")
 def certificate(server: ServerProcess) -> str:
-    """A certificate that the server has run to its end."""
+    """A succeeded certificate."""
     job_id = server.submit(CERTIFICATE)
     server.wait_for(job_id, "succeeded")
     return job_id
 
 
-def test_it_has_the_parts_that_make_sense_for_one_design(
+def test_it_has_the_applicable_tabs(
     server: ServerProcess, certificate: str, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url).go("/jobs")
@@ -48,22 +48,22 @@ def test_it_has_the_parts_that_make_sense_for_one_design(
     expect(page.get_by_role("progressbar", name="14 of 14 designs")).to_be_visible()
 
 
-def test_tables_show_what_the_design_comes_to_and_worlds_are_a_click_away(
+def test_tables_show_utilities_and_link_to_worlds(
     server: ServerProcess, certificate: str, visit: Callable[..., Visit]
 ) -> None:
-    found = server.client.get(f"/v1/jobs/{certificate}/certificate").json()
+    certificate_view = server.client.get(f"/v1/jobs/{certificate}/certificate").json()
     page = visit(server.url).go(f"/jobs/{certificate}/certificate")
 
-    expect(page.get_by_role("heading", name="The design in 12 worlds")).to_be_visible()
+    expect(page.get_by_role("heading", name="Failures in 12 worlds")).to_be_visible()
     table = page.get_by_role("table", name="Utility by scenario")
     expect(table.get_by_role("rowheader")).to_have_text(["short", "uphill", "all"])
     shown = page.locator('[data-scenario="all"] td.numeric').all_inner_texts()
-    spread = found["fitness"]
+    spread = certificate_view["fitness"]
     expected = [spread["nominal"], spread["quantiles"][2], spread["quantiles"][4]]
     assert [float(text) for text in shown[2:5]] == pytest.approx(expected, rel=1e-3)
     expect(page.get_by_role("table", name="Rank correlation")).to_contain_text("efficiency factor")
 
-    worst = found["worst"][0]
+    worst = certificate_view["worst"][0]
     page.get_by_role("link", name=str(worst["world"]), exact=True).click()
     expect(page.get_by_label("Design")).to_be_visible()
     place = f"design {worst['iteration']}.{worst['particle']}"
@@ -73,31 +73,33 @@ def test_tables_show_what_the_design_comes_to_and_worlds_are_a_click_away(
     assert f"particle={worst['particle']}" in page.url
 
 
-def test_what_another_engine_makes_of_it_is_a_table_of_its_own(
+def test_another_engine_has_a_separate_table(
     server: ServerProcess, certificate: str, visit: Callable[..., Visit]
 ) -> None:
-    found = server.client.get(f"/v1/jobs/{certificate}/certificate").json()["engines"]["mujoco"]
+    certificate_view = server.client.get(f"/v1/jobs/{certificate}/certificate").json()["engines"][
+        "mujoco"
+    ]
     page = visit(server.url).go(f"/jobs/{certificate}/certificate")
-    expect(page.get_by_role("heading", name="The nominal world in mujoco")).to_be_visible()
-    expect(page.locator("[data-engine=mujoco]")).to_contain_text("walks in 2 of 2 scenarios")
+    expect(page.get_by_role("heading", name="Nominal world in mujoco")).to_be_visible()
+    expect(page.locator("[data-engine=mujoco]")).to_contain_text("2 of 2 scenarios succeed")
     table = page.get_by_role("table", name="Scenarios and objectives in mujoco")
     first = table.locator("tbody tr").first
-    # Texts are read at once, whether they are there or not.
+    # Wait for the content: all_inner_texts does not.
     expect(first).to_contain_text("%")
-    torque = found["scenarios"]["short"]["objectives"]["torque"]
+    torque = certificate_view["scenarios"]["short"]["objectives"]["torque"]
     shown = first.locator("td.numeric").all_inner_texts()
     assert [float(text) for text in shown[:2]] == pytest.approx(
         [torque["ours"], torque["theirs"]], rel=1e-3
     )
-    # By the size of the difference, the greatest first.
+    # By magnitude of the difference, greatest first.
     table.get_by_role("button", name="Difference").click()
     expect(table.locator("tbody tr").first).to_be_visible()
 
     page = visit(server.url).go(f"/walk?job={certificate}&iteration=0&particle=1&scenario=short")
-    expect(page.get_by_text("this walk was computed by mujoco")).to_be_visible()
+    expect(page.get_by_text("this walk was simulated by mujoco")).to_be_visible()
 
 
-def test_a_certificate_that_waits_says_so(
+def test_a_queued_certificate_has_an_empty_state(
     start_server: Callable[..., Server], visit: Callable[..., Visit]
 ) -> None:
     idle = start_server()
@@ -105,7 +107,7 @@ def test_a_certificate_that_waits_says_so(
     expect(page.get_by_role("heading", name="No world yet")).to_be_visible()
 
 
-def test_no_part_has_to_be_scrolled_sideways(
+def test_no_tab_scrolls_horizontally(
     server: ServerProcess, certificate: str, visit: Callable[..., Visit]
 ) -> None:
     visited = visit(server.url, viewport={"width": 360, "height": 740})

@@ -1,4 +1,4 @@
-"""One controller: its surface, drawn and in numbers."""
+"""Controller page: surface and its values."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.web.visit import Visit
 pytestmark = pytest.mark.slow
 
 
-def test_the_surface_is_drawn_and_its_numbers_are_the_apis(
+def test_the_surface_is_drawn_with_the_values_of_the_api(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:
     controllers = server.client.get("/v1/controllers").json()["items"]
@@ -35,7 +35,7 @@ def test_the_surface_is_drawn_and_its_numbers_are_the_apis(
         assert float(drawn.get_attribute(f"data-{name}") or "nan") == pytest.approx(value)
     painted(drawn.locator("canvas"), colourful(200))
 
-    # The camera stands where the link puts it: turned to and fro, it is there again.
+    # The camera of the link: rotating back and forth restores it.
     page.goto("/controller?published=A&camera=-1.5:-2.5:1.5:0:0:-0.04")
     painted(drawn.locator("canvas"), colourful(200))
     drawn.press("ArrowLeft")

@@ -1,4 +1,4 @@
-"""Files that the page makes: numbers and pictures of charts."""
+"""Export of charts as numbers and pictures."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SVG = "{http://www.w3.org/2000/svg}"
 
 
 def save(page: Page, chart: str, entry: str, folder: Path) -> Path:
-    """The file that an entry of a chart's menu makes, under the name that is proposed for it."""
+    """Save a file with an entry of a chart's menu, under its suggested name."""
     button = page.get_by_role("button", name=re.compile(f"^Save .*: {chart}$"))
     button.click()
     expect(page.get_by_role("menuitem").first).to_be_focused()
@@ -32,45 +32,45 @@ def save(page: Page, chart: str, entry: str, folder: Path) -> Path:
 
 
 def opaque(canvas: Locator, x: float, y: float) -> bool:
-    """Whether something stronger than a grid's line is painted at a place [px]."""
-    taken = "(c, [x, y]) => [...c.getContext('2d').getImageData(x, y, 1, 1).data]"
-    red, green, blue, alpha = canvas.evaluate(taken, [x, y])
+    """Whether something darker than a grid line is painted at a position [px]."""
+    read_pixel = "(c, [x, y]) => [...c.getContext('2d').getImageData(x, y, 1, 1).data]"
+    red, green, blue, alpha = canvas.evaluate(read_pixel, [x, y])
     return bool(alpha > 200 and max(red, green, blue) < 160)
 
 
-def test_a_chart_gives_its_numbers_in_full_and_its_picture(
+def test_a_chart_is_exported_as_numbers_and_pictures(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit], tmp_path: Path
 ) -> None:
     page = visit(server.url).go(f"/jobs/{finished_job}?dots=yes")
     expect(page.locator("[data-dots]")).to_be_visible()
-    # All six iterations, also where they are there before the chart is.
+    # All six iterations, even if loaded before the chart.
     expect(page.locator(".uplot").first).to_have_attribute("data-range", "0 5")
     numbers = save(page, "Convergence", "Numbers (CSV)", tmp_path)
     assert numbers.name == "small-convergence.csv"
     with numbers.open(newline="") as file:
         rows = list(csv.DictReader(file))
-    told = server.client.get(f"/v1/jobs/{finished_job}/iterations").json()["items"]
-    assert [float(row["Best so far"]) for row in rows] == [one["best_so_far"] for one in told]
+    expected = server.client.get(f"/v1/jobs/{finished_job}/iterations").json()["items"]
+    assert [float(row["Best so far"]) for row in rows] == [one["best_so_far"] for one in expected]
 
     saved = save(page, "Convergence", "Picture (SVG)", tmp_path)
-    drawing = ET.parse(saved).getroot()  # noqa: S314 - this page's own
+    drawing = ET.parse(saved).getroot()  # noqa: S314 - created by the page
     words = [text.text for text in drawing.iter(f"{SVG}text")]
     assert {"Convergence", "best so far", "iteration"} <= set(words)
-    # Lines rather than pixels: the best so far has a place for every iteration.
+    # Vector lines: the best so far has a point for every iteration.
     lines = [path.get("d", "") for path in drawing.iter(f"{SVG}path")]
-    assert any(len(re.findall("[ML]", line)) == len(told) for line in lines)
-    # What is over the lines on the screen is over them here: words, and marks of what lies above.
-    best, published = told[-1]["best_so_far"], server.job(finished_job)["reference"]["fitness"]
+    assert any(len(re.findall("[ML]", line)) == len(expected) for line in lines)
+    # Labels, and marks of values above the range.
+    best, published = expected[-1]["best_so_far"], server.job(finished_job)["reference"]["fitness"]
     assert {f"best {best:#.4g}", f"published A {published:#.4g}"} <= set(words)
     places = re.compile(r"M(\S+) (\S+)L(\S+) (\S+)L\S+ (\S+)Z")
     marks = [
-        [float(at) for at in found.groups()] for found in map(places.fullmatch, lines) if found
+        [float(at) for at in match.groups()] for match in map(places.fullmatch, lines) if match
     ]
     assert len(marks) == int(page.locator("[data-above]").get_attribute("data-above") or 0) > 0
-    # They point up, as in the legend.
+    # The marks point up, as in the legend.
     assert all(tip < foot == other for _, foot, _, other, tip in marks)
-    assert "▴ worse designs lie above what is shown" in words
-    # And they are where they are on the screen, to the pixel.
+    assert "▴ worse designs outside the range shown" in words
+    # They are at the same positions as on the screen.
     canvas = page.locator(".uplot canvas").first
     for left, foot, right, _, tip in marks:
         assert opaque(canvas, (left + right) / 2, (2 * foot + tip) / 3)
@@ -85,39 +85,37 @@ def test_a_chart_gives_its_numbers_in_full_and_its_picture(
     assert int.from_bytes(picture[16:20]) == 2 * int(drawing.get("width", "0"))
 
 
-def test_every_design_is_in_the_file_of_parallel_coordinates(
+def test_parallel_coordinates_export_every_design(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit], tmp_path: Path
 ) -> None:
     page = visit(server.url).go(f"/jobs/{finished_job}/variables")
-    with save(page, "Designs by their variables", "Numbers (CSV)", tmp_path).open(
-        newline=""
-    ) as file:
+    with save(page, "Designs by variable", "Numbers (CSV)", tmp_path).open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 48
     best = min(float(row["fitness"]) for row in rows if row["fitness"])
-    told = server.client.get(f"/v1/jobs/{finished_job}").json()["best"]["fitness"]
-    assert best == pytest.approx(told, rel=1e-6)
+    expected = server.client.get(f"/v1/jobs/{finished_job}").json()["best"]["fitness"]
+    assert best == pytest.approx(expected, rel=1e-6)
     page.keyboard.press("Escape")
     expect(page.get_by_role("menu")).to_have_count(0)
 
 
-def test_what_limits_the_winner_is_saved_with_the_names_of_its_columns(
+def test_limiting_factors_are_exported_with_column_names(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit], tmp_path: Path
 ) -> None:
     page = visit(server.url).go(f"/jobs/{finished_job}")
-    card = page.get_by_role("region", name="What limits the winner", exact=True)
-    saved = save(page, "What limits the winner", "Picture (SVG)", tmp_path)
-    drawing = ET.parse(saved).getroot()  # noqa: S314 - this page's own
+    card = page.get_by_role("region", name="Limiting factors", exact=True)
+    saved = save(page, "Limiting factors", "Picture (SVG)", tmp_path)
+    drawing = ET.parse(saved).getroot()  # noqa: S314 - created by the page
     drawn = " ".join(text.text or "" for text in drawing.iter(f"{SVG}text"))
     names = card.locator("thead th").all_inner_texts()
     assert len(names) > 3
     assert all(" ".join(name.split()) in drawn for name in names)
 
-    file = save(page, "What limits the winner", "Numbers (CSV)", tmp_path)
+    file = save(page, "Limiting factors", "Numbers (CSV)", tmp_path)
     with file.open(newline="") as numbers:
         rows = list(csv.DictReader(numbers))
-    told = server.client.get(f"/v1/jobs/{finished_job}").json()["best"]["scenarios"]
+    expected = server.client.get(f"/v1/jobs/{finished_job}").json()["best"]["scenarios"]
     values = {(row["Scenario"], row["Objective"]): float(row["Value"]) for row in rows}
-    assert {scenario for scenario, _ in values} == set(told)
+    assert {scenario for scenario, _ in values} == set(expected)
     for (scenario, objective), value in values.items():
-        assert value == told[scenario]["objectives"][objective.replace(" ", "_")]
+        assert value == expected[scenario]["objectives"][objective.replace(" ", "_")]

@@ -1,4 +1,4 @@
-"""The best design of a job as firmware: memory against the microcontroller's, and the download."""
+"""Firmware tab: memory use and download."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ pytestmark = pytest.mark.slow
 
 
 def digits(text: str) -> str:
-    """Without the spaces that group them."""
+    """Remove grouping spaces."""
     return re.sub(r"\s", "", text)
 
 
 def grouped(number: int) -> re.Pattern[str]:
-    """The same digits with or without spaces that group them."""
+    """Pattern of a number with optional grouping spaces."""
     return re.compile(r"\s?".join(str(number)))
 
 
-def test_the_winners_memory_stands_beside_the_microcontrollers_and_it_is_downloaded(
+def test_memory_use_is_shown_and_firmware_is_downloaded(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
     summary = f"/v1/jobs/{finished_job}/firmware/summary"
@@ -36,10 +36,10 @@ def test_the_winners_memory_stands_beside_the_microcontrollers_and_it_is_downloa
     table = page.get_by_role("table", name="Memory of a leg's microcontroller")
     tables = table.get_by_role("row", name=re.compile("^Fuzzy tables"))
     expect(tables).to_contain_text(grouped(memory["tables"]))
-    limits = table.get_by_role("row", name=re.compile("^An MSP430F2618 has")).inner_text()
+    limits = table.get_by_role("row", name=re.compile("^MSP430F2618 capacity")).inner_text()
     assert digits(limits).endswith("118784B8192B")
     expect(page.get_by_text("116 kB of flash, 8 kB of RAM")).to_be_visible()
-    walks = page.get_by_role("table", name="Trajectories and walks by scenario")
+    walks = page.get_by_role("table", name="Trajectories and simulations by scenario")
     expect(walks.get_by_role("rowheader")).to_have_text(["short", "loaded"])
 
     smaller = server.client.get(summary, params={"table_bits": "8x6"}).json()
@@ -57,24 +57,24 @@ def test_the_winners_memory_stands_beside_the_microcontrollers_and_it_is_downloa
         )
 
 
-def test_a_job_without_a_winner_says_when_there_will_be_firmware(
+def test_a_job_without_a_winner_has_no_firmware(
     start_server: Callable[..., Server], visit: Callable[..., Visit]
 ) -> None:
     server = start_server()
     page = visit(server.url).go(f"/jobs/{server.submit(SMALL_JOB)}/firmware")
-    expect(page.get_by_role("heading", name="No design to write yet")).to_be_visible()
+    expect(page.get_by_role("heading", name="No firmware yet")).to_be_visible()
     expect(page.get_by_role("link", name="Download")).to_have_count(0)
 
 
-def test_what_cannot_be_written_is_told(
+def test_an_error_is_shown(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
     visited = visit(server.url, allowed="status of 503")
     visited.page.route(
         "**/firmware/summary*",
         lambda route: route.fulfill(
-            status=503, json={"detail": "the compiler is gone", "errors": []}
+            status=503, json={"detail": "the compiler is missing", "errors": []}
         ),
     )
     page = visited.go(f"/jobs/{finished_job}/firmware")
-    expect(page.get_by_role("alert")).to_contain_text("The compiler is gone.")
+    expect(page.get_by_role("alert")).to_contain_text("The compiler is missing.")

@@ -1,4 +1,4 @@
-"""Forms that fit a robot to a measured walk: its log is uploaded, read, and a job made of it."""
+"""Forms of identification and calibration, from upload to submission."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ pytestmark = pytest.mark.slow
 PASTE = """(field, text) => {
   const clipboardData = new DataTransfer()
   clipboardData.setData('text', text)
-  const how = { clipboardData, cancelable: true, bubbles: true }
-  field.dispatchEvent(new ClipboardEvent('paste', how))
+  const options = { clipboardData, cancelable: true, bubbles: true }
+  field.dispatchEvent(new ClipboardEvent('paste', options))
 }"""
 
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Of one cycle of the first preset with the design that the form begins with."""
+    """Log of one cycle of the first preset with the form's initial design."""
     scenario = find_scenario("normal-fast").model_copy(update={"cycles": 1.0})
     walk = MeasuredWalk.of(load_robot(DEFAULT_ROBOT), scenario, "fuzzy-pi", PUBLISHED_A)
     path = tmp_path_factory.mktemp("log") / "walk.csv"
@@ -42,41 +42,43 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def upload(page: Page, log: Path) -> None:
     page.get_by_label("Log").set_input_files(log)
-    page.get_by_role("button", name="Read the log").click()
+    page.get_by_role("button", name="Upload the log").click()
 
 
 def submitted(page: Page) -> str:
-    """Id of the job, once its page is there."""
+    """Submit the form; returns the id of the job."""
     page.get_by_role("button", name="Submit the job").click()
     expect(page).to_have_url(re.compile(r"/jobs/(?!new)[^/?]+$"))
     return page.url.rsplit("/", 1)[1]
 
 
-def test_a_log_is_uploaded_read_and_identified_from(
+def test_a_log_is_uploaded_and_an_identification_submitted(
     server: ServerProcess, log: Path, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url, allowed="422").go("/jobs/new")
     page.get_by_role("link", name="an identification from measured walks").click()
     page.get_by_label("Cycles").fill("2")
     upload(page, log)
-    read = page.get_by_role("region", name="What was read")
-    expect(read).to_contain_text("1.500 s in 750 rows. The walk begins 0 s into the log; 1 whole")
+    read = page.get_by_role("region", name="Log summary")
+    expect(read).to_contain_text(
+        "1.500 s in 750 rows. The walk starts 0 s into the log. 1 complete"
+    )
     expect(read.get_by_role("row").filter(has_text="I_M")).to_contain_text("18")
     recording = str(read.get_attribute("data-recording"))
     chosen = page.locator(f"[data-chosen='{recording}']")
     expect(chosen).to_contain_text("1.50 s of normal-fast")
 
-    # It is kept: whoever left it out, or comes later, finds it.
+    # The recording remains stored and can be selected again.
     page.get_by_role("button", name=f"Remove {recording[:12]}").click()
     expect(chosen).to_have_count(0)
-    field = page.get_by_role("combobox", name="Recordings that are kept")
+    field = page.get_by_role("combobox", name="Stored recordings")
     field.fill("NORMAL-F")
     offered = page.get_by_role("option", name=re.compile(recording[:12]))
-    expect(offered).to_contain_text("18 joints · 500 rows a second")
+    expect(offered).to_contain_text("18 joints · 500 rows per second")
     offered.click()
     expect(chosen).to_contain_text("1.50 s of normal-fast")
     field.fill(recording)
-    expect(page.get_by_text("Nothing fits.")).to_be_visible()
+    expect(page.get_by_text("No matches.")).to_be_visible()
     field.press("Escape")
     page.get_by_role("button", name=f"Remove {recording[:12]}").click()
     expect(chosen).to_have_count(0)
@@ -107,7 +109,7 @@ def test_a_log_is_uploaded_read_and_identified_from(
     ]
 
 
-def test_what_a_log_tells_is_calibrated_to_beside_what_is_typed(
+def test_a_calibration_has_targets_of_a_log_and_typed_ones(
     server: ServerProcess, log: Path, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url, allowed="422").go("/jobs/new?kind=calibration")
@@ -116,7 +118,7 @@ def test_what_a_log_tells_is_calibrated_to_beside_what_is_typed(
     value = page.get_by_label("value of target 1")
     expect(value).not_to_have_value("")
     page.get_by_label("tolerance of target 2").fill("0.3")
-    page.get_by_role("button", name="Add a target").click()
+    page.get_by_role("button", name="Add target").click()
     page.get_by_label("value of target 3").fill("fast")
     expect(page.get_by_text("entry 3, value:")).to_be_visible()
     page.get_by_label("value of target 3").fill("0.15")
@@ -136,8 +138,8 @@ def test_what_a_log_tells_is_calibrated_to_beside_what_is_typed(
     assert spec["walks"][0]["scenarios"][0]["cycles"] == 1.0
 
 
-@pytest.mark.thorough("test_every_eye_hand_and_width_can_use_it")
-def test_every_eye_hand_and_width_can_use_targets_of_a_log(
+@pytest.mark.thorough("test_views_are_accessible_at_every_width")
+def test_targets_of_a_log_are_accessible_at_every_width(
     server: ServerProcess, log: Path, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url, allowed="422", bypass_csp=True).go("/jobs/new?kind=calibration")
@@ -147,21 +149,21 @@ def test_every_eye_hand_and_width_can_use_targets_of_a_log(
     assert findings(page) == {}
 
 
-def test_what_is_wrong_with_a_log_is_told_at_its_field(
+def test_errors_of_a_log_are_shown_at_its_field(
     server: ServerProcess, log: Path, tmp_path: Path, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url, allowed="422").go("/jobs/new?kind=identification")
-    page.get_by_role("button", name="Read the log").click()
+    page.get_by_role("button", name="Upload the log").click()
     expect(page.get_by_label("Log")).to_have_accessible_description("choose a file first")
     lines = log.read_text(encoding="utf-8").splitlines()
     broken = tmp_path / "broken.csv"
     broken.write_text("\n".join([*lines[:9], "warp" + lines[9], *lines[10:]]), encoding="utf-8")
     upload(page, broken)
-    told = re.compile(r"line 10, column 'time \[s\]': 'warp.*' is not a number")
-    expect(page.get_by_label("Log")).to_have_accessible_description(told)
+    message = re.compile(r"line 10, column 'time \[s\]': 'warp.*' is not a number")
+    expect(page.get_by_label("Log")).to_have_accessible_description(message)
 
 
-def test_parameters_of_a_robot_of_ones_own_are_those_of_its_legs(
+def test_parameters_of_a_custom_robot_are_those_of_its_legs(
     server: ServerProcess, log: Path, visit: Callable[..., Visit]
 ) -> None:
     read = server.client.post(
@@ -178,15 +180,15 @@ def test_parameters_of_a_robot_of_ones_own_are_those_of_its_legs(
     page = visit(server.url, allowed="422").go(
         f"/jobs/new?kind=identification&recordings={recording}"
     )
-    # Six legs of a foot and three gearheads each, battery and body.
+    # Six legs with a foot and three gearheads each, battery and body.
     parameters = page.locator("summary").filter(has_text="Parameters:")
     expect(parameters).to_have_text("Parameters: 45 of 45 fitted")
-    page.get_by_role("button", name="a robot of one’s own").click()
+    page.get_by_role("button", name="custom", exact=True).first.click()
     page.get_by_label("URDF").set_input_files(QUADRUPED / "robot.urdf")
     page.get_by_label("robot.toml").set_input_files(QUADRUPED / "robot.toml")
     toml, urdf = (
         (QUADRUPED / name).read_text(encoding="utf-8") for name in ("robot.toml", "robot.urdf")
     )
-    own = load_robot(RobotFiles(toml=toml, urdf=urdf))
-    fitted = len(identifiable_variables(own))
+    robot = load_robot(RobotFiles(toml=toml, urdf=urdf))
+    fitted = len(identifiable_variables(robot))
     expect(parameters).to_have_text(f"Parameters: {fitted} of {fitted} fitted")

@@ -1,4 +1,4 @@
-"""What frames every view: skip link and titles; charts and tables that stay as they were set."""
+"""Skip link, titles, breadcrumbs, and persistent settings of charts and tables."""
 
 from __future__ import annotations
 
@@ -11,14 +11,12 @@ from playwright.sync_api import Page, expect
 from tests.examples.servers import Server, ServerProcess
 from tests.web.conftest import SMALL_JOB
 from tests.web.job_page import wait_for_iteration
-from tests.web.visit import Visit, seen_again
+from tests.web.visit import Visit, show_tab_again
 
 pytestmark = pytest.mark.slow
 
 
-def test_the_skip_link_leads_past_the_header(
-    server: ServerProcess, visit: Callable[..., Visit]
-) -> None:
+def test_the_skip_link_skips_the_header(server: ServerProcess, visit: Callable[..., Visit]) -> None:
     page = visit(server.url).go("/jobs")
     expect(page.get_by_role("heading", name="Jobs", exact=True)).to_be_visible()
     page.keyboard.press("Tab")
@@ -26,7 +24,7 @@ def test_the_skip_link_leads_past_the_header(
     page.keyboard.press("Enter")
     expect(page).to_have_url(re.compile("#main$"))
     page.keyboard.press("Tab")
-    # The first link of the content, not of the header.
+    # The focus is in the content, not in the header.
     assert page.evaluate("document.querySelector('main').contains(document.activeElement)")
 
 
@@ -45,7 +43,7 @@ def test_titles_name_the_job_and_its_progress(
     expect(page).to_have_title("small · queued 0/6 · gaitswarm")
 
 
-def test_titles_and_crumbs_name_what_is_shown(
+def test_titles_and_breadcrumbs_name_the_content(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
     visited = visit(server.url)
@@ -53,7 +51,7 @@ def test_titles_and_crumbs_name_what_is_shown(
     for path, title, crumbs in (
         (
             f"/walk?{job}&scenario=loaded&against=published:A",
-            "Best of small, scenario loaded, beside Published A, fuzzy-pi · Walk",
+            "Best of small, scenario loaded, compared with Published A, fuzzy-pi · Walk",
             ["All jobs", "small", "Walk of the best"],
         ),
         (
@@ -78,13 +76,13 @@ def test_titles_and_crumbs_name_what_is_shown(
 
 @pytest.fixture
 def endless_job(server: ServerProcess) -> Iterator[str]:
-    """A job that runs until the test is over."""
+    """A job that runs until the end of the test."""
     job_id = server.submit(SMALL_JOB | {"iterations": 5000})
     yield job_id
     server.client.post(f"/v1/jobs/{job_id}/cancel")
 
 
-def test_the_title_of_a_walk_tells_how_far_its_job_is(
+def test_the_title_of_a_walk_shows_the_progress_of_its_job(
     server: ServerProcess, endless_job: str, visit: Callable[..., Visit]
 ) -> None:
     visited = visit(server.url)
@@ -94,18 +92,18 @@ def test_the_title_of_a_walk_tells_how_far_its_job_is(
     expect(page).to_have_title(re.compile(rf"^{named} · running \d+/5000 · Walk · gaitswarm$"))
     before = page.title()
 
-    seen_again(page)
+    show_tab_again(page)
 
     expect(page).not_to_have_title(before)
     assert "running" in page.title()
     server.client.post(f"/v1/jobs/{endless_job}/cancel")
     server.wait_for(endless_job, "cancelled")
-    seen_again(page)
+    show_tab_again(page)
     expect(page).to_have_title(f"{named} · Walk · gaitswarm")
 
 
 FROM_ZERO = re.compile("^0 ")
-"""Range of an axis that begins with the first iteration."""
+"""Range of an axis that starts at the first iteration."""
 
 
 DOUBLE_CLICK_WITH_AN_ITERATION = """() => new Promise((done) => {
@@ -118,7 +116,7 @@ DOUBLE_CLICK_WITH_AN_ITERATION = """() => new Promise((done) => {
     const job = document.querySelector('[data-stream]')
     new MutationObserver(clicked).observe(job, { attributeFilter: ['data-iteration'] })
 })"""
-"""After the page has the iteration, and before its chart draws that."""
+"""Double-click after the page receives an iteration and before the chart draws it."""
 
 
 DOUBLE_CLICK_ON_A_NEW_CHART = """() => new Promise((done) => {
@@ -134,11 +132,11 @@ DOUBLE_CLICK_ON_A_NEW_CHART = """() => new Promise((done) => {
     new MutationObserver(drawn).observe(chart, { childList: true })
     document.querySelector('.chart-frame input[type=checkbox]:checked').click()
 })"""
-"""Before anything else happens: what draws it anew is another scale."""
+"""Double-click right after the chart was recreated, by a change of its scale."""
 
 
 def chart_range(page: Page) -> list[float]:
-    """Of the horizontal axis of the first chart."""
+    """Range of the x axis of the first chart."""
     text = page.locator(".uplot").first.get_attribute("data-range")
     return [float(end) for end in (text or "").split()]
 
@@ -162,12 +160,12 @@ def test_a_zoom_stays_while_iterations_arrive(
     last = int(page.locator("[data-stream]").get_attribute("data-iteration") or 0)
     wait_for_iteration(page, last + 5)
     assert chart_range(page) == zoomed
-    # A link shows it too, before the iterations are there and after.
+    # The link restores the zoom, even before the iterations are loaded.
     expect(page).to_have_url(re.compile("zoom="))
     page.reload()
     wait_for_iteration(page, last + 5)
     assert chart_range(page) == pytest.approx(zoomed, rel=1e-4)
-    # All is shown again, also where an iteration comes at that very moment.
+    # The zoom is reset even if an iteration arrives at the same moment.
     page.evaluate(DOUBLE_CLICK_WITH_AN_ITERATION)
     expect(page.locator(".uplot").first).to_have_attribute("data-range", FROM_ZERO)
     expect(page).not_to_have_url(re.compile("zoom="))
@@ -175,7 +173,7 @@ def test_a_zoom_stays_while_iterations_arrive(
     assert chart_range(page)[0] == 0.0
 
 
-def test_a_chart_that_was_just_drawn_anew_shows_all_when_asked(
+def test_the_zoom_of_a_recreated_chart_can_be_reset(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url).go(f"/jobs/{finished_job}?zoom=1:3")
@@ -187,7 +185,7 @@ def test_a_chart_that_was_just_drawn_anew_shows_all_when_asked(
     expect(page.locator(".uplot").first).to_have_attribute("data-range", FROM_ZERO)
 
 
-def test_a_new_order_begins_on_the_first_page(
+def test_a_new_order_starts_on_the_first_page(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:
     job_id = server.submit(SMALL_JOB | {"iterations": 60, "optimizer": {"particles": 2}})
@@ -195,19 +193,19 @@ def test_a_new_order_begins_on_the_first_page(
     page = visit(server.url).go(f"/jobs/{job_id}/iterations")
     page.get_by_role("button", name="Next").click()
     expect(page.get_by_text("page 2 of 2")).to_be_visible()
-    # A link shows the same page.
+    # The link restores the page.
     expect(page).to_have_url(re.compile("page=2$"))
     page.reload()
     expect(page.get_by_text("page 2 of 2")).to_be_visible()
     page.get_by_role("columnheader", name="Worst").get_by_role("button").click()
     expect(page.get_by_text("page 1 of 2")).to_be_visible()
-    # Where there is little room, what the chart draws stays.
+    # Narrow screens hide the columns that the chart does not show.
     page.set_viewport_size({"width": 360, "height": 740})
     expect(page.get_by_role("columnheader", name="Median")).to_be_visible()
     expect(page.get_by_role("columnheader", name="Mean")).to_be_hidden()
 
 
-def test_bounds_of_a_selection_in_the_wrong_order_are_those_of_the_same_stretch(
+def test_bounds_of_a_selection_in_the_wrong_order_are_swapped(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url).go(f"/jobs/{finished_job}/variables")

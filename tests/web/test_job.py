@@ -1,4 +1,4 @@
-"""A job from the form to its end, as people go about it."""
+"""Jobs from submission to the end."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ OTHER_SCENARIOS = ("normal-slow", "loaded-fast", "loaded-slow", "slope-fast", "t
 
 
 def fill_in(page: Page, name: str, *, iterations: int) -> None:
-    """The form of a job of one scenario and eight particles."""
+    """Fill in the form of a job with one scenario and eight particles."""
     page.get_by_label("Name", exact=True).fill(name)
     page.get_by_label(re.compile("^Iterations")).fill(str(iterations))
     page.get_by_label(re.compile("^particles", re.IGNORECASE)).fill("8")
@@ -33,7 +33,7 @@ def fill_in(page: Page, name: str, *, iterations: int) -> None:
 
 
 def submitted(page: Page) -> str:
-    """Id of the job whose page the form has led to."""
+    """Id of the submitted job, from the address."""
     expect(page).to_have_url(re.compile(r"/jobs/(?!new)\w+$"))
     return page.url.rpartition("/")[2]
 
@@ -43,12 +43,12 @@ def test_a_job_is_submitted_watched_paused_reloaded_and_resumed(
 ) -> None:
     page = visit(server.url).go("/jobs/new")
     fill_in(page, "from the form", iterations=5000)
-    # The API's own estimate, before anything is submitted.
+    # The API's estimate before submission.
     expect(page.locator("[data-walks]")).to_have_attribute("data-walks", "40000")
     page.get_by_role("button", name="Submit the job").click()
     job_id = submitted(page)
 
-    # It advances without being reloaded.
+    # The page updates without reloading.
     page.evaluate("window.notReloaded = true")
     wait_for_iteration(page, 2)
     wait_for_iteration(page, shown_iteration(page) + 3)
@@ -69,9 +69,9 @@ def test_a_job_is_submitted_watched_paused_reloaded_and_resumed(
     wait_for_iteration(page, committed + 1)
     expect_state(page, "running")
 
-    # What is lost is asked about first.
+    # Cancelling requires confirmation.
     page.get_by_role("button", name="Cancel…").click()
-    page.get_by_role("button", name="Keep it").click()
+    page.get_by_role("button", name="Back").click()
     assert server.job(job_id)["state"] == "running"
     page.get_by_role("button", name="Cancel…").click()
     page.get_by_role("button", name="Cancel the job").click()
@@ -79,7 +79,7 @@ def test_a_job_is_submitted_watched_paused_reloaded_and_resumed(
     assert server.job(job_id)["state"] == "cancelled"
 
 
-def test_a_spec_that_makes_no_sense_is_not_submitted_and_the_field_is_named(
+def test_an_invalid_spec_is_not_submitted_and_its_field_is_marked(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:
     jobs_before = server.client.get("/v1/jobs").json()["items"]
@@ -133,7 +133,7 @@ FOCUSED = """() => {
 
 
 def press_until_focused(page: Page, name: str) -> None:
-    """Press Tab until the element whose name begins so has the focus."""
+    """Press Tab until the element whose name starts with `name` has the focus."""
     seen: list[str] = []
     for _ in range(150):
         page.keyboard.press("Tab")
@@ -149,18 +149,18 @@ def test_a_job_is_extended_and_cloned(server: ServerProcess, visit: Callable[...
     page = visit(server.url).go(f"/jobs/{job_id}")
 
     page.get_by_role("button", name="Extend…").click()
-    page.get_by_label(re.compile("^Iterations in all")).fill(str(done + 2))
-    page.get_by_role("button", name=f"Run {done + 2} iterations in all").click()
+    page.get_by_label(re.compile("^Iterations in total")).fill(str(done + 2))
+    page.get_by_role("button", name=f"Run {done + 2} iterations in total").click()
     wait_for_iteration(page, done + 1)
     expect_state(page, "succeeded")
 
     page.get_by_role("link", name="Clone").click()
     expect(page.get_by_label("Name", exact=True)).to_have_value("small")
     expect(page.get_by_label(re.compile("^particles", re.IGNORECASE))).to_have_value("8")
-    expect(page.locator("[data-own]")).to_have_count(2)
+    expect(page.locator("[data-custom]")).to_have_count(2)
 
 
-def test_a_job_in_single_precision_shows_its_best_in_double_and_the_difference(
+def test_a_job_in_single_precision_shows_its_best_in_double_precision_too(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url).go("/jobs/new")
@@ -172,11 +172,11 @@ def test_a_job_in_single_precision_shows_its_best_in_double_and_the_difference(
     job_id = submitted(page)
     best = server.wait_for(job_id, "succeeded")["best"]
     expect_state(page, "succeeded")
-    expect(page.get_by_text("single precision")).to_be_visible()
+    expect(page.locator(".job-header p").filter(has_text="single precision")).to_be_visible()
     figures = page.locator(".job-header dl")
-    expect(figures).to_contain_text("Best fitness, in double")
+    expect(figures).to_contain_text("Best fitness (double precision)")
     expect(figures).to_contain_text(f"{best['fitness']:.7g}")
-    searched = figures.locator("div", has_text="Its fitness in the search, in single")
+    searched = figures.locator("div", has_text="Fitness in the search (single precision)")
     expect(searched).to_contain_text(f"{best['search']['fitness']:.7g}")
     expect(searched).to_contain_text("%")
 
@@ -198,36 +198,36 @@ def test_a_jobs_headline_convergence_winner_and_walk(
     expect(walked).to_contain_text("designs")
     assert 0 < int(walked.get_attribute("data-dots") or 0) <= job["evaluations"]
 
-    winner = page.get_by_role("region", name="The winner")
+    winner = page.get_by_role("region", name="Winner")
     expect(winner.get_by_role("img")).to_have_count(len(job["best"]["design"]))
-    winner.get_by_role("button", name=re.compile("^Show as table.*The winner")).click()
-    rows = winner.get_by_role("table", name="The winner in its bounds").locator("tbody tr")
+    winner.get_by_role("button", name=re.compile("^Show as table.*Winner")).click()
+    rows = winner.get_by_role("table", name="Winner and search bounds").locator("tbody tr")
     expect(rows).to_have_count(len(job["best"]["design"]))
 
     page.get_by_role("link", name="Activity").click()
     expect(page.get_by_role("img", name=re.compile("^Timeline of"))).to_be_visible()
     machines = page.get_by_role("table", name="Workers of the job").locator("tbody tr")
     expect(machines).to_have_count(1)
-    page.get_by_label("Least grave messages").select_option("from error on")
+    page.get_by_label("Minimum level").select_option("error and above")
     expect(page).to_have_url(re.compile("level=ERROR$"))
     page.reload()
-    expect(page.get_by_label("Least grave messages")).to_have_value("ERROR")
+    expect(page.get_by_label("Minimum level")).to_have_value("ERROR")
     page.go_back()
 
-    # Little movement is asked for: nothing walks by itself, and nothing is loaded for it.
-    page.get_by_role("button", name="Show its walk").click()
-    expect(page.get_by_role("img", name="The best design walking")).to_be_visible()
+    # With reduced motion, the replay is neither loaded nor played automatically.
+    page.get_by_role("button", name="Show the replay").click()
+    expect(page.get_by_role("img", name="Replay of the best design")).to_be_visible()
     expect(page.locator("[data-stage]")).to_have_attribute("data-playing", "false")
-    page.get_by_role("button", name="Let it walk").click()
+    page.get_by_role("button", name="Play").click()
     expect(page.locator("[data-stage]")).to_have_attribute("data-playing", "true")
 
 
-def test_a_clone_asks_for_the_same(server: ServerProcess, visit: Callable[..., Visit]) -> None:
+def test_a_clone_has_the_same_spec(server: ServerProcess, visit: Callable[..., Visit]) -> None:
     window = {"name": "fir_window", "kind": "categorical", "choices": ["hamming", "moving_average"]}
     job_id = server.submit(
         SMALL_JOB
         | {
-            "name": "of everything",
+            "name": "all settings",
             "robot": "szabadka2",
             "controller": "pi",
             "scenarios": ["stuck-leg", "drop", "backward"],
@@ -246,13 +246,13 @@ def test_a_clone_asks_for_the_same(server: ServerProcess, visit: Callable[..., V
     assert server.job(submitted(page))["spec"] == server.job(job_id)["spec"]
 
 
-def test_the_form_offers_robots_and_folds_away_what_is_seldom_changed(
+def test_the_form_offers_robots_and_collapses_conventions(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:
     robots = [robot["name"] for robot in server.client.get("/v1/robots").json()["items"]]
     page = visit(server.url).go("/jobs/new")
 
-    picker = page.get_by_label("Robot that ships")
+    picker = page.get_by_label("Shipped robot")
     expect(picker.locator("option")).to_have_text(robots)
     expect(picker).to_have_value(robots[0])
     conventions = page.locator("details").filter(has_text="Conventions")

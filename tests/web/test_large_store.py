@@ -1,4 +1,4 @@
-"""A thousand jobs, and one of a hundred thousand evaluations."""
+"""The page with a thousand jobs, one of them with a hundred thousand evaluations."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ FIRST_VIEW_BYTES = 120_000
 
 WRITTEN_SHORT, SHORT_COPIES = 9, 110
 WRITTEN_ITERATIONS = 40
-"""What the store writes itself; all else is copied from row to row, in a tenth of the time."""
+"""Written by the store; the remaining rows are copies, which takes a tenth of the time."""
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +69,7 @@ def long_job(database: Path) -> str:
 
 
 def lengthen(connection: Connection, job_id: str) -> None:
-    """Let the iterations of a job follow each other again and again."""
+    """Repeat the iterations of a job."""
     copies = numbers(ITERATIONS // WRITTEN_ITERATIONS - 1)
     for table in (iterations, evaluations):
         later = {"iteration": table.c.iteration + WRITTEN_ITERATIONS * copies.c.n}
@@ -80,7 +80,7 @@ def lengthen(connection: Connection, job_id: str) -> None:
 
 
 def multiply_others(connection: Connection, job_id: str) -> None:
-    """Make more of every job but one, with other ids and names."""
+    """Copy all jobs but one, with other ids and names."""
     copies = numbers(SHORT_COPIES)
     n = copies.c.n
     number = cast(func.substr(jobs.c.spec["name"].as_string(), 7), Integer) + WRITTEN_SHORT * n
@@ -93,13 +93,13 @@ def multiply_others(connection: Connection, job_id: str) -> None:
 
 
 def numbers(count: int) -> CTE:
-    """1..count, in a column `n`."""
+    """1..count in a column `n`."""
     series = select(literal(1).label("n")).cte("copies", recursive=True)
     return series.union_all(select(series.c.n + 1).where(series.c.n < count))
 
 
 def copied_id(job_id: ColumnElement[str], n: ColumnElement[int]) -> ColumnElement[str]:
-    """An id that begins as another one and differs from it; of the characters that ids have."""
+    """A distinct valid id with the same prefix."""
     size = len(ID_ALPHABET)
     other = func.instr(ID_ALPHABET, func.substr(job_id, 10, 1)) % size
     letters = [func.substr(ID_ALPHABET, k + 1, 1) for k in (other, n // size, n % size)]
@@ -113,7 +113,7 @@ def copy_rows(
     copies: CTE,
     changes: dict[str, ColumnElement[Any]],
 ) -> None:
-    """Insert a table's rows once more for every copy, with some columns changed."""
+    """Insert copies of a table's rows with some columns changed."""
     values = [changes.get(column.name, column) for column in table.columns]
     rows = select(*values).select_from(table.join(copies, true())).where(where)
     connection.execute(insert(table).from_select(table.columns.keys(), rows))
@@ -150,7 +150,7 @@ def test_the_first_view_of_a_long_job_is_small_and_then_complete(
     page = visited.go(f"/jobs/{long_job}")
     wait_for_iteration(page, 1)
 
-    # What follows is asked for page by page, while the first one is looked at.
+    # Further pages are loaded in the background.
     assert visited.received(without="after=") <= FIRST_VIEW_BYTES
     assert largest_asset(visited) < 100_000
     wait_for_iteration(page, ITERATIONS - 1)
@@ -162,21 +162,21 @@ def test_the_first_view_of_a_long_job_is_small_and_then_complete(
 
 @pytest.mark.thorough("the benchmark of the page")
 @pytest.mark.timeout(600)
-def test_the_pages_benchmark_measures_first_views_and_what_moves(
+def test_the_benchmark_of_the_page_measures_first_views_and_animations(
     large_server: Server, long_job: str, pages: Pages
 ) -> None:
-    found = measure(pages, large_server.url, long_job, rounds=1, steps=6)
-    assert len(found) == 5
-    for numbers in found.values():
+    measurements = measure(pages, large_server.url, long_job, rounds=1, steps=6)
+    assert len(measurements) == 5
+    for numbers in measurements.values():
         if "seconds" in numbers:
             assert numbers["seconds"] > 0.0 and 1.0 < numbers["kilobytes"] < 120.0
         else:
-            # Between the first and the last picture of as many strokes or turns of a wheel.
+            # Between the first and the last frame of the interaction.
             assert 1000.0 / numbers["longest_ms"] < numbers["per_second"] < 121.0
 
 
 @pytest.mark.timeout(600)
-def test_a_picker_loads_what_it_shows_and_finds_all_others(
+def test_a_picker_loads_pages_on_demand_and_searches_on_the_server(
     large_server: Server, visit: Callable[..., Visit]
 ) -> None:
     visited = visit(large_server.url)
@@ -184,11 +184,11 @@ def test_a_picker_loads_what_it_shows_and_finds_all_others(
     field = page.get_by_role("combobox", name="Design")
     expect(field).to_have_value("fuzzy-pi: A")
 
-    def asked() -> list[dict[str, list[str]]]:
+    def job_queries() -> list[dict[str, list[str]]]:
         addresses = map(urlsplit, visited.requested)
-        return [parse_qs(one.query) for one in addresses if one.path == "/v1/jobs"]
+        return [parse_qs(address.query) for address in addresses if address.path == "/v1/jobs"]
 
-    assert asked() == []
+    assert job_queries() == []
     field.focus()
     field.press("ArrowDown")
     offered = page.get_by_role("group", name="Best of a job").get_by_role("option")
@@ -208,15 +208,15 @@ def test_a_picker_loads_what_it_shows_and_finds_all_others(
     field.press("Enter")
     expect(page).to_have_url(re.compile(f"job={oldest['id']}"))
     expect(field).to_have_attribute("aria-expanded", "false")
-    assert [one["limit"] for one in asked()] == [["20"]] * len(asked())
+    assert [params["limit"] for params in job_queries()] == [["20"]] * len(job_queries())
 
     field.press("ArrowDown")
     field.press_sequentially("no such job")
-    expect(page.get_by_role("status").get_by_text("Nothing fits.")).to_be_visible()
+    expect(page.get_by_role("status").get_by_text("No matches.")).to_be_visible()
 
 
 def largest_asset(visited: Visit) -> int:
-    """[B] as received: the chunk for three dimensions is larger than all others together."""
+    """Size of the largest asset received [B]."""
     return max(
         count
         for url, count in visited.received_by_url.items()

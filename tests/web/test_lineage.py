@@ -1,4 +1,4 @@
-"""A fork's page leads to its parent, the parent's to its forks, and both to their evidence."""
+"""Forks, evidence and verification on the page."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.web.visit import Visit
 pytestmark = pytest.mark.slow
 
 
-def test_a_fork_and_its_parent_lead_to_each_other(
+def test_a_fork_and_its_parent_link_to_each_other(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url).go(f"/jobs/{finished_job}")
@@ -25,10 +25,10 @@ def test_a_fork_and_its_parent_lead_to_each_other(
     page.goto(f"{server.url}/jobs/{finished_job}/iterations/1")
     page.get_by_label("Other iterations").get_by_role("button", name="Fork…").click()
     dialog = page.get_by_role("dialog", name="Fork the job")
-    # After the iteration that is shown.
-    expect(dialog.get_by_label("First iteration of its own")).to_have_value("2")
+    # The default is the iteration after the one shown.
+    expect(dialog.get_by_label("First new iteration")).to_have_value("2")
     submit = dialog.get_by_role("button", name="Fork the job")
-    budget = dialog.get_by_label("Iterations in all")
+    budget = dialog.get_by_label("Iterations in total")
     budget.fill("2")
     expect(submit).to_be_disabled()
     budget.fill("3")
@@ -53,16 +53,16 @@ def test_a_fork_and_its_parent_lead_to_each_other(
     expect(row).to_contain_text(f"fork of {finished_job}")
 
 
-def test_no_button_moves_when_the_forks_of_a_job_are_known(
+def test_no_button_moves_when_the_forks_are_loaded(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
     (job,) = server.client.get("/v1/jobs", params={"search": finished_job}).json()["items"]
     lineage = {"from_iteration": 2, "changed": ["optimizer", "preference"]}
     forks = [job | {"id": f"fork{n}", "lineage": lineage} for n in range(12)]
-    asked: list[Route] = []
+    requests: list[Route] = []
 
     def hold(route: Route) -> None:
-        asked.append(route)
+        requests.append(route)
 
     visited = visit(server.url)
     visited.page.route("**/v1/jobs?parent=*", hold)
@@ -72,7 +72,7 @@ def test_no_button_moves_when_the_forks_of_a_job_are_known(
     expect(page.get_by_text("Computing time", exact=True)).to_be_visible()
     before = button.bounding_box()
 
-    asked[0].fulfill(json={"items": forks, "next": None})
+    requests[0].fulfill(json={"items": forks, "next": None})
     expect(page.locator("[data-forks='12']")).to_be_visible()
     assert button.bounding_box() == before is not None
 
@@ -88,11 +88,11 @@ def test_evidence_is_downloaded_and_verified(
     assert gaitswarm.verify(download.value.path(), replay=1).verified
 
 
-def test_the_history_is_verified_on_the_page(
+def test_the_history_is_verified(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url).go(f"/jobs/{finished_job}/reproduce")
-    card = page.get_by_role("region", name="What its numbers depend on")
+    card = page.get_by_role("region", name="Provenance")
     with gaitswarm.connect(server.url) as jobs:
         head = jobs.job(finished_job).head
     expect(card.locator(f"[data-head='{head}']")).to_contain_text(str(head)[:16])

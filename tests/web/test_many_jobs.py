@@ -1,4 +1,4 @@
-"""The list of many jobs, and several of them beside each other."""
+"""List of many jobs, and comparison of jobs."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from playwright.sync_api import Page, expect
 
 from tests.examples.servers import Server, ServerProcess
 from tests.web.conftest import SMALL_JOB
-from tests.web.visit import Visit, seen_again
+from tests.web.visit import Visit, show_tab_again
 
 pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
 def two_jobs(server: ServerProcess, finished_job: str) -> tuple[str, str]:
-    """The finished job, and the same with another seed and a smaller budget."""
+    """The finished job, and one with another seed and a smaller budget."""
     other = server.submit(SMALL_JOB | {"name": "other", "seed": 6, "iterations": 3})
     server.wait_for(other, "succeeded")
     return finished_job, other
@@ -28,7 +28,7 @@ def rows(page: Page) -> list[str]:
     return [row.get_attribute("data-job") or "" for row in listed.all()]
 
 
-def test_filters_orders_and_search_are_the_servers_and_in_the_address(
+def test_filters_order_and_search_are_in_the_address(
     start_server: Callable[..., Server], visit: Callable[..., Visit]
 ) -> None:
     server = start_server()
@@ -55,7 +55,7 @@ def test_filters_orders_and_search_are_the_servers_and_in_the_address(
     expect(page.locator("[data-job]")).to_have_count(1)
 
 
-def test_several_are_deleted_and_those_that_stay_are_named(
+def test_several_jobs_are_deleted_and_refusals_explained(
     start_server: Callable[..., Server], visit: Callable[..., Visit]
 ) -> None:
     server = start_server()
@@ -68,17 +68,17 @@ def test_several_are_deleted_and_those_that_stay_are_named(
     for job_id in (*named.values(), queued):
         page.locator(f"[data-job='{job_id}']").get_by_role("checkbox").check()
     page.get_by_role("button", name="Delete…").click()
-    asked = page.get_by_role("dialog")
-    expect(asked).to_contain_text("kept: it is kept; release it first, on its page")
-    expect(asked).to_contain_text("queued: it is queued; cancel or pause it first")
-    expect(asked).to_contain_text("0 iterations with 0 evaluated designs are lost for good")
-    asked.get_by_role("button", name="Delete 2 jobs").click()
+    dialog = page.get_by_role("dialog")
+    expect(dialog).to_contain_text("kept: it is protected; release it on its page first")
+    expect(dialog).to_contain_text("queued: it is queued; cancel or pause it first")
+    expect(dialog).to_contain_text("0 iterations with 0 evaluated designs are permanently lost")
+    dialog.get_by_role("button", name="Delete 2 jobs").click()
     expect(page.get_by_text("2 jobs deleted.")).to_be_visible()
     expect(page.locator("[data-job]")).to_have_count(2)
     assert rows(page) == [queued, named["kept"]]
 
 
-def test_every_job_is_reached_by_pages(
+def test_paging_reaches_every_job(
     start_server: Callable[..., Server], visit: Callable[..., Visit]
 ) -> None:
     server = start_server()
@@ -90,7 +90,7 @@ def test_every_job_is_reached_by_pages(
     expect(page.locator("[data-job]")).to_have_count(3)
     assert rows(page) == ids[2::-1]
     expect(page.get_by_text("page 2", exact=True)).to_be_visible()
-    # The page and what is chosen there are the address's: Back and a reload come to both again.
+    # Page and selection are in the address: Back and reload restore both.
     page.locator(f"[data-job='{ids[1]}']").get_by_role("checkbox").check()
     page.get_by_role("link", name="job 0", exact=True).click()
     expect(page).to_have_url(re.compile(f"/jobs/{ids[0]}$"))
@@ -103,12 +103,12 @@ def test_every_job_is_reached_by_pages(
     expect(page.locator("[data-job]")).to_have_count(50)
     page.go_back()
     expect(page.locator("[data-job]")).to_have_count(3)
-    # Another order begins anew.
+    # Another order starts at the first page.
     page.get_by_label("Order").select_option("name")
     expect(page.locator("[data-job]")).to_have_count(50)
 
 
-def test_chosen_jobs_are_compared(
+def test_selected_jobs_are_compared(
     server: ServerProcess, two_jobs: tuple[str, str], visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url).go("/jobs?order=name")
@@ -118,7 +118,7 @@ def test_chosen_jobs_are_compared(
     page.get_by_role("link", name="Compare").click()
     expect(page).to_have_url(re.compile(f"/compare.jobs={two_jobs[0]},{two_jobs[1]}$"))
     expect(page.locator("[data-compared]")).to_have_count(2)
-    differences = page.get_by_role("table", name="Differences of the specs")
+    differences = page.get_by_role("table", name="Differences between specs")
     fields = differences.get_by_role("rowheader")
     expect(fields).to_have_text(["iterations", "seed"])
     published = server.job(two_jobs[0])["reference"]
@@ -128,7 +128,7 @@ def test_chosen_jobs_are_compared(
     )
     first = page.locator(f"[data-compared='{two_jobs[0]}']")
     expect(first).to_contain_text("% over A")
-    # What is zoomed to and how it is drawn is a link's to show.
+    # Links reproduce zoom and scale.
     page.get_by_label("logarithmic").uncheck()
     plot = page.locator(".uplot").first
     with_zoom = f"{page.url}&log=no&zoom=1:2"
@@ -148,7 +148,7 @@ def test_chosen_jobs_are_compared(
     expect(shares.locator("tbody tr").first).to_contain_text(f"{best:.3f}"[:5])
 
 
-def test_a_comparison_goes_on_with_its_jobs(
+def test_a_comparison_follows_its_jobs(
     start_server: Callable[..., Server], visit: Callable[..., Visit]
 ) -> None:
     server = start_server()
@@ -160,18 +160,18 @@ def test_a_comparison_goes_on_with_its_jobs(
 
     server.client.post(f"/v1/jobs/{job_id}/cancel")
 
-    seen_again(page)
+    show_tab_again(page)
     expect(compared).to_contain_text("cancelled")
     expect(page).to_have_title("small · compared · gaitswarm")
 
 
-def test_jobs_that_cannot_be_compared_are_told(
+def test_errors_of_a_comparison_are_shown(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url).go("/compare")
-    expect(page.get_by_role("heading", name="No job is chosen")).to_be_visible()
+    expect(page.get_by_role("heading", name="No jobs selected")).to_be_visible()
     page = visit(server.url, allowed="status of 404").go("/compare?jobs=aaaaaaaaaaaa")
-    expect(page.get_by_role("alert")).to_contain_text("The jobs cannot be compared.")
+    expect(page.get_by_role("alert")).to_contain_text("Could not compare the jobs.")
 
 
 def test_a_job_is_labelled_and_archived(
@@ -182,9 +182,9 @@ def test_a_job_is_labelled_and_archived(
     page = visit(server.url).go(f"/jobs/{job_id}")
     page.get_by_role("button", name="Label").click()
     page.get_by_label("Name", exact=True).fill("renamed")
-    page.get_by_label("Tags, separated by commas").fill("thesis, wide")
+    page.get_by_label("Tags, comma-separated").fill("thesis, wide")
     page.get_by_label("Note", exact=True).fill("P is at its bound")
-    page.get_by_role("button", name="Write them down").click()
+    page.get_by_role("button", name="Save").click()
     expect(page.get_by_role("heading", name="renamed")).to_be_visible()
     expect(page.locator("[data-labels]")).to_contain_text("thesis · wide")
     page.goto("/jobs")
@@ -194,7 +194,7 @@ def test_a_job_is_labelled_and_archived(
     expect(page.locator("[data-job]")).to_have_count(1)
     row.get_by_role("checkbox").check()
     page.get_by_role("button", name="Archive").click()
-    expect(page.get_by_text("No job fits the filter")).to_be_visible()
+    expect(page.get_by_text("No matching jobs")).to_be_visible()
     page.get_by_role("button", name="Show all jobs").click()
     expect(page.locator("[data-job]")).to_have_count(1)
     assert rows(page) == [other]

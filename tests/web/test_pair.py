@@ -1,4 +1,4 @@
-"""Designs over any two of their axes, with the selection of all charts and of the table."""
+"""Designs over two axes, linked to the other charts and the table."""
 
 from __future__ import annotations
 
@@ -44,11 +44,11 @@ def test_a_box_selects_in_all_charts_and_in_the_table(
     expect(page.locator("[data-selected]")).to_have_attribute("data-selected", "48")
 
 
-def test_ranks_stand_in_cells_and_in_a_table_and_axes_may_be_objectives(
+def test_ranks_are_shown_by_cell_and_axes_may_be_objectives(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url).go(f"/jobs/{finished_job}/variables")
-    page.get_by_label("objectives too").check()
+    page.get_by_label("objectives", exact=True).check()
     page.get_by_label("Across").select_option("energy")
     page.get_by_label("Up").select_option("torque")
     expect(page).to_have_url(re.compile("x=energy&(objectives=yes&)?y=torque"))
@@ -60,7 +60,7 @@ def test_ranks_stand_in_cells_and_in_a_table_and_axes_may_be_objectives(
     assert int(chart.locator("[data-ticks]").first.get_attribute("data-ticks") or 0) > 2
     page.get_by_label("mean rank by cell").check()
     expect(page).to_have_url(re.compile("as=ranks"))
-    # Wherever there is a design, its cell is told under the pointer.
+    # The readout describes the cell under the pointer.
     box = chart.get_by_role("img").bounding_box()
     assert box is not None
     for across, up in product(range(14), range(14)):
@@ -69,8 +69,8 @@ def test_ranks_stand_in_cells_and_in_a_table_and_axes_may_be_objectives(
         if "mean rank" in chart.locator(".readout").inner_text():
             break
     else:
-        raise AssertionError("nothing is told of any cell")
-    # Of a few designs, four cells side by side are hardly to be had.
+        raise AssertionError("no cell was described")
+    # Few designs hardly ever fill four adjacent cells.
     page.get_by_label("isolines").check()
     expect(page).to_have_url(re.compile("isolines=yes"))
     expect(page.locator("[data-isolines], .isolines-none")).to_be_visible()
@@ -79,7 +79,7 @@ def test_ranks_stand_in_cells_and_in_a_table_and_axes_may_be_objectives(
     expect(cells.first).to_contain_text(" to ")
 
 
-def test_a_design_that_is_clicked_is_marked_in_the_table(
+def test_a_clicked_design_is_highlighted_in_the_table(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url).go(f"/jobs/{finished_job}/variables?x=FI1R&y=FI2R")
@@ -89,10 +89,10 @@ def test_a_design_that_is_clicked_is_marked_in_the_table(
     assert box is not None
     marked = page.locator("[data-marked='true']")
     expect(marked).to_have_count(0)
-    # Somewhere along these lines there is a design.
+    # There is a design somewhere along these lines.
     for share in (0.3, 0.5, 0.7):
         for step in range(1, 20):
             page.mouse.click(box["x"] + box["width"] * step / 20, box["y"] + box["height"] * share)
             if marked.count() == 1:
                 return
-    raise AssertionError("no click marked a design")
+    raise AssertionError("no click selected a design")

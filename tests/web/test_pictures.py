@@ -1,7 +1,7 @@
-"""Pictures of the main views, for the README: `make pictures`.
+"""Screenshots of the main views for the documentation: `make pictures`.
 
-They go to the folder that GAITSWARM_SCREENSHOTS names, and then show the job of the thesis's
-chapter 4; else to a folder of the test's own, and show a small job.
+With GAITSWARM_SCREENSHOTS, they show the thesis's job of chapter 4 and are saved to that folder;
+otherwise they show a small job and are saved to a temporary folder.
 """
 
 from __future__ import annotations
@@ -51,11 +51,11 @@ def test_pictures(
     part: Page | Locator = page
     if name == "what-if":
         page.get_by_role("button", name="C", exact=True).click()
-        # Under the job's own preference the ranks are those that they were.
-        expect(page.get_by_text("rank correlation")).not_to_contain_text("preference 1.00")
+        # Under the job's preference, the correlation would be 1.
+        expect(page.get_by_text("rank correlation")).not_to_contain_text("preference: 1.00")
     if name == "two-walks":
         page.get_by_role("button", name="Side by side").click()
-        page.get_by_label("Moment of the walk").fill("80")
+        page.get_by_label("Time in the walk").fill("80")
         part = page.locator("[data-player]")
         expect(part).to_have_attribute("data-frame", "80")
 

@@ -1,4 +1,4 @@
-"""A job that judges designs in many worlds: its part of the form, and what its page says of it."""
+"""Robust jobs: form section and job page."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.web.visit import Visit
 pytestmark = pytest.mark.slow
 
 
-def test_a_robust_job_is_set_up_in_the_form_and_its_cost_is_told_first(
+def test_a_robust_job_is_configured_with_its_cost_in_view(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url, allowed="status of 422").go("/jobs/new")
@@ -27,7 +27,7 @@ def test_a_robust_job_is_set_up_in_the_form_and_its_cost_is_told_first(
     expect(part.get_by_label(re.compile("^Worlds"))).to_have_count(0)
 
     part.get_by_role("button", name="many worlds").click()
-    expect(part.get_by_text("Every design walks 8 times")).to_be_visible()
+    expect(part.get_by_text("Every design is simulated 8 times")).to_be_visible()
     expect(walks).to_have_attribute("data-walks", "128")
     worlds = part.get_by_label(re.compile("^Worlds"))
     worlds.fill("3")
@@ -47,11 +47,11 @@ def test_a_robust_job_is_set_up_in_the_form_and_its_cost_is_told_first(
     spec = server.job(submitted(page))["spec"]
     assert (spec["worlds"]["count"], spec["worlds"]["aggregate"]) == (2, "worst")
     note = page.locator("[data-worlds='2']")
-    expect(note).to_contain_text("Robust job: every design walks in 2 worlds")
-    expect(note).to_contain_text("A scenario counts by the worst of its utilities.")
+    expect(note).to_contain_text("Robust job: every design is simulated in 2 worlds")
+    expect(note).to_contain_text("The utility of a scenario is the worst over all worlds.")
 
 
-def test_its_page_has_a_row_for_every_world_and_a_clone_asks_for_the_same(
+def test_its_page_has_a_row_per_world_and_a_clone_has_the_same_spec(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:
     ranges = ["friction_factor", "efficiency_factor"]
@@ -62,16 +62,16 @@ def test_its_page_has_a_row_for_every_world_and_a_clone_asks_for_the_same(
     names = ["short.world-0", "short.world-1"]
     expect(table.get_by_role("rowheader")).to_have_text(names)
     note = page.locator("[data-worlds='2']")
-    expect(note).to_contain_text("in 2 perturbations")
+    expect(note).to_contain_text("(2 perturbations)")
     expect(note).to_contain_text("the mean of the worst 25 %")
 
     page.get_by_role("link", name="Clone").click()
-    expect(page.get_by_text("2 perturbations are drawn")).to_be_visible()
+    expect(page.get_by_text("2 perturbations with the ranges of the cloned job")).to_be_visible()
     page.get_by_role("button", name="Submit the job").click()
     assert server.job(submitted(page))["spec"] == server.job(job_id)["spec"]
 
 
-def test_other_jobs_do_not_call_themselves_robust(
+def test_other_jobs_are_not_described_as_robust(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url).go(f"/jobs/{finished_job}")

@@ -1,4 +1,4 @@
-"""The winner's robustness index, by scenario and variable."""
+"""Robustness tab: index by scenario and variable."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from tests.web.visit import Visit
 pytestmark = pytest.mark.slow
 
 
-def test_the_index_of_the_winner_is_drawn_and_told_as_a_table(
+def test_the_index_is_drawn_and_listed(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
     spec = server.job(finished_job)["spec"]
-    asked = {name: spec[name] for name in ("robot", "controller", "scenarios", "variables")}
+    request = {name: spec[name] for name in ("robot", "controller", "scenarios", "variables")}
     design = server.job(finished_job)["best"]["design"]
     view = server.client.post(
-        "/v1/robustness", json=asked | {"design": design, "samples": 128}
+        "/v1/robustness", json=request | {"design": design, "samples": 128}
     ).json()
 
     page = visit(server.url).go(f"/jobs/{finished_job}")
@@ -32,18 +32,18 @@ def test_the_index_of_the_winner_is_drawn_and_told_as_a_table(
     bars = page.locator(".bars").first.get_by_role("listitem")
     expect(bars).to_have_count(3)
     expect(bars.last).to_contain_text("all")
-    expect(page.get_by_text("Not changed: FOMF")).to_be_visible()
+    expect(page.get_by_text("Fixed: FOMF")).to_be_visible()
 
     page.get_by_role("button", name=re.compile("^Show as table.*Robustness index")).click()
     rows = page.get_by_role("table", name="Robustness index by scenario").get_by_role("row")
     expect(rows).to_have_count(4)
     most = max(view["by_variable"], key=view["by_variable"].get)
-    page.get_by_role("button", name=re.compile("^Show as table.*To which variables")).click()
+    page.get_by_role("button", name=re.compile("^Show as table.*Sensitivity by variable")).click()
     sensitive = page.get_by_role("table", name="Sensitivity by variable").get_by_role("row")
     expect(sensitive.nth(1)).to_contain_text(most)
 
 
-def test_a_job_without_a_winner_says_when_there_will_be_an_index(
+def test_a_job_without_a_winner_has_no_index(
     start_server: Callable[..., Server], visit: Callable[..., Visit]
 ) -> None:
     server = start_server()

@@ -1,4 +1,4 @@
-"""Search methods on the page: chosen and set in the form, shown with the job."""
+"""Search methods: choice and settings in the form, display with the job."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ pytestmark = pytest.mark.slow
 
 
 def setting(page: Page, name: str) -> object:
-    """What the card of the search method says of a setting: value and default."""
+    """Value and default of a setting, as shown."""
     row = page.locator(f"tr[data-setting='{name}']")
     return [cell.strip() for cell in row.locator("td").all_text_contents()]
 
 
-def test_a_method_is_chosen_and_set_in_the_form_and_shown_with_its_job(
+def test_a_method_is_configured_in_the_form_and_shown_with_its_job(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url, allowed="status of 422").go("/jobs/new")
@@ -31,7 +31,7 @@ def test_a_method_is_chosen_and_set_in_the_form_and_shown_with_its_job(
     expect(page.get_by_label(re.compile("^Sigma"))).to_have_value("0.25")
     page.get_by_label("Method").select_option("de")
     expect(page.get_by_label(re.compile("^Sigma"))).to_have_count(0)
-    # How many designs an iteration has stays; all else is the method's own.
+    # The number of designs per iteration is kept; other settings belong to the method.
     expect(page.get_by_label(re.compile("^Particles"))).to_have_value("8")
 
     crossover = page.get_by_label(re.compile("^Crossover"))
@@ -54,7 +54,7 @@ def test_a_method_is_chosen_and_set_in_the_form_and_shown_with_its_job(
     assert setting(page, "memory") == ["10", "the same"]
 
 
-def test_a_job_of_small_iterations_shows_designs_and_can_be_looked_through(
+def test_the_budget_of_a_job_with_small_iterations_is_counted_in_designs(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:
     job_id = server.submit(
@@ -70,12 +70,12 @@ def test_a_job_of_small_iterations_shows_designs_and_can_be_looked_through(
     expect_state(page, "succeeded")
     bar = page.get_by_role("progressbar")
     expect(bar).to_have_attribute("aria-label", "30 of 30 designs")
-    expect(page.get_by_text(f"{job['iterations']}, of 5 designs at most")).to_be_visible()
+    expect(page.get_by_text(f"{job['iterations']}, at most 5 designs each")).to_be_visible()
     expect(page.get_by_role("img", name=re.compile("^Convergence over"))).to_be_visible()
 
     page.get_by_role("button", name="Extend…").click()
     expect(page.get_by_text("30 of 30 designs are done")).to_be_visible()
-    expect(page.get_by_label(re.compile("^Iterations in all"))).to_have_attribute("min", "7")
+    expect(page.get_by_label(re.compile("^Iterations in total"))).to_have_attribute("min", "7")
     page.get_by_role("button", name="Back").click()
 
     page.get_by_role("link", name="Iterations", exact=True).click()
@@ -87,16 +87,16 @@ def test_a_job_of_small_iterations_shows_designs_and_can_be_looked_through(
     expect(page.get_by_text("30 of 30 designs").first).to_be_visible()
 
 
-def test_a_search_starts_from_the_best_of_a_job_and_says_so(
+def test_a_search_starts_from_the_best_of_a_job(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url, allowed="status of 4(04|22)").go(f"/jobs/{finished_job}")
-    # Its forks, of which other tests make some, come later and move what is below them.
+    # Forks created by other tests are loaded later and move the content below.
     page.wait_for_load_state("networkidle")
-    page.get_by_role("link", name="Start from its best").click()
+    page.get_by_role("link", name="Start from best design").click()
     expect(page.locator(f"[data-chosen='{finished_job}']")).to_contain_text("fitness")
     page.goto(f"{page.url},nosuchjob")
-    jobs = page.get_by_label("From the best of jobs")
+    jobs = page.get_by_label("Best designs of jobs")
     page.get_by_role("button", name="Submit the job").click()
     expect(jobs).to_be_focused()
     expect(page.get_by_text(re.compile("no job 'nosuchjob'")).first).to_be_visible()
@@ -106,8 +106,8 @@ def test_a_search_starts_from_the_best_of_a_job_and_says_so(
     page.get_by_role("option", name=re.compile(finished_job)).click()
     expect(jobs).to_have_value("")
     jobs.fill(finished_job)
-    expect(page.get_by_text("Nothing fits.")).to_be_visible()
-    page.get_by_label("Designs in all").fill("3")
+    expect(page.get_by_text("No matches.")).to_be_visible()
+    page.get_by_label("Number of designs").fill("3")
     page.get_by_role("button", name="Submit the job").click()
 
     job_id = submitted(page)
@@ -115,14 +115,14 @@ def test_a_search_starts_from_the_best_of_a_job_and_says_so(
     assert len(start) == 3
     server.wait_for(job_id, "succeeded")
     expect_state(page, "succeeded")
-    expect(page.get_by_text("3 known designs", exact=True)).to_be_visible()
-    # They have walked before, for the job that they are of.
+    expect(page.locator(".job-header dl div", has_text="Start designs")).to_be_visible()
+    # Their evaluations are reused from the first job.
     saved = server.job(job_id)["evaluations_saved"]
     assert saved >= 3
     expect(page.get_by_text(re.compile(rf"^{saved} \("))).to_be_visible()
     page.get_by_role("link", name="Spec", exact=True).click()
-    rows = page.get_by_role("table", name="Designs that the job began with").locator("tbody tr")
+    rows = page.get_by_role("table", name="Start designs").locator("tbody tr")
     expect(rows).to_have_count(3)
 
     page.get_by_role("link", name="Clone", exact=True).click()
-    expect(page.get_by_text("It begins with the 3 designs")).to_be_visible()
+    expect(page.get_by_text("The search starts from 3 start designs")).to_be_visible()

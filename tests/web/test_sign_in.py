@@ -1,4 +1,4 @@
-"""A server that asks for a token: the form, and the link that `gaitswarm serve` prints."""
+"""Sign-in by form, and by the link of `gaitswarm serve`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ REFUSED = r"401 \(Unauthorized\)"
 
 @pytest.fixture
 def secret(store: SqlStore) -> str:
-    """Of a token in the database of `start_server`."""
+    """Secret of a token in the database of `start_server`."""
     return store.tokens.create("reader", Scope.READ)[1]
 
 
@@ -26,7 +26,7 @@ def guarded(start_server: Callable[..., Server]) -> Server:
     return start_server(api_access="token")
 
 
-def test_the_page_asks_for_a_token_and_goes_on_with_it(
+def test_the_page_asks_for_a_token(
     guarded: Server, secret: str, visit: Callable[..., Visit]
 ) -> None:
     page = visit(guarded.url, allowed=REFUSED).go("/jobs")
@@ -42,7 +42,7 @@ def test_the_page_asks_for_a_token_and_goes_on_with_it(
     expect(page.get_by_role("heading", name="Jobs", exact=True)).to_be_visible()
 
 
-def test_the_link_of_the_first_start_signs_in_and_leaves_no_trace(
+def test_the_link_signs_in_and_does_not_reveal_the_token(
     guarded: Server, secret: str, visit: Callable[..., Visit]
 ) -> None:
     visited = visit(guarded.url)

@@ -1,4 +1,4 @@
-"""What a job's page shows when the network breaks, and when the job fails."""
+"""Job page during network outages and after failures."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def proxy(server: ServerProcess) -> Iterator[CuttableProxy]:
     proxy.close()
 
 
-def test_a_broken_stream_is_said_to_be_stale_and_goes_on_without_a_gap(
+def test_a_broken_stream_is_marked_stale_and_resumes_without_a_gap(
     server: ServerProcess, proxy: CuttableProxy, visit: Callable[..., Visit]
 ) -> None:
     job_id = server.submit(SMALL_JOB | {"iterations": 5000})
@@ -39,9 +39,9 @@ def test_a_broken_stream_is_said_to_be_stale_and_goes_on_without_a_gap(
     proxy.cut()
 
     expect(job_element(page)).to_have_attribute("data-stream", "stale")
-    expect(page.get_by_text("data is stale since")).to_be_visible()
+    expect(page.get_by_text("stale since")).to_be_visible()
     last = shown_iteration(page)
-    # The job goes on meanwhile.
+    # The job continues meanwhile.
     while server.job(job_id)["iterations"] < last + 10:
         page.wait_for_timeout(50)
     assert shown_iteration(page) == last
@@ -50,7 +50,7 @@ def test_a_broken_stream_is_said_to_be_stale_and_goes_on_without_a_gap(
 
     wait_for_iteration(page, last + 12)
     expect(job_element(page)).to_have_attribute("data-stream", "open")
-    expect(page.get_by_text("data is stale since")).to_be_hidden()
+    expect(page.get_by_text("stale since")).to_be_hidden()
     server.client.post(f"/v1/jobs/{job_id}/cancel")
     expect_state(page, "cancelled")
     committed = server.job(job_id)["iterations"]
@@ -60,7 +60,7 @@ def test_a_broken_stream_is_said_to_be_stale_and_goes_on_without_a_gap(
     expect(page.get_by_text(f"{committed} of {committed}", exact=True)).to_be_visible()
 
 
-def test_a_job_that_fails_is_shown_with_its_reason(
+def test_a_failed_job_is_shown_with_its_reason(
     start_server: Callable[..., Server], tmp_path: Path, visit: Callable[..., Visit]
 ) -> None:
     server = start_server()
@@ -68,17 +68,17 @@ def test_a_job_that_fails_is_shown_with_its_reason(
     page = visit(server.url).go(f"/jobs/{job_id}")
     expect_state(page, "queued")
 
-    # As a runner does that takes the job up and has to give it up.
+    # Simulate a runner that claims the job and fails.
     with closing(open_store(str(tmp_path / "jobs.db"))) as store:
         claim = store.claim("test", lease_seconds=60.0, job_id=job_id)
         assert claim is not None
         expect_state(page, "running")
-        store.release(claim, JobState.FAILED, error="the workers are gone; start them, resume")
+        store.release(claim, JobState.FAILED, error="the workers are away; start them, resume")
 
     expect_state(page, "failed")
-    expect(page.get_by_role("alert")).to_contain_text("the workers are gone; start them, resume")
+    expect(page.get_by_role("alert")).to_contain_text("the workers are away; start them, resume")
     expect(page.get_by_role("button", name="Resume")).to_be_visible()
     page.goto("/jobs")
     row = page.locator(f'[data-job="{job_id}"]')
     expect(row).to_have_attribute("data-state", "failed")
-    expect(row).to_contain_text("the workers are gone")
+    expect(row).to_contain_text("the workers are away")

@@ -1,4 +1,4 @@
-"""The Pareto front of a job, and the preference that would have chosen one of its designs."""
+"""Trade-offs tab: Pareto front, and preferences for its designs."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def table(page: Page, name: str) -> Locator:
     return page.get_by_role("table", name=name)
 
 
-def test_the_front_is_drawn_over_any_two_objectives_and_listed_with_its_marks(
+def test_the_front_is_drawn_over_any_two_objectives_and_listed(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
     front = front_of(server, finished_job)
@@ -59,7 +59,7 @@ def test_the_front_is_drawn_over_any_two_objectives_and_listed_with_its_marks(
     rows = table(page, "Designs of the front").locator("tbody tr")
     expect(rows).to_have_count(min(20, len(front["designs"])))
     marked = [design for design in front["designs"] if design["marks"]]
-    # Those with a mark come first.
+    # Marked designs come first.
     expect(rows.nth(len(marked) - 1)).to_contain_text(re.compile("best|knee|least"))
     listed = table(page, "Designs of the front")
     listed.get_by_role("button", name=re.compile("^energy")).click()
@@ -70,7 +70,7 @@ def test_the_front_is_drawn_over_any_two_objectives_and_listed_with_its_marks(
     expect(page).to_have_url(re.compile(rf"/walk\?job={finished_job}&iteration="))
 
 
-def test_published_designs_walk_when_they_are_asked_for_and_stand_in_the_table(
+def test_published_designs_are_simulated_on_request_and_listed(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
     visited = visit(server.url)
@@ -84,7 +84,7 @@ def test_published_designs_walk_when_they_are_asked_for_and_stand_in_the_table(
     expect(rows).to_have_text(["published A", "published B", "published C"])
 
 
-def test_winners_of_known_preferences_and_the_hypervolume_are_told(
+def test_winners_by_preference_and_the_hypervolume_are_shown(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
     front = front_of(server, finished_job)
@@ -93,14 +93,14 @@ def test_winners_of_known_preferences_and_the_hypervolume_are_told(
     for winner in front["winners"]:
         row = page.locator(f"[data-preference='{winner['preference']}']")
         expect(row).to_have_attribute("data-place", place(winner))
-        expect(row).to_contain_text("yes" if winner["on_front"] else "dominate it")
+        expect(row).to_contain_text("yes" if winner["on_front"] else "dominated by")
     page.get_by_role("button", name=re.compile("^Show as table.*Hypervolume")).click()
     rows = table(page, "Hypervolume by iteration").locator("tbody tr")
     expect(rows).to_have_count(len(front["iterations"]))
     expect(rows.first).to_contain_text(f"{front['hypervolume']:.4g}".rstrip("0"))
 
 
-def test_a_design_that_is_pointed_at_has_its_preference_which_ranks_and_starts_jobs(
+def test_the_preference_for_a_design_ranks_the_history_and_starts_a_job(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
     front = front_of(server, finished_job)
@@ -110,25 +110,25 @@ def test_a_design_that_is_pointed_at_has_its_preference_which_ranks_and_starts_j
         for design in front["designs"]
         if place(design) != best and preference_of(server, finished_job, design)["wins"]
     )
-    wanted = preference_of(server, finished_job, chosen)["fits"][0]["preference"]
+    expected = preference_of(server, finished_job, chosen)["fits"][0]["preference"]
     page = visit(server.url).go(f"/jobs/{finished_job}/trade-offs")
     expect(page.get_by_role("heading", name="No design chosen")).to_be_visible()
     page.get_by_role("button", name=re.compile("^Show as table.*Pareto front")).click()
     name = f"design {place(chosen)}"
     row = table(page, "Designs of the front").get_by_role("row").filter(has_text=name)
     row.get_by_role("button").click()
-    expect(page.locator("[data-wins='true']")).to_contain_text("is the best of the job")
+    expect(page.locator("[data-wins='true']")).to_contain_text("is the best design of the job")
     assert parse_qs(urlsplit(page.url).query)["design"] == [place(chosen)]
 
-    page.get_by_role("link", name="Rank the history under it").click()
+    page.get_by_role("link", name="Rank the history with it").click()
     expect(page.locator("[data-winner]")).to_have_attribute("data-winner", place(chosen))
     page.go_back()
     page.get_by_role("link", name="Start a job with it").click()
     query = parse_qs(urlsplit(page.url).query)
-    assert json.loads(query["preference"][0]) == wanted
-    expect(page.get_by_role("button", name="own", exact=True)).to_have_attribute(
-        "aria-pressed", "true"
-    )
+    assert json.loads(query["preference"][0]) == expected
+    expect(
+        page.get_by_role("group", name="Preference").get_by_role("button", name="custom")
+    ).to_have_attribute("aria-pressed", "true")
 
 
 def test_a_click_in_the_chart_chooses_the_nearest_design_of_the_front(
@@ -142,7 +142,7 @@ def test_a_click_in_the_chart_chooses_the_nearest_design_of_the_front(
     assert box is not None
     chosen = page.locator("[data-chosen]")
     expect(chosen).to_have_attribute("data-chosen", "")
-    # Somewhere along these lines there is a design.
+    # There is a design somewhere along these lines.
     for share, step in product((0.3, 0.5, 0.7), range(8, 60)):
         page.mouse.click(box["x"] + box["width"] * step / 60, box["y"] + box["height"] * share)
         if chosen.get_attribute("data-chosen") != "":
@@ -151,18 +151,18 @@ def test_a_click_in_the_chart_chooses_the_nearest_design_of_the_front(
     assert chosen.get_attribute("data-chosen") in {place(design) for design in front["designs"]}
 
 
-def test_a_design_that_fails_is_told_why_it_has_no_preference(
+def test_a_missing_design_is_reported(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url, allowed="status of 404").go(
         f"/jobs/{finished_job}/trade-offs?design=0/4000"
     )
     notice = page.get_by_role("alert")
-    expect(notice).to_contain_text("Its preference cannot be told.")
+    expect(notice).to_contain_text("Could not find a preference.")
     expect(notice).to_contain_text("has no design 0.4000")
 
 
-def test_a_job_that_waits_has_no_front_yet(
+def test_a_queued_job_has_no_front(
     start_server: Callable[..., Server], visit: Callable[..., Visit]
 ) -> None:
     server = start_server()

@@ -1,4 +1,4 @@
-"""A job whose spec the server cannot read: it is listed and shown, and the page goes on."""
+"""Jobs whose spec the server cannot read."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from tests.web.visit import Visit
 pytestmark = pytest.mark.slow
 
 
-def test_it_is_listed_and_its_page_says_why_it_shows_so_little(
+def test_it_is_listed_and_its_page_shows_the_reason(
     start_server: Callable[..., Server], visit: Callable[..., Visit], tmp_path: Path
 ) -> None:
     server = start_server()
-    job_id, sound = server.submit(SMALL_JOB), server.submit(SMALL_JOB)
+    job_id, readable = server.submit(SMALL_JOB), server.submit(SMALL_JOB)
     with closing(sqlite3.connect(tmp_path / "jobs.db")) as connection, connection:
         connection.execute(
             "UPDATE jobs SET spec = json_set(spec, '$.schema_version', 99) WHERE id = ?", (job_id,)
         )
     page = visit(server.url).go("/jobs")
-    for listed in (job_id, sound):
+    for listed in (job_id, readable):
         expect(page.locator(f"[data-job='{listed}']")).to_be_visible()
     page.locator(f"[data-job='{job_id}'] a").click()
     expect(page.get_by_role("alert")).to_contain_text("schema_version")

@@ -1,4 +1,4 @@
-"""One walk: from a particle to its replay, whose numbers are the simulator's."""
+"""Replays of walks."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ pytestmark = pytest.mark.slow
 
 @dataclass(frozen=True)
 class Recording:
-    """header: as the API sends it. frames: (n, floats)."""
+    """header: of the replay format. frames: (n, floats)."""
 
     header: dict[str, Any]
     frames: NDArray[np.float32]
 
     def body(self, frame: int) -> list[float]:
-        """Place of the body [m]."""
+        """Position of the body [m]."""
         offset = next(c["offset"] for c in self.header["channels"] if c["name"] == "link_pose")
         return [float(value) for value in self.frames[frame, offset : offset + 3]]
 
     def travel(self) -> list[list[float]]:
-        """How far each leg's joints turn [rad]."""
+        """Range of each leg's joint angles [rad]."""
         offset, (joints,) = next(
             (c["offset"], c["shape"]) for c in self.header["channels"] if c["name"] == "joint_angle"
         )
@@ -50,21 +50,21 @@ def replay(client: httpx2.Client, **request: Any) -> Recording:
 
 
 def player(page: Page) -> Locator:
-    """The replay, once it can be played."""
-    found = page.locator("[data-player]")
-    expect(found.locator("canvas")).to_be_visible()
-    return found
+    """The player once its canvas is visible."""
+    element = page.locator("[data-player]")
+    expect(element.locator("canvas")).to_be_visible()
+    return element
 
 
 def expect_frame(page: Page, frame: int, recording: Recording) -> None:
-    """The page shows this frame, with the body where the simulator had it."""
+    """Expect this frame with the body at the simulated position."""
     shown = player(page)
     expect(shown).to_have_attribute("data-frame", str(frame))
     place = [float(shown.get_attribute(f"data-{axis}") or "nan") for axis in "xyz"]
     assert place == pytest.approx(recording.body(frame), abs=1e-4)
 
 
-def test_a_row_leads_to_its_particles_and_a_particle_to_its_walk(
+def test_an_iteration_links_to_its_designs_and_a_design_to_its_walk(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
     where = f"/v1/jobs/{finished_job}/iterations/2/evaluations"
@@ -78,13 +78,13 @@ def test_a_row_leads_to_its_particles_and_a_particle_to_its_walk(
     design = evaluation["design"]
     recording = replay(server.client, controller="fuzzy-pi", design=design, scenario=scenario)
     expect_frame(page, 0, recording)
-    worth = page.get_by_role("table", name="Objectives of the walk")
-    energy = worth.get_by_role("row").filter(has_text="energy").get_by_role("cell")
+    objectives = page.get_by_role("table", name="Objectives of the walk")
+    energy = objectives.get_by_role("row").filter(has_text="energy").get_by_role("cell")
     expected = evaluation["scenarios"]["short"]["objectives"]["energy"]
     assert float(energy.inner_text()) == pytest.approx(expected, rel=1e-3)
 
 
-def test_a_replay_is_scrubbed_stepped_and_played(
+def test_a_replay_can_be_scrubbed_stepped_and_played(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:
     published = server.client.get("/v1/controllers").json()["items"]
@@ -95,15 +95,14 @@ def test_a_replay_is_scrubbed_stepped_and_played(
     stage = player(page).locator("canvas")
     first = painted(stage, colourful(200))
 
-    moment = page.get_by_label("Moment of the walk")
+    moment = page.get_by_label("Time in the walk")
     moment.fill("150")
     expect_frame(page, 150, recording)
-    page.get_by_label("One frame ahead").click()
+    page.get_by_label("Next frame").click()
     expect_frame(page, 151, recording)
     painted(stage, other_than(first))
 
-    # Played, it moves by itself and ends at the end.
-    # Slowly first: at the full speed it may have ended before anybody looks.
+    # Playback stops at the end. Slowly at first, so that the playing state can be observed.
     page.get_by_label("Speed").select_option("0.25")
     page.get_by_role("button", name="Play").click()
     expect(player(page)).to_have_attribute("data-playing", "true")
@@ -112,7 +111,7 @@ def test_a_replay_is_scrubbed_stepped_and_played(
     expect_frame(page, recording.header["frames"] - 1, recording)
 
 
-def test_a_replay_is_saved_as_a_video_of_the_chosen_size_and_speed(
+def test_a_replay_is_saved_as_a_video_with_the_chosen_size_and_speed(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url).go("/walk?published=A&scenario=normal-fast&t=0.5")
@@ -131,7 +130,7 @@ def test_a_replay_is_saved_as_a_video_of_the_chosen_size_and_speed(
     page.get_by_role("button", name="Save as video").click()
     dialog = page.get_by_role("dialog", name="Save as video")
     dialog.get_by_label("Size").select_option(label="640 × 360")
-    # What is stopped is not saved.
+    # A stopped recording is not saved.
     dialog.get_by_label("Speed").select_option("0.1")
     dialog.get_by_role("button", name="Record").click()
     expect(dialog.get_by_role("progressbar")).to_be_visible()
@@ -139,18 +138,18 @@ def test_a_replay_is_saved_as_a_video_of_the_chosen_size_and_speed(
 
     dialog.get_by_label("Speed").select_option("4")
     duration = float((shown.locator(".moment").inner_text()).split()[2])
-    expect(dialog).to_contain_text(f"It takes {duration / 4:.1f}")
+    expect(dialog).to_contain_text(f"Recording takes {duration / 4:.1f}")
     with page.expect_download() as download:
         dialog.get_by_role("button", name="Record").click()
     assert download.value.suggested_filename == "walk-normal-fast.webm"
     video = download.value.path().read_bytes()
-    # EBML, the type of document, and the track's width and height (RFC 9559).
+    # EBML header, document type, width and height of the track (RFC 9559).
     assert video[:4] == bytes.fromhex("1a45dfa3") and b"webm" in video[:64]
     assert bytes.fromhex("b0820280") in video and bytes.fromhex("ba820168") in video
-    # A busy machine is slow to draw the first picture, which the film shows the longer for it.
+    # On a slow machine, the first frame lasts longer.
     assert 0.7 < video_seconds(video) / (duration / 4) < 3.0
 
-    # The replay is as it was.
+    # The replay returns to its previous state.
     expect(dialog).to_have_count(0)
     expect(shown).to_have_attribute("data-time", "0.5000")
     assert shown.locator("canvas").bounding_box() == before
@@ -162,7 +161,7 @@ def test_a_replay_is_saved_as_a_video_of_the_chosen_size_and_speed(
 
 
 def video_seconds(video: bytes) -> float:
-    """Duration that a WebM tells [s]: a float in milliseconds."""
+    """Duration of a WebM [s], stored as a float in milliseconds."""
     at = video.index(bytes.fromhex("4489")) + 2
     size = video[at] & 0x7F
     (milliseconds,) = struct.unpack(">f" if size == 4 else ">d", video[at + 1 : at + 1 + size])
@@ -174,7 +173,7 @@ def goes_backward(walk: Recording) -> bool:
 
 
 def falls_onto_its_feet(walk: Recording) -> bool:
-    """From 30 mm above the stance, within 0.2 s."""
+    """Falls from 30 mm above the stance within 0.2 s."""
     return walk.body(0)[2] - walk.body(20)[2] > 0.03
 
 
@@ -191,7 +190,7 @@ def holds_one_leg_still(walk: Recording) -> bool:
         ("stuck-leg", holds_one_leg_still),
     ],
 )
-def test_a_preset_beyond_the_table_is_shown_to_its_end(
+def test_additional_presets_are_shown_to_the_end(
     server: ServerProcess,
     visit: Callable[..., Visit],
     scenario: str,
@@ -205,20 +204,22 @@ def test_a_preset_beyond_the_table_is_shown_to_its_end(
     expect_frame(page, 0, recording)
 
     last = recording.header["frames"] - 1
-    page.get_by_label("Moment of the walk").fill(str(last))
+    page.get_by_label("Time in the walk").fill(str(last))
     expect_frame(page, last, recording)
-    # The camera has followed: the robot is in the picture still.
+    # The camera follows: the robot remains in view.
     painted(player(page).locator("canvas"), colourful(200))
 
 
-def test_two_walks_are_shown_together(
+def test_two_walks_are_compared(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url).go(f"/walk?job={finished_job}&against=published:A")
     player(page)
 
-    worth = page.get_by_role("table", name="Objectives of the walk")
-    expect(worth.get_by_role("row").filter(has_text="energy").get_by_role("cell")).to_have_count(3)
+    objectives = page.get_by_role("table", name="Objectives of the walk")
+    expect(
+        objectives.get_by_role("row").filter(has_text="energy").get_by_role("cell")
+    ).to_have_count(3)
     stage = player(page).locator("canvas")
     ghost = painted(stage, colourful(200))
     page.get_by_role("button", name="Side by side").click()
@@ -228,9 +229,7 @@ def test_two_walks_are_shown_together(
     painted(stage, other_than(ghost))
 
 
-def test_a_walk_that_is_worth_nothing_says_why(
-    server: ServerProcess, visit: Callable[..., Visit]
-) -> None:
+def test_a_failed_walk_shows_the_reason(server: ServerProcess, visit: Callable[..., Visit]) -> None:
     page = visit(server.url).go('/walk?controller=p&design={"P":0}')
 
     status = page.locator("[data-status]")

@@ -1,4 +1,4 @@
-"""Other preferences over a job's history, and its designs across their variables."""
+"""What-if ranking under other preferences, and brushing of designs."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.slow
 OBJECTIVES = ("torque", "acceleration", "angular acceleration", "energy", "reciprocal speed")
 
 
-def test_the_preference_of_chapter_3_has_a_sixth_objective_to_weigh(
+def test_the_preference_of_chapter_3_weights_a_sixth_objective(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
     ranking = server.client.post(
@@ -44,10 +44,10 @@ def test_the_preference_of_chapter_3_has_a_sixth_objective_to_weigh(
     spec = server.job(page.url.rpartition("/")[2])["spec"]
     assert spec["preference"]["bias"] == [0.0] * 5 + [0.03]
     assert (spec["optimizer"]["inertia_end"], spec["optimizer"]["particles"]) == (0.9, 8)
-    expect(page.get_by_text("F of eq. 3.1, maximized")).to_be_visible(timeout=30_000)
+    expect(page.get_by_text("Figure of merit F (eq. 3.1)")).to_be_visible(timeout=30_000)
 
 
-def test_another_preference_ranks_the_history_anew_without_a_walk(
+def test_another_preference_ranks_the_history_without_simulation(
     server: ServerProcess,
     finished_job: str,
     visit: Callable[..., Visit],
@@ -55,9 +55,9 @@ def test_another_preference_ranks_the_history_anew_without_a_walk(
     best = server.job(finished_job)["best"]
     bias = server.job(finished_job)["spec"]["preference"]["bias"]
     exponents = [0.0, 0.0, 0.0, 0.0, 1.0]
-    wanted = {"bias": bias, "exponent": exponents}
+    other = {"bias": bias, "exponent": exponents}
     ranking = server.client.post(
-        f"/v1/jobs/{finished_job}/ranking", json={"preference": wanted}
+        f"/v1/jobs/{finished_job}/ranking", json={"preference": other}
     ).json()
     winner = ranking["top"][0]
     assert (winner["iteration"], winner["particle"]) != (best["iteration"], best["particle"])
@@ -67,17 +67,17 @@ def test_another_preference_ranks_the_history_anew_without_a_walk(
     shown = page.locator("[data-winner]")
     expect(shown).to_have_attribute("data-winner", f"{best['iteration']}.{best['particle']}")
     expect(shown).to_have_attribute("data-evaluations", str(ranking["evaluations"]))
-    asked_before = len(visited.requested)
-    # Only fast walks count.
+    before = len(visited.requested)
+    # Only speed counts.
     for objective, exponent in zip(OBJECTIVES, exponents, strict=True):
         page.get_by_label(f"exponent of {objective}, number").fill(str(exponent))
         page.keyboard.press("Tab")
 
     expect(shown).to_have_attribute("data-winner", f"{winner['iteration']}.{winner['particle']}")
-    expect(page.get_by_role("heading", name="Another design wins")).to_be_visible()
-    asked = {urlsplit(url).path for url in visited.requested[asked_before:]}
-    assert f"/v1/jobs/{finished_job}/ranking" in asked
-    assert not asked & {"/v1/simulations", "/v1/replays"}
+    expect(page.get_by_role("heading", name="New winner")).to_be_visible()
+    paths = {urlsplit(url).path for url in visited.requested[before:]}
+    assert f"/v1/jobs/{finished_job}/ranking" in paths
+    assert not paths & {"/v1/simulations", "/v1/replays"}
 
     page.get_by_role("link", name="Start a job from here").click()
     query = parse_qs(urlsplit(page.url).query)

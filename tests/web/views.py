@@ -1,4 +1,4 @@
-"""The main views of the page, by name."""
+"""Main views of the page."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ VIEWS: Final[Mapping[str, Mapping[str, str]]] = {
         "jobs": "/jobs",
         "new-job": "/jobs/new",
     },
-    "other forms, and jobs compared": {
+    "other forms and comparison": {
         "new-identification": "/jobs/new?kind=identification",
-        "own-robot": "/jobs/new?robot=own",
+        "custom-robot": "/jobs/new?robot=own",
         "compare": "/compare?jobs={job}",
     },
     "a job": {
@@ -28,7 +28,7 @@ VIEWS: Final[Mapping[str, Mapping[str, str]]] = {
         "iterations": "/jobs/{job}/iterations",
         "particles": "/jobs/{job}/iterations/1",
     },
-    "what a job leads to": {
+    "more of a job": {
         "what-if": "/jobs/{job}/preferences",
         "trade-offs": "/jobs/{job}/trade-offs",
         "firmware": "/jobs/{job}/firmware",
@@ -41,18 +41,18 @@ VIEWS: Final[Mapping[str, Mapping[str, str]]] = {
         "controller": "/controller?job={job}",
         "linear-controller": "/controller?controller=pi",
     },
-    "nothing there": {
+    "missing": {
         "no-such-job": "/jobs/none",
         "no-such-page": "/walk/none",
     },
 }
-"""Paths by kind and name; {job} is a job that has ended well."""
+"""Paths by group and name; {job} is a succeeded job."""
 
 _PATHS: Final = {name: path for views in VIEWS.values() for name, path in views.items()}
 
 
 def open_view(visited: Visit, name: str, job: str) -> Page:
-    """A view with all that it asks the server for."""
+    """Open a view and wait until it is loaded."""
     page = visited.go(_PATHS[name].format(job=job))
     expect(page.get_by_role("main")).not_to_be_empty()
     page.wait_for_load_state("networkidle")

@@ -1,4 +1,4 @@
-"""One page before one server, and the rules that it keeps to throughout."""
+"""A visit to the page, with checks that hold throughout."""
 
 from __future__ import annotations
 
@@ -15,18 +15,17 @@ expect.set_options(timeout=TIMEOUT_MS)
 WINDOW: Final[ViewportSize] = {"width": 1280, "height": 800}
 
 
-def seen_again(page: Page) -> None:
-    """As when the tab is shown again: what is asked now and then is asked at once."""
+def show_tab_again(page: Page) -> None:
+    """Simulate a tab becoming visible, which triggers polling at once."""
     page.evaluate("document.dispatchEvent(new Event('visibilitychange'))")
 
 
 class Visit:
-    """A visit fails, when it ends, if the page asked another host for something, broke its content
-    security policy, threw, or logged an error.
+    """Fails at its end if the page sent requests to another host, violated its content security
+    policy, threw, or logged an error.
 
-    allowed: pattern of errors in the console that the test provokes. color_scheme: that the system
-    is set to. bypass_csp: of a page that a test adds its own scripts to. fresh: nothing is cached
-    yet, and what comes is counted.
+    allowed: pattern of expected console errors. color_scheme: of the system. bypass_csp:
+    for tests that inject scripts. fresh: empty cache, with received bytes counted.
     """
 
     def __init__(
@@ -49,7 +48,7 @@ class Visit:
         self.page: Page = pages.take(url, bypass_csp=bypass_csp, fresh=fresh)
         self.page.set_viewport_size(viewport)
         self.page.emulate_media(color_scheme=color_scheme)
-        self.page.on("request", self._asked)
+        self.page.on("request", self._requested)
         self.page.on("console", self._logged)
         self.page.on("pageerror", self._threw)
         if fresh:
@@ -60,17 +59,16 @@ class Visit:
         return self.page
 
     def foreign_requests(self) -> list[str]:
-        """Those for which another host would be asked."""
-        own = urlsplit(self.url).netloc
+        """Requests to other hosts."""
+        host = urlsplit(self.url).netloc
         return [
             url
             for url in self.requested
-            if urlsplit(url).scheme not in ("data", "blob") and urlsplit(url).netloc != own
+            if urlsplit(url).scheme not in ("data", "blob") and urlsplit(url).netloc != host
         ]
 
     def received(self, *, without: str | None = None) -> int:
-        """Bytes of bodies so far, compressed as they came; without those of some addresses. Of a
-        fresh visit."""
+        """Compressed bytes of bodies received by a fresh visit; `without` excludes addresses."""
         return sum(
             count
             for url, count in self.received_by_url.items()
@@ -78,7 +76,7 @@ class Visit:
         )
 
     def close(self, *, failed: bool = False) -> None:
-        self.page.remove_listener("request", self._asked)
+        self.page.remove_listener("request", self._requested)
         self.page.remove_listener("console", self._logged)
         self.page.remove_listener("pageerror", self._threw)
         self._pages.give_back(self.page, failed=failed)
@@ -101,14 +99,14 @@ class Visit:
             lambda event: urls.update({event["requestId"]: event["request"]["url"]}),
         )
 
-        def came(event: dict[str, Any]) -> None:
+        def received(event: dict[str, Any]) -> None:
             url = urls[event["requestId"]]
             before = self.received_by_url.get(url, 0)
             self.received_by_url[url] = before + event["encodedDataLength"]
 
-        network.on("Network.dataReceived", came)
+        network.on("Network.dataReceived", received)
 
-    def _asked(self, request: Request) -> None:
+    def _requested(self, request: Request) -> None:
         self.requested.append(request.url)
 
     def _threw(self, error: Error) -> None:

@@ -1,16 +1,16 @@
-// A browser by WebDriver BiDi (https://w3c.github.io/webdriver-bidi/), as far as one page takes it.
+// Minimal client of WebDriver BiDi (https://w3c.github.io/webdriver-bidi/), for one page.
 //
-// Firefox speaks it itself. The protocol is JSON over a socket, and libraries for it bring seventy
-// packages, or a driver that is not to be had everywhere.
+// Firefox implements the protocol, JSON over a WebSocket, natively. Existing libraries depend on seventy
+// packages, or on a driver that is not available everywhere.
 import { spawn } from 'node:child_process'
 import { mkdtemp, rm, writeFile } from 'node:fs/promises'
 import { tmpdir } from 'node:os'
 import { join } from 'node:path'
 import WebSocket from 'ws'
 
-const PATIENCE_MS = 30_000
+const TIMEOUT_MS = 30_000
 
-/** Start a browser without a window; `use` is called with its one page, and it ends after that. */
+/** Start a headless browser, call `use` with its page, and stop the browser. */
 export async function withPage(executable, preferences, use) {
   const profile = await mkdtemp(join(tmpdir(), 'gaitswarm-firefox-'))
   const lines = Object.entries(preferences).map(
@@ -33,14 +33,14 @@ export async function withPage(executable, preferences, use) {
 
 function address(browser) {
   return new Promise((resolve, reject) => {
-    let told = ''
+    let output = ''
     browser.stderr.on('data', (data) => {
-      told += data
-      const found = /WebDriver BiDi listening on (ws:\S+)/.exec(told)
-      if (found) resolve(`${found[1]}/session`)
+      output += data
+      const match = /WebDriver BiDi listening on (ws:\S+)/.exec(output)
+      if (match) resolve(`${match[1]}/session`)
     })
     browser.on('error', reject)
-    browser.on('close', () => reject(new Error(`the browser has ended: ${told}`)))
+    browser.on('close', () => reject(new Error(`the browser exited: ${output}`)))
   })
 }
 
@@ -52,47 +52,49 @@ function connected(url) {
   })
 }
 
-/** What a user does with a page and sees of it, and what goes wrong meanwhile, in `wrong`. */
+/** User actions on a page; collects errors in `problems`. */
 class Page {
-  wrong = []
+  problems = []
   #socket
-  #asked = new Map()
+  #pending = new Map()
   #context = ''
 
   constructor(socket) {
     this.#socket = socket
     socket.on('message', (data) => this.#take(JSON.parse(data)))
     socket.on('close', () => {
-      for (const { reject } of this.#asked.values()) reject(new Error('the browser has ended'))
+      for (const { reject } of this.#pending.values()) reject(new Error('the browser exited'))
     })
   }
 
   async begin() {
-    await this.#ask('session.new', { capabilities: {} })
-    const { contexts } = await this.#ask('browsingContext.getTree', {})
+    await this.#send('session.new', { capabilities: {} })
+    const { contexts } = await this.#send('browsingContext.getTree', {})
     this.#context = contexts[0].context
-    await this.#ask('session.subscribe', {
+    await this.#send('session.subscribe', {
       events: ['log.entryAdded', 'network.responseCompleted'],
     })
   }
 
   go(url) {
-    return this.#ask('browsingContext.navigate', { context: this.#context, url, wait: 'complete' })
+    return this.#send('browsingContext.navigate', { context: this.#context, url, wait: 'complete' })
   }
 
   resize(width, height) {
     const viewport = { width, height }
-    return this.#ask('browsingContext.setViewport', { context: this.#context, viewport })
+    return this.#send('browsingContext.setViewport', { context: this.#context, viewport })
   }
 
   async picture(path) {
-    const found = await this.#ask('browsingContext.captureScreenshot', { context: this.#context })
-    await writeFile(path, Buffer.from(found.data, 'base64'))
+    const { data } = await this.#send('browsingContext.captureScreenshot', {
+      context: this.#context,
+    })
+    await writeFile(path, Buffer.from(data, 'base64'))
   }
 
-  /** What a function comes to in the page: anything that JSON can hold. */
-  async tell(of, ...values) {
-    const { result, exceptionDetails } = await this.#ask('script.evaluate', {
+  /** Evaluate a function in the page; arguments and result must be JSON. */
+  async evaluate(of, ...values) {
+    const { result, exceptionDetails } = await this.#send('script.evaluate', {
       expression: `(async () => JSON.stringify(await (${of})(...${JSON.stringify(values)})))()`,
       target: { context: this.#context },
       awaitPromise: true,
@@ -101,17 +103,17 @@ class Page {
     return result.value === undefined ? undefined : JSON.parse(result.value)
   }
 
-  /** Wait until a function comes to something in the page. */
+  /** Wait until a function returns a truthy value in the page. */
   async until(what, of, ...values) {
-    for (const ends = Date.now() + PATIENCE_MS; Date.now() < ends; ) {
-      const found = await this.tell(of, ...values)
-      if (found) return found
+    for (const ends = Date.now() + TIMEOUT_MS; Date.now() < ends; ) {
+      const result = await this.evaluate(of, ...values)
+      if (result) return result
       await new Promise((resolve) => setTimeout(resolve, 50))
     }
-    throw new Error(`in vain waited for: ${what}`)
+    throw new Error(`timeout waiting for ${what}`)
   }
 
-  /** Click in the middle of what the selector finds, the one with this text, or the control that it labels. */
+  /** Click the matching element that starts with this text, or the control that it labels. */
   async click(selector, text = '') {
     const [x, y] = await this.until(`${selector} ${text}`, middle, selector, text)
     const pointer = { type: 'pointer', id: 'mouse' }
@@ -122,7 +124,7 @@ class Page {
     await this.#perform({ ...pointer, actions: [...actions, { type: 'pointerUp', button: 0 }] })
   }
 
-  /** Replace what the field with this label has. */
+  /** Replace the text of the field with this label. */
   async fill(label, text) {
     await this.click('label', label)
     const keys = (type) => (value) => ({ type, value })
@@ -132,26 +134,26 @@ class Page {
   }
 
   async #perform(source) {
-    await this.#ask('input.performActions', { context: this.#context, actions: [source] })
+    await this.#send('input.performActions', { context: this.#context, actions: [source] })
   }
 
-  #ask(method, params) {
-    const id = this.#asked.size
+  #send(method, params) {
+    const id = this.#pending.size
     return new Promise((resolve, reject) => {
-      this.#asked.set(id, { resolve, reject })
+      this.#pending.set(id, { resolve, reject })
       this.#socket.send(JSON.stringify({ id, method, params }))
     })
   }
 
   #take(message) {
-    if (message.type === 'success') this.#asked.get(message.id).resolve(message.result)
+    if (message.type === 'success') this.#pending.get(message.id).resolve(message.result)
     else if (message.type === 'error')
-      this.#asked.get(message.id).reject(new Error(`${message.error}: ${message.message}`))
+      this.#pending.get(message.id).reject(new Error(`${message.error}: ${message.message}`))
     else if (message.method === 'log.entryAdded' && message.params.level === 'error')
-      this.wrong.push(`console: ${message.params.text}`)
+      this.problems.push(`console: ${message.params.text}`)
     else if (message.method === 'network.responseCompleted') {
       const { status, url } = message.params.response
-      if (status >= 400) this.wrong.push(`${status}: ${url}`)
+      if (status >= 400) this.problems.push(`${status}: ${url}`)
     }
   }
 }
@@ -161,11 +163,11 @@ const pressed = (key) => [
   { type: 'keyUp', value: key },
 ]
 
-/* Runs in the page. */
+/* Evaluated in the page. */
 function middle(selector, text) {
-  const begins = (one) => one.textContent.trim().startsWith(text)
-  const found = [...document.querySelectorAll(selector)].find(begins)
-  const element = found?.control ?? found
+  const starts = (element) => element.textContent.trim().startsWith(text)
+  const match = [...document.querySelectorAll(selector)].find(starts)
+  const element = match?.control ?? match
   if (!element || element.disabled) return null
   element.scrollIntoView({ block: 'center', behavior: 'instant' })
   const box = element.getBoundingClientRect()

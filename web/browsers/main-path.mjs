@@ -1,7 +1,7 @@
 // The page's main path in Firefox: main-path.mjs FIREFOX URL JOB FOLDER
 //
-// From the list of jobs to a new one, its progress, one of its designs and how that walks; then it is
-// compared with JOB. Pictures go to FOLDER. Prints what was wrong on the way, and then ends with 1.
+// Lists jobs, submits one, follows its progress, opens the replay of one of its designs, and compares it
+// with JOB. Screenshots are saved to FOLDER. Prints problems and exits with 1 if there are any.
 import { join } from 'node:path'
 import { withPage } from './bidi.mjs'
 
@@ -15,16 +15,16 @@ const OTHER_SCENARIOS = [
   '6 turn',
 ]
 
-async function seen(page, name) {
+async function checkWidths(page, name) {
   for (const width of WIDTHS) {
     await page.resize(width, 800)
-    const wide = await page.tell(async () => {
-      // Laid out anew by then, charts as well.
+    const wide = await page.evaluate(async () => {
+      // Wait for the layout, including charts.
       await new Promise((resolve) => setTimeout(resolve, 300))
       const { scrollWidth, clientWidth } = document.documentElement
       return scrollWidth > clientWidth
     })
-    if (wide) page.wrong.push(`${name} is wider than ${width} px`)
+    if (wide) page.problems.push(`${name} is wider than ${width} px`)
     await page.picture(join(folder, `${name}-${width}.png`))
   }
 }
@@ -37,11 +37,11 @@ async function mainPath(page) {
     (job) => document.querySelector(`[data-job='${job}']`) !== null,
     other,
   )
-  await seen(page, 'jobs')
+  await checkWidths(page, 'jobs')
 
   await page.click('main a', 'New job')
   await page.until('the form', () => document.querySelector('[data-walks]') !== null)
-  await seen(page, 'form')
+  await checkWidths(page, 'form')
   await page.fill('Name', 'in Firefox')
   await page.fill('Iterations', '12')
   await page.fill('Particles', '8')
@@ -54,27 +54,27 @@ async function mainPath(page) {
   })
   await page.until('its end', () => /succeeded/.test(document.querySelector('main').textContent))
   await page.until('the curves', () => document.querySelector('main canvas, main svg') !== null)
-  const job = await page.tell(() => location.pathname.split('/')[2])
-  await seen(page, 'job')
+  const job = await page.evaluate(() => location.pathname.split('/')[2])
+  await checkWidths(page, 'job')
 
   await page.click('nav a', 'Iterations')
   await page.click('main tbody a')
   await page.click('main tbody a[href*="/walk"]')
   await page.until('the walk', () => document.querySelector('[data-player][data-frame]') !== null)
-  await seen(page, 'walk')
+  await checkWidths(page, 'walk')
 
   await page.go(`${url}/compare?jobs=${job},${other}`)
   await page.until('both', () => document.querySelectorAll('[data-compared]').length === 2)
-  await seen(page, 'compare')
+  await checkWidths(page, 'compare')
 }
 
-// Little movement is asked for, and light colours.
+// Reduced motion and light colours.
 const preferences = {
   'ui.prefersReducedMotion': 1,
   'layout.css.prefers-color-scheme.content-override': 1,
 }
 await withPage(executable, preferences, async (page) => {
-  await mainPath(page).catch((error) => page.wrong.push(String(error)))
-  for (const line of page.wrong) console.error(line)
-  process.exitCode = page.wrong.length ? 1 : 0
+  await mainPath(page).catch((error) => page.problems.push(String(error)))
+  for (const line of page.problems) console.error(line)
+  process.exitCode = page.problems.length ? 1 : 0
 })

@@ -1,4 +1,4 @@
-/** The frame around every page: header, navigation, and the page that the path means. */
+/** Frame of every page: header, navigation and routing. */
 
 import { useEffect, useLayoutEffect, useRef } from 'preact/hooks'
 import { Empty } from './components/feedback'
@@ -27,7 +27,7 @@ const LINKS = [
   { page: 'controller', href: '/controller', label: 'Controller' },
 ] as const
 
-/** What pages are called before they name themselves by what they show. */
+/** Titles until a page sets its own. */
 const TITLES: Readonly<Record<Route['page'], string>> = {
   jobs: 'Jobs',
   'new-job': 'New job',
@@ -35,7 +35,7 @@ const TITLES: Readonly<Record<Route['page'], string>> = {
   compare: 'Compared jobs',
   walk: 'Walk',
   controller: 'Controller',
-  'not-found': 'No such page',
+  'not-found': 'Page not found',
 }
 
 export function App() {
@@ -81,14 +81,14 @@ export function App() {
   )
 }
 
-/** The page itself; takes the focus after each move, so that keyboards and readers start there. */
+/** The page; takes the focus after navigation, for keyboards and screen readers. */
 function Main({ route }: { route: Route }) {
   const main = useRef<HTMLElement>(null)
-  // Before the effects of the page, which then calls itself otherwise.
+  // A layout effect runs before the effects of the page, which may set another title.
   useLayoutEffect(() => setTitle(TITLES[route.page]), [route.page])
   useEffect(() => {
-    if (moved) main.current?.focus({ preventScroll: true })
-    moved = true
+    if (navigated) main.current?.focus({ preventScroll: true })
+    navigated = true
     return forgetIgnored
   }, [route.page])
   return (
@@ -99,7 +99,7 @@ function Main({ route }: { route: Route }) {
   )
 }
 
-let moved = false
+let navigated = false
 
 function Page({ route }: { route: Route }) {
   switch (route.page) {
@@ -117,7 +117,7 @@ function Page({ route }: { route: Route }) {
       return <ControllerPage />
     case 'not-found':
       return (
-        <Empty title="There is no such page">
+        <Empty title="Page not found">
           <p>
             Go to the <a href="/jobs">list of jobs</a>.
           </p>

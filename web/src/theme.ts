@@ -1,4 +1,4 @@
-/** Light or dark: the system's choice unless the user made one, and colours for canvases. */
+/** Light and dark theme, and theme colours for canvases. */
 
 import { useEffect, useState } from 'preact/hooks'
 
@@ -9,21 +9,20 @@ const dark = matchMedia('(prefers-color-scheme: dark)')
 const listeners = new Set<() => void>()
 const resolved = new Map<string, string>()
 
-/** The theme that is shown now. */
 export function currentTheme(): Theme {
   const chosen = document.documentElement.dataset.theme
   if (chosen === 'light' || chosen === 'dark') return chosen
   return dark.matches ? 'dark' : 'light'
 }
 
-/** Show the theme chosen on an earlier visit, and follow the system where none was. */
+/** Apply the stored theme, and follow the system's otherwise. */
 export function startTheme(): void {
   const stored = localStorage.getItem(KEY)
   if (stored === 'light' || stored === 'dark') document.documentElement.dataset.theme = stored
   dark.addEventListener('change', changed)
 }
 
-/** Show the other theme, now and on later visits. */
+/** Switch the theme, now and on later visits. */
 export function toggleTheme(): void {
   const next: Theme = currentTheme() === 'dark' ? 'light' : 'dark'
   document.documentElement.dataset.theme = next
@@ -31,7 +30,7 @@ export function toggleTheme(): void {
   changed()
 }
 
-/** The present theme; the component renders again when it changes. */
+/** The current theme as component state. */
 export function useTheme(): Theme {
   const [theme, setTheme] = useState(currentTheme)
   useEffect(() => {
@@ -45,10 +44,10 @@ export function useTheme(): Theme {
   return theme
 }
 
-/** A custom property such as `--accent` as `rgb(...)`, for canvases and WebGL. */
+/** Resolve a custom property such as `--accent` to `rgb(...)`, for canvases and WebGL. */
 export function themeColour(name: `--${string}`): string {
-  const known = resolved.get(name)
-  if (known !== undefined) return known
+  const cached = resolved.get(name)
+  if (cached !== undefined) return cached
   // A custom property's own computed value is unresolved; that of `color` is not.
   const probe = document.createElement('span')
   probe.style.color = `var(${name})`

@@ -1,4 +1,4 @@
-/** What tab, history and bookmarks call the page. */
+/** Document title. */
 
 let name = ''
 
@@ -7,7 +7,7 @@ export function setTitle(...parts: readonly string[]): void {
   document.title = [...parts, 'gaitswarm'].join(' · ')
 }
 
-/** What the page is about, such as a job's name; files that are saved are called by it. */
+/** First part of the title, such as a job's name; saved files are named after it. */
 export function pageName(): string {
   return name
 }

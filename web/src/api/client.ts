@@ -1,11 +1,10 @@
-/** Requests to the API, typed by its OpenAPI document. */
+/** Typed requests to the REST API. */
 
 import { ApiProblem, problemOf } from './problem'
 import type { paths } from './schema'
 
 type Method = 'get' | 'post' | 'put' | 'patch' | 'delete'
 
-/** Paths that have an operation of the method. */
 export type PathOf<M extends Method> = {
   [P in keyof paths]: paths[P] extends Record<M, { responses: unknown }> ? P : never
 }[keyof paths]
@@ -15,11 +14,11 @@ type Operation<P extends keyof paths, M extends Method> =
 
 type Json<R> = R extends { content: { 'application/json': infer B } } ? B : never
 
-/** Body of the successful answer. */
+/** Body of a successful response. */
 export type Answer<P extends keyof paths, M extends Method> =
   Operation<P, M> extends { responses: infer R } ? Json<R[keyof R & (200 | 201 | 202)]> : never
 
-/** Body that the operation takes. */
+/** Request body of an operation. */
 export type Body<P extends keyof paths, M extends Method> =
   Operation<P, M> extends { requestBody: { content: { 'application/json': infer B } } } ? B : never
 
@@ -42,7 +41,6 @@ export async function get<P extends PathOf<'get'>>(
   return (await response.json()) as Answer<P, 'get'>
 }
 
-/** POST a body, or a command without one. */
 export async function post<P extends PathOf<'post'>>(
   path: P,
   options: Options & {
@@ -56,7 +54,6 @@ export async function post<P extends PathOf<'post'>>(
   return (await response.json()) as Answer<P, 'post'>
 }
 
-/** PUT a body. */
 export async function put<P extends PathOf<'put'>>(
   path: P,
   options: Options & { path?: Params<P, 'put'>; body?: Body<P, 'put'> } = {},
@@ -66,7 +63,6 @@ export async function put<P extends PathOf<'put'>>(
   return (await response.json()) as Answer<P, 'put'>
 }
 
-/** PATCH a resource. */
 export async function patch<P extends PathOf<'patch'>>(
   path: P,
   options: Options & { path?: Params<P, 'patch'>; body: Body<P, 'patch'> },
@@ -76,7 +72,6 @@ export async function patch<P extends PathOf<'patch'>>(
   return (await response.json()) as Answer<P, 'patch'>
 }
 
-/** DELETE a resource. */
 export async function remove<P extends PathOf<'delete'>>(
   path: P,
   options: Options & { path?: Params<P, 'delete'> } = {},
@@ -93,7 +88,7 @@ export async function getBytes<P extends PathOf<'get'>>(
   return response.arrayBuffer()
 }
 
-/** POST a body whose answer is not JSON. */
+/** POST a body; the response is not JSON. */
 export async function postBytes<P extends PathOf<'post'>>(
   path: P,
   options: Options & { path?: Params<P, 'post'>; body?: Body<P, 'post'> } = {},
@@ -102,10 +97,7 @@ export async function postBytes<P extends PathOf<'post'>>(
   return response.arrayBuffer()
 }
 
-/**
- * The path with its parameters filled in, and what is not null or undefined as query; a list is
- * written out, each of its values under the same name.
- */
+/** Fill in the path parameters and append the query; null values are left out, lists repeat the name. */
 export function url(path: string, params?: unknown, query?: unknown): string {
   const values = (params ?? {}) as Record<string, unknown>
   const filled = path.replace(/\{(\w+)\}/g, (_, name: string) =>
@@ -133,18 +125,19 @@ function posted(
   }
 }
 
-/** The successful response; throws ApiProblem for any other, and AbortError as fetch does. */
+/** Throw ApiProblem for any response but a success; AbortError passes through. */
 async function send(target: string, init: RequestInit): Promise<Response> {
   let response: Response
   try {
     response = await fetch(target, init)
   } catch (error) {
     if (error instanceof DOMException && error.name === 'AbortError') throw error
-    throw new ApiProblem(0, 'the server cannot be reached; is `gaitswarm serve` still running?')
+    throw new ApiProblem(0, 'cannot reach the server; is `gaitswarm serve` still running?')
   }
   if (!response.ok) {
-    // A token that is refused by the sign-in form is the form's to tell.
-    if (response.status === 401 && target !== SESSION) for (const tell of unauthorized) tell()
+    // The sign-in form reports a rejected token itself.
+    if (response.status === 401 && target !== SESSION)
+      for (const listener of unauthorized) listener()
     throw await problemOf(response)
   }
   return response
@@ -153,8 +146,8 @@ async function send(target: string, init: RequestInit): Promise<Response> {
 const SESSION = '/v1/session'
 const unauthorized = new Set<() => void>()
 
-/** Call back whenever the server asks for a token; returns what ends that. */
-export function onUnauthorized(tell: () => void): () => void {
-  unauthorized.add(tell)
-  return () => unauthorized.delete(tell)
+/** Subscribe to 401 responses; returns the unsubscribe function. */
+export function onUnauthorized(listener: () => void): () => void {
+  unauthorized.add(listener)
+  return () => unauthorized.delete(listener)
 }

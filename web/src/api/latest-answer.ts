@@ -1,7 +1,7 @@
-/** Questions that come faster than answers: only the last one counts. */
+/** Debounced requests of which only the latest counts. */
 
 interface LatestPorts {
-  /** Call back after some time [ms]; returns what cancels it. */
+  /** Schedule a call; returns the function that cancels it. */
   later(call: () => void, milliseconds: number): () => void
 }
 
@@ -12,21 +12,16 @@ const BROWSER: LatestPorts = {
   },
 }
 
-/**
- * | event | what happens |
- * | --- | --- |
- * | ask | after a pause without another question, it is sent; an older one is given up |
- * | an answer | told, if no newer question was asked meanwhile |
- */
+/** Send the last question after a pause without another one; abort and drop older requests. */
 export class LatestAnswer<Q, A> {
   private cancel: (() => void) | null = null
   private abort: AbortController | null = null
 
   constructor(
     private readonly send: (question: Q, signal: AbortSignal) => Promise<A>,
-    private readonly told: (answer: A) => void,
-    private readonly failed: (error: unknown) => void,
-    /** Pause after which a question is sent [ms]. */
+    private readonly onAnswer: (answer: A) => void,
+    private readonly onError: (error: unknown) => void,
+    /** Pause before a question is sent [ms]. */
     private readonly pause = 50,
     private readonly ports = BROWSER,
   ) {}
@@ -38,16 +33,15 @@ export class LatestAnswer<Q, A> {
       this.abort = abort
       this.send(question, abort.signal).then(
         (answer) => {
-          if (!abort.signal.aborted) this.told(answer)
+          if (!abort.signal.aborted) this.onAnswer(answer)
         },
         (error: unknown) => {
-          if (!abort.signal.aborted) this.failed(error)
+          if (!abort.signal.aborted) this.onError(error)
         },
       )
     }, this.pause)
   }
 
-  /** Whatever was asked is of no interest any more. */
   stop(): void {
     this.cancel?.()
     this.abort?.abort()

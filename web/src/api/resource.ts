@@ -1,21 +1,17 @@
-/** Answers of the API as component state. */
+/** API responses as component state. */
 
 import { useCallback, useEffect, useRef, useState } from 'preact/hooks'
 import { messageOf } from './problem'
 
-/** An answer that is awaited, there, or failed; `data` stays while it is asked for again. */
+/** A pending, received or failed response; `data` is kept during a reload. */
 export interface Resource<T> {
   readonly data: T | null
   readonly error: Error | null
   readonly loading: boolean
-  /** Ask again. */
   readonly reload: () => void
 }
 
-/**
- * What `load` resolves to, asked again when `key` changes; null as key asks nothing.
- * An answer that a later question has overtaken is dropped.
- */
+/** Fetch when `key` changes, dropping outdated responses; a null key fetches nothing. */
 export function useResource<T>(
   key: string | null,
   load: (signal: AbortSignal) => Promise<T>,
@@ -57,7 +53,7 @@ export function useResource<T>(
   return { data: state.data, error: state.error, loading: state.loading, reload }
 }
 
-/** Call `tick` every `milliseconds` while the tab is shown, and at once when it is shown again. */
+/** Call `tick` every `milliseconds` while the tab is visible, and as soon as it becomes visible. */
 export function usePolling(tick: () => void, milliseconds: number, active = true): void {
   const latest = useRef(tick)
   latest.current = tick
@@ -75,14 +71,14 @@ export function usePolling(tick: () => void, milliseconds: number, active = true
   }, [milliseconds, active])
 }
 
-/** The time [ms], renewed every `milliseconds` while the tab is shown. */
+/** The current time [ms], updated every `milliseconds` while the tab is visible. */
 export function useNow(milliseconds = 1000): number {
   const [now, setNow] = useState(Date.now)
   usePolling(() => setNow(Date.now()), milliseconds)
   return now
 }
 
-/** A number that follows another one, but not more often than every `milliseconds`. */
+/** Follow a number, at most once per `milliseconds`. */
 export function useSlowly(value: number, milliseconds: number): number {
   const [shown, setShown] = useState(value)
   const changed = useRef(0)

@@ -1,18 +1,18 @@
-/** The API's objects under short names; their fields come from the OpenAPI document. */
+/** Short names of the API's schemas. */
 
 import type { components } from './schema'
 
 type Schemas = components['schemas']
 
 export type JobSpec = Schemas['JobSpec']
-/** A shipped robot by its name, a variant of one, or the files of one's own. */
+/** A shipped robot by name, a variant of one, or the files of another robot. */
 export type RobotSource = NonNullable<JobSpec['robot']>
 export type TuningWorlds = Schemas['TuningWorlds']
 export type JobState = Schemas['JobState']
 export type JobSummary = Schemas['JobSummaryView']
-/** A job as it is answered: without a spec and a kind where the server cannot read it. */
+/** A job whose spec and kind are null if the server cannot read them. */
 export type StoredJob = Schemas['JobView']
-/** A job with its spec. */
+/** A readable job. */
 export type Job = StoredJob & {
   readonly spec: AnySpec
   readonly kind: NonNullable<StoredJob['kind']>
@@ -41,7 +41,6 @@ export type Objective = Schemas['ObjectiveView']
 export type IdentificationSpec = Schemas['IdentificationSpec']
 export type CalibrationSpec = Schemas['CalibrationSpec']
 export type CertificateSpec = Schemas['CertificateSpec']
-/** A spec of any kind. */
 export type AnySpec = JobSpec | IdentificationSpec | CalibrationSpec | CertificateSpec
 export type Certificate = Schemas['CertificateView']
 export type CertifiedScenario = Schemas['CertifiedScenarioView']

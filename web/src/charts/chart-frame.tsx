@@ -1,4 +1,4 @@
-/** A chart with its title, and the same numbers as a table for those who read rather than look. */
+/** A chart card: title, legend, export menu, and the same numbers as a table. */
 
 import type { ComponentChildren } from 'preact'
 import { useId, useRef, useState } from 'preact/hooks'
@@ -17,16 +17,13 @@ export function ChartFrame({
   children,
 }: {
   title: string
-  /** A sentence on what is drawn. */
   note?: string
-  /** The chart's numbers; made only when asked for. */
+  /** The chart's numbers; rendered on demand. */
   table: () => ComponentChildren
-  /** All of the chart's numbers, where the table holds some of them only. */
+  /** All numbers of the chart, if the table holds only some of them. */
   data?: () => DataTable
-  /** Controls of the chart. */
   tools?: ComponentChildren
   legend?: ComponentChildren
-  /** The chart. */
   children: ComponentChildren
 }) {
   const [asTable, setAsTable] = useState(false)
@@ -68,7 +65,7 @@ export function ChartFrame({
           </button>
         </div>
       </header>
-      {error !== null && <ErrorNotice what="The file could not be made." error={error} />}
+      {error !== null && <ErrorNotice what="Could not create the file." error={error} />}
       {asTable ? (
         table()
       ) : (
@@ -81,7 +78,6 @@ export function ChartFrame({
   )
 }
 
-/** An entry of a legend. */
 export function LegendEntry({
   colour,
   label,

@@ -1,13 +1,13 @@
-/** Range and ticks of a logarithmic axis that may span much less than a power of ten. */
+/** Range and ticks of linear and logarithmic axes; a logarithmic axis may span less than a decade. */
 
-/** The data's range with a little room around it. */
+/** The range of the data with a margin. */
 export function logRange(low: number | null, high: number | null): [number, number] {
   if (low === null || high === null || !(low > 0)) return [1, 10]
   const room = Math.max((high / low) ** 0.05, 1.02)
   return [low / room, high * room]
 }
 
-/** Round numbers between two others, some four to ten of them. */
+/** Four to ten round numbers in a range. */
 export function logTicks(low: number, high: number): number[] {
   if (!(low > 0) || !(high > low)) return [low]
   const decades = Math.log10(high / low)
@@ -22,9 +22,9 @@ export function logTicks(low: number, high: number): number[] {
   return ticks.filter((tick) => tick >= low && tick <= high)
 }
 
-/** Multiples of 1, 2 or 5 times a power of ten between two numbers. */
-export function linearTicks(low: number, high: number, wanted = 6): number[] {
-  const rough = (high - low) / wanted
+/** Multiples of 1, 2 or 5 times a power of ten in a range. */
+export function linearTicks(low: number, high: number, count = 6): number[] {
+  const rough = (high - low) / count
   const power = 10 ** Math.floor(Math.log10(rough))
   const step = ([1, 2, 5, 10].find((factor) => factor * power >= rough) ?? 10) * power
   const ticks: number[] = []

@@ -1,27 +1,21 @@
-/** Draws many lines without holding up the page: a part of them in every frame. */
+/** Draws many lines over several frames, to keep the page responsive. */
 
 import { BUCKETS, FAILED, type ParallelModel } from './parallel/parallel-model'
 
 export interface Palette {
-  /** Colours from the best rows to the worst. */
+  /** Colours from best to worst. */
   readonly buckets: readonly string[]
   readonly failed: string
 }
 
-/** Frames longer than this [ms] make the parts smaller. */
+/** Slower frames [ms] shrink the batches, quicker ones enlarge them. */
 const SLOW_FRAME_MS = 30
 const QUICK_FRAME_MS = 20
 const FIRST_PART = 800
 const LEAST_PART = 100
 const LARGEST_PART = 6000
 
-/**
- * | call | what is seen |
- * | --- | --- |
- * | paint(rows) | the canvas is cleared; a first part of the rows is drawn at once |
- * | frame after frame | further parts, as large as 30 frames per second allow |
- * | paint(others) | the drawing begins anew; what was not drawn yet never is |
- */
+/** Draw a first batch at once and one per frame afterwards; a new call to `paint` starts over. */
 export class ProgressivePainter {
   private readonly context: CanvasRenderingContext2D
   private rows: Uint32Array = new Uint32Array()
@@ -34,11 +28,10 @@ export class ProgressivePainter {
 
   constructor(
     private readonly canvas: HTMLCanvasElement,
-    /** Told how many of the rows are drawn. */
+    /** Called with the number of rows drawn. */
     private readonly progress: (drawn: number, of: number) => void,
   ) {
-    // Thousands of thin lines are slow on graphics processors that are not there: on the processor
-    // they take as long on every machine. This is how a canvas is kept there.
+    // A software canvas: without a GPU, thousands of thin lines are slow on an accelerated one.
     this.context = canvas.getContext('2d', { willReadFrequently: true })!
   }
 
@@ -69,7 +62,7 @@ export class ProgressivePainter {
     })
   }
 
-  /** Choose the size of the next part by how long the last frame took. */
+  /** Adapt the batch size to the duration of the last frame. */
   private adapt(now: number): void {
     const took = this.before === 0 ? SLOW_FRAME_MS : now - this.before
     this.before = now
@@ -78,7 +71,7 @@ export class ProgressivePainter {
     this.part = Math.round(this.part)
   }
 
-  /** The worst first, so that the best lie on top; one stroke for each colour. */
+  /** Draw the worst first, so that the best are on top; one stroke per colour. */
   private drawLines(rows: Uint32Array): void {
     const { axes, buckets } = this.model!
     const { context, canvas, palette } = this

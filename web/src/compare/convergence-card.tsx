@@ -1,4 +1,4 @@
-/** The best of every job as it went on, by iterations, evaluations or time. */
+/** Best fitness so far of several jobs, by iterations, evaluations or time. */
 
 import { useCallback, useMemo } from 'preact/hooks'
 import type uPlot from 'uplot'
@@ -55,11 +55,11 @@ export function ConvergenceCard({
     },
     [references],
   )
-  const beside = references.map((each) => `; ${lineLabel(each)}`).join('')
+  const referenceText = references.map((each) => `; ${lineLabel(each)}`).join('')
   return (
     <ChartFrame
       title="Convergence"
-      note="Best fitness so far; less is better. Drag to zoom, double-click to see all."
+      note="Best fitness so far; lower is better. Drag to zoom, double-click to reset."
       tools={
         <>
           <label class="row small">
@@ -68,7 +68,7 @@ export function ConvergenceCard({
               value={axis}
               onChange={(event) => {
                 setAxis(event.currentTarget.value as Axis)
-                // A stretch of another axis means nothing.
+                // A range of the previous axis is meaningless on the new one.
                 setZoom(null)
               }}
             >
@@ -112,7 +112,7 @@ export function ConvergenceCard({
     >
       <LineChart
         key={axis}
-        label={`Convergence of ${jobs.length} jobs by ${AXES[axis].label}${beside}`}
+        label={`Convergence of ${jobs.length} jobs by ${AXES[axis].label}${referenceText}`}
         x={x}
         xLabel={AXES[axis].label}
         xUnit={AXES[axis].unit}

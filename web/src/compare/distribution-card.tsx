@@ -1,4 +1,4 @@
-/** The distribution function of every job's fitness: how many of its designs are how good. */
+/** Cumulative distribution of the fitness of several jobs. */
 
 import { useMemo } from 'preact/hooks'
 import { ChartFrame, LegendEntry } from '../charts/chart-frame'
@@ -7,7 +7,7 @@ import { Table } from '../components/table/table'
 import { formatNumber, percent } from '../format/number'
 import { type ComparedJob, colourOf, dashOf, distributions } from './series'
 
-/** Shares that the table lists. */
+/** Shares listed in the table. */
 const LISTED = [0, 0.05, 0.25, 0.5, 0.75, 0.95, 1]
 
 export function DistributionCard({ jobs }: { jobs: readonly ComparedJob[] }) {
@@ -28,7 +28,7 @@ export function DistributionCard({ jobs }: { jobs: readonly ComparedJob[] }) {
   return (
     <ChartFrame
       title="Distribution of fitness"
-      note="Share of the designs that walk in every case whose fitness is at most this."
+      note="Share of the designs that walk in every scenario with at most this fitness."
       legend={jobs.map((job, k) => (
         <LegendEntry key={job.id} colour={colourOf(k)} label={job.name || job.id} />
       ))}

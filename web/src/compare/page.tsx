@@ -1,4 +1,4 @@
-/** Jobs beside each other: how they converged, how their designs are spread, how their specs differ. */
+/** Comparison of jobs: convergence, distribution of fitness, differences between specs. */
 
 import { get } from '../api/client'
 import { usePolling, useResource } from '../api/resource'
@@ -7,7 +7,7 @@ import { Empty, ErrorNotice, Loading } from '../components/feedback'
 import { StateBadge } from '../components/state-badge'
 import { Table } from '../components/table/table'
 import { formatCount, formatNumber, NONE, percent } from '../format/number'
-import { isUnderWay } from '../job/state'
+import { isActive } from '../job/state'
 import { ALL_JOBS, Breadcrumbs } from '../router/breadcrumbs'
 import { usePlace } from '../router/navigation'
 import { idsOf } from '../router/query-value'
@@ -17,25 +17,25 @@ import { DistributionCard } from './distribution-card'
 import { type ComparedJob, colourOf } from './series'
 import './compare.css'
 
-/** How often jobs under way are asked for again [ms]. */
+/** Polling interval while a job is active [ms]. */
 const RENEW_MS = 4000
-/** Jobs that the title names at most. */
+/** Most jobs named in the title. */
 const NAMED = 3
 
 export default function ComparePage() {
   const { query } = usePlace()
   const ids = idsOf(query.get('jobs'))
   const [first, ...also] = ids
-  const found = useResource(ids.length === 0 ? null : ids.join(), (signal) =>
+  const comparison = useResource(ids.length === 0 ? null : ids.join(), (signal) =>
     get('/v1/jobs/{job_id}/comparison', { path: { job_id: first }, query: { also }, signal }),
   )
-  usePolling(found.reload, RENEW_MS, found.data?.jobs.some(isUnderWay) ?? false)
+  usePolling(comparison.reload, RENEW_MS, comparison.data?.jobs.some(isActive) ?? false)
   return (
     <>
       <Breadcrumbs
         crumbs={[ALL_JOBS]}
         here="Compared jobs"
-        title={found.data ? titleOf(found.data.jobs) : undefined}
+        title={comparison.data ? titleOf(comparison.data.jobs) : undefined}
       />
       <header class="page-header">
         <h1>Compared jobs</h1>
@@ -43,49 +43,49 @@ export default function ComparePage() {
       <div class="stack">
         {ids.length === 0 && (
           <section class="card">
-            <Empty title="No job is chosen">
+            <Empty title="No jobs selected">
               <p>
-                Choose some in the <a href="/jobs">list of jobs</a>.
+                Select jobs in the <a href="/jobs">list of jobs</a>.
               </p>
             </Empty>
           </section>
         )}
-        {found.error && (
+        {comparison.error && (
           <ErrorNotice
-            what="The jobs cannot be compared."
-            error={found.error}
-            retry={found.reload}
+            what="Could not compare the jobs."
+            error={comparison.error}
+            retry={comparison.reload}
           />
         )}
-        {found.loading && !found.data && <Loading what="the jobs" />}
-        {found.data && <Comparison found={found.data} />}
+        {comparison.loading && !comparison.data && <Loading what="the jobs" />}
+        {comparison.data && <Comparison comparison={comparison.data} />}
       </div>
     </>
   )
 }
 
-/** The jobs by name, a few of many, and how many are under way. */
+/** The first jobs by name, and the number of active ones. */
 function titleOf(jobs: readonly ComparedJob[]): readonly string[] {
   const names = jobs.slice(0, NAMED).map(({ name, id }) => name || id)
   if (jobs.length > NAMED) names.push(`${jobs.length - NAMED} more`)
-  const running = jobs.filter(isUnderWay).length
+  const running = jobs.filter(isActive).length
   return [names.join(', '), ...(running > 0 ? [`${running} running`] : []), 'compared']
 }
 
-function Comparison({ found }: { found: JobComparison }) {
+function Comparison({ comparison }: { comparison: JobComparison }) {
   return (
     <>
-      {!found.comparable && (
+      {!comparison.comparable && (
         <div class="notice" data-tone="warn" role="status" data-comparable="false">
-          <strong>They judge by different measures.</strong>
-          <p>Their fitness is not the same quantity: see what their specs say differently.</p>
+          <strong>These jobs measure fitness differently.</strong>
+          <p>Their fitness values are not comparable: see the differences between their specs.</p>
         </div>
       )}
       <section class="card" aria-labelledby="compared">
         <h2 id="compared">The jobs</h2>
         <Table
           caption="Compared jobs"
-          rows={found.jobs}
+          rows={comparison.jobs}
           rowKey={({ id }) => id}
           rowData={({ id }) => ({ 'data-compared': id })}
           columns={[
@@ -98,7 +98,7 @@ function Comparison({ found }: { found: JobComparison }) {
                 <>
                   <i
                     class="compared-mark"
-                    style={{ background: `var(${colourOf(found.jobs.indexOf(job))})` }}
+                    style={{ background: `var(${colourOf(comparison.jobs.indexOf(job))})` }}
                     aria-hidden="true"
                   />
                   <a href={jobPath(job.id)}>{job.name || job.id}</a>
@@ -148,24 +148,24 @@ function Comparison({ found }: { found: JobComparison }) {
           ]}
         />
       </section>
-      <ConvergenceCard jobs={found.jobs} comparable={found.comparable} />
-      <DistributionCard jobs={found.jobs} />
-      <Differences found={found} />
+      <ConvergenceCard jobs={comparison.jobs} comparable={comparison.comparable} />
+      <DistributionCard jobs={comparison.jobs} />
+      <Differences comparison={comparison} />
     </>
   )
 }
 
-function Differences({ found: { jobs, differences } }: { found: JobComparison }) {
+function Differences({ comparison: { jobs, differences } }: { comparison: JobComparison }) {
   return (
     <section class="card" aria-labelledby="differences" data-differences={differences.length}>
-      <h2 id="differences">What their specs say differently</h2>
+      <h2 id="differences">Differences between specs</h2>
       {differences.length === 0 ? (
-        <Empty title="Nothing">
-          <p>Their specs are the same.</p>
+        <Empty title="None">
+          <p>All specs are identical.</p>
         </Empty>
       ) : (
         <Table
-          caption="Differences of the specs"
+          caption="Differences between specs"
           rows={differences}
           rowKey={({ field }) => field}
           columns={[

@@ -1,4 +1,4 @@
-/** Lines of several jobs over one axis, which a chart of lines takes with the same x for all. Pure. */
+/** Data of charts that compare jobs, on a common x axis. */
 
 import type { JobComparison } from '../api/types'
 import type { ReferenceLine } from '../charts/lines/reference-line'
@@ -6,15 +6,15 @@ import { referenceLabel } from '../job/gain'
 
 export type ComparedJob = JobComparison['jobs'][number]
 
-/** What jobs of one measure are compared with, each once. */
+/** Distinct reference fitness values of the jobs. */
 export function referencesOf(jobs: readonly ComparedJob[]): readonly ReferenceLine[] {
-  const found = new Map<string, ReferenceLine>()
+  const references = new Map<string, ReferenceLine>()
   for (const { reference } of jobs) {
     if (typeof reference?.fitness !== 'number') continue
     const label = referenceLabel(reference)
-    found.set(`${label} ${reference.fitness}`, { label, fitness: reference.fitness })
+    references.set(`${label} ${reference.fitness}`, { label, fitness: reference.fitness })
   }
-  return [...found.values()]
+  return [...references.values()]
 }
 
 const COLOURS = [1, 2, 3, 4, 5, 6].map((k) => `--series-${k}` as const)
@@ -23,14 +23,14 @@ export function colourOf(index: number): `--${string}` {
   return COLOURS[index % COLOURS.length]
 }
 
-/** Lines whose colours come again are dashed. */
+/** Dash the lines whose colours repeat. */
 export function dashOf(index: number): readonly number[] | undefined {
   return index < COLOURS.length ? undefined : [6, 4]
 }
 
 export type Axis = 'iterations' | 'evaluations' | 'seconds'
 
-/** Best so far of every job where any has a point; null before its first and after its last. */
+/** Best so far of every job on the union of their x values; null outside a job's range. */
 export function convergences(jobs: readonly ComparedJob[], axis: Axis) {
   const places = jobs.map(({ convergence }) => convergence[axis])
   const x = union(places)
@@ -38,7 +38,7 @@ export function convergences(jobs: readonly ComparedJob[], axis: Axis) {
   return { x, lines }
 }
 
-/** Share of each job's designs that are as good as each fitness, or better. */
+/** Share of each job's designs with at most each fitness. */
 export function distributions(jobs: readonly ComparedJob[]) {
   const x = union(jobs.map(({ fitness }) => fitness))
   const lines = jobs.map(({ fitness, shares }) => {
@@ -50,7 +50,7 @@ export function distributions(jobs: readonly ComparedJob[]) {
   return { x, lines }
 }
 
-/** The value of the last place that is not after each x. */
+/** Resample a step function: the value at the last position not after each x. */
 function held(
   x: readonly number[],
   places: readonly number[],

@@ -1,4 +1,4 @@
-/** A name of the API that may be broken into lines after its underscores. */
+/** An API name that may wrap after its underscores. */
 
 import { Fragment } from 'preact'
 

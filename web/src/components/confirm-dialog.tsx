@@ -1,4 +1,4 @@
-/** A question before something is lost. */
+/** Confirmation dialog. */
 
 import type { ComponentChildren } from 'preact'
 import { useEffect, useId, useRef } from 'preact/hooks'
@@ -16,11 +16,10 @@ export function ConfirmDialog({
 }: {
   open: boolean
   title: string
-  /** What the button that does it says. */
+  /** Label of the confirming button. */
   confirm: string
   dismiss?: string
   dangerous?: boolean
-  /** Whether it cannot be confirmed as things stand. */
   disabled?: boolean
   onConfirm: () => void
   onDismiss: () => void

@@ -2,11 +2,10 @@
 
 import { useState } from 'preact/hooks'
 
-/** The text itself, with a button that copies it. */
 export function CopyBlock({ text, label }: { text: string; label: string }) {
   return (
     <div class="command">
-      {/* A box that scrolls must take the keyboard. */}
+      {/* A scrollable box must be reachable by keyboard. */}
       <pre tabIndex={0}>{text}</pre>
       <CopyButton text={text} label={label} />
     </div>
@@ -14,24 +13,24 @@ export function CopyBlock({ text, label }: { text: string; label: string }) {
 }
 
 export function CopyButton({ text, label }: { text: string; label: string }) {
-  const [told, setTold] = useState('')
+  const [status, setStatus] = useState('')
   const copy = async () => {
-    setTold((await copied(text)) ? 'Copied' : 'Select and copy by hand')
-    setTimeout(() => setTold(''), 2500)
+    setStatus((await copied(text)) ? 'Copied' : 'Select the text to copy it')
+    setTimeout(() => setStatus(''), 2500)
   }
   return (
     <>
       <button type="button" class="compact" onClick={copy} aria-label={`Copy ${label}`}>
-        {told === '' ? 'Copy' : told}
+        {status === '' ? 'Copy' : status}
       </button>
       <span class="visually-hidden" role="status">
-        {told}
+        {status}
       </span>
     </>
   )
 }
 
-/** The clipboard is closed to pages that came over plain http from another machine. */
+/** Browsers deny the clipboard to pages served over plain HTTP from another host. */
 async function copied(text: string): Promise<boolean> {
   try {
     await navigator.clipboard.writeText(text)

@@ -1,10 +1,9 @@
-/** What a page shows while it has nothing to show. */
+/** Loading, empty and error states. */
 
 import type { ComponentChildren } from 'preact'
 import { ApiProblem, messageOf } from '../api/problem'
 import { sentence } from '../format/words'
 
-/** Something is on its way. */
 export function Loading({ what }: { what: string }) {
   return (
     <div class="loading" role="status">
@@ -13,7 +12,7 @@ export function Loading({ what }: { what: string }) {
   )
 }
 
-/** There is nothing yet; children say what to do about it. */
+/** Nothing to show yet; children explain how to change that. */
 export function Empty({ title, children }: { title: string; children?: ComponentChildren }) {
   return (
     <div class="empty">
@@ -23,14 +22,14 @@ export function Empty({ title, children }: { title: string; children?: Component
   )
 }
 
-/** Something failed: what, why, and a button to try again where that may help. */
+/** An error with its reason, and a retry button unless retrying cannot help. */
 export function ErrorNotice({
   error,
   what,
   retry,
 }: {
   error: unknown
-  /** What could not be done, as in "the jobs cannot be shown". */
+  /** Short summary, such as "Could not load the jobs." */
   what: string
   retry?: () => void
 }) {
@@ -60,7 +59,7 @@ export function ErrorNotice({
   )
 }
 
-/** Whether asking the same again gets the same answer. */
+/** Whether the same request would fail again. */
 function isFinal(error: unknown): boolean {
   return error instanceof ApiProblem && error.status === 422
 }

@@ -1,4 +1,4 @@
-/** A button with a few commands below it (the menu button of the ARIA patterns). */
+/** Menu button (ARIA pattern). */
 
 import { useEffect, useId, useRef, useState } from 'preact/hooks'
 
@@ -12,9 +12,9 @@ export function Menu({
   of,
   items,
 }: {
-  /** Of the button. */
+  /** Label of the button. */
   label: string
-  /** What the commands are about; read, not shown. */
+  /** Subject of the commands, for screen readers only. */
   of: string
   items: readonly MenuItem[]
 }) {

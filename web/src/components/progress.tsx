@@ -1,4 +1,4 @@
-/** How much of a budget is done. */
+/** Progress bar. */
 
 export function Progress({
   done,

@@ -1,4 +1,4 @@
-/** A job's state, told by word and colour. */
+/** A job's state as a coloured badge. */
 
 import type { JobState } from '../api/types'
 

@@ -1,4 +1,4 @@
-/** Parts of a page of which one is shown. */
+/** Tabs (ARIA pattern); arrow keys move between them. */
 
 import type { ComponentChildren } from 'preact'
 import { useId } from 'preact/hooks'
@@ -8,7 +8,6 @@ export interface Tab<K extends string> {
   readonly label: string
 }
 
-/** Tabs with the panel of the chosen one; arrow keys move between them. */
 export function Tabs<K extends string>({
   tabs,
   chosen,
@@ -20,7 +19,7 @@ export function Tabs<K extends string>({
   chosen: K
   onChoose: (key: K) => void
   label: string
-  /** The chosen tab's panel. */
+  /** Panel of the chosen tab. */
   children: ComponentChildren
 }) {
   const id = useId()

@@ -1,4 +1,4 @@
-/** A unit in brackets behind a label; nothing for the unit `1`. */
+/** A unit in brackets after a label; nothing for the unit `1`. */
 
 import { writtenUnit } from '../format/number'
 

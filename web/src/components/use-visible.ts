@@ -1,9 +1,9 @@
-/** Whether an element is in view. */
+/** Visibility of an element. */
 
 import type { RefObject } from 'preact'
 import { useEffect, useState } from 'preact/hooks'
 
-/** True while any part of the element is in the window. */
+/** True while any part of the element is in the viewport. */
 export function useVisible(element: RefObject<Element | null>): boolean {
   const [visible, setVisible] = useState(false)
   useEffect(() => {

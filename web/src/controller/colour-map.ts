@@ -1,10 +1,10 @@
-/** A diverging colour map: blue below zero, orange above, told apart by every common eye. */
+/** A diverging colour map for colour-blind readers too: blue below zero, orange above. */
 
 import type { Theme } from '../theme'
 
 type Triple = readonly [number, number, number]
 
-/** sRGB, 0 to 255: least value, zero, greatest; zero is near the page's surface. */
+/** sRGB, 0 to 255: minimum, zero, maximum; zero is close to the page's surface colour. */
 const ENDS: Readonly<Record<Theme, readonly [Triple, Triple, Triple]>> = {
   light: [
     [14, 73, 140],

@@ -1,4 +1,4 @@
-/** The values of a design, with what each is and the bounds of its search. */
+/** Table of a design's values with their meanings and search bounds. */
 
 import type { Variable } from '../api/types'
 import { type Column, Table } from '../components/table/table'
@@ -15,8 +15,8 @@ interface Row {
 
 export function DesignCard({ design }: { design: ResolvedDesign }) {
   const { controller } = design
-  const known = variablesOf(controller)
-  const rows = [...known, ...ofLegGroups(known, Object.keys(design.design))]
+  const common = variablesOf(controller)
+  const rows = [...common, ...ofLegGroups(common, Object.keys(design.design))]
     .filter(({ name }) => name in design.design)
     .map((variable): Row => ({ variable, value: design.design[variable.name] }))
   const columns: Column<Row>[] = [
@@ -34,7 +34,7 @@ export function DesignCard({ design }: { design: ResolvedDesign }) {
     },
     {
       key: 'bounds',
-      label: 'Bounds of the search',
+      label: 'Search bounds',
       numeric: true,
       minor: true,
       cell: ({ variable }) => searched(variable),
@@ -48,7 +48,7 @@ export function DesignCard({ design }: { design: ResolvedDesign }) {
         <p class="muted small">{controller.description}</p>
       </header>
       <Table
-        caption="Values of the design"
+        caption="Design values"
         columns={columns}
         rows={rows}
         rowKey={({ variable }) => variable.name}
@@ -57,7 +57,7 @@ export function DesignCard({ design }: { design: ResolvedDesign }) {
   )
 }
 
-/** Its bounds, or its choices. */
+/** Bounds, or choices. */
 function searched({ low, high, choices = [] }: Variable): string {
   if (choices.length > 0) return choices.map(inWords).join(', ')
   return `${formatExact(low)} to ${formatExact(high)}`

@@ -1,4 +1,4 @@
-/** All there is to see of one output of a fuzzy controller. */
+/** Surface, rules, table and membership functions of one fuzzy output. */
 
 import { useMemo, useState } from 'preact/hooks'
 import { HeatMap } from './heat-map'

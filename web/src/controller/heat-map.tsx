@@ -1,4 +1,4 @@
-/** A surface from above: colours for numbers, which pointer and keys read out. */
+/** A surface as a heat map with a movable point and a numeric readout. */
 
 import { useEffect, useRef, useState } from 'preact/hooks'
 import { ChartFrame } from '../charts/chart-frame'
@@ -11,7 +11,7 @@ import { type Cell, cells, extent, type Layer, layerData, moved } from './surfac
 
 const HEIGHT = 300
 
-/** Currents that the table shows; it would have too many columns with all. */
+/** Number of currents in the table; all of them would be too many columns. */
 const TABLE_COLUMNS = 9
 
 const STEPS: Readonly<Record<string, readonly [errors: number, currents: number]>> = {
@@ -52,8 +52,8 @@ export function HeatMap({
   const point = (event: PointerEvent) => {
     const { left, top, width } = canvas.current!.getBoundingClientRect()
     const [x, y] = [event.clientX - left, event.clientY - top]
-    const found = cellAt(x, y, plotOf(width, HEIGHT), layer)
-    if (found) onCell(found)
+    const hit = cellAt(x, y, plotOf(width, HEIGHT), layer)
+    if (hit) onCell(hit)
   }
   const press = (event: KeyboardEvent) => {
     const step = STEPS[event.key]
@@ -75,8 +75,8 @@ export function HeatMap({
         ref={box}
         tabIndex={0}
         role="application"
-        aria-label={`${layer.title} over error and current; arrow keys move the chosen point`}
-        data-own-keys
+        aria-label={`${layer.title} over error and current; arrow keys move the selected point`}
+        data-handles-keys
         onPointerDown={point}
         onPointerMove={point}
         onKeyDown={press}
@@ -92,7 +92,7 @@ export function HeatMap({
           data-value={layer.values[cell.error][cell.current]}
         />
       </div>
-      {/* The other maps show the same point; one voice is enough. */}
+      {/* All maps show the same point; only the focused one is announced. */}
       <p class="heat-reading" aria-live={focused ? 'polite' : 'off'}>
         {reading(layer, cell)}
       </p>
@@ -100,7 +100,7 @@ export function HeatMap({
   )
 }
 
-/** The numbers of a cell in words. */
+/** Values of a cell in words. */
 function reading({ error, current, values, unit, key }: Layer, cell: Cell): string {
   const value = values[cell.error][cell.current]
   return [

@@ -1,4 +1,4 @@
-/** Draws a matrix as coloured cells with axes onto a canvas. */
+/** Draws a matrix as coloured cells with axes on a canvas. */
 
 import { linearTicks } from '../charts/log-axis'
 import { formatExact, withUnit } from '../format/number'
@@ -6,7 +6,7 @@ import { type Theme, themeColour } from '../theme'
 import { diverging } from './colour-map'
 import type { Cell, Layer, Universe } from './surface'
 
-/** Where the cells lie on the canvas [CSS px]. */
+/** Area of the cells on the canvas [CSS px]. */
 export interface Plot {
   readonly left: number
   readonly top: number
@@ -19,7 +19,7 @@ export function plotOf(width: number, height: number): Plot {
   return { left, top: 8, width: width - left - 10, height: height - 52 }
 }
 
-/** The cell at a place of the canvas; null outside the plot. */
+/** The cell at a position on the canvas; null outside the plot. */
 export function cellAt(x: number, y: number, plot: Plot, layer: Layer): Cell | null {
   const across = (x - plot.left) / plot.width
   const up = 1 - (y - plot.top) / plot.height
@@ -30,7 +30,7 @@ export function cellAt(x: number, y: number, plot: Plot, layer: Layer): Cell | n
   }
 }
 
-/** Paint everything: cells, axes, and a cross through the chosen cell. */
+/** Draw cells, axes, and a cross through the selected cell. */
 export function paint(
   canvas: HTMLCanvasElement,
   width: number,
@@ -124,11 +124,11 @@ function paintAxes(context: CanvasRenderingContext2D, plot: Plot, layer: Layer):
   context.restore()
 }
 
-/** Places along an axis, as shares of it, with their numbers. */
-function ticksOf({ range: [low, high], values }: Universe, wanted: number): [number, string][] {
-  // Values are the cells' middles.
+/** Tick positions as shares of an axis, with labels. */
+function ticksOf({ range: [low, high], values }: Universe, count: number): [number, string][] {
+  // Values are at the centres of the cells.
   const half = 0.5 / values.length
-  return linearTicks(low, high, wanted).map((tick) => [
+  return linearTicks(low, high, count).map((tick) => [
     half + ((tick - low) / (high - low)) * (1 - 2 * half),
     formatExact(tick, 5),
   ])

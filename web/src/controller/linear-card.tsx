@@ -1,4 +1,4 @@
-/** What a controller without rules does: its law and its gains. */
+/** Control law and gains of a linear controller. */
 
 import { formatExactValue } from '../format/value'
 import type { ResolvedDesign } from '../walk/design/resolve-design'
@@ -9,22 +9,22 @@ interface Term {
   readonly meaning: string
 }
 
-/** Terms of the law, by the gain that they need. */
+/** Terms of the control law, by gain. */
 const TERMS: readonly Term[] = [
-  { gain: 'P', text: 'error', meaning: 'answers at once, in proportion to the angle error' },
+  { gain: 'P', text: 'error', meaning: 'responds immediately, in proportion to the angle error' },
   {
     gain: 'I',
     text: '∫ error dt',
-    meaning: 'grows as long as an error stays, and so takes it away',
+    meaning: 'grows as long as an error persists, and thus removes it',
   },
   {
     gain: 'D',
     text: 'd error / dt',
-    meaning: 'answers to the change of the error, and so damps',
+    meaning: 'responds to the rate of change of the error, and thus damps',
   },
 ]
 
-/** Whether a controller has gains and nothing else; it has no fuzzy surface then. */
+/** Whether a controller has only gains, and hence no fuzzy surface. */
 export function isLinear({ controller }: ResolvedDesign): boolean {
   return controller.variables.every(({ name }) => TERMS.some(({ gain }) => gain === name))
 }
@@ -34,10 +34,10 @@ export function LinearCard({ design }: { design: ResolvedDesign }) {
   return (
     <section class="card" data-linear={design.controller.name}>
       <header>
-        <h2>Its law</h2>
+        <h2>Control law</h2>
         <p class="muted small">
-          This controller is linear: it has no rules, so no fuzzy surface and no table. Its answer
-          does not depend on the motor current.
+          This controller is linear: it has no rules, hence no fuzzy surface and no table. Its
+          output does not depend on the motor current.
         </p>
       </header>
       <p class="law">

@@ -1,4 +1,4 @@
-/** The fuzzy sets of an input or output: how much every value belongs to each. */
+/** Membership functions of an input or output. */
 
 import { useMemo } from 'preact/hooks'
 import { ChartFrame, LegendEntry } from '../charts/chart-frame'
@@ -17,7 +17,7 @@ export function MembershipChart({
 }: {
   universe: Universe
   side: 'Input' | 'Output'
-  /** Value at the chosen point. */
+  /** Value at the selected point. */
   marker: number
 }) {
   const { name, unit, values, memberships } = universe
@@ -37,7 +37,7 @@ export function MembershipChart({
     <div class="plot" data-membership={name}>
       <ChartFrame
         title={`${side}: ${name}`}
-        note="Degree of membership; the line is the chosen point."
+        note="Degree of membership; the line marks the selected point."
         table={() => <MembershipTable universe={universe} />}
         legend={series.map(({ label, colour }) => (
           <LegendEntry key={label} label={label} colour={colour} />

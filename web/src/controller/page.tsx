@@ -1,4 +1,4 @@
-/** One controller: its design, and what it answers to error and current. */
+/** Controller page: a design and its control surface. */
 
 import { useState } from 'preact/hooks'
 import { post } from '../api/client'
@@ -17,7 +17,7 @@ import { FuzzyPanel } from './fuzzy-panel'
 import { isLinear, LinearCard } from './linear-card'
 import { inputOf, type SurfaceView } from './surface'
 
-/** Points of the grid; odd, so that zero error is one of them. */
+/** Points of the grid; odd, so that it includes zero error. */
 const GRID = { error_points: 65, current_points: 33 }
 
 export default function ControllerPage() {
@@ -42,11 +42,15 @@ function Controller({ source, query }: { source: DesignSource; query: URLSearchP
           chosenLabel={design?.label ?? 'This design'}
           onChoose={(chosen) => setQuery({ ...queryOf(chosen!), velocity: null })}
         />
-        <DesignLinks source={design?.source ?? source} path={design && '/walk'} label="Its walk" />
+        <DesignLinks
+          source={design?.source ?? source}
+          path={design && '/walk'}
+          label="Simulate it"
+        />
       </div>
       {resolved.error && (
         <ErrorNotice
-          what="This controller cannot be shown."
+          what="Could not load the controller."
           error={resolved.error}
           retry={resolved.reload}
         />
@@ -73,7 +77,7 @@ function Fuzzy({ design, velocity }: { design: ResolvedDesign; velocity: number 
   if (surface.error) {
     return (
       <ErrorNotice
-        what="The fuzzy surface cannot be shown."
+        what="Could not compute the fuzzy surface."
         error={surface.error}
         retry={surface.reload}
       />
@@ -109,12 +113,12 @@ function Outputs({ surface }: { surface: SurfaceView }) {
   )
 }
 
-/** At which velocity error the surfaces are drawn. */
+/** Slider for the velocity error at which the surfaces are evaluated. */
 function VelocityChoice({ surface, velocity }: { surface: SurfaceView; velocity: number }) {
   const { range, unit, values } = inputOf(surface, 'velocity')
   return (
     <div class="card field">
-      <label for="velocity">Velocity error at which the surfaces are drawn</label>
+      <label for="velocity">Velocity error of the surfaces</label>
       <div class="row">
         <input
           id="velocity"
@@ -135,7 +139,7 @@ function VelocityChoice({ surface, velocity }: { surface: SurfaceView; velocity:
   )
 }
 
-/** As the query has it; none for zero. */
+/** Query value; null for zero. */
 function formatted(value: string): string | null {
   return Number(value) === 0 ? null : String(Number(value))
 }

@@ -1,4 +1,4 @@
-/** What the table costs: memory, and how far it is from the inference. */
+/** Memory use and accuracy of the quantised table. */
 
 import { formatCount, percent, quantity } from '../format/number'
 import type { Output } from './surface'
@@ -18,9 +18,9 @@ export function QuantisationCard({ output }: { output: Output }) {
       data-rms-difference={q.rms_difference}
     >
       <header>
-        <h2>The table that is shipped</h2>
+        <h2>Lookup table</h2>
         <p class="muted small">
-          The microcontroller looks the output up instead of computing the inference.
+          The microcontroller looks up the output in a table instead of computing the inference.
         </p>
       </header>
       <dl class="figures">

@@ -1,4 +1,4 @@
-/** The rules in words, with their weights and how far they fire at the chosen point. */
+/** Fuzzy rules with their weights and firing strengths at the selected point. */
 
 import { type Column, Table } from '../components/table/table'
 import { formatExact } from '../format/number'
@@ -24,7 +24,7 @@ export function RulesCard({
   )
   const columns: Column<Row>[] = [
     { key: 'number', label: 'Rule', numeric: true, header: true, value: (row) => row.number },
-    { key: 'text', label: 'In words', cell: (row) => ruleText(row.rule, output.name) },
+    { key: 'text', label: 'Text', cell: (row) => ruleText(row.rule, output.name) },
     {
       key: 'weight',
       label: 'Weight',
@@ -34,7 +34,7 @@ export function RulesCard({
     },
     {
       key: 'fires',
-      label: 'Fires',
+      label: 'Strength',
       numeric: true,
       value: (row) => row.fires,
       cell: (row) => (
@@ -51,9 +51,7 @@ export function RulesCard({
     <section class="card" data-rules={rows.length}>
       <header>
         <h2>Rules of {output.name}</h2>
-        <p class="muted small">
-          A rule fires as far as the least of its conditions holds, times its weight.
-        </p>
+        <p class="muted small">The strength of a rule is its weakest condition times its weight.</p>
       </header>
       <Table
         caption={`Rules of ${output.name}`}

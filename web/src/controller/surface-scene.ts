@@ -1,4 +1,4 @@
-/** A surface in three dimensions: heights and colours for numbers, with axes and a chosen point. */
+/** A three-dimensional surface with axes and a selected point. */
 
 import {
   BufferAttribute,
@@ -31,10 +31,10 @@ import { createRenderer } from '../walk/scene/renderer'
 import { diverging } from './colour-map'
 import type { Cell, Layer } from './surface'
 
-/** Half the edges of the box that the surface fills. */
+/** Half the edge lengths of the box that the surface fills. */
 const HALF = { error: 0.75, current: 0.55, value: 0.36 } as const
 
-/** Lines of the net across each axis. */
+/** Number of grid lines across each axis. */
 const NET = 16
 
 const TEXT = 0.075
@@ -51,7 +51,7 @@ export class SurfaceScene {
   constructor(
     private layer: Layer,
     private cell: Cell,
-    /** Told of every other place of the camera; null for the usual one. */
+    /** Called when the user moves the camera; null for the default view. */
     private readonly onPlaced: (place: CameraPlace | null) => void,
   ) {
     this.renderer = createRenderer()
@@ -73,7 +73,7 @@ export class SurfaceScene {
     return this.renderer.domElement
   }
 
-  /** Show a matrix in the page's colours. */
+  /** Show a layer in the theme's colours. */
   show(layer: Layer, cell: Cell): void {
     this.layer = layer
     disposeTree(this.drawn)
@@ -89,14 +89,14 @@ export class SurfaceScene {
     this.mark(cell)
   }
 
-  /** Put the marker on a cell. */
+  /** Move the marker to a cell. */
   mark(cell: Cell): void {
     this.cell = cell
     this.marker.position.copy(placeOf(this.layer, this.cell.error, this.cell.current))
     this.request()
   }
 
-  /** Turn about the vertical axis [rad], or up. */
+  /** Turn about the vertical axis, and up [rad]. */
   turn(around: number, up: number): void {
     const axis = new Vector3(0, 0, 1)
     this.camera.position.applyAxisAngle(axis, around)
@@ -114,7 +114,7 @@ export class SurfaceScene {
     this.onPlaced(null)
   }
 
-  /** From a place, or the usual one, without telling of it. */
+  /** Set the camera, or the default view for null, without calling `onPlaced`. */
   look(place: CameraPlace | null): void {
     const narrow = Math.min(1, this.camera.aspect / 1.5)
     this.camera.position.set(-1.35, -2.75, 1.75).multiplyScalar(1 / narrow)
@@ -138,7 +138,7 @@ export class SurfaceScene {
     this.request()
   }
 
-  /** Draw now. */
+  /** Render immediately. */
   render(): void {
     this.renderer.render(this.scene, this.camera)
   }
@@ -194,7 +194,7 @@ function surfaceOf(layer: Layer): Mesh {
   geometry.setIndex(faces)
   geometry.computeVertexNormals()
   const material = new MeshLambertMaterial({ vertexColors: true, side: DoubleSide })
-  // The net lies on the surface.
+  // The grid lines lie on the surface.
   material.polygonOffset = true
   material.polygonOffsetFactor = 1
   material.polygonOffsetUnits = 1
@@ -222,7 +222,7 @@ function netOf(layer: Layer, theme: 'light' | 'dark'): LineSegments {
   return new LineSegments(new BufferGeometry().setFromPoints(points), material)
 }
 
-/** The box's floor, its back edges, and the level of zero. */
+/** The box's floor, its back edges, and the zero level. */
 function frameOf(colour: Color): LineSegments {
   const { error: x, current: y, value: z } = HALF
   const corner = (a: number, b: number, c: number) => new Vector3(a * x, b * y, c * z)

@@ -1,4 +1,4 @@
-/** The surface in three dimensions, with the choice of what it shows. */
+/** Interactive three-dimensional view of a control surface. */
 
 import { useEffect, useRef, useState } from 'preact/hooks'
 import { messageOf } from '../api/problem'
@@ -29,7 +29,7 @@ export function SurfaceView({
   cell,
 }: {
   layers: readonly Layer[]
-  /** Of the output. */
+  /** Name of the output. */
   name: string
   cell: Cell
 }) {
@@ -38,12 +38,12 @@ export function SurfaceView({
   return (
     <ChartFrame
       title={withUnit(`Surface of ${name}`, layer.unit)}
-      note="Output over error and current; the ball is the chosen point. Drag to turn."
+      note="Output over error and current; the ball marks the selected point. Drag to rotate."
       table={() => <Summary layers={layers} />}
       data={() => layerData(layer)}
       tools={
         <Segmented
-          label="What the surface shows"
+          label="Surface to show"
           value={key}
           options={layers.map((each) => [each.key, each.title] as const)}
           onChoose={setKey}
@@ -67,10 +67,10 @@ function Stage({ layer, cell }: { layer: Layer; cell: Cell }) {
   useEffect(() => {
     const box = stage.current!
     let observer: ResizeObserver | null = null
-    let left = false
+    let unmounted = false
     import('./surface-scene')
       .then(({ SurfaceScene }) => {
-        if (left) return
+        if (unmounted) return
         const { layer, cell } = latest.current
         const built = new SurfaceScene(layer, cell, (place) => latest.current.setCamera(place))
         scene.current = built
@@ -82,9 +82,9 @@ function Stage({ layer, cell }: { layer: Layer; cell: Cell }) {
         observer = new ResizeObserver(fill)
         observer.observe(box)
       })
-      .catch((error: unknown) => !left && setFailure(messageOf(error)))
+      .catch((error: unknown) => !unmounted && setFailure(messageOf(error)))
     return () => {
-      left = true
+      unmounted = true
       observer?.disconnect()
       scene.current?.dispose()
       scene.current = null
@@ -107,20 +107,20 @@ function Stage({ layer, cell }: { layer: Layer; cell: Cell }) {
         ref={stage}
         tabIndex={0}
         role="application"
-        aria-label="The surface in three dimensions; arrow keys turn it. The maps have its numbers."
+        aria-label="The surface in three dimensions; arrow keys rotate it. The maps list its values."
         data-surface={layer.key}
         data-min={low}
         data-max={high}
         data-cells={cells(layer.values)}
-        data-own-keys
+        data-handles-keys
         onKeyDown={press}
       >
         {failure !== null && (
           <div class="notice" data-tone="warn" role="alert">
-            <strong>The surface cannot be drawn in three dimensions here.</strong>
+            <strong>Could not draw the surface in three dimensions.</strong>
             <p>
-              {failure} Switch on hardware acceleration or WebGL in the browser's settings. The maps
-              show the same numbers.
+              {failure} Enable hardware acceleration or WebGL in the browser's settings. The maps
+              show the same values.
             </p>
           </div>
         )}
@@ -137,19 +137,19 @@ function Stage({ layer, cell }: { layer: Layer; cell: Cell }) {
   )
 }
 
-/** The range of every layer; their numbers one by one are in the maps' tables. */
+/** Ranges of the layers; the maps' tables list the values. */
 function Summary({ layers }: { layers: readonly Layer[] }) {
   return (
     <table>
-      <caption>Every number is in the tables of the maps below.</caption>
+      <caption>The tables of the maps below list all values.</caption>
       <thead>
         <tr>
-          <th scope="col">what</th>
+          <th scope="col">layer</th>
           <th scope="col" class="numeric">
-            least
+            minimum
           </th>
           <th scope="col" class="numeric">
-            greatest
+            maximum
           </th>
         </tr>
       </thead>

@@ -1,4 +1,4 @@
-/** A fuzzy controller's surface: numbers over error and current. Pure. */
+/** Data of a fuzzy controller's surface: values over error and current. */
 
 import type { components } from '../api/schema'
 import type { DataTable } from '../export/csv'
@@ -14,13 +14,13 @@ export type Rule = Schemas['RuleView']
 /** Values by error, then by current. */
 export type Matrix = readonly (readonly number[])[]
 
-/** A point of the grid. */
+/** A grid point, by index. */
 export interface Cell {
   readonly error: number
   readonly current: number
 }
 
-/** A matrix over error and current with what its numbers mean. */
+/** A matrix over error and current with its meaning. */
 export interface Layer {
   readonly key: 'inference' | 'table' | 'difference'
   readonly title: string
@@ -29,11 +29,11 @@ export interface Layer {
   readonly error: Universe
   readonly current: Universe
   readonly unit: string
-  /** Value of full colour; as much below zero. */
+  /** Value of full colour, positive or negative. */
   readonly limit: number
 }
 
-/** Inference, table, and table less inference; the first two in the same colours. */
+/** Inference, table, and their difference; the first two share a colour scale. */
 export function layersOf(surface: SurfaceView, output: Output): Layer[] {
   const axes = { error: inputOf(surface, 'error'), current: inputOf(surface, 'current') }
   const difference = output.table.map((row, i) => row.map((v, k) => v - output.inference[i][k]))
@@ -44,7 +44,7 @@ export function layersOf(surface: SurfaceView, output: Output): Layer[] {
       ...common,
       key: 'inference',
       title: 'Inference',
-      note: 'What the rules say.',
+      note: 'Output of the fuzzy rules.',
       values: output.inference,
       limit,
     },
@@ -52,7 +52,7 @@ export function layersOf(surface: SurfaceView, output: Output): Layer[] {
       ...common,
       key: 'table',
       title: 'Quantised table',
-      note: 'What the microcontroller looks up.',
+      note: 'Output of the microcontroller’s lookup table.',
       values: output.table,
       limit,
     },
@@ -60,7 +60,7 @@ export function layersOf(surface: SurfaceView, output: Output): Layer[] {
       ...common,
       key: 'difference',
       title: 'Difference',
-      note: 'Table less inference, in colours of its own.',
+      note: 'Table minus inference, on a separate colour scale.',
       values: difference,
       limit: largest(difference),
     },
@@ -68,12 +68,12 @@ export function layersOf(surface: SurfaceView, output: Output): Layer[] {
 }
 
 export function inputOf(surface: SurfaceView, name: string): Universe {
-  const found = surface.inputs.find((input) => input.name === name)
-  if (!found) throw new Error(`the surface has no input ${name}; reload the page`)
-  return found
+  const match = surface.inputs.find((input) => input.name === name)
+  if (!match) throw new Error(`the surface has no input ${name}; reload the page`)
+  return match
 }
 
-/** Least and greatest value of a matrix. */
+/** Minimum and maximum of a matrix. */
 export function extent(values: Matrix): readonly [low: number, high: number] {
   let [low, high] = [Number.POSITIVE_INFINITY, Number.NEGATIVE_INFINITY]
   for (const row of values) {
@@ -95,7 +95,7 @@ function largest(values: Matrix): number {
   return Math.max(Math.abs(low), Math.abs(high))
 }
 
-/** The cell in the middle of the error's range and a quarter up the current's. */
+/** The initial cell: at three quarters of the error's range and one quarter of the current's. */
 export function firstCell({ error, current }: Layer): Cell {
   return {
     error: Math.floor((3 * error.values.length) / 4),
@@ -103,7 +103,7 @@ export function firstCell({ error, current }: Layer): Cell {
   }
 }
 
-/** The cell so many steps further, within the grid. */
+/** The cell a number of steps away, clamped to the grid. */
 export function moved(cell: Cell, errors: number, currents: number, layer: Layer): Cell {
   const within = (index: number, count: number) => Math.min(count - 1, Math.max(0, index))
   return {
@@ -112,7 +112,7 @@ export function moved(cell: Cell, errors: number, currents: number, layer: Layer
   }
 }
 
-/** Index of the value nearest to another one. */
+/** Index of the nearest value. */
 export function nearest(values: readonly number[], value: number): number {
   return values.reduce(
     (best, v, k) => (Math.abs(v - value) < Math.abs(values[best] - value) ? k : best),
@@ -120,7 +120,7 @@ export function nearest(values: readonly number[], value: number): number {
   )
 }
 
-/** How far a rule fires at a cell, times its weight: the least degree of its antecedents [1]. */
+/** Firing strength of a rule at a cell: the smallest degree of its antecedents times its weight [1]. */
 export function strength(rule: Rule, surface: SurfaceView, cell: Cell): number {
   const degrees = Object.entries(rule.if).map(([name, set]) => {
     const input = inputOf(surface, name)
@@ -130,7 +130,7 @@ export function strength(rule: Rule, surface: SurfaceView, cell: Cell): number {
   return Math.min(1, ...degrees) * rule.weight
 }
 
-/** Index of an input's value at a cell; inputs beside error and current are held. */
+/** Index of an input's value at a cell; inputs other than error and current are fixed. */
 export function indexOf(input: Universe, surface: SurfaceView, cell: Cell): number {
   if (input.name === 'error') return cell.error
   if (input.name === 'current') return cell.current
@@ -143,7 +143,7 @@ export function ruleText(rule: Rule, output: string): string {
   return `If ${conditions.join(' and ')}, then ${output} is ${rule.then}`
 }
 
-/** Every number of a layer, a row for each pair of error and current. */
+/** All values of a layer, one row per pair of error and current. */
 export function layerData({ title, unit, error, current, values }: Layer): DataTable {
   return {
     name: title,

@@ -1,9 +1,9 @@
-/** How a canvas tells what is on it: as lines and words where it can, else as its pixels. */
+/** Vector drawing functions of canvases, for export. */
 
 export interface CanvasSource {
-  /** Draws the chart anew in CSS pixels; missing where pixels are all that there is. */
+  /** Redraw the chart in CSS pixels; missing if only pixels are available. */
   readonly draw?: (context: CanvasRenderingContext2D) => void
-  /** Called before pixels are read: what is drawn by the graphics card is lost after each frame. */
+  /** Redraw before pixels are read: WebGL discards them after each frame. */
   readonly refresh?: () => void
 }
 

@@ -1,9 +1,8 @@
-/** Tables as comma-separated values (RFC 4180), numbers in full. Pure. */
+/** Tables as comma-separated values (RFC 4180) in full precision. */
 
 import type { Cell } from '../components/table/rows'
 
 export interface DataTable {
-  /** What the table holds. */
   readonly name: string
   readonly header: readonly string[]
   readonly rows: Iterable<readonly Cell[]>
@@ -15,7 +14,7 @@ export function csvOf({ header, rows }: DataTable): string {
   return `${lines.join('\r\n')}\r\n`
 }
 
-/** What is missing is empty. */
+/** Missing values are empty fields. */
 function line(cells: readonly Cell[]): string {
   return cells.map(field).join(',')
 }
@@ -26,7 +25,7 @@ function field(cell: Cell): string {
   return /[",\r\n]/.test(cell) ? `"${cell.replaceAll('"', '""')}"` : cell
 }
 
-/** Parts of a file's name: `Small job`, `Pareto front` -> `small-job-pareto-front`. */
+/** Stem of a file name: `Small job`, `Pareto front` -> `small-job-pareto-front`. */
 export function fileStem(...parts: readonly string[]): string {
   const words = parts.map((part) =>
     part

@@ -1,4 +1,4 @@
-/** What a card shows as one SVG picture: words, bars and legends as they lie, charts as lines. */
+/** A card as an SVG picture: text, bars and legends in their positions, charts as vectors. */
 
 import { themeColour } from '../theme'
 import { sourceOf } from './canvas-source'
@@ -12,16 +12,13 @@ export interface Picture {
   readonly height: number
 }
 
-/**
- * Not of the picture: controls other than the heads of columns, what only readers of screens hear,
- * and what follows the pointer.
- */
+/** Excluded: controls except column headers, text for screen readers only, pointer readouts. */
 const LEFT_OUT =
   '[data-not-drawn], .visually-hidden, button:not(th > button), select, input, details, .readout, .u-select, [class*="u-cursor"]'
 
 const ROOM = 12
 
-/** card: an element of the page, as it is shown now. */
+/** card: a rendered element. */
 export function pictureOf(card: HTMLElement): Picture {
   const scrolled = [...card.querySelectorAll('.parallel-scroll')].map(
     (box) => [box, box.scrollLeft] as const,
@@ -121,7 +118,7 @@ class Writer {
     }
   }
 
-  /** Line by line, as the words lie. */
+  /** Write line by line, as the text is wrapped. */
   private text(node: Text): void {
     const style = node.parentElement && getComputedStyle(node.parentElement)
     if (!style || node.data.trim() === '') return
@@ -156,14 +153,14 @@ class Writer {
     this.parts.push(element('image', { ...box, href, preserveAspectRatio: 'none' }))
   }
 
-  /** An SVG of the page, with the colours that its style sheet gives it. */
+  /** Copy an SVG of the page with the colours of its style sheets. */
   private drawing(node: SVGSVGElement, box: Box): void {
     const copy = node.cloneNode(true) as SVGSVGElement
     const [all, copies] = [node.querySelectorAll('*'), copy.querySelectorAll('*')]
     for (const [k, each] of [...all].entries()) {
       const style = getComputedStyle(each)
-      const kept = copies[k]
-      kept.removeAttribute('style')
+      const target = copies[k]
+      target.removeAttribute('style')
       for (const name of [
         'fill',
         'fill-opacity',
@@ -173,7 +170,7 @@ class Writer {
         'vector-effect',
         'opacity',
       ]) {
-        kept.setAttribute(name, style.getPropertyValue(name))
+        target.setAttribute(name, style.getPropertyValue(name))
       }
     }
     for (const [name, value] of Object.entries(box)) copy.setAttribute(name, String(value))
@@ -210,7 +207,7 @@ function linesOf(node: Text): readonly { readonly text: string; readonly box: DO
   return lines
 }
 
-/** The picture in pixels, two for each of the page's. */
+/** Rasterize at two pixels per CSS pixel. */
 export async function pngOf({ svg, width, height }: Picture): Promise<Blob> {
   const address = URL.createObjectURL(new Blob([svg], { type: 'image/svg+xml' }))
   try {
@@ -222,7 +219,7 @@ export async function pngOf({ svg, width, height }: Picture): Promise<Blob> {
     canvas.height = 2 * height
     canvas.getContext('2d')!.drawImage(image, 0, 0, canvas.width, canvas.height)
     const blob = await new Promise<Blob | null>((done) => canvas.toBlob(done, 'image/png'))
-    if (!blob) throw new Error('The browser cannot make a PNG of this size; take SVG.')
+    if (!blob) throw new Error('The browser cannot create a PNG of this size; use SVG instead.')
     return blob
   } finally {
     URL.revokeObjectURL(address)

@@ -1,4 +1,4 @@
-/** Files of a chart: its numbers, and its picture. Loaded when the first is asked for. */
+/** Saves a chart's numbers or picture as files. Loaded on demand. */
 
 import type { ComponentChildren } from 'preact'
 import { pageName } from '../title'
@@ -11,13 +11,13 @@ export type Kind = 'csv' | 'svg' | 'png'
 export interface Chart {
   readonly title: string
   readonly card: HTMLElement
-  /** What readers of screens get. */
+  /** The chart's numbers as tables. */
   readonly table: () => ComponentChildren
-  /** The chart's numbers, where its table holds some of them only. */
+  /** All numbers of the chart, if the table holds only some of them. */
   readonly data?: () => DataTable
 }
 
-/** Several tables are as many files. */
+/** Save a chart; several tables become several files. */
 export async function saveChart(kind: Kind, chart: Chart): Promise<void> {
   const stem = fileStem(pageName(), chart.title)
   if (kind === 'csv') {
@@ -35,13 +35,13 @@ export async function saveChart(kind: Kind, chart: Chart): Promise<void> {
   saveFile(blob, `${stem}.${kind}`)
 }
 
-/** Hand a file to the browser, which saves it or asks where. */
+/** Download a file. */
 export function saveFile(content: Blob, name: string): void {
   const address = URL.createObjectURL(content)
   const link = document.createElement('a')
   link.href = address
   link.download = name
   link.click()
-  // The browser has begun to read it by then.
+  // Allow time for the download to start.
   setTimeout(() => URL.revokeObjectURL(address), 10_000)
 }

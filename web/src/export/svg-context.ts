@@ -1,4 +1,4 @@
-/** Writes down as SVG what charts draw: the part of CanvasRenderingContext2D that they use. */
+/** The part of CanvasRenderingContext2D that charts use, writing SVG. */
 
 import { element, paint, short } from './svg-text'
 
@@ -15,7 +15,7 @@ const STATE = [
   'lineJoin',
 ] as const
 
-interface Kept {
+interface SavedState {
   readonly values: Readonly<Record<string, unknown>>
   readonly matrix: Matrix
   readonly dash: readonly number[]
@@ -35,32 +35,32 @@ export class SvgContext {
   textAlign = 'left'
   textBaseline = 'alphabetic'
   lineJoin = 'miter'
-  /** What was drawn so far. */
+  /** Elements drawn so far. */
   readonly parts: string[] = []
   private path = ''
   private matrix: Matrix = [1, 0, 0, 1, 0, 0]
   private dash: readonly number[] = []
   private clipped: string | null = null
-  private readonly kept: Kept[] = []
+  private readonly saved: SavedState[] = []
 
   constructor(
-    /** Size of the canvas that it stands for [CSS px]. */
+    /** Size of the canvas [CSS px]. */
     readonly canvas: { readonly width: number; readonly height: number },
     private readonly ruler: Pick<CanvasRenderingContext2D, 'font' | 'measureText'>,
   ) {}
 
   save(): void {
     const values = Object.fromEntries(STATE.map((key) => [key, this[key]]))
-    this.kept.push({ values, matrix: this.matrix, dash: this.dash, clipped: this.clipped })
+    this.saved.push({ values, matrix: this.matrix, dash: this.dash, clipped: this.clipped })
   }
 
   restore(): void {
-    const kept = this.kept.pop()
-    if (!kept) return
-    Object.assign(this, kept.values)
-    this.matrix = kept.matrix
-    this.dash = kept.dash
-    this.clipped = kept.clipped
+    const saved = this.saved.pop()
+    if (!saved) return
+    Object.assign(this, saved.values)
+    this.matrix = saved.matrix
+    this.dash = saved.dash
+    this.clipped = saved.clipped
   }
 
   translate(x: number, y: number): void {
@@ -101,7 +101,7 @@ export class SvgContext {
     this.path += `M${[...corners, this.at(x, y + height)].join('L')}Z`
   }
 
-  /** Whole circles, the only arcs that charts draw. */
+  /** Full circles, the only arcs that charts draw. */
   arc(x: number, y: number, radius: number): void {
     const r = short(radius * this.size)
     const [left, right] = [this.at(x - radius, y), this.at(x + radius, y)]
@@ -187,7 +187,7 @@ export class SvgContext {
     return `${short(a * x + c * y + e)} ${short(b * x + d * y + f)}`
   }
 
-  /** Length of what was one long. */
+  /** Scale factor of lengths. */
   private get size(): number {
     return Math.hypot(this.matrix[0], this.matrix[1])
   }

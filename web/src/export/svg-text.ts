@@ -1,8 +1,8 @@
-/** Elements of an SVG picture as text. Pure. */
+/** SVG elements as text. */
 
 export type Attributes = Readonly<Record<string, string | number | null | undefined>>
 
-/** `<name a="1">content</name>`; attributes without a value are left out. */
+/** `<name a="1">content</name>`; attributes without a value are omitted. */
 export function element(name: string, attributes: Attributes, content = ''): string {
   const written = Object.entries(attributes)
     .filter(([, value]) => value !== null && value !== undefined)
@@ -22,12 +22,12 @@ export function escaped(text: string): string {
     .replaceAll('"', '&quot;')
 }
 
-/** A hundredth of a pixel is more than can be seen. */
+/** Round to a hundredth of a pixel. */
 export function short(value: number): string {
   return String(Math.round(value * 100) / 100)
 }
 
-/** `fill` or `stroke` with its opacity apart, as not every program reads `rgba()`. */
+/** `fill` or `stroke` with a separate opacity, since some programs cannot read `rgba()`. */
 export function paint(kind: 'fill' | 'stroke', colour: string, opacity = 1): Attributes {
   const [red, green, blue, alpha = 1] = (colour.match(/[\d.]+/g) ?? []).map(Number)
   if (!colour.startsWith('rgb')) {

@@ -1,4 +1,4 @@
-/** The tables behind a chart as data: the same that readers of screens get, all rows, in full. */
+/** The tables of a chart as data: all rows, in full precision. */
 
 import { type ComponentChildren, render } from 'preact'
 import type { Cell } from '../components/table/rows'

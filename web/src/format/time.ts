@@ -1,10 +1,10 @@
-/** Spans of time and moments as people read them. */
+/** Formatting of durations and timestamps. */
 
 import { formatNumber, NONE } from './number'
 
 const SPACE = '\u00a0'
 
-/** A span: 0.42 s, 12 s, 3 min 05 s, 2 h 14 min, 3 d 4 h. */
+/** A duration: 0.42 s, 12 s, 3 min 05 s, 2 h 14 min, 3 d 4 h. */
 export function formatDuration(seconds: number | null | undefined): string {
   if (seconds === null || seconds === undefined || !Number.isFinite(seconds)) return NONE
   if (seconds < 0) return NONE
@@ -18,7 +18,7 @@ export function formatDuration(seconds: number | null | undefined): string {
   return pair(Math.floor(hours / 24), 'd', hours % 24, 'h')
 }
 
-/** How long ago a moment was, in one unit: 5 s, 3 min, 2 h, 4 d. now: [ms]. */
+/** Time since a moment, in one unit: 5 s, 3 min, 2 h, 4 d. now: [ms]. */
 export function formatAge(moment: string | null | undefined, now: number): string {
   if (!moment) return NONE
   const seconds = Math.max(0, (now - Date.parse(moment)) / 1000)
@@ -29,13 +29,13 @@ export function formatAge(moment: string | null | undefined, now: number): strin
   return `${Math.floor(seconds / 86400)}${SPACE}d`
 }
 
-/** Hour and minute of a moment: 14:05. moment: [ms]. */
+/** Hour and minute: 14:05. moment: [ms]. */
 export function formatClock(moment: number): string {
   const date = new Date(moment)
   return `${two(date.getHours())}:${two(date.getMinutes())}`
 }
 
-/** A moment in full, in the reader's time zone: 2026-03-01 14:05:09. */
+/** Date and time in the local time zone: 2026-03-01 14:05:09. */
 export function formatMoment(moment: string | null | undefined): string {
   if (!moment) return NONE
   const date = new Date(moment)

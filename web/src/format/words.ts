@@ -1,16 +1,16 @@
-/** Names of the API in words for people. */
+/** Text formatting of API names and messages. */
 
 /** `angular_acceleration` -> `angular acceleration`. */
 export function inWords(name: string): string {
   return name.replaceAll('_', ' ')
 }
 
-/** With a capital at the beginning. */
+/** Capitalize the first letter. */
 export function capitalized(text: string): string {
   return text.charAt(0).toUpperCase() + text.slice(1)
 }
 
-/** As a sentence: a capital at the beginning, a stop at the end. */
+/** Capitalize, and end with a full stop. */
 export function sentence(text: string): string {
   const whole = capitalized(text.trim())
   return whole === '' || /[.!?…]$/.test(whole) ? whole : `${whole}.`

@@ -1,4 +1,4 @@
-/** How much of a job's budget is spent, in the unit that fits it. */
+/** Spent budget of a job. */
 
 import type { Iteration, JobSummary } from '../api/types'
 import { formatCount } from '../format/number'
@@ -6,7 +6,7 @@ import { formatCount } from '../format/number'
 export interface Spent {
   readonly done: number
   readonly planned: number
-  /** `designs` where iterations are smaller than they may be, so that there may be many more. */
+  /** `designs` if some iterations were smaller than planned, so that there may be more of them. */
   readonly unit: 'iterations' | 'designs'
 }
 
@@ -15,7 +15,7 @@ export type Counts = Pick<
   'iterations' | 'evaluations' | 'particles' | 'iterations_planned' | 'evaluations_planned'
 >
 
-/** followed: iterations that are known from the stream, which may be ahead of the job. */
+/** followed: iterations received from the stream, which may be ahead of the job. */
 export function budgetSpent(job: Counts, followed: readonly Iteration[] = []): Spent {
   const ahead = followed.length > job.iterations
   const iterations = ahead ? followed.length : job.iterations
@@ -26,7 +26,7 @@ export function budgetSpent(job: Counts, followed: readonly Iteration[] = []): S
     : { done: evaluations, planned: job.evaluations_planned, unit: 'designs' }
 }
 
-/** Whole iterations of the budget that are spent, as far as one can be extended. */
+/** Budget spent in full iterations, the lower limit of an extension. */
 export function iterationsSpent(job: Counts): number {
   return job.particles === 0 ? job.iterations : Math.ceil(job.evaluations / job.particles)
 }

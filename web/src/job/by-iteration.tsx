@@ -1,4 +1,4 @@
-/** Numbers of a chart over the iterations, as a table. */
+/** Values of a chart by iteration, as a table. */
 
 import { type Column, Table } from '../components/table/table'
 
@@ -9,7 +9,7 @@ export function ByIteration<R extends { readonly index: number }>({
 }: {
   caption: string
   rows: readonly R[]
-  /** Besides the iteration's index. */
+  /** Columns after the iteration index. */
   columns: readonly Column<R>[]
 }) {
   return (

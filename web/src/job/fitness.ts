@@ -1,59 +1,56 @@
-/** What a job's fitness is, by the kind of job. */
+/** Unit and terms of the fitness, by kind of job. */
 
 import type { Job, StoredJob } from '../api/types'
 
-/**
- * Unit of a job's fitness: the product that tunes a drive has none, nor has a calibration's count of
- * tolerances; an identification's is a mean of its objectives, which are currents.
- */
+/** Unit of a job's fitness: dimensionless, except for identification, which averages errors in current. */
 export function fitnessUnit({
   kind,
   objectives,
 }: {
-  /** Null for a job that cannot be read. */
+  /** Null for an unreadable job. */
   readonly kind: StoredJob['kind']
-  /** Summaries are without them. */
+  /** Missing in summaries. */
   readonly objectives?: Job['objectives']
 }): string {
   return kind !== 'identification' ? '1' : (objectives?.[0]?.unit ?? 'A')
 }
 
-/** What the parts of a fitness are called. */
+/** Terms for the components of the fitness. */
 export interface CaseWords {
-  /** One walk of which several are judged, and several. */
-  readonly one: string
-  readonly many: string
-  /** What a walk is worth, and what several are. */
-  readonly worth: string
-  readonly worths: string
-  /** What that is to the fitness. */
-  readonly bars: string
+  /** What is evaluated: singular and plural. */
+  readonly item: string
+  readonly items: string
+  /** Its measure: singular and plural. */
+  readonly measure: string
+  readonly measures: string
+  /** How the fitness combines the measures. */
+  readonly note: string
 }
 
-const MEAN = 'What the fitness is the mean of'
+const MEAN = 'The fitness is their mean'
 
 const SCENARIOS: CaseWords = {
-  one: 'scenario',
-  many: 'scenarios',
-  worth: 'utility',
-  worths: 'utilities',
-  bars: MEAN,
+  item: 'scenario',
+  items: 'scenarios',
+  measure: 'utility',
+  measures: 'utilities',
+  note: MEAN,
 }
 
 const WORDS: Readonly<Partial<Record<Job['kind'], CaseWords>>> = {
   identification: {
-    one: 'recording',
-    many: 'recordings',
-    worth: 'error',
-    worths: 'errors',
-    bars: MEAN,
+    item: 'recording',
+    items: 'recordings',
+    measure: 'error',
+    measures: 'errors',
+    note: MEAN,
   },
   calibration: {
-    one: 'walk',
-    many: 'walks',
-    worth: 'misfit',
-    worths: 'misfits',
-    bars: 'Root mean square of how many tolerances the fitted targets of a walk are off',
+    item: 'walk',
+    items: 'walks',
+    measure: 'misfit',
+    measures: 'misfits',
+    note: 'Root mean square of the deviations from the fitted targets of a walk, in tolerances',
   },
 }
 

@@ -1,4 +1,4 @@
-/** By which share a job's best is better than the published design, or than the start. */
+/** Relative improvement of a job's best over the published or the start design. */
 
 import { get } from '../api/client'
 import { useResource } from '../api/resource'
@@ -6,25 +6,25 @@ import type { ReferenceView, StoredJob } from '../api/types'
 import type { ReferenceLine } from '../charts/lines/reference-line'
 
 export interface Gain {
-  /** Null while it is not known, and where there is none. */
+  /** Null if unknown or if there is none. */
   readonly reference: ReferenceLine | null
-  /** [1]; null if it is not known. */
+  /** [1]; null if unknown. */
   readonly share: number | null
-  /** Why it is not known, for people. */
+  /** Why the gain is unknown. */
   readonly reason: string | null
 }
 
 const UNKNOWN: Gain = { reference: null, share: null, reason: null }
 
-/** What is stored with the job; else the server is asked, which lets the design walk once. */
+/** Use the reference stored with the job; otherwise request it, which simulates one design. */
 export function useGain(job: StoredJob | null): Gain {
   const stored = job?.reference ?? null
-  const asks = stored === null && job?.kind === 'tuning' && job.best_fitness !== null
-  const asked = useResource(asks ? `reference ${job.id}` : null, (signal) =>
+  const pending = stored === null && job?.kind === 'tuning' && job.best_fitness !== null
+  const response = useResource(pending ? `reference ${job.id}` : null, (signal) =>
     get('/v1/jobs/{job_id}/reference', { path: { job_id: job!.id }, signal }),
   )
-  const found = stored ?? asked.data?.reference ?? null
-  return gainOf(found, job?.best_fitness ?? null, asked.data?.reason ?? null)
+  const reference = stored ?? response.data?.reference ?? null
+  return gainOf(reference, job?.best_fitness ?? null, response.data?.reason ?? null)
 }
 
 export function gainOf(
@@ -38,7 +38,7 @@ export function gainOf(
   return { reference: { label: referenceLabel(reference), fitness }, share, reason }
 }
 
-/** What a job's best is measured against, for people. */
+/** Display name of a reference. */
 export function referenceLabel({ name, kind }: Pick<ReferenceView, 'name' | 'kind'>): string {
   return kind === 'start' ? name : `published ${name}`
 }

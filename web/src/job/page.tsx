@@ -1,4 +1,4 @@
-/** One job, live: header, commands, and its parts under tabs. */
+/** Job page: header, commands and tabs, updated live. */
 
 import { isReadable } from '../api/readable'
 import type { Job, StoredJob } from '../api/types'
@@ -17,7 +17,7 @@ import { type LiveJob, useJob } from './live/use-job'
 import { OverviewPanel } from './overview/panel'
 import { progressInWords } from './state'
 
-// Only the overview's code comes with the page.
+// Only the overview is part of the page's chunk.
 const ActivityPanel = lazyPart('the activity', 'ActivityPanel', () => import('./activity/panel'))
 const AnalysisPanel = lazyPart('the analysis', 'AnalysisPanel', () => import('./analysis/panel'))
 const CertificatePanel = lazyPart(
@@ -86,11 +86,11 @@ const TABS = [
   { tab: 'reproduce', label: 'Spec' },
 ] as const
 
-/** Parts of jobs of some kinds only. */
+/** Tabs that apply only to some kinds of jobs. */
 const ONLY: Readonly<Partial<Record<string, readonly Job['kind'][]>>> = {
   certificate: ['certificate'],
   targets: ['calibration'],
-  // Which world is best says nothing.
+  // A certificate has no best world to show by scenario.
   scenarios: ['tuning', 'identification', 'calibration'],
   parameters: ['identification', 'calibration'],
   robustness: ['tuning'],
@@ -105,7 +105,7 @@ function hasPart({ kind }: Job, tab: string): boolean {
 }
 
 export default function JobPage({ id, tab }: { id: string; tab: string }) {
-  // Another job is another page: nothing of the one before may stay.
+  // Remount for another job, to reset all state.
   return <OneJob key={id} id={id} tab={tab} />
 }
 
@@ -122,7 +122,7 @@ function OneJob({ id, tab }: { id: string; tab: string }) {
         ) : (
           <>
             <h1>Job {id}</h1>
-            <ErrorNotice what="The job cannot be shown." error={live.error} retry={live.reload} />
+            <ErrorNotice what="Could not load the job." error={live.error} retry={live.reload} />
           </>
         )}
       </div>
@@ -157,7 +157,7 @@ function crumbsOf(job: StoredJob, tab: string): readonly Crumb[] {
 function hereOf(job: StoredJob, tab: string): string {
   const [section, inside] = tab.split('/')
   if (inside) return inside
-  const part = TABS.find((known) => known.tab === section)
+  const part = TABS.find((entry) => entry.tab === section)
   return section === '' || !part ? job.name || job.id : part.label
 }
 
@@ -172,17 +172,17 @@ function Parts({ live, job, tab, gain }: PartProps) {
   const tabs = TABS.filter(({ tab }) => hasPart(job, tab))
   const [section] = tab.split('/')
   const { query } = usePlace()
-  const kept = Object.fromEntries(SHARED.map((name) => [name, query.get(name) ?? undefined]))
+  const sharedQuery = Object.fromEntries(SHARED.map((name) => [name, query.get(name) ?? undefined]))
   return (
     <>
       <nav class="tabs" aria-label="Parts of the job">
         {tabs.map((t) => (
           <a
             key={t.tab}
-            href={withQuery(jobPath(job.id, t.tab), kept)}
+            href={withQuery(jobPath(job.id, t.tab), sharedQuery)}
             aria-current={t.tab === section ? 'page' : undefined}
           >
-            {t.tab === 'scenarios' ? capitalized(caseWords(job.kind).many) : t.label}
+            {t.tab === 'scenarios' ? capitalized(caseWords(job.kind).items) : t.label}
           </a>
         ))}
       </nav>
@@ -230,10 +230,10 @@ function Panel({ live, job, tab, gain }: PartProps) {
 }
 
 function NoSuchPart() {
-  return <ErrorNotice what="This job has no such part." error="Choose one of those above." />
+  return <ErrorNotice what="Page not found." error="Choose one of the tabs above." />
 }
 
-/** As tests and other tools read it. */
+/** Connection state, read by tests. */
 function streamState({ followed }: LiveJob): 'open' | 'stale' | 'ended' | 'connecting' {
   return followed.connection
 }

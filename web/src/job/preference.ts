@@ -1,8 +1,8 @@
-/** The bias-weighted product and its parts (eq. 3.8, 4.1, 4.2), to explain what limits a design. */
+/** Bias-weighted product and its factors (eq. 3.8, 4.1, 4.2). */
 
 import type { Preference, ScenarioResult } from '../api/types'
 
-/** The objectives that a preference may weigh, in its order: f1..f6 of table 4.1. */
+/** Objectives that a preference can weight, in order: f1..f6 of table 4.1. */
 const PREFERRED = [
   'torque',
   'acceleration',
@@ -12,17 +12,17 @@ const PREFERRED = [
   'height_loss',
 ] as const
 
-/** The objectives that a preference of so many entries weighs. */
+/** The objectives weighted by a preference, by its number of entries. */
 export function weighed({ bias }: { readonly bias: readonly unknown[] }): readonly string[] {
   return PREFERRED.slice(0, bias.length)
 }
 
-/** The preference that a query asks for; undefined if it has none that can be read. */
+/** Preference in the query; undefined if there is none or it is invalid. */
 export function preferenceIn(query: URLSearchParams): Preference | undefined {
   return preferenceOf(query.get('preference') ?? '')
 }
 
-/** A preference as JSON; undefined if it is none. */
+/** Parse a preference from JSON; undefined if invalid. */
 export function preferenceOf(text: string): Preference | undefined {
   try {
     const { bias, exponent } = JSON.parse(text) as Partial<Preference>
@@ -35,7 +35,7 @@ export function preferenceOf(text: string): Preference | undefined {
   }
 }
 
-/** What `preferenceIn` reads. */
+/** Inverse of `preferenceIn`. */
 export function preferenceQuery({ bias, exponent }: Preference): string {
   return JSON.stringify({ bias, exponent })
 }
@@ -46,20 +46,20 @@ export interface Factor {
   readonly objective: string
   readonly value: number
   /**
-   * e ln((b + f) / geometric mean of b + f over the scenarios): what it adds to the logarithm of the
-   * scenario's utility over that of all. No unit decides it, as it is a ratio of like things.
+   * e ln((b + f) / geometric mean of b + f over the scenarios): contribution to the logarithm of the
+   * scenario's utility relative to the mean. A ratio of like quantities, hence independent of units.
    */
   readonly contribution: number
-  /** Change of the fitness, as a share of it, per relative change of the objective. */
+  /** Relative change of the fitness per relative change of the objective. */
   readonly sensitivity: number
 }
 
-/** Why a design is worth what it is. */
+/** Explanation of a design's fitness. */
 export interface Analysis {
   readonly factors: readonly Factor[]
   /** Logarithm of each scenario's utility over the geometric mean of all. */
   readonly utilities: Readonly<Record<string, number>>
-  /** The scenario of greatest utility, that is, of the worst. */
+  /** The scenario of greatest utility, i.e. the worst. */
   readonly worstScenario: string
   /** The factor of greatest contribution in that scenario. */
   readonly worstFactor: Factor
@@ -67,7 +67,7 @@ export interface Analysis {
   readonly excess: number
 }
 
-/** The factors of every scenario's utility against those of the others; null if a walk failed. */
+/** Compare the factors of each scenario with those of the others; null if a simulation failed. */
 export function analyse(
   scenarios: Readonly<Record<string, ScenarioResult>>,
   preference: Preference,
@@ -76,9 +76,9 @@ export function analyse(
   const absolute: Factor[] = []
   const utilities: Record<string, number> = {}
   for (const scenario of names) {
-    const own = factorsOf(scenario, scenarios[scenario], preference, names.length)
-    if (own === null) return null
-    absolute.push(...own)
+    const scenarioFactors = factorsOf(scenario, scenarios[scenario], preference, names.length)
+    if (scenarioFactors === null) return null
+    absolute.push(...scenarioFactors)
   }
   if (absolute.length === 0) return null
   const factors = absolute.map((factor) => {
@@ -87,8 +87,8 @@ export function analyse(
     return { ...factor, contribution: factor.contribution - mean }
   })
   for (const scenario of names) {
-    const own = factors.filter((factor) => factor.scenario === scenario)
-    utilities[scenario] = own.reduce((sum, f) => sum + f.contribution, 0)
+    const scenarioFactors = factors.filter((factor) => factor.scenario === scenario)
+    utilities[scenario] = scenarioFactors.reduce((sum, f) => sum + f.contribution, 0)
   }
   const worstScenario = names.reduce((a, b) => (utilities[b] > utilities[a] ? b : a))
   const worstFactor = factors
@@ -98,13 +98,13 @@ export function analyse(
   return { factors, utilities, worstScenario, worstFactor, excess }
 }
 
-/** Utility of one walk under a preference (eq. 4.1); null if it failed. */
+/** Utility of one simulation under a preference (eq. 4.1); null if it failed. */
 export function utilityOf(result: ScenarioResult, preference: Preference): number | null {
   const factors = factorsOf('', result, preference, 1)
   return factors && Math.exp(factors.reduce((sum, f) => sum + f.contribution, 0))
 }
 
-/** The factors of one walk, each contribution e ln(b + f) by itself. */
+/** Factors of one simulation, with contributions e ln(b + f). */
 function factorsOf(
   scenario: string,
   result: ScenarioResult,
@@ -117,7 +117,7 @@ function factorsOf(
     const [b, e, value] = [bias[m], exponent[m], result.objectives[objective]]
     if (e === 0) continue
     if (value === null || value === undefined) return null
-    // The loss of height has a sign, and counts by its size.
+    // Height loss is signed; only its magnitude counts.
     const f = objective === 'height_loss' ? Math.abs(value) : value
     if (!(b + f > 0)) return null
     factors.push({

@@ -1,13 +1,13 @@
-/** Priorities of jobs: their bounds, and what they do. */
+/** Bounds and meaning of priorities. */
 
 export const LOWEST = -10
 export const HIGHEST = 10
 
 export const PRIORITY_HELP =
-  'Of waiting jobs the highest is run first, and of running jobs one that is a step higher has' +
-  ' twice the share of the workers. No result depends on it.'
+  'Queued jobs start in order of priority. Among running jobs, each step doubles the share of the' +
+  ' workers. Results do not depend on it.'
 
-/** Whether a text is a priority. */
+/** Whether a text is a valid priority. */
 export function isPriority(text: string): boolean {
   const priority = Number(text)
   const whole = text.trim() !== '' && Number.isInteger(priority)

@@ -1,7 +1,7 @@
-/** What a job's winner is compared with: a published design, or the winner of another job. */
+/** Reference for a job's winner: a published design, or the winner of another job. */
 
 import { get, post } from '../api/client'
-import { foundJobs } from '../api/found-jobs'
+import { jobSearch } from '../api/job-search'
 import { readableJob } from '../api/readable'
 import { useResource } from '../api/resource'
 import { isPublished, NOT_PUBLISHED } from '../api/robots'
@@ -16,7 +16,7 @@ export interface Reference {
 
 const simulated = new Map<string, Promise<Simulation>>()
 
-/** A choice as it stands in the address bar: `published:fuzzy-pi:A`, `job:k2q7`, `none`. */
+/** Load the reference for an address value: `published:fuzzy-pi:A`, `job:k2q7`, `none`. */
 export function useReference(job: Job, choice: string) {
   const key = choice === 'none' ? null : `${job.id} ${choice}`
   return useResource<Reference>(key, (signal) => load(job, choice, signal))
@@ -37,11 +37,11 @@ async function load(job: Job, choice: string, signal: AbortSignal): Promise<Refe
   return { label: `published ${study}`, scenarios: result.scenarios }
 }
 
-/** The published designs of the job's controller, walking in its scenarios. */
+/** Simulate the published designs of the job's controller in its scenarios. */
 export async function publishedWalks(job: Job): Promise<readonly Reference[]> {
   const spec = job.spec as JobSpec
-  const found = (await catalogue()).find(({ name }) => name === spec.controller)
-  const walks = Object.entries(found?.published ?? {}).map(async ([study, design]) => {
+  const match = (await catalogue()).find(({ name }) => name === spec.controller)
+  const walks = Object.entries(match?.published ?? {}).map(async ([study, design]) => {
     const { scenarios } = await walkOf(spec, spec.controller, design)
     return { label: `published ${study}`, scenarios }
   })
@@ -58,7 +58,7 @@ function catalogue(): Promise<readonly Controller[]> {
   return controllers
 }
 
-/** The design walking in the job's scenarios; the same question is asked once. */
+/** Simulate a design in the job's scenarios; identical requests are sent once. */
 function walkOf(
   { robot, scenarios, preference }: JobSpec,
   controller: JobSpec['controller'],
@@ -67,12 +67,12 @@ function walkOf(
   const walks = { scenarios, preference, precision: 'double' as const, log: false }
   const body = { robot, controller, design: { ...design }, ...walks }
   const key = JSON.stringify(body)
-  const known = simulated.get(key)
-  if (known) return known
-  const asked = post('/v1/simulations', { body })
-  simulated.set(key, asked)
-  asked.catch(() => simulated.delete(key))
-  return asked
+  const cached = simulated.get(key)
+  if (cached) return cached
+  const request = post('/v1/simulations', { body })
+  simulated.set(key, request)
+  request.catch(() => simulated.delete(key))
+  return request
 }
 
 export function ReferencePicker({
@@ -83,7 +83,7 @@ export function ReferencePicker({
 }: {
   job: Job
   choice: string
-  /** What the reference is called, once it is known. */
+  /** Label of the reference once loaded. */
   label: string | null
   onChoose: (choice: string) => void
 }) {
@@ -92,16 +92,16 @@ export function ReferencePicker({
   const published = useResource(hasPublished ? 'controllers' : null, catalogue)
   const groups = [{ label: '', choices: [{ value: 'none', label: 'nothing' }] }]
   if (hasPublished) groups.push({ label: 'Published designs', choices: designs(published.data) })
-  const known = groups.flatMap(({ choices }) => choices).find(({ value }) => value === choice)
+  const selected = groups.flatMap(({ choices }) => choices).find(({ value }) => value === choice)
   return (
     <Combobox
       label="Compare with"
-      shown={known?.label ?? label ?? choice.slice(choice.indexOf(':') + 1)}
+      chosenLabel={selected?.label ?? label ?? choice.slice(choice.indexOf(':') + 1)}
       hint={tuning && !hasPublished ? NOT_PUBLISHED : undefined}
       groups={groups}
-      found={{
+      remote={{
         label: 'Winners of other jobs',
-        search: foundJobs(job.kind, { without: [job.id], value: (id) => `job:${id}` }),
+        search: jobSearch(job.kind, { exclude: [job.id], value: (id) => `job:${id}` }),
       }}
       onChoose={onChoose}
     />

@@ -1,9 +1,9 @@
-/** Where a job's search began. Pure. */
+/** Start designs of a job. */
 
 import type { AnySpec } from '../api/types'
 import type { Design } from '../format/value'
 
-/** The designs that a job judged first; jobs that it named have become designs when it was stored. */
+/** Start designs; references to jobs were resolved to designs when the job was stored. */
 export function startDesigns({ spec }: { readonly spec: AnySpec }): readonly Design[] {
   return Array.isArray(spec.start) ? (spec.start as readonly Design[]) : []
 }

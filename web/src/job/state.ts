@@ -1,4 +1,4 @@
-/** What the state of a job says of it. Pure. */
+/** Meaning of job states. */
 
 import type { Iteration, JobState } from '../api/types'
 import { budgetSpent, type Counts } from './budget'
@@ -7,22 +7,22 @@ interface WithState {
   readonly state: JobState
 }
 
-/** Whether nothing more is to come of it, whatever anybody does. */
+/** Whether the job is in a final state. */
 export function hasEnded({ state }: WithState): boolean {
   return state === 'succeeded' || state === 'failed' || state === 'cancelled'
 }
 
-/** Whether more is to come of it without anybody's doing. */
-export function isUnderWay(job: WithState): boolean {
-  return job.state === 'queued' || isComputed(job)
+/** Whether the job will progress without a command. */
+export function isActive(job: WithState): boolean {
+  return job.state === 'queued' || isRunning(job)
 }
 
-/** Whether it is worked on now. */
-export function isComputed({ state }: WithState): boolean {
+/** Whether the job is being computed. */
+export function isRunning({ state }: WithState): boolean {
   return state === 'running' || state === 'pausing'
 }
 
-/** `running 3/6`, or how it ended. followed: iterations that are known from the stream. */
+/** `running 3/6`, or the final state. followed: iterations received from the stream. */
 export function progressInWords(
   job: Counts & WithState,
   followed: readonly Iteration[] = [],

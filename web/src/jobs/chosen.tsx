@@ -1,4 +1,4 @@
-/** What can be done with several jobs at once: compare, archive, delete. */
+/** Commands for the selected jobs: compare, archive, delete. */
 
 import { useState } from 'preact/hooks'
 import { patch, remove } from '../api/client'
@@ -7,9 +7,15 @@ import { ConfirmDialog } from '../components/confirm-dialog'
 import { ErrorNotice } from '../components/feedback'
 import { formatCount } from '../format/number'
 import { comparePath, jobPath } from '../router/routes'
-import { type Deletion, deleteAll, type Fate, lookedUp, lostWith } from './deletion'
+import {
+  type Deletion,
+  type DeletionPreview,
+  deleteAll,
+  deletionPreview,
+  lostWith,
+} from './deletion'
 
-/** Jobs that can be compared at once. */
+/** Most jobs that can be compared. */
 const MOST_COMPARED = 12
 
 export function Chosen({
@@ -19,13 +25,13 @@ export function Chosen({
   onChoose,
 }: {
   chosen: readonly string[]
-  /** Whether the list shows the archive. */
+  /** Whether the list shows archived jobs. */
   archived: boolean
   onDone: () => void
   onChoose: (chosen: readonly string[]) => void
 }) {
   const [error, setError] = useState<unknown>(null)
-  const [asked, setAsked] = useState<Fate | null>(null)
+  const [preview, setPreview] = useState<DeletionPreview | null>(null)
   const [deletion, setDeletion] = useState<Deletion | null>(null)
   const [busy, setBusy] = useState(false)
   const during = (work: Promise<void>) => {
@@ -41,21 +47,21 @@ export function Chosen({
     onChoose([])
     onDone()
   }
-  const deleteThem = async (jobs: readonly JobSummary[]) => {
-    setAsked(null)
-    const done = await deleteAll(jobs, (id) =>
+  const deleteJobs = async (jobs: readonly JobSummary[]) => {
+    setPreview(null)
+    const result = await deleteAll(jobs, (id) =>
       remove('/v1/jobs/{job_id}', { path: { job_id: id } }),
     )
-    setDeletion(done)
-    const gone = new Set(done.deleted)
-    onChoose(chosen.filter((id) => !gone.has(id)))
+    setDeletion(result)
+    const deleted = new Set(result.deleted)
+    onChoose(chosen.filter((id) => !deleted.has(id)))
     onDone()
   }
   return (
     <>
       {chosen.length > 0 && (
         <div class="row chosen" data-chosen={chosen.length}>
-          <strong aria-live="polite">{formatCount(chosen.length)} chosen</strong>
+          <strong aria-live="polite">{formatCount(chosen.length)} selected</strong>
           {chosen.length <= MOST_COMPARED ? (
             <a class="button compact" href={comparePath(chosen)}>
               Compare
@@ -64,54 +70,54 @@ export function Chosen({
             <span class="muted small">at most {MOST_COMPARED} can be compared</span>
           )}
           <button type="button" class="compact" disabled={busy} onClick={() => during(archive())}>
-            {archived ? 'Take back from the archive' : 'Archive'}
+            {archived ? 'Restore from archive' : 'Archive'}
           </button>
           <button
             type="button"
             class="compact danger"
             disabled={busy}
-            onClick={() => during(lookedUp(chosen).then(setAsked))}
+            onClick={() => during(deletionPreview(chosen).then(setPreview))}
           >
             Delete…
           </button>
           <button type="button" class="compact" onClick={() => onChoose([])}>
-            Choose none
+            Clear selection
           </button>
         </div>
       )}
-      {error !== null && <ErrorNotice what="That was not done." error={error} />}
+      {error !== null && <ErrorNotice what="The command failed." error={error} />}
       {deletion !== null && <DeletionNote deletion={deletion} onClose={() => setDeletion(null)} />}
       <ConfirmDialog
-        open={asked !== null}
-        title={`Delete ${jobsInWords(asked?.deletable.length ?? 0)} and all that they have found?`}
-        confirm={`Delete ${jobsInWords(asked?.deletable.length ?? 0)}`}
-        dismiss="Keep them"
+        open={preview !== null}
+        title={`Delete ${jobsInWords(preview?.deletable.length ?? 0)} and their results?`}
+        confirm={`Delete ${jobsInWords(preview?.deletable.length ?? 0)}`}
+        dismiss="Back"
         dangerous
-        disabled={asked === null || asked.deletable.length === 0}
-        onConfirm={() => asked && during(deleteThem(asked.deletable))}
-        onDismiss={() => setAsked(null)}
+        disabled={preview === null || preview.deletable.length === 0}
+        onConfirm={() => preview && during(deleteJobs(preview.deletable))}
+        onDismiss={() => setPreview(null)}
       >
-        {asked && <FateNote fate={asked} />}
+        {preview && <PreviewNote preview={preview} />}
       </ConfirmDialog>
     </>
   )
 }
 
-function FateNote({ fate }: { fate: Fate }) {
-  const lost = lostWith(fate.deletable)
+function PreviewNote({ preview }: { preview: DeletionPreview }) {
+  const lost = lostWith(preview.deletable)
   return (
     <>
-      {fate.deletable.length > 0 && (
+      {preview.deletable.length > 0 && (
         <p>
           {formatCount(lost.iterations)} iterations with {formatCount(lost.evaluations)} evaluated
-          designs are lost for good. Forks of the jobs keep their copies but lose their parents, and
-          certificates of their designs stay as jobs of their own.
+          designs are permanently lost. Forks of the jobs keep their copies but lose their parents;
+          certificates of their designs are separate jobs and remain.
         </p>
       )}
-      {fate.refused.length > 0 && (
+      {preview.refused.length > 0 && (
         <>
-          <p>{jobsInWords(fate.refused.length)} may not be deleted and will stay:</p>
-          <Reasons items={fate.refused} />
+          <p>{jobsInWords(preview.refused.length)} cannot be deleted:</p>
+          <Reasons items={preview.refused} />
         </>
       )}
     </>
@@ -123,7 +129,7 @@ function DeletionNote({ deletion, onClose }: { deletion: Deletion; onClose: () =
     <div class="notice" data-tone={deletion.refused.length > 0 ? 'warn' : 'good'} role="status">
       <p>
         {jobsInWords(deletion.deleted.length)} deleted
-        {deletion.refused.length > 0 && `; ${jobsInWords(deletion.refused.length)} stayed`}.
+        {deletion.refused.length > 0 && `; ${jobsInWords(deletion.refused.length)} not deleted`}.
       </p>
       {deletion.refused.length > 0 && <Reasons items={deletion.refused} />}
       <button type="button" class="compact" onClick={onClose}>
@@ -133,7 +139,7 @@ function DeletionNote({ deletion, onClose }: { deletion: Deletion; onClose: () =
   )
 }
 
-function Reasons({ items }: { items: Fate['refused'] }) {
+function Reasons({ items }: { items: DeletionPreview['refused'] }) {
   return (
     <ul class="small reasons">
       {items.map(({ id, name, reason }) => (

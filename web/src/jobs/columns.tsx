@@ -1,4 +1,4 @@
-/** Columns of the list of jobs. */
+/** Columns of the job list. */
 
 import type { JobSummary } from '../api/types'
 import { Progress } from '../components/progress'
@@ -12,15 +12,15 @@ import { referenceLabel } from '../job/gain'
 import { jobPath } from '../router/routes'
 import { Sparkline, type Sparklines } from './sparkline'
 
-/** What the rows of the list share. */
+/** Data shared by all rows. */
 interface Shared {
   readonly lines: Sparklines
-  /** Ids of the jobs that are chosen. */
+  /** Ids of the selected jobs. */
   readonly chosen: readonly string[]
   readonly onChoose: (id: string, on: boolean) => void
 }
 
-/** The server sorts. now: [ms], for ages. */
+/** Columns sorted by the server. now: [ms], for ages. */
 export function jobColumns(
   now: number,
   { lines, chosen, onChoose }: Shared,
@@ -28,11 +28,11 @@ export function jobColumns(
   return [
     {
       key: 'choose',
-      label: 'Choose',
+      label: 'Select',
       cell: (job) => (
         <input
           type="checkbox"
-          aria-label={`Choose ${job.name || job.id}`}
+          aria-label={`Select ${job.name || job.id}`}
           checked={chosen.includes(job.id)}
           onChange={(event) => onChoose(job.id, event.currentTarget.checked)}
         />
@@ -81,7 +81,7 @@ export function jobColumns(
     },
     {
       key: 'line',
-      label: 'How it came',
+      label: 'Convergence',
       minor: true,
       cell: (job) => <Sparkline line={lines.get(job.id)} />,
     },

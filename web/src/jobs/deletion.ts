@@ -1,21 +1,21 @@
-/** Deleting several jobs: which may be, what is lost, and what came of it. */
+/** Deletion of several jobs. */
 
 import { get } from '../api/client'
 import { ApiProblem } from '../api/problem'
 import type { JobSummary } from '../api/types'
 
-/** Requests under way at once. */
+/** Concurrent requests. */
 const AT_ONCE = 4
 
 interface Refused {
   readonly id: string
   readonly name: string
-  /** Why the job stays. */
+  /** Why the job cannot be deleted. */
   readonly reason: string
 }
 
-/** What would become of chosen jobs. */
-export interface Fate {
+/** Preview of a deletion. */
+export interface DeletionPreview {
   readonly deletable: readonly JobSummary[]
   readonly refused: readonly Refused[]
 }
@@ -25,19 +25,19 @@ export interface Deletion {
   readonly refused: readonly Refused[]
 }
 
-/** The chosen jobs as they are now; a list may be some seconds old, or show another page. */
-export async function lookedUp(ids: readonly string[]): Promise<Fate> {
-  const found = await inTurn(ids, (id) =>
+/** Fetch the selected jobs; the list may be outdated, or show another page. */
+export async function deletionPreview(ids: readonly string[]): Promise<DeletionPreview> {
+  const jobs = await inTurn(ids, (id) =>
     get('/v1/jobs/{job_id}', { path: { job_id: id } }).catch((error: unknown) => {
       if (error instanceof ApiProblem && error.status === 404) return null
       throw error
     }),
   )
-  return fateOf(found.filter((job) => job !== null))
+  return previewOf(jobs.filter((job) => job !== null))
 }
 
-/** Jobs by whether the server lets them be deleted. */
-export function fateOf(jobs: readonly JobSummary[]): Fate {
+/** Split jobs by whether the server allows their deletion. */
+export function previewOf(jobs: readonly JobSummary[]): DeletionPreview {
   return {
     deletable: jobs.filter((job) => 'delete' in job.links),
     refused: jobs
@@ -46,13 +46,13 @@ export function fateOf(jobs: readonly JobSummary[]): Fate {
         id: job.id,
         name: job.name,
         reason: job.kept
-          ? 'it is kept; release it first, on its page'
+          ? 'it is protected; release it on its page first'
           : `it is ${job.state}; cancel or pause it first`,
       })),
   }
 }
 
-/** Iterations and designs that go with jobs. */
+/** Totals lost with the jobs. */
 export function lostWith(jobs: readonly JobSummary[]) {
   return {
     iterations: jobs.reduce((sum, job) => sum + job.iterations, 0),
@@ -60,7 +60,7 @@ export function lostWith(jobs: readonly JobSummary[]) {
   }
 }
 
-/** Delete each; one that cannot be keeps no other from it. Throws if the server is away. */
+/** Delete each job; failures do not stop the others. Throws if the server is unreachable. */
 export async function deleteAll(
   jobs: readonly JobSummary[],
   send: (id: string) => Promise<void>,
@@ -71,16 +71,16 @@ export async function deleteAll(
       return null
     } catch (error) {
       if (!(error instanceof ApiProblem) || error.status === 0) throw error
-      // Somebody else was faster.
+      // Already deleted by another client.
       return error.status === 404 ? null : { id, name, reason: error.message }
     }
   })
   const refused = results.filter((result) => result !== null)
-  const stayed = new Set(refused.map(({ id }) => id))
-  return { deleted: jobs.map(({ id }) => id).filter((id) => !stayed.has(id)), refused }
+  const refusedIds = new Set(refused.map(({ id }) => id))
+  return { deleted: jobs.map(({ id }) => id).filter((id) => !refusedIds.has(id)), refused }
 }
 
-/** Results in the order of the items, of which a few are worked at together. */
+/** Map over the items with limited concurrency, preserving their order. */
 async function inTurn<T, R>(items: readonly T[], work: (item: T) => Promise<R>): Promise<R[]> {
   const results: R[] = []
   for (let begin = 0; begin < items.length; begin += AT_ONCE) {

@@ -1,4 +1,4 @@
-/** What the list is filtered and sorted by; all of it is in the address. */
+/** Filters and order of the job list, stored in the address. */
 
 import type { ComponentChildren } from 'preact'
 import type { JobFacets } from '../api/types'
@@ -7,7 +7,7 @@ import { capitalized } from '../format/words'
 import { setQuery } from '../router/navigation'
 import { FACETS, type Facet, FIRST_PAGE, type ListQuery, ORDERS, STATES } from './list-query'
 
-/** What `setQuery` takes to show all jobs. */
+/** Query changes that reset all filters. */
 export const NO_FILTER: Readonly<Record<string, null>> = {
   ...FIRST_PAGE,
   search: null,
@@ -29,9 +29,9 @@ export function Filters({
   children,
 }: {
   query: ListQuery
-  /** Null until they are known. */
+  /** Null while loading. */
   facets: JobFacets | null
-  /** How many jobs fit. */
+  /** Number of matches. */
   children: ComponentChildren
 }) {
   return (
@@ -92,7 +92,7 @@ function FacetFilter({
   const names = facet === 'state' ? STATES.filter((s) => s in counts) : Object.keys(counts).sort()
   const offered =
     chosen === undefined || names.includes(chosen as never) ? names : [...names, chosen]
-  // A choice of one says nothing.
+  // A single option cannot filter.
   if (chosen === undefined && offered.length < 2 && facet !== 'state') return null
   return (
     <select

@@ -1,4 +1,4 @@
-/** What the list of jobs shows, as its address says; the server finds and sorts. Pure. */
+/** Filters and order of the job list as query parameters; the server applies them. */
 
 import type { JobState } from '../api/types'
 
@@ -27,10 +27,10 @@ export const ORDERS = {
 
 export type Order = keyof typeof ORDERS
 
-/** Jobs of one page. */
+/** Jobs per page. */
 export const PAGE = 50
 
-/** Filters by facet, in the order in which they are offered. */
+/** Filters in the order in which they are offered. */
 export const FACETS = ['state', 'robot', 'controller', 'preference', 'tag'] as const
 
 export type Facet = (typeof FACETS)[number]
@@ -44,27 +44,27 @@ export interface ListQuery {
   readonly tag?: string
   readonly archived: boolean
   readonly order: Order
-  /** Whether the order is turned round. */
+  /** Whether the order is reversed. */
   readonly reverse: boolean
 }
 
-/** Orders that begin with what is greatest; all others begin with what is least. */
+/** Orders that start with the greatest value; all others start with the smallest. */
 const DESCENDING: readonly Order[] = ['gain', 'priority', 'iterations', 'evaluations', 'rate']
 
-/** Whether a list goes from what is great to what is little. */
+/** Whether a list is in descending order. */
 export function descends(order: Order, reverse: boolean): boolean {
   return DESCENDING.includes(order) !== reverse
 }
 
-/** What the address is to say when a column is sorted by: turned round if it is already. */
+/** Query changes to sort by an order; selecting the current one reverses it. */
 export function reordered(
   { order, reverse }: ListQuery,
-  wanted: Order,
+  column: Order,
 ): Readonly<Record<'order' | 'reverse' | 'after', string | null>> {
-  return { order: wanted, reverse: order === wanted && !reverse ? '' : null, ...FIRST_PAGE }
+  return { order: column, reverse: order === column && !reverse ? '' : null, ...FIRST_PAGE }
 }
 
-/** What an address such as `?controller=pi&order=fitness` asks for. */
+/** Parse a query such as `?controller=pi&order=fitness`. */
 export function listQuery(query: URLSearchParams): ListQuery {
   const text = (name: string) => query.get(name) || undefined
   const order = query.get('order') ?? 'created'
@@ -81,10 +81,10 @@ export function listQuery(query: URLSearchParams): ListQuery {
   }
 }
 
-/** Another filter or order has other pages. */
+/** Query change that returns to the first page. */
 export const FIRST_PAGE = { after: null } as const
 
-/** Whether all jobs that are not archived, or all that are, fit. */
+/** Whether any filter other than `archived` is active. */
 export function isFiltered(query: ListQuery): boolean {
   return query.search !== undefined || FACETS.some((facet) => query[facet] !== undefined)
 }

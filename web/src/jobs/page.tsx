@@ -1,4 +1,4 @@
-/** All jobs: how they stand and where to go on; the server finds, sorts and pages them. */
+/** List of jobs, filtered, sorted and paged by the server. */
 
 import { useNow } from '../api/resource'
 import type { JobFacets } from '../api/types'
@@ -19,7 +19,7 @@ import { useFacets, useList } from './use-list'
 export function JobsPage() {
   const place = usePlace()
   const query = listQuery(place.query)
-  // Where the pages before begin after, so that Previous, Back and a reload find them.
+  // Cursors of the previous pages, so that Previous, Back and reload work.
   const cursors = place.query.getAll('after')
   const setCursors = (after: readonly string[]) => setQuery({ after }, { replace: false })
   const chosen = idsOf(place.query.get('chosen'))
@@ -43,7 +43,7 @@ export function JobsPage() {
       <div class="stack">
         {error !== null && (
           <ErrorNotice
-            what={jobs ? 'The list is not up to date.' : 'The jobs cannot be shown.'}
+            what={jobs ? 'The list is out of date.' : 'Could not load the jobs.'}
             error={error}
           />
         )}
@@ -61,7 +61,7 @@ export function JobsPage() {
               onChoose={setChosen}
             />
             {none ? (
-              <Empty title="No job fits the filter">
+              <Empty title="No matching jobs">
                 <button type="button" onClick={() => setQuery(NO_FILTER)}>
                   Show all jobs
                 </button>
@@ -72,7 +72,7 @@ export function JobsPage() {
                 columns={jobColumns(now, { lines, chosen, onChoose: toggle })}
                 rows={jobs}
                 rowKey={(job) => job.id}
-                elsewhere={{
+                external={{
                   order: { column: query.order, descending: descends(query.order, query.reverse) },
                   onOrder: (column) => setQuery(reordered(query, column as Order)),
                 }}
@@ -90,7 +90,7 @@ export function JobsPage() {
   )
 }
 
-/** How many jobs fit, where that is known without asking for all pages. */
+/** Number of matches, as far as known without loading all pages. */
 function countWords(
   facets: JobFacets | null,
   filtered: boolean,
@@ -111,7 +111,7 @@ function Pages({
   next,
   onPage,
 }: {
-  /** Where the pages before begin after, but for the first. */
+  /** Cursors of all pages but the first. */
   cursors: readonly string[]
   next: string | null
   onPage: (cursors: readonly string[]) => void
@@ -146,13 +146,13 @@ function NoJobs() {
   return (
     <section class="card">
       <Empty title="No jobs yet">
-        <p>A job searches for the controller that walks best in all of its scenarios.</p>
+        <p>A job searches for the controller that performs best in all of its scenarios.</p>
         <p>
           <a class="button primary" href="/jobs/new">
-            Set up the first job
+            Create the first job
           </a>
         </p>
-        <p>or, in a terminal, run the job of the thesis’s chapter 4:</p>
+        <p>or run the job of the thesis’s chapter 4 in a terminal:</p>
         <CopyBlock
           label="the command"
           text={`echo '{"name": "chapter 4"}' > job.json\ngaitswarm submit --spec job.json --server ${location.origin}`}

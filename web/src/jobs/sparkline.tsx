@@ -1,4 +1,4 @@
-/** How jobs came to their best, in a word's size. */
+/** Sparklines of the jobs' convergence. */
 
 import { useRef } from 'preact/hooks'
 import { get } from '../api/client'
@@ -6,28 +6,29 @@ import { useResource, useSlowly } from '../api/resource'
 import type { Convergence, JobSummary } from '../api/types'
 
 const POINTS = 24
-/** How often those of jobs that run are asked for again [ms]. */
+/** Polling interval for running jobs [ms]. */
 const RENEW_MS = 8000
 const WIDTH = 80
 const HEIGHT = 20
 
 export type Sparklines = ReadonlyMap<string, Convergence>
 
-/** Of the jobs that have found something. */
+/** Convergence of the jobs with a result. */
 export function useSparklines(jobs: readonly JobSummary[]): Sparklines {
-  const begun = jobs.filter(({ best_fitness }) => best_fitness !== null)
-  const iterations = begun.reduce((sum, job) => sum + job.iterations, 0)
+  const withResult = jobs.filter(({ best_fitness }) => best_fitness !== null)
+  const iterations = withResult.reduce((sum, job) => sum + job.iterations, 0)
   const renewed = useSlowly(iterations, RENEW_MS)
-  const ids = begun.map(({ id }) => id)
-  const found = useResource(ids.length === 0 ? null : `${ids.join()} ${renewed}`, (signal) =>
+  const ids = withResult.map(({ id }) => id)
+  const convergences = useResource(ids.length === 0 ? null : `${ids.join()} ${renewed}`, (signal) =>
     get('/v1/job-convergences', { query: { job: ids, points: POINTS }, signal }),
   )
   const shown = useRef<Sparklines>(new Map())
-  if (found.data) shown.current = new Map(found.data.items.map((item) => [item.id, item]))
+  if (convergences.data)
+    shown.current = new Map(convergences.data.items.map((item) => [item.id, item]))
   return shown.current
 }
 
-/** Best so far over the evaluations, logarithmic; a picture beside the number that it ends with. */
+/** Best so far over the evaluations, logarithmic. */
 export function Sparkline({ line }: { line: Convergence | undefined }) {
   const points = (line?.best_so_far ?? []).flatMap((best, k) =>
     best !== null && best > 0 ? [[line!.evaluations[k], Math.log(best)] as const] : [],

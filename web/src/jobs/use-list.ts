@@ -1,4 +1,4 @@
-/** One page of the list, and what there is to filter by, kept up to date while the tab is shown. */
+/** One page of the job list and its filter options, polled while the tab is visible. */
 
 import { useEffect, useRef, useState } from 'preact/hooks'
 import { get } from '../api/client'
@@ -9,7 +9,7 @@ import { type ListQuery, PAGE } from './list-query'
 
 const POLL_MS = 2000
 const FACETS_MS = 15_000
-/** So that not every letter of a search is asked for [ms]. */
+/** Debounce of typing [ms]. */
 const PAUSE_MS = 150
 
 interface Page {
@@ -17,7 +17,7 @@ interface Page {
   readonly next: string | null
 }
 
-interface Asked {
+interface Request {
   readonly query: ListQuery
   readonly after: string | null
 }
@@ -29,10 +29,10 @@ export function useList(query: ListQuery, after: string | null) {
   const before = useRef(new Map<string, JobState>())
   const [latest] = useState(
     () =>
-      new LatestAnswer<Asked, Page>(
-        (asked, signal) =>
+      new LatestAnswer<Request, Page>(
+        (request, signal) =>
           get('/v1/jobs', {
-            query: { ...asked.query, after: asked.after, limit: PAGE },
+            query: { ...request.query, after: request.after, limit: PAGE },
             signal,
           }),
         (answer) => {
@@ -56,7 +56,7 @@ export function useList(query: ListQuery, after: string | null) {
   return { page, error, announcement, reload }
 }
 
-/** Counts by what jobs are found by; null until they are known. */
+/** Job counts by filter value; null while loading. */
 export function useFacets(archived: boolean): JobFacets | null {
   const counts = useResource(`facets ${archived}`, (signal) =>
     get('/v1/job-facets', { query: { archived }, signal }),

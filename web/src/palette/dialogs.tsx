@@ -1,4 +1,4 @@
-/** The palette of pages, jobs and commands, and the list of keys. */
+/** Command palette and keyboard help. */
 
 import { useEffect, useId, useRef, useState } from 'preact/hooks'
 import { get } from '../api/client'
@@ -8,14 +8,14 @@ import { navigate } from '../router/navigation'
 import { jobPath } from '../router/routes'
 import { useManual } from '../session/session'
 import { toggleTheme } from '../theme'
-import { type Entry, entriesOfPage, found } from './entries'
+import { type Entry, entriesOfPage, matchingEntries } from './entries'
 import type { Shown } from './keys'
 import './palette.css'
 import { SHORTCUTS, shortcutsOn, switchShortcuts } from './shortcuts'
 
-/** Jobs that are looked for at once. */
+/** Most jobs listed. */
 const MOST_JOBS = 8
-/** After the last letter [ms]. */
+/** Debounce of typing [ms]. */
 const DELAY = 150
 
 const MANUAL: Entry = {
@@ -40,7 +40,7 @@ export default function Dialogs({ shown, onShow }: DialogsProps) {
     <dialog
       ref={dialog}
       class="palette"
-      aria-label={shown === 'palette' ? 'Find' : 'Keys'}
+      aria-label={shown === 'palette' ? 'Find' : 'Keyboard shortcuts'}
       onClose={() => onShow(null)}
     >
       {shown === 'palette' ? (
@@ -55,12 +55,12 @@ export default function Dialogs({ shown, onShow }: DialogsProps) {
 function Palette({ onClose, onHelp }: { onClose: () => void; onHelp: () => void }) {
   const [text, setText] = useState('')
   const [chosen, setChosen] = useState(0)
-  const [own] = useState(entriesOfPage)
+  const [pageEntries] = useState(entriesOfPage)
   const id = useId()
-  const asked = useDelayed(text.trim())
+  const search = useDelayed(text.trim())
   const manual = useManual()
-  const jobs = useResource(`palette ${asked}`, (signal) =>
-    get('/v1/jobs', { query: { search: asked || undefined, limit: MOST_JOBS }, signal }),
+  const jobs = useResource(`palette ${search}`, (signal) =>
+    get('/v1/jobs', { query: { search: search || undefined, limit: MOST_JOBS }, signal }),
   )
   const pages = [
     ...SHORTCUTS.flatMap(({ words, action }): Entry[] =>
@@ -70,14 +70,14 @@ function Palette({ onClose, onHelp }: { onClose: () => void; onHelp: () => void 
     ),
     {
       key: 'own robot',
-      label: 'A robot of your own, from its URDF',
+      label: 'Custom robot from a URDF',
       kind: 'page',
       run: () => navigate('/jobs/new?robot=own'),
     },
     { key: 'api', label: 'API', kind: 'page', run: () => location.assign('/docs') },
     ...(manual ? [MANUAL] : []),
     { key: 'theme', label: 'Light or dark', kind: 'command', run: toggleTheme },
-    { key: 'help', label: 'Keys', kind: 'command', run: onHelp },
+    { key: 'help', label: 'Keyboard shortcuts', kind: 'command', run: onHelp },
   ]
   const listed = (jobs.data?.items ?? []).map(
     (job): Entry => ({
@@ -87,7 +87,7 @@ function Palette({ onClose, onHelp }: { onClose: () => void; onHelp: () => void 
       run: () => navigate(jobPath(job.id)),
     }),
   )
-  const entries = [...found([...own, ...pages], text), ...listed]
+  const entries = [...matchingEntries([...pageEntries, ...pages], text), ...listed]
   const at = Math.min(chosen, entries.length - 1)
   const choose = (entry: Entry | undefined) => {
     if (!entry) return
@@ -121,10 +121,10 @@ function Palette({ onClose, onHelp }: { onClose: () => void; onHelp: () => void 
         }}
         onKeyDown={press}
       />
-      <div role="listbox" id={id} aria-label="What was found">
+      <div role="listbox" id={id} aria-label="Matches">
         {entries.map((entry, k) => (
-          // biome-ignore lint/a11y/useKeyWithClickEvents: the field above takes the keys
-          // biome-ignore lint/a11y/useFocusableInteractive: the field above keeps the focus
+          // biome-ignore lint/a11y/useKeyWithClickEvents: the input handles keys
+          // biome-ignore lint/a11y/useFocusableInteractive: the input keeps the focus
           <div
             key={entry.key}
             id={`${id}-${k}`}
@@ -139,8 +139,8 @@ function Palette({ onClose, onHelp }: { onClose: () => void; onHelp: () => void 
       </div>
       <p class="muted small" role="status">
         {jobs.error !== null
-          ? `Jobs cannot be looked for: ${messageOf(jobs.error)}`
-          : entries.length === 0 && 'Nothing fits.'}
+          ? `Could not search jobs: ${messageOf(jobs.error)}`
+          : entries.length === 0 && 'No matches.'}
       </p>
     </>
   )
@@ -150,7 +150,7 @@ function Help({ onClose }: { onClose: () => void }) {
   const [on, setOn] = useState(shortcutsOn)
   return (
     <>
-      <h2>Keys</h2>
+      <h2>Keyboard shortcuts</h2>
       <dl class="keys">
         <div>
           <dt>
@@ -176,7 +176,7 @@ function Help({ onClose }: { onClose: () => void }) {
             setOn(event.currentTarget.checked)
           }}
         />
-        single keys work
+        enable single-key shortcuts
       </label>
       <div class="actions">
         <button type="button" onClick={onClose}>
@@ -188,10 +188,10 @@ function Help({ onClose }: { onClose: () => void }) {
 }
 
 function useDelayed(value: string): string {
-  const [late, setLate] = useState(value)
+  const [delayed, setDelayed] = useState(value)
   useEffect(() => {
-    const timer = setTimeout(() => setLate(value), DELAY)
+    const timer = setTimeout(() => setDelayed(value), DELAY)
     return () => clearTimeout(timer)
   }, [value])
-  return late
+  return delayed
 }

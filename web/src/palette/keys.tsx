@@ -1,4 +1,4 @@
-/** Hears the keys that work everywhere; the palette and the list of keys are loaded with the first use. */
+/** Global keyboard shortcuts; the dialogs are loaded on first use. */
 
 import type { ComponentType } from 'preact'
 import { useEffect, useState } from 'preact/hooks'

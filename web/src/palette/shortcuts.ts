@@ -1,6 +1,5 @@
-/** Keys that work everywhere: which there are, and when they are heard. */
+/** Global keyboard shortcuts. */
 
-/** What a key does. */
 export type Action =
   | { readonly kind: 'go'; readonly href: string }
   | { readonly kind: 'palette' | 'help' | 'theme' }
@@ -16,16 +15,16 @@ export const SHORTCUTS: readonly {
   { key: 'c', words: 'Controller', action: { kind: 'go', href: '/controller' } },
   { key: 't', words: 'Light or dark', action: { kind: 'theme' } },
   { key: '/', words: 'Find pages, jobs and commands', action: { kind: 'palette' } },
-  { key: '?', words: 'These keys', action: { kind: 'help' } },
+  { key: '?', words: 'Keyboard shortcuts', action: { kind: 'help' } },
 ]
 
-/** What has a use of its own for letters. */
-const OWN_LETTERS =
+/** Elements that handle letters themselves. */
+const LETTER_TARGETS =
   'input, select, textarea, [contenteditable], dialog, [role="menu"], [role="application"]'
 
 const KEY = 'gaitswarm.shortcuts'
 
-/** Whether keys without Ctrl do something; whoever speaks to the machine may not want it. */
+/** Whether single-key shortcuts are enabled; speech input may trigger them by accident. */
 export function shortcutsOn(): boolean {
   return localStorage.getItem(KEY) !== 'off'
 }
@@ -35,7 +34,7 @@ export function switchShortcuts(on: boolean): void {
   else localStorage.setItem(KEY, 'off')
 }
 
-/** What a key asks for; null for nothing. on: whether keys without Ctrl do something. */
+/** Action of a key; null for none. on: whether single-key shortcuts are enabled. */
 export function actionOf(
   event: Pick<KeyboardEvent, 'key' | 'ctrlKey' | 'metaKey' | 'altKey' | 'isComposing'>,
   target: Pick<Element, 'closest'> | null,
@@ -45,6 +44,6 @@ export function actionOf(
   if (event.ctrlKey || event.metaKey) {
     return event.key.toLowerCase() === 'k' ? { kind: 'palette' } : null
   }
-  if (!on || target?.closest(OWN_LETTERS)) return null
+  if (!on || target?.closest(LETTER_TARGETS)) return null
   return SHORTCUTS.find(({ key }) => key === event.key)?.action ?? null
 }

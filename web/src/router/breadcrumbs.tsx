@@ -1,4 +1,4 @@
-/** Where a page lies below others, each a link; the tab is called by it. */
+/** Breadcrumb navigation; also sets the document title. */
 
 import { useEffect } from 'preact/hooks'
 import { setTitle } from '../title'
@@ -7,7 +7,7 @@ export type Crumb = readonly [label: string, href: string]
 
 export const ALL_JOBS: Crumb = ['All jobs', '/jobs']
 
-/** crumbs: from the outermost; here: the page itself; title: of the tab, what is shown first. */
+/** crumbs: outermost first; here: the current page; title: parts of the document title. */
 export function Breadcrumbs({
   crumbs,
   here,

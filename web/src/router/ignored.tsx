@@ -1,28 +1,28 @@
-/** Parts of an address that could not be read: they change nothing, and are told. */
+/** Notice about invalid query parameters, which are ignored. */
 
 import { useEffect, useState } from 'preact/hooks'
 
 type Listener = () => void
 
-const found = new Map<string, string>()
+const ignored = new Map<string, string>()
 const listeners = new Set<Listener>()
 
-/** text: what the address says. */
+/** text: the invalid value. */
 export function ignore(name: string, text: string): void {
-  found.set(name, text)
-  tell()
+  ignored.set(name, text)
+  notify()
 }
 
 export function forgetIgnored(): void {
-  if (found.size === 0) return
-  found.clear()
-  tell()
+  if (ignored.size === 0) return
+  ignored.clear()
+  notify()
 }
 
 export function IgnoredNotice() {
-  const [parts, setParts] = useState(() => [...found])
+  const [parts, setParts] = useState(() => [...ignored])
   useEffect(() => {
-    const update = () => setParts([...found])
+    const update = () => setParts([...ignored])
     listeners.add(update)
     update()
     return () => {
@@ -33,7 +33,7 @@ export function IgnoredNotice() {
   return (
     <div class="notice" data-tone="warn" role="status">
       <p>
-        Part of this address could not be read and is ignored:{' '}
+        Part of this address is invalid and was ignored:{' '}
         {parts.map(([name, text], k) => (
           <span key={name}>
             {k > 0 && ', '}
@@ -48,6 +48,6 @@ export function IgnoredNotice() {
   )
 }
 
-function tell(): void {
+function notify(): void {
   for (const listener of [...listeners]) listener()
 }

@@ -1,10 +1,10 @@
-/** Pages whose code is fetched when they are first shown. */
+/** Code splitting: components loaded when first shown. */
 
 import type { ComponentType } from 'preact'
 import { useEffect, useState } from 'preact/hooks'
 import { ErrorNotice, Loading } from '../components/feedback'
 
-/** A component that stands for a module's default export. what: as in "Loading the walk". */
+/** Wrap a module's default export. what: as in "Loading the walk". */
 export function lazyPage<P extends object>(
   what: string,
   load: () => Promise<{ default: ComponentType<P> }>,
@@ -23,7 +23,7 @@ export function lazyPage<P extends object>(
     if (error !== null) {
       return (
         <ErrorNotice
-          what={`The code of ${what} could not be loaded.`}
+          what={`Could not load the code of ${what}.`}
           error={error}
           retry={() => location.reload()}
         />
@@ -33,7 +33,7 @@ export function lazyPage<P extends object>(
   }
 }
 
-/** The same of a module's export of some name. */
+/** Wrap a named export. */
 export function lazyPart<K extends string, P extends object>(
   what: string,
   name: K,

@@ -1,8 +1,8 @@
-/** The address bar as state: links move without reloading, back and forward work. */
+/** Client-side navigation and the address as state. */
 
 import { useEffect, useState } from 'preact/hooks'
 
-/** What the address bar says. */
+/** Path and query of the address. */
 export interface Place {
   readonly path: string
   readonly query: URLSearchParams
@@ -19,10 +19,10 @@ export function navigate(href: string, { replace = false } = {}): void {
   for (const listener of [...listeners]) listener()
 }
 
-/** What is to change in a query: a value, several of one name, or none any more. */
+/** Changes of a query: a value, several values of one name, or null to remove it. */
 export type QueryChanges = Readonly<Record<string, string | readonly string[] | null>>
 
-/** Change some of the query. The place in the history stays the same, unless Back is to undo it. */
+/** Change query parameters; by default without a new history entry. */
 export function setQuery(changes: QueryChanges, { replace = true } = {}): void {
   const query = new URLSearchParams(location.search)
   for (const [name, value] of Object.entries(changes)) {
@@ -35,7 +35,7 @@ export function setQuery(changes: QueryChanges, { replace = true } = {}): void {
   navigate(text === '' ? location.pathname : `${location.pathname}?${text}`, { replace })
 }
 
-/** The present place; the component renders again when it changes. */
+/** The current place as component state. */
 export function usePlace(): Place {
   const [href, setHref] = useState(location.pathname + location.search)
   useEffect(() => {
@@ -52,7 +52,7 @@ export function usePlace(): Place {
   return { path, query: new URLSearchParams(query) }
 }
 
-/** Follow plain clicks on links to this page's own paths without reloading. */
+/** Handle plain clicks on links to paths of this page without reloading. */
 export function followLinks(): void {
   document.addEventListener('click', (event) => {
     if (event.defaultPrevented || event.button !== 0) return
@@ -60,7 +60,7 @@ export function followLinks(): void {
     const link = (event.target as Element | null)?.closest('a')
     if (!link || link.target !== '' || link.hasAttribute('download')) return
     if (link.origin !== location.origin || !isOwnPath(link.pathname)) return
-    // A place on the page that is shown is the browser's to go to, such as that of the skip link.
+    // Fragments of the current page, such as the skip link's, are left to the browser.
     if (link.hash !== '' && isHere(link)) return
     event.preventDefault()
     navigate(link.pathname + link.search + link.hash)
@@ -72,7 +72,7 @@ function isHere({ pathname, search }: HTMLAnchorElement): boolean {
   return pathname === location.pathname && search === location.search
 }
 
-/** Other paths of the server, such as /docs and /v1, are left to the browser. */
+/** Whether a path is handled here; others, such as /docs and /v1, are left to the browser. */
 function isOwnPath(path: string): boolean {
   return path === '/' || /^\/(jobs|compare|walk|controller)(\/|$)/.test(path)
 }

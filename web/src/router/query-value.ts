@@ -1,21 +1,21 @@
-/** State that is part of the address, so that a link shows what is seen. */
+/** State stored in the address, so that links reproduce the view. */
 
 import { useEffect, useRef, useState } from 'preact/hooks'
 import { ignore } from './ignored'
 import { setQuery } from './navigation'
 
-/** How a value is written into the address. */
+/** Conversion between values and query text. */
 export interface Codec<T> {
-  /** Undefined where the text means nothing. */
+  /** Undefined for invalid text. */
   readonly read: (text: string) => T | undefined
-  /** Null for what need not be written. */
+  /** Null for values that are omitted. */
   readonly write: (value: T) => string | null
 }
 
-/** After the last change, so that a slider does not write a hundred addresses [ms]. */
+/** Delay after the last change, so that a slider does not write many addresses [ms]. */
 const DELAY = 250
 
-/** A value of the query by its name; initial: where the address has none, or none that can be read. */
+/** A query parameter as state; initial: used if it is missing or invalid. */
 export function useQueryValue<T>(
   name: string,
   codec: Codec<T>,
@@ -36,7 +36,7 @@ export function useQueryValue<T>(
   return [value, change]
 }
 
-/** Writes a value of the query some time after the last call, unless the page was left by then. */
+/** Write a query parameter after a delay, unless the page was left meanwhile. */
 export function useDelayedQuery(name: string): (text: string | null) => void {
   const timer = useRef(0)
   useEffect(() => () => clearTimeout(timer.current), [])
@@ -46,39 +46,39 @@ export function useDelayedQuery(name: string): (text: string | null) => void {
   }
 }
 
-/** Whether something is shown, written only where it is not as usual. */
-export function flag(usual: boolean): Codec<boolean> {
+/** A boolean, omitted if it has its default. */
+export function flag(initial: boolean): Codec<boolean> {
   return {
     read: (text) => (text === 'yes' ? true : text === 'no' ? false : undefined),
-    write: (value) => (value === usual ? null : value ? 'yes' : 'no'),
+    write: (value) => (value === initial ? null : value ? 'yes' : 'no'),
   }
 }
 
-/** One of some words, written only where it is not the usual one. */
-export function oneOf<K extends string>(words: readonly K[], usual: K): Codec<K> {
+/** One of several words, omitted if it is the default. */
+export function oneOf<K extends string>(words: readonly K[], initial: K): Codec<K> {
   return {
     read: (text) => words.find((word) => word === text),
-    write: (word) => (word === usual ? null : word),
+    write: (word) => (word === initial ? null : word),
   }
 }
 
-/** Ids of a list in the address, separated by commas, each once. */
+/** Distinct ids, separated by commas. */
 export function idsOf(text: string | null): string[] {
   return [...new Set((text ?? '').split(/[\s,]+/))].filter((id) => id !== '')
 }
 
-/** Page of a table, counted from 1 in the address and from 0 here. */
+/** Page of a table, counted from 1 in the address and from 0 in code. */
 export const PAGE_NUMBER: Codec<number> = {
   read: (text) => (/^[1-9]\d{0,6}$/.test(text) ? Number(text) - 1 : undefined),
   write: (page) => (page === 0 ? null : String(page + 1)),
 }
 
-/** Numbers between colons; NaN for what is none. */
+/** Numbers separated by colons; NaN for invalid ones. */
 export function numbersOf(text: string): number[] {
   return text.split(':').map((part) => Number(part || Number.NaN))
 }
 
-/** Two numbers in rising order, or none: `2:40`. */
+/** An increasing pair of numbers: `2:40`. */
 export const RANGE: Codec<readonly [number, number] | null> = {
   read: (text) => {
     const [low, high, ...rest] = numbersOf(text)
@@ -87,7 +87,7 @@ export const RANGE: Codec<readonly [number, number] | null> = {
   write: (range) => range && range.map((end) => Number(end.toPrecision(5))).join(':'),
 }
 
-/** A column, with a minus before it for the greatest first. */
+/** A column; a leading minus means descending. */
 export const ORDER: Codec<{ readonly column: string; readonly descending: boolean }> = {
   read: (text) =>
     /^-?\w[\w-]*$/.test(text)

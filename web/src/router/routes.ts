@@ -1,6 +1,6 @@
-/** Which page a path means. Pure: the address bar is the navigation module's. */
+/** Routes of the page. */
 
-/** A page, with what its path says. */
+/** A page with the parameters of its path. */
 export type Route =
   | { readonly page: 'jobs' }
   | { readonly page: 'new-job' }
@@ -10,7 +10,7 @@ export type Route =
   | { readonly page: 'controller' }
   | { readonly page: 'not-found' }
 
-/** The route of a path such as `/jobs/k2q7/iterations`; a slash at its end makes no difference. */
+/** The route of a path such as `/jobs/k2q7/iterations`; trailing slashes are ignored. */
 export function routeOf(path: string): Route {
   const parts = path.split('/').filter((part) => part !== '')
   const [first, second, ...rest] = parts.map(decoded)
@@ -32,18 +32,16 @@ export function routeOf(path: string): Route {
   }
 }
 
-/** The path of a job's page. */
 export function jobPath(id: string, tab = ''): string {
   const base = `/jobs/${encodeURIComponent(id)}`
   return tab === '' ? base : `${base}/${tab}`
 }
 
-/** The path of a comparison of jobs. */
 export function comparePath(ids: readonly string[]): string {
   return `/compare?jobs=${ids.map(encodeURIComponent).join(',')}`
 }
 
-/** A path with the values that are set as its query. */
+/** Append the defined, non-empty values as a query. */
 export function withQuery(
   path: string,
   query: Readonly<Record<string, string | number | undefined>>,
@@ -53,7 +51,7 @@ export function withQuery(
   return `${path}?${new URLSearchParams(set.map(([name, value]) => [name, String(value)]))}`
 }
 
-/** A part of a path that cannot be decoded stays as it is. */
+/** Decode a path segment; invalid ones are left as they are. */
 function decoded(part: string): string {
   try {
     return decodeURIComponent(part)

@@ -1,46 +1,46 @@
-/** Whether the server knows who asks: a token that it asks for, kept as a cookie by the browser. */
+/** Authentication by token, stored by the browser as a cookie. */
 
 import { useEffect, useState } from 'preact/hooks'
 import { get, onUnauthorized, post } from '../api/client'
 
 const IN_FRAGMENT = '#token='
 
-/** Ask with a token from now on; throws ApiProblem if the server does not take it. */
+/** Sign in with a token; throws ApiProblem if the server rejects it. */
 export async function signIn(token: string): Promise<void> {
   await post('/v1/session', { body: { token } })
 }
 
 /**
- * Take the token of a link that `gaitswarm serve` printed, before anything is asked. Fragments are
- * never sent, so that no log of a server or proxy has it; nor is it to stay in the history.
+ * Sign in with the token of a link printed by `gaitswarm serve`, before any request. Fragments are not
+ * sent to servers or proxies; the token is also removed from the history.
  */
 export async function takeTokenOfLink(): Promise<void> {
   if (!location.hash.startsWith(IN_FRAGMENT)) return
   const token = decodeURIComponent(location.hash.slice(IN_FRAGMENT.length))
   history.replaceState(history.state, '', location.pathname + location.search)
-  // One that is refused is asked for by the form.
+  // The sign-in form handles a rejected token.
   await signIn(token).catch(() => undefined)
 }
 
-/** Whether the server has refused a request of this page for want of a valid token. */
+/** Whether a request was rejected for lack of a valid token. */
 export function useUnauthorized(): boolean {
-  const [refused, setRefused] = useState(false)
-  useEffect(() => onUnauthorized(() => setRefused(true)), [])
-  return refused
+  const [rejected, setRejected] = useState(false)
+  useEffect(() => onUnauthorized(() => setRejected(true)), [])
+  return rejected
 }
 
 let manual: Promise<boolean> | null = null
 
-/** Whether this server has the manual at /manual; asked once. */
+/** Whether the server has the manual at /manual; requested once. */
 export function useManual(): boolean {
-  const [there, setThere] = useState(false)
+  const [available, setAvailable] = useState(false)
   useEffect(() => {
-    // Without an answer there is no link, which is all that is lost.
+    // Without a response, the link is omitted.
     manual ??= get('/v1/session').then(
       (session) => session.manual,
       () => false,
     )
-    manual.then(setThere)
+    manual.then(setAvailable)
   }, [])
-  return there
+  return available
 }

@@ -1,4 +1,4 @@
-/** The form for a token, where the server asks for one. */
+/** Sign-in form. */
 
 import { useState } from 'preact/hooks'
 import { ErrorNotice } from '../components/feedback'
@@ -11,17 +11,17 @@ export function SignIn() {
     event.preventDefault()
     try {
       await signIn(token.trim())
-      // Whatever was refused is asked for anew.
+      // Repeats all rejected requests.
       location.reload()
-    } catch (refused) {
-      setError(refused)
+    } catch (problem) {
+      setError(problem)
     }
   }
   return (
     <form class="sign-in" onSubmit={submit}>
       <h1>Sign in</h1>
       <p>
-        This server asks for a token. Its owner makes one with{' '}
+        This server requires a token. Its owner creates one with{' '}
         <code>gaitswarm token create NAME</code>.
       </p>
       <label>
@@ -35,7 +35,7 @@ export function SignIn() {
           onInput={(event) => setToken(event.currentTarget.value)}
         />
       </label>
-      {error !== null && <ErrorNotice error={error} what="The token was not taken" />}
+      {error !== null && <ErrorNotice error={error} what="The token was rejected." />}
       <button type="submit">Sign in</button>
     </form>
   )

@@ -1,8 +1,8 @@
-/** After a refused submission the first field that is to blame takes the focus. */
+/** Focus on the first invalid field after a rejected submission. */
 
 import { useEffect } from 'preact/hooks'
 
-/** Not for what an estimate has against the spec: whoever types keeps the focus. */
+/** Only after submissions: an estimate's problems must not move the focus while the user types. */
 export function useFirstProblem(attempts: number): void {
   useEffect(() => {
     if (attempts > 0) requestAnimationFrame(show)

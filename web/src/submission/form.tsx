@@ -1,4 +1,4 @@
-/** All parts of the form, with the estimate and the spec beside them. */
+/** New-job form, with its estimate and its spec as JSON. */
 
 import { useMemo, useState } from 'preact/hooks'
 import { ApiProblem } from '../api/problem'

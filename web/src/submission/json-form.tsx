@@ -1,4 +1,4 @@
-/** A job written as JSON: for specs of kinds that the form does not know, and for those who type. */
+/** JSON editor for a spec, also for kinds that the form does not support. */
 
 import { useState } from 'preact/hooks'
 import type { AnySpec } from '../api/types'
@@ -33,7 +33,7 @@ export function JsonForm({ spec, onBack }: { spec: AnySpec; onBack?: () => void 
           <h2 id="part-json">Spec as JSON</h2>
           {onBack && (
             <button type="button" class="compact" onClick={onBack}>
-              Back to the form, dropping changes made here
+              Back to the form, discarding changes
             </button>
           )}
         </header>

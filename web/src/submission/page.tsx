@@ -1,4 +1,4 @@
-/** The form of a new job, empty or prefilled from another job. */
+/** New-job page, empty or prefilled from another job. */
 
 import { get } from '../api/client'
 import { readableJob } from '../api/readable'
@@ -24,7 +24,7 @@ import { widened } from './draft/widen'
 interface Start {
   readonly catalogue: Catalogue
   readonly draft: Draft
-  /** The job that is cloned. */
+  /** The cloned job. */
   readonly from: Job | null
 }
 
@@ -54,7 +54,7 @@ function NewTuning({ query }: { query: URLSearchParams }) {
           {query.get('clone') === null && <OtherKinds kind="tuning" />}
           {query.get('clone') === null && query.get('robot') !== 'own' && (
             <p class="muted">
-              or see <a href="/jobs/new?robot=own">a robot of your own</a> walk, from its URDF
+              or simulate <a href="/jobs/new?robot=own">a custom robot</a> from its URDF
             </p>
           )}
           {from && (
@@ -65,11 +65,7 @@ function NewTuning({ query }: { query: URLSearchParams }) {
         </div>
       </header>
       {start.error && (
-        <ErrorNotice
-          what="The form cannot be filled in."
-          error={start.error}
-          retry={start.reload}
-        />
+        <ErrorNotice what="Could not load the form." error={start.error} retry={start.reload} />
       )}
       {start.loading && <Loading what="the catalogue" />}
       {start.data &&
@@ -87,8 +83,10 @@ function NewTuning({ query }: { query: URLSearchParams }) {
 }
 
 /**
- * `robot=own` begins with a URDF; `clone` names a job; `seed` and `preference` replace its own; `scenarios` names those of its
- * scenarios that stay; `widen` gives variables other bounds, as `P:0:2`; `start` names jobs whose best designs the search begins with; `iteration`, `particle` name a design to stay near.
+ * Query parameters: `robot=own` starts with a URDF; `clone` is the id of a job, whose `seed` and
+ * `preference` can be replaced; `scenarios` selects some of its scenarios; `widen` replaces bounds of
+ * variables (`P:0:2`); `start` lists jobs whose best designs start the search; `iteration` and
+ * `particle` select a design to search around.
  */
 async function prepare(query: URLSearchParams, signal: AbortSignal): Promise<Start> {
   const id = query.get('clone')
@@ -122,7 +120,7 @@ function startingFrom(draft: Draft, query: URLSearchParams): Draft {
   return jobs.length === 0 ? draft : { ...draft, start: { ...draft.start, jobs } }
 }
 
-/** Whether the form would lose something of a job: what it is, or the case of a plug-in that is not here. */
+/** Whether the form cannot represent the job, because of its kind or an unknown plug-in case. */
 function isDocument({ spec }: Job, { cases }: Catalogue): boolean {
   if (spec.kind !== 'tuning') return true
   return (spec.case ?? null) !== null && caseOf(spec.case, cases) === null

@@ -1,4 +1,4 @@
-/** What the job will cost, what is wrong with it, and the button that starts it. */
+/** Estimate, problems and submission of a job. */
 
 import { ApiProblem } from '../api/problem'
 import type { AnySpec } from '../api/types'
@@ -17,7 +17,7 @@ export function SubmitPanel({
 }: {
   spec: AnySpec
   submission: Submission
-  /** Write the spec as JSON instead. */
+  /** Edit the spec as JSON instead. */
   onJson?: () => void
 }) {
   const { estimate, problem, sending } = submission
@@ -30,10 +30,10 @@ export function SubmitPanel({
           <>
             <dl class="estimate" data-walks={estimate.walks}>
               <Row label="Evaluations" value={formatCount(estimate.evaluations)} />
-              <Row label="Walks" value={formatCount(estimate.walks)} />
+              <Row label="Simulations" value={formatCount(estimate.walks)} />
               <Row label="Simulated time" value={formatDuration(estimate.simulated_seconds)} />
               <Row
-                label="Takes about"
+                label="Duration (approx.)"
                 value={estimate.seconds === null ? 'unknown' : formatDuration(estimate.seconds)}
               />
             </dl>
@@ -48,7 +48,7 @@ export function SubmitPanel({
       <TextField
         label="Webhook"
         value={submission.notify}
-        hint="a URL that is told when the job ends; of a host that the server allows"
+        hint="called when the job ends; the server must allow the host"
         error={problemOf(problem, NOTIFY)}
         onChange={submission.setNotify}
       />
@@ -93,13 +93,13 @@ function PriorityField({ submission }: { submission: Submission }) {
         onInput={(event) => setPriority(event.currentTarget.value)}
       />
       <span id="submit-priority-hint" class={valid ? 'hint' : 'wrong'}>
-        {LOWEST} to {HIGHEST}, the higher the sooner
+        {LOWEST} to {HIGHEST}; higher runs first
       </span>
     </div>
   )
 }
 
-/** What the server has against a field. */
+/** Message of the server for a field. */
 function problemOf(problem: unknown, field: string): string | undefined {
   const errors = problem instanceof ApiProblem ? problem.errors : []
   return errors.find((error) => error.field === field)?.message
@@ -115,6 +115,6 @@ function Row({ label, value }: { label: string; value: string }) {
 }
 
 function advice(problem: unknown): string {
-  if (problem instanceof ApiProblem && problem.status === 422) return 'To be put right first:'
-  return 'The API cannot take it now.'
+  if (problem instanceof ApiProblem && problem.status === 422) return 'Please correct:'
+  return 'Could not validate the job.'
 }

@@ -1,4 +1,4 @@
-/** What the API thinks of a spec while it is written, and its submission. */
+/** Validation and estimate of a spec during editing, and its submission. */
 
 import { useEffect, useRef, useState } from 'preact/hooks'
 import { post } from '../api/client'
@@ -8,23 +8,23 @@ import type { AnySpec, Estimate } from '../api/types'
 import { navigate } from '../router/navigation'
 import { jobPath } from '../router/routes'
 
-/** Pause in typing after which the API is asked [ms]. */
+/** Debounce of typing [ms]. */
 const PAUSE_MS = 400
 
-/** Header that names the URL. */
+/** Request header with the webhook's URL. */
 export const NOTIFY = 'Notify-URL'
 
 export interface Submission {
   readonly estimate: Estimate | null
-  /** What the API has against the spec as it stands; null if nothing is known. */
+  /** Why the server rejects the spec; null if it does not, or is unknown. */
   readonly problem: unknown
   readonly sending: boolean
-  /** Submissions that were refused so far. */
+  /** Number of rejected submissions. */
   readonly attempts: number
-  /** How urgent the job is to be, as it was typed. */
+  /** Priority as typed. */
   readonly priority: string
   readonly setPriority: (text: string) => void
-  /** URL that is told of the job's end, as it was typed; empty for none. */
+  /** Webhook URL as typed; empty for none. */
   readonly notify: string
   readonly setNotify: (text: string) => void
   readonly submit: () => void
@@ -56,7 +56,7 @@ export function useSubmission(spec: AnySpec): Submission {
   useEffect(() => latest.ask(spec), [text])
   useEffect(() => () => latest.stop(), [])
 
-  // The same spec has the same key: a repeated request does not make a second job.
+  // The same spec uses the same key, so a repeated request does not create a second job.
   const key = useRef({ text: '', key: '' })
   const submit = () => {
     if (key.current.text !== text) key.current = { text, key: randomKey() }
@@ -70,7 +70,7 @@ export function useSubmission(spec: AnySpec): Submission {
       .then(
         (job) => navigate(jobPath(job.id)),
         (error: unknown) => {
-          // An answer ends the use of the key; without one, asking again must not double the job.
+          // A response invalidates the key. Without one the job may exist, so a retry must reuse the key.
           if (error instanceof ApiProblem && error.status !== 0) key.current.text = ''
           setProblem(error)
           setAttempts((n) => n + 1)

@@ -1,4 +1,4 @@
-/** One walk, or two compared: replay, worth and charts over time. */
+/** Replay page of one walk, or two compared, with objectives and plots. */
 
 import { useEffect, useMemo, useState } from 'preact/hooks'
 import { get } from '../api/client'
@@ -15,7 +15,7 @@ import { type ResolvedDesign, resolveDesign } from './design/resolve-design'
 import { ScenarioPicker } from './design/scenario-picker'
 import { Playback } from './player/playback'
 import { Player } from './player/player'
-import { CAMERA, MOMENT, USUAL_VIEW, VIEW } from './player/view-words'
+import { CAMERA, DEFAULT_VIEW, MOMENT, VIEW } from './player/view-words'
 import { DEFAULT_RATE, RATES, type Recorded, recordWalk } from './replay/recorded'
 import './walk.css'
 import { WalkPlots } from './plots/walk-plots'
@@ -36,30 +36,31 @@ export default function WalkPage() {
 
 function Walk({ address, query }: { address: Address; query: URLSearchParams }) {
   const { source, against } = address
-  const rate = RATES.find((known) => String(known) === query.get('rate')) ?? DEFAULT_RATE
+  const rate = RATES.find((candidate) => String(candidate) === query.get('rate')) ?? DEFAULT_RATE
   const presets = useResource('scenarios', (signal) => get('/v1/scenarios', { signal }))
   const first = useResource(wordOf(source), (signal) => resolveDesign(source, signal))
   const like = first.data?.controller.name
   const second = useResource(against && like ? `${wordOf(against)} ${like}` : null, (signal) =>
     resolveDesign(against!, signal, like),
   )
-  const own = first.data?.scenarios ?? []
+  const jobScenarios = first.data?.scenarios ?? []
   const hasPublished = first.data === null || isPublished(first.data.robot)
   const listed = hasPublished ? (presets.data?.items ?? []) : []
-  const wanted = query.get('scenario') ?? own[0]?.name ?? listed[0]?.name ?? 'normal-fast'
-  const scenario = own.find(({ name }) => name === wanted) ?? wanted
+  const requested =
+    query.get('scenario') ?? jobScenarios[0]?.name ?? listed[0]?.name ?? 'normal-fast'
+  const scenario = jobScenarios.find(({ name }) => name === requested) ?? requested
   const one = useWalk(first.data, scenario, rate)
   const other = useWalk(against ? second.data : null, scenario, rate)
   const failed = [presets, first, second, one, other].find(({ error }) => error !== null)
   const awaited = against !== null && (other.data === null || other.loading)
-  const compared = second.data ? [`beside ${second.data.label}`] : []
+  const compared = second.data ? [`compared with ${second.data.label}`] : []
   return (
     <div class="stack">
       <DesignHeading
         title="Walk"
         path="/walk"
         design={first.data}
-        beside={[`scenario ${wanted}`, ...compared]}
+        details={[`scenario ${requested}`, ...compared]}
       />
       <div class="card walk-choice">
         <DesignPicker
@@ -69,9 +70,9 @@ function Walk({ address, query }: { address: Address; query: URLSearchParams }) 
           onChoose={(chosen) => setQuery(queryOf(chosen!))}
         />
         <ScenarioPicker
-          own={own}
+          jobScenarios={jobScenarios}
           presets={listed}
-          chosen={wanted}
+          chosen={requested}
           onChoose={(name) => setQuery({ scenario: name })}
         />
         <DesignPicker
@@ -86,20 +87,20 @@ function Walk({ address, query }: { address: Address; query: URLSearchParams }) 
         <DesignLinks
           source={first.data?.source ?? source}
           path={first.data && '/controller'}
-          label="Its controller"
+          label="Show controller"
         />
       </div>
       {failed?.error && (
-        <ErrorNotice what="This walk cannot be shown." error={failed.error} retry={failed.reload} />
+        <ErrorNotice what="Could not load the walk." error={failed.error} retry={failed.reload} />
       )}
-      {!failed && one.loading && <Loading what="the walk; the robot walks it now" />}
-      {!failed && !one.loading && awaited && <Loading what="the walk to compare it with" />}
+      {!failed && one.loading && <Loading what="the walk; simulating it" />}
+      {!failed && !one.loading && awaited && <Loading what="the walk to compare with" />}
       {one.data && <Recording one={one.data} other={against ? other.data : null} />}
     </div>
   )
 }
 
-/** The recorded walk of a design, asked for once it is known. */
+/** Simulate and record the walk of a design once the design is loaded. */
 function useWalk(design: ResolvedDesign | null, scenario: string | Scenario, rate: number) {
   const key = design && JSON.stringify([wordOf(design.source), design.design, scenario, rate])
   return useResource(key, (signal) => recordWalk(design!, scenario, rate, signal))
@@ -108,15 +109,15 @@ function useWalk(design: ResolvedDesign | null, scenario: string | Scenario, rat
 function Recording({ one, other }: { one: Recorded; other: Recorded | null }) {
   const walks = useMemo(() => (other ? [one, other] : [one]), [one, other])
   const shown = useMemo(() => walks.filter(({ replay }) => replay.frames > 0), [walks])
-  const [choices, setChoices] = useQueryValue('view', VIEW, USUAL_VIEW)
+  const [choices, setChoices] = useQueryValue('view', VIEW, DEFAULT_VIEW)
   const [camera, setCamera] = useQueryValue('camera', CAMERA, null)
-  const [asked] = useQueryValue('t', MOMENT, null)
-  const tell = useDelayedQuery('t')
-  // A moment of another walk means nothing.
+  const [requestedTime] = useQueryValue('t', MOMENT, null)
+  const writeTime = useDelayedQuery('t')
+  // A time in the address applies to the first walk only.
   const [first] = useState(() => shown)
-  const playback = useMemo(() => playbackOf(shown, shown === first ? asked : null), [shown])
+  const playback = useMemo(() => playbackOf(shown, shown === first ? requestedTime : null), [shown])
   useEffect(
-    () => playback.subscribe(() => !playback.playing && tell(MOMENT.write(playback.time))),
+    () => playback.subscribe(() => !playback.playing && writeTime(MOMENT.write(playback.time))),
     [playback],
   )
   return (
@@ -136,7 +137,7 @@ function Recording({ one, other }: { one: Recorded; other: Recorded | null }) {
   )
 }
 
-/** Stands at a moment that is asked for [s]; else plays at once, unless little movement is asked for. */
+/** Start at the requested time [s]; otherwise play, unless reduced motion is preferred. */
 function playbackOf(walks: readonly Recorded[], moment: number | null): Playback {
   const replays = walks.map(({ replay }) => replay)
   const end = Math.max(0, ...replays.map((replay) => replay.end))
@@ -149,15 +150,15 @@ function playbackOf(walks: readonly Recorded[], moment: number | null): Playback
 function RatePicker({ rate }: { rate: number }) {
   return (
     <div class="field">
-      <label for="walk-rate">Recorded at</label>
+      <label for="walk-rate">Recording rate</label>
       <select
         id="walk-rate"
         value={String(rate)}
         onChange={(event) => setQuery({ rate: event.currentTarget.value })}
       >
-        {RATES.map((known) => (
-          <option key={known} value={String(known)}>
-            {known} Hz
+        {RATES.map((candidate) => (
+          <option key={candidate} value={String(candidate)}>
+            {candidate} Hz
           </option>
         ))}
       </select>

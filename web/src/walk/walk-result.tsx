@@ -1,4 +1,4 @@
-/** How the walks ended and what they are worth. */
+/** Outcome and objectives of walks. */
 
 import { Table } from '../components/table/table'
 import { Unit } from '../components/unit'
@@ -7,17 +7,17 @@ import { inWords, sentence } from '../format/words'
 import type { Recorded } from './replay/recorded'
 import type { Replay } from './replay/replay'
 
-/** What the objectives of a walk mean (thesis table 4.1). */
+/** Descriptions of the objectives (table 4.1). */
 const MEANINGS: Readonly<Record<string, string>> = {
   torque: 'rms of the summed gear torques',
   acceleration: "rms of the body's acceleration",
   angular_acceleration: "rms of the body's angular acceleration",
   energy: 'electrical energy per metre',
-  reciprocal_speed: 'one over the mean speed',
-  height_loss: "body's height at the start less that at the end",
+  reciprocal_speed: 'reciprocal of the mean speed',
+  height_loss: "body's height at the start minus that at the end",
 }
 
-/** A notice for every walk that did not get to its end. */
+/** Notices for walks that did not finish. */
 export function FailureNotices({ walks }: { walks: readonly Recorded[] }) {
   const failed = walks.filter(({ replay }) => replay.header.status !== 'ok')
   return failed.map(({ label, replay }) => (
@@ -59,15 +59,15 @@ export function ObjectivesTable({ walks }: { walks: readonly Recorded[] }) {
   }))
   const compared = {
     key: 'difference',
-    label: 'Second against first',
+    label: 'Second vs. first',
     numeric: true,
     cell: ({ unit, values: [first, second] }: Row) => difference(unit, first, second),
   }
   return (
     <section class={walks.length > 1 ? 'card wide' : 'card'} data-objectives>
       <header>
-        <h2>What the walk is worth</h2>
-        <p class="muted small">All are to be small.</p>
+        <h2>Objectives</h2>
+        <p class="muted small">Lower is better.</p>
       </header>
       <Table<Row>
         caption="Objectives of the walk"
@@ -94,7 +94,7 @@ export function ObjectivesTable({ walks }: { walks: readonly Recorded[] }) {
   )
 }
 
-/** In per cent; in the objective's unit where it may be of either sign. */
+/** In percent, or in the objective's unit if it can be negative. */
 function difference(unit: string, first: number | null, second: number | null): string {
   if (first === null || second === null) return NONE
   return first > 0 && second > 0
@@ -102,9 +102,9 @@ function difference(unit: string, first: number | null, second: number | null): 
     : change(second - first, unit)
 }
 
-/** How much of a failed walk there is to see. */
+/** How much of a failed walk can be shown. */
 function extentOf({ frames, header }: Replay): string {
-  if (frames === 0) return 'There is nothing to show of it.'
+  if (frames === 0) return 'There is nothing to show.'
   const { cycles, cycle_time } = header.scenario
-  return header.duration < cycles * cycle_time - 0.01 ? 'Shown up to there.' : 'Shown in full.'
+  return header.duration < cycles * cycle_time - 0.01 ? 'Shown up to that point.' : 'Shown in full.'
 }

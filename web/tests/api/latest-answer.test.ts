@@ -8,31 +8,31 @@ afterEach(() => {
   vi.useRealTimers()
 })
 
-/** Questions that were sent, to be answered in any order. */
+/** Requests that were sent, to be answered in any order. */
 function setUp() {
   const sent: { question: string; signal: AbortSignal; answer: (text: string) => void }[] = []
-  const told: string[] = []
+  const received: string[] = []
   const latest = new LatestAnswer<string, string>(
     (question, signal) =>
       new Promise((answer) => {
         sent.push({ question, signal, answer })
       }),
-    (answer) => told.push(answer),
-    () => told.push('failed'),
+    (answer) => received.push(answer),
+    () => received.push('failed'),
     50,
   )
-  return { latest, sent, told }
+  return { latest, sent, received: received }
 }
 
-test('questions in quick succession are asked once', async () => {
+test('requests in quick succession are sent once', async () => {
   const { latest, sent } = setUp()
   for (const question of ['a', 'b', 'c']) latest.ask(question)
   await vi.advanceTimersByTimeAsync(50)
   expect(sent.map(({ question }) => question)).toEqual(['c'])
 })
 
-test('an answer that a later question has overtaken is dropped', async () => {
-  const { latest, sent, told } = setUp()
+test('a response overtaken by a later request is dropped', async () => {
+  const { latest, sent, received } = setUp()
   latest.ask('slow')
   await vi.advanceTimersByTimeAsync(50)
   latest.ask('quick')
@@ -40,16 +40,16 @@ test('an answer that a later question has overtaken is dropped', async () => {
   sent[1].answer('to quick')
   sent[0].answer('to slow')
   await vi.advanceTimersByTimeAsync(1)
-  expect(told).toEqual(['to quick'])
+  expect(received).toEqual(['to quick'])
   expect(sent[0].signal.aborted).toBe(true)
 })
 
-test('after stop nothing is told', async () => {
-  const { latest, sent, told } = setUp()
+test('no response is reported after stop', async () => {
+  const { latest, sent, received } = setUp()
   latest.ask('a')
   await vi.advanceTimersByTimeAsync(50)
   latest.stop()
   sent[0].answer('too late')
   await vi.advanceTimersByTimeAsync(1)
-  expect(told).toEqual([])
+  expect(received).toEqual([])
 })

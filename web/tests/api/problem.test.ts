@@ -2,7 +2,7 @@ import { expect, test } from 'vitest'
 import { problemOf } from '../../src/api/problem'
 import { quoted, submitCommand } from '../../src/job/reproduce/commands'
 
-test('a problem keeps what the API says, field by field', async () => {
+test('a problem keeps the detail and the field errors of the API', async () => {
   const errors = [{ field: 'iterations', message: 'must be at least 1' }]
   const body = JSON.stringify({ detail: 'iterations: must be at least 1', errors })
   const headers = { 'content-type': 'application/problem+json' }
@@ -11,18 +11,16 @@ test('a problem keeps what the API says, field by field', async () => {
     status: 422,
     detail: 'iterations: must be at least 1',
     errors,
-    temporary: false,
   })
 })
 
-test('an answer that is no problem is told by its status', async () => {
+test('a response without problem details is reported by its status', async () => {
   const answer = new Response('<html>', { status: 502, statusText: 'Bad Gateway' })
   const problem = await problemOf(answer)
-  expect(problem.message).toBe('the server answered 502: Bad Gateway')
-  expect(problem.temporary).toBe(true)
+  expect(problem.message).toBe('the server responded with 502: Bad Gateway')
 })
 
-test('commands carry the whole spec as one word', () => {
+test('commands quote the whole spec', () => {
   expect(quoted(`it's`)).toBe(`'it'\\''s'`)
   const command = submitCommand({ name: 'x' }, 'http://127.0.0.1:8000')
   expect(command).toContain('"name": "x"')

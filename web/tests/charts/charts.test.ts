@@ -14,22 +14,22 @@ import { decodeParticles } from '../../src/job/designs/particles'
 import { grouped } from '../../src/job/overview/grouped'
 
 describe('a logarithmic axis', () => {
-  test('within a decade has round numbers', () => {
+  test('has round numbers within a decade', () => {
     expect(logTicks(9.9, 54)).toEqual([10, 20, 30, 40, 50])
   })
 
-  test('over many decades has powers of ten', () => {
+  test('has powers of ten over many decades', () => {
     expect(logTicks(1, 1e6)).toEqual([1, 10, 100, 1000, 10000, 100000, 1000000])
   })
 
-  test('has a range even where all numbers are the same, or none is', () => {
+  test('has a range for equal values and for no values', () => {
     const [low, high] = logRange(5, 5)
     expect(low).toBeLessThan(5)
     expect(high).toBeGreaterThan(5)
     expect(logRange(null, null)).toEqual([1, 10])
   })
 
-  test('ticks do not carry rounding errors', () => {
+  test('ticks have no rounding errors', () => {
     expect(linearTicks(0, 0.6)).toEqual([0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
   })
 })
@@ -69,29 +69,29 @@ describe('parallel coordinates', () => {
     fitness,
   )
 
-  test('place values between the bounds, or between the least and the greatest', () => {
+  test('place values between the bounds, or between minimum and maximum', () => {
     expect([...model.axes[0].places]).toEqual([0, 0.5, 1, 0.75])
     expect(model.axes[1]).toMatchObject({ low: 1, high: 3 })
     expect(model.axes[1].places[2]).toBeNaN()
   })
 
-  test('find the value of a place again', () => {
+  test('valueAt inverts placeOf', () => {
     expect(valueAt(model.axes[1], placeOf(model.axes[1], 2))).toBeCloseTo(2, 12)
   })
 
-  test('mark an axis with its bounds, or with the names of its choices', () => {
+  test('label an axis with its bounds or its choices', () => {
     expect(marksOf(model.axes[0])).toEqual([0, 10])
     expect(marksOf(model.axes[2])).toEqual(['linear_zone', 'karnopp', 'stick'])
     expect([...model.axes[2].places]).toEqual([0, 1, 0.5, 0])
   })
 
-  test('say which numbers or choices are selected', () => {
+  test('describe the selected range or choices', () => {
     expect(stretchOf(model.axes[0], [0.2, 0.5])).toBe('2 to 5')
     expect(stretchOf(model.axes[2], [0, 0.6])).toBe('linear zone, karnopp')
     expect(stretchOf(model.axes[2], [0.6, 0.9])).toBe('none')
   })
 
-  test('hold every row once in their order', () => {
+  test('order every row exactly once', () => {
     const many = buildModel([], new Float32Array(1000))
     expect(new Set(many.order).size).toBe(1000)
   })
@@ -105,22 +105,22 @@ describe('parallel coordinates', () => {
     expect([...selectRows(model, both)]).toEqual([1])
   })
 
-  test('a brush on fitness leaves failed designs out', () => {
+  test('a brush on fitness excludes failed designs', () => {
     expect([...selectRows(model, new Map([[1, [0, 1]]]))].sort()).toEqual([0, 1, 3])
   })
 
-  test('know the best among those selected', () => {
+  test('return the best of the selected rows', () => {
     expect(bestRows(model, model.order, 2)).toEqual([1, 3])
   })
 
-  test('colour by rank, with failed designs apart', () => {
+  test('colour by rank, with a separate colour for failed designs', () => {
     expect(model.buckets[2]).toBe(FAILED)
     expect(model.buckets[1]).toBeLessThan(model.buckets[3])
     expect(model.buckets[3]).toBeLessThan(model.buckets[0])
   })
 })
 
-test('particles are read as the API frames them', () => {
+test('particles are decoded from the API format', () => {
   const columns = ['iteration', 'fitness'].map((name) => ({
     name,
     unit: '1',
@@ -140,7 +140,7 @@ test('particles are read as the API frames them', () => {
   expect([...particles.columns[1].values]).toEqual([21.5, Number.NaN, 20.25])
 })
 
-test('many iterations are drawn as a few strips of mean quantiles', () => {
+test('many iterations are grouped into strips of mean quantiles', () => {
   const items = [1, 2, 3, 4, null].map((best, index) => ({
     index,
     fitness: [best, best === null ? null : best * 10],

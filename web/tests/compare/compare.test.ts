@@ -31,7 +31,7 @@ const long = job(
   [1, 5],
 )
 
-test('what jobs are measured against is drawn once each', () => {
+test('each reference is drawn once', () => {
   const reference = { name: 'A', kind: 'published', fitness: 20.93 } as const
   const start = { name: 'start design', kind: 'start', fitness: 40 } as const
   const none = { ...reference, fitness: null }
@@ -49,7 +49,7 @@ test('what jobs are measured against is drawn once each', () => {
 })
 
 describe('convergence of several jobs', () => {
-  test('holds what a job has found until it finds better, and ends where the job does', () => {
+  test('holds the best value until the next improvement, and ends with the job', () => {
     const { x, lines } = convergences([short, long], 'evaluations')
     expect(x).toEqual([2, 4, 6, 8])
     expect(lines).toEqual([
@@ -58,12 +58,12 @@ describe('convergence of several jobs', () => {
     ])
   })
 
-  test('numbers iterations from 0, as everywhere', () => {
+  test('numbers iterations from 0', () => {
     expect(convergences([short, long], 'iterations').x).toEqual([0, 1, 2])
   })
 })
 
-test('distribution functions rise from 0 to 1 over the fitness of all', () => {
+test('distribution functions rise from 0 to 1 over the fitness values of all jobs', () => {
   const { x, lines } = distributions([short, long])
   expect(x).toEqual([1, 2, 4, 5, 6])
   expect(lines).toEqual([

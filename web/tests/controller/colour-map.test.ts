@@ -3,7 +3,7 @@ import { diverging, gradient } from '../../src/controller/colour-map'
 
 const SURFACE = { light: [255, 255, 255], dark: [26, 33, 37] } as const
 
-/** Contrast of two colours, as WCAG has it. */
+/** Contrast ratio of two colours (WCAG). */
 function contrast(a: readonly number[], b: readonly number[]): number {
   const luminance = (c: readonly number[]) => {
     const [r, g, b] = c.map((v) => {
@@ -17,13 +17,13 @@ function contrast(a: readonly number[], b: readonly number[]): number {
 }
 
 describe.each(['light', 'dark'] as const)('in %s colours', (theme) => {
-  test('zero is near the surface of the page, both ends are far from it', () => {
+  test("zero is close to the page's surface, and both ends contrast with it", () => {
     expect(contrast(diverging(0, theme), SURFACE[theme])).toBeLessThan(1.2)
     expect(contrast(diverging(-1, theme), SURFACE[theme])).toBeGreaterThan(4.5)
     expect(contrast(diverging(1, theme), SURFACE[theme])).toBeGreaterThan(4.5)
   })
 
-  test('contrast with zero grows with every step on both sides', () => {
+  test('contrast with zero increases monotonically on both sides', () => {
     for (const side of [-1, 1]) {
       const steps = Array.from({ length: 11 }, (_, k) =>
         contrast(diverging((side * k) / 10, theme), diverging(0, theme)),
@@ -32,7 +32,7 @@ describe.each(['light', 'dark'] as const)('in %s colours', (theme) => {
     }
   })
 
-  test('blue tells below from above zero, which no common colour blindness takes away', () => {
+  test('negative and positive values differ in blue, visible with common colour blindness', () => {
     expect(diverging(-1, theme)[2] - diverging(1, theme)[2]).toBeGreaterThan(100)
   })
 
@@ -42,6 +42,6 @@ describe.each(['light', 'dark'] as const)('in %s colours', (theme) => {
   })
 })
 
-test('the legend goes from one end to the other', () => {
+test('the legend spans the whole range', () => {
   expect(gradient('light')).toMatch(/^linear-gradient\(to right, rgb\(14, 73, 140\) 0%/)
 })

@@ -65,17 +65,17 @@ const surface = {
 
 const [inference, table, difference] = layersOf(surface, output)
 
-/** As it comes from the server; objects with a `then` are not to be written in code. */
+/** Parsed from JSON, because code must not contain objects with a `then`. */
 function ruleOf(json: string): Rule {
   return JSON.parse(json) as Rule
 }
 
 describe('layers', () => {
-  test('inference and table share their colours, the difference has its own', () => {
+  test('inference and table share a colour scale; the difference has its own', () => {
     expect([inference.limit, table.limit, difference.limit]).toEqual([8.5, 8.5, 0.5])
   })
 
-  test('the difference is table less inference', () => {
+  test('the difference is table minus inference', () => {
     expect(difference.values).toEqual([
       [-0.5, 0],
       [0, 0],
@@ -83,7 +83,7 @@ describe('layers', () => {
     ])
   })
 
-  test('have least, greatest and number of values', () => {
+  test('have a minimum, a maximum and a number of values', () => {
     expect(extent(inference.values)).toEqual([-8, 8])
     expect(cells(inference.values)).toBe(6)
   })
@@ -94,24 +94,24 @@ describe('rules', () => {
     '{"if": {"error": "positive", "current": "large"}, "then": "negative-extreme", "weight": 0.5}',
   )
 
-  test('fire as far as the least of their conditions, times their weight', () => {
+  test('the strength is the smallest degree times the weight', () => {
     expect(strength(rule, surface, { error: 2, current: 1 })).toBeCloseTo(0.2)
     expect(strength(rule, surface, { error: 2, current: 0 })).toBe(0)
   })
 
-  test('without a condition on an input do not depend on it', () => {
+  test('a rule without a condition on an input does not depend on it', () => {
     const alone = ruleOf('{"if": {"error": "positive"}, "then": "positive", "weight": 0.9}')
     expect(strength(alone, surface, { error: 2, current: 0 })).toBeCloseTo(0.9)
   })
 
-  test('are told in words', () => {
+  test('are written as sentences', () => {
     expect(ruleText(rule, 'FO')).toBe(
       'If error is positive and current is large, then FO is negative-extreme',
     )
   })
 })
 
-test('the chosen point stays within the grid', () => {
+test('the selected point stays within the grid', () => {
   const cell = firstCell(inference)
   expect(moved(cell, 99, 99, inference)).toEqual({ error: 2, current: 1 })
   expect(moved(cell, -99, -99, inference)).toEqual({ error: 0, current: 0 })

@@ -5,7 +5,7 @@ import { element, paint } from '../../src/export/svg-text'
 import { decodeParticles, particlesTable } from '../../src/job/designs/particles'
 
 describe('comma-separated values', () => {
-  test('keep numbers in full, quote what must be, and leave out what is missing', () => {
+  test('keep full precision, quote where necessary, and leave missing values empty', () => {
     const rows = [
       [0.1 + 0.2, 'say "yes", or no', null],
       [Number.NaN, 'plain', -1e-12],
@@ -15,13 +15,13 @@ describe('comma-separated values', () => {
     )
   })
 
-  test('are called by job and chart', () => {
+  test('files are named after job and chart', () => {
     expect(fileStem('Gänge: Lauf #3', 'Pareto front')).toBe('ga-nge-lauf-3-pareto-front')
     expect(fileStem('/', '')).toBe('chart')
   })
 })
 
-test('designs of a file are the numbers that were computed, choices by name', () => {
+test('exported designs have full precision, and choices by name', () => {
   const header = JSON.stringify({
     rows: 2,
     total: 2,
@@ -38,13 +38,13 @@ test('designs of a file are the numbers that were computed, choices by name', ()
   expect(csvOf(table)).toBe('x [s],kind\r\n,a\r\n0.1,b\r\n')
 })
 
-describe('a drawing that is written down', () => {
+describe('an SVG drawing', () => {
   const ruler = {
     font: '',
     measureText: () => ({ fontBoundingBoxAscent: 8, fontBoundingBoxDescent: 2, width: 5 }) as never,
   }
 
-  test('has lines where they were drawn, moved and scaled', () => {
+  test('has transformed lines and rectangles', () => {
     const context = new SvgContext({ width: 10, height: 10 }, ruler)
     context.save()
     context.translate(5, 0)
@@ -64,7 +64,7 @@ describe('a drawing that is written down', () => {
     ])
   })
 
-  test('holds words that a reader of XML takes', () => {
+  test('has escaped text', () => {
     const context = new SvgContext({ width: 10, height: 10 }, ruler)
     context.font = '600 12px serif'
     context.fillText('a < b & c', 1, 1)

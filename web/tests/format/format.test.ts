@@ -24,12 +24,12 @@ describe('values of a design', () => {
     ])
   })
 
-  test('or numbers as all are', () => {
+  test('are numbers like all others', () => {
     expect(formatValue(8.71359)).toBe('8.714')
     expect(exactValueQuantity(0.5, 's')).toBe(`0.5${SPACE}s`)
   })
 
-  test('are named by the index of a choice', () => {
+  test('are looked up by the index of a choice', () => {
     const laws = ['karnopp', 'stick']
     expect([0, 1].map((index) => named(index, laws))).toEqual(laws)
     expect(named(1, [])).toBe(1)
@@ -55,7 +55,7 @@ describe('numbers', () => {
     expect(quantity(value, 'N')).toBe('–')
   })
 
-  test('exact numbers have no zeros at the end, whole ones keep theirs', () => {
+  test('exact numbers have no trailing zeros, but integers keep theirs', () => {
     expect(formatExact(0.5)).toBe('0.5')
     expect(formatExact(24000)).toBe(`24${THIN}000`)
     expect(formatExact(100)).toBe('100')
@@ -66,13 +66,13 @@ describe('numbers', () => {
     expect(formatCount(100000)).toBe(`100${THIN}000`)
   })
 
-  test('units are written, except of what has none', () => {
+  test('units are written, except for dimensionless values', () => {
     expect(quantity(8.71359, 'N m')).toBe(`8.714${SPACE}N m`)
     expect(quantity(8.71359, '1')).toBe('8.714')
     expect(percent(0.1234)).toBe(`12.3${SPACE}%`)
   })
 
-  test('changes carry their sign', () => {
+  test('changes have a sign', () => {
     expect(change(3.2, '%', 2)).toBe(`+3.2${SPACE}%`)
     expect(change(-3.2, '%', 2)).toBe(`−3.2${SPACE}%`)
   })
@@ -91,24 +91,24 @@ describe('times', () => {
     expect(formatDuration(seconds)).toBe(text)
   })
 
-  test('no span is a dash', () => {
+  test('missing durations are a dash', () => {
     expect(formatDuration(null)).toBe('–')
     expect(formatDuration(-1)).toBe('–')
   })
 
-  test('ages have one unit, and clocks that differ make none negative', () => {
+  test('ages have one unit, and are never negative', () => {
     const now = Date.parse('2026-03-01T12:00:00Z')
     expect(formatAge('2026-03-01T11:59:55Z', now)).toBe(`5${SPACE}s`)
     expect(formatAge('2026-03-01T09:30:00Z', now)).toBe(`2${SPACE}h`)
     expect(formatAge('2026-03-01T12:00:09Z', now)).toBe(`0${SPACE}s`)
   })
 
-  test('what is no moment is a dash', () => {
+  test('an invalid moment is a dash', () => {
     expect(formatMoment('never')).toBe('–')
   })
 })
 
-test('units are written as they are printed', () => {
+test('units are written typographically', () => {
   expect(writtenUnit('rad/s2')).toBe('rad/s²')
   expect(writtenUnit('kg m2')).toBe('kg m²')
   expect(writtenUnit('ohm')).toBe('Ω')

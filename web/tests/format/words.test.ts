@@ -6,7 +6,7 @@ test('names are written in words', () => {
   expect(capitalized('error')).toBe('Error')
 })
 
-test('a message becomes a sentence, and one that is one stays as it is', () => {
+test('a message becomes a sentence, and a sentence is unchanged', () => {
   expect(sentence("there is no job 'none'")).toBe("There is no job 'none'.")
   expect(sentence('Choose one of those above.')).toBe('Choose one of those above.')
   expect(sentence('')).toBe('')

@@ -20,11 +20,11 @@ const walked = (torque: number, energy: number, reciprocal_speed: number): Scena
 describe('a preference in an address', () => {
   const read = (preference: string) => preferenceIn(new URLSearchParams({ preference }))
 
-  test('is what was written there', () => {
+  test('is read as written', () => {
     expect(read(preferenceQuery(PREFERENCE))).toEqual(PREFERENCE)
   })
 
-  test('is none where it cannot be read', () => {
+  test('is undefined if invalid', () => {
     expect(preferenceIn(new URLSearchParams())).toBeUndefined()
     for (const text of [
       'A',
@@ -42,7 +42,7 @@ describe('the utility', () => {
     expect(utilityOf(walked(3, 2, 4), PREFERENCE)).toBeCloseTo(3 * 2 ** 2 * 5, 12)
   })
 
-  test('weighs as many objectives as the preference has, and a loss of height by its size', () => {
+  test('weights as many objectives as the preference has, and height loss by magnitude', () => {
     const six = { bias: [...PREFERENCE.bias, 0.03], exponent: [...PREFERENCE.exponent, 1] }
     const sunk = walked(3, 2, 4)
     const result = { ...sunk, objectives: { ...sunk.objectives, height_loss: -0.01 } }
@@ -52,25 +52,25 @@ describe('the utility', () => {
     expect(weighed(six)).toHaveLength(6)
   })
 
-  test('of a failed walk there is none', () => {
+  test('is null for a failed simulation', () => {
     expect(utilityOf({ ...walked(3, 2, 4), status: 'fell' }, PREFERENCE)).toBeNull()
   })
 })
 
-describe('what limits a design', () => {
+describe('the limiting factor of a design', () => {
   const analysis = analyse({ flat: walked(3, 2, 4), steep: walked(3, 10, 4) }, PREFERENCE)!
 
-  test('is the scenario of greatest utility, and there what it has most more of than the others', () => {
+  test('is the factor of greatest contribution in the scenario of greatest utility', () => {
     expect(analysis.worstScenario).toBe('steep')
     expect(analysis.worstFactor).toMatchObject({ scenario: 'steep', objective: 'energy' })
     expect(analysis.worstFactor.contribution).toBeCloseTo(2 * Math.log(10 / Math.sqrt(20)), 12)
   })
 
-  test('exceeds the geometric mean by the root of the ratio of two utilities', () => {
+  test('the excess over the geometric mean is the root of the ratio of two utilities', () => {
     expect(analysis.excess).toBeCloseTo(Math.sqrt(25), 12)
   })
 
-  test('contributions add up to the logarithm of the utility over that of all', () => {
+  test('contributions add up to the logarithm of the relative utility', () => {
     const sum = analysis.factors
       .filter((factor) => factor.scenario === 'flat')
       .reduce((total, factor) => total + factor.contribution, 0)
@@ -78,7 +78,7 @@ describe('what limits a design', () => {
     expect(sum).toBeCloseTo(analysis.utilities.flat, 12)
   })
 
-  test('depends on no unit', () => {
+  test('does not depend on units', () => {
     const inMillimetres = { flat: walked(3000, 2, 4), steep: walked(3300, 2.1, 4) }
     const inMetres = { flat: walked(3, 2, 4), steep: walked(3.3, 2.1, 4) }
     const [one, other] = [inMillimetres, inMetres].map((walks) => analyse(walks, PREFERENCE)!)
@@ -86,7 +86,7 @@ describe('what limits a design', () => {
     expect(one.worstFactor.contribution).toBeCloseTo(other.worstFactor.contribution, 12)
   })
 
-  test('sensitivities are those of the fitness, by small differences', () => {
+  test('sensitivities equal finite differences of the fitness', () => {
     const fitness = (energy: number) =>
       Math.sqrt(
         utilityOf(walked(3, 2, 4), PREFERENCE)! * utilityOf(walked(3, energy, 4), PREFERENCE)!,
@@ -95,11 +95,11 @@ describe('what limits a design', () => {
     expect(analysis.worstFactor.sensitivity).toBeCloseTo(slope, 6)
   })
 
-  test('objectives without a weight do not appear', () => {
+  test('unweighted objectives are not included', () => {
     expect(analysis.factors.some((factor) => factor.objective === 'acceleration')).toBe(false)
   })
 
-  test('is unknown if a walk failed', () => {
+  test('is null if a simulation failed', () => {
     const fallen = { ...walked(3, 2, 4), status: 'fell' as const }
     expect(analyse({ flat: walked(3, 2, 4), steep: fallen }, PREFERENCE)).toBeNull()
   })

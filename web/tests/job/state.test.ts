@@ -1,6 +1,6 @@
 import { expect, test } from 'vitest'
 import type { Iteration } from '../../src/api/types'
-import { hasEnded, isComputed, isUnderWay, progressInWords } from '../../src/job/state'
+import { hasEnded, isActive, isRunning, progressInWords } from '../../src/job/state'
 
 const STATES = [
   'queued',
@@ -12,15 +12,15 @@ const STATES = [
   'cancelled',
 ] as const
 
-test('states are told apart by what is still to come', () => {
+test('states are classified by whether the job may progress', () => {
   const those = (is: (job: { state: (typeof STATES)[number] }) => boolean) =>
     STATES.filter((state) => is({ state }))
   expect(those(hasEnded)).toEqual(['succeeded', 'failed', 'cancelled'])
-  expect(those(isUnderWay)).toEqual(['queued', 'running', 'pausing'])
-  expect(those(isComputed)).toEqual(['running', 'pausing'])
+  expect(those(isActive)).toEqual(['queued', 'running', 'pausing'])
+  expect(those(isRunning)).toEqual(['running', 'pausing'])
 })
 
-test('progress is told until a job has ended', () => {
+test('progress is shown until a job has ended', () => {
   const job = {
     iterations: 3,
     evaluations: 12,

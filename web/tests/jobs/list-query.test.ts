@@ -4,20 +4,20 @@ import { descends, isFiltered, listQuery, reordered } from '../../src/jobs/list-
 const read = (text: string) => listQuery(new URLSearchParams(text))
 
 describe('the list of jobs', () => {
-  test('shows the newest that are not archived unless its address says otherwise', () => {
+  test('shows the newest jobs that are not archived by default', () => {
     expect(read('')).toEqual({ archived: false, order: 'created', reverse: false })
     expect(isFiltered(read(''))).toBe(false)
     expect(isFiltered(read('archived&order=name'))).toBe(false)
   })
 
-  test('takes from its address what the server finds and sorts by', () => {
-    const asked = read('search=gait&state=failed&controller=pi&tag=a&archived&order=fitness')
-    expect(asked).toMatchObject({ search: 'gait', state: 'failed', controller: 'pi', tag: 'a' })
-    expect(asked).toMatchObject({ archived: true, order: 'fitness' })
-    expect(isFiltered(asked)).toBe(true)
+  test('takes filters and order from the address', () => {
+    const query = read('search=gait&state=failed&controller=pi&tag=a&archived&order=fitness')
+    expect(query).toMatchObject({ search: 'gait', state: 'failed', controller: 'pi', tag: 'a' })
+    expect(query).toMatchObject({ archived: true, order: 'fitness' })
+    expect(isFiltered(query)).toBe(true)
   })
 
-  test('leaves out what cannot be', () => {
+  test('ignores invalid values', () => {
     expect(read('state=lost&order=age&search=')).toEqual({
       archived: false,
       order: 'created',
@@ -25,7 +25,7 @@ describe('the list of jobs', () => {
     })
   })
 
-  test('turns round what is sorted by already, begins with any other as it is, and on the first page', () => {
+  test('reverses the current order, and starts any other on the first page', () => {
     expect(reordered(read('order=gain'), 'gain')).toEqual({
       order: 'gain',
       reverse: '',

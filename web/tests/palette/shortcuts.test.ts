@@ -1,5 +1,5 @@
 import { expect, test } from 'vitest'
-import { type Entry, found } from '../../src/palette/entries'
+import { type Entry, matchingEntries } from '../../src/palette/entries'
 import { actionOf, SHORTCUTS } from '../../src/palette/shortcuts'
 
 const press = (key: string, more = {}) => ({
@@ -8,7 +8,7 @@ const press = (key: string, more = {}) => ({
 })
 const inside = (inField: boolean) => ({ closest: () => (inField ? {} : null) }) as never
 
-test('keys act outside of fields, and only while they are switched on', () => {
+test('single keys act outside of fields, and only while enabled', () => {
   expect(actionOf(press('n'), inside(false), true)).toEqual({ kind: 'go', href: '/jobs/new' })
   expect(actionOf(press('n'), inside(true), true)).toBeNull()
   expect(actionOf(press('n'), inside(false), false)).toBeNull()
@@ -16,7 +16,7 @@ test('keys act outside of fields, and only while they are switched on', () => {
   expect(actionOf(press('n', { ctrlKey: true }), inside(false), true)).toBeNull()
 })
 
-test('Ctrl or Cmd with K finds, in fields and while single keys are off too', () => {
+test('Ctrl or Cmd with K opens the palette, in fields too and while single keys are disabled', () => {
   for (const held of [{ ctrlKey: true }, { metaKey: true }]) {
     expect(actionOf(press('k', held), inside(true), false)).toEqual({ kind: 'palette' })
   }
@@ -26,9 +26,9 @@ test('no key has two meanings', () => {
   expect(new Set(SHORTCUTS.map(({ key }) => key)).size).toBe(SHORTCUTS.length)
 })
 
-test('what begins with the words that are looked for comes first', () => {
+test('entries that start with the text come first', () => {
   const entry = (label: string): Entry => ({ key: label, label, kind: 'page', run: () => {} })
   const entries = [entry('New job'), entry('Jobs'), entry('Walk')]
-  expect(found(entries, 'job').map(({ label }) => label)).toEqual(['Jobs', 'New job'])
-  expect(found(entries, '')).toHaveLength(3)
+  expect(matchingEntries(entries, 'job').map(({ label }) => label)).toEqual(['Jobs', 'New job'])
+  expect(matchingEntries(entries, '')).toHaveLength(3)
 })

@@ -3,8 +3,8 @@ import { buildModel } from '../../src/charts/parallel/parallel-model'
 import { brushesOf, brushWords } from '../../src/job/designs/brush-words'
 import { flag, ORDER, oneOf, RANGE } from '../../src/router/query-value'
 
-describe('what an address says', () => {
-  test('of a choice is one of its words, and nothing for the usual one', () => {
+describe('a query value', () => {
+  test('of a choice is one of its words, omitted for the default', () => {
     const layer = oneOf(['inference', 'table'], 'inference')
     expect(layer.read('table')).toBe('table')
     expect(layer.read('toString')).toBeUndefined()
@@ -12,7 +12,7 @@ describe('what an address says', () => {
     expect(layer.write('table')).toBe('table')
   })
 
-  test('of a stretch is two rising numbers, or nothing', () => {
+  test('of a range is two increasing numbers', () => {
     expect(RANGE.read('2:40.5')).toEqual([2, 40.5])
     for (const wrong of ['', '2', '2:', ':3', '40:2', '1:2:3', 'a:b', '1:Infinity']) {
       expect(RANGE.read(wrong)).toBeUndefined()
@@ -21,14 +21,14 @@ describe('what an address says', () => {
     expect(RANGE.write(null)).toBeNull()
   })
 
-  test('of an order is a column and its direction', () => {
+  test('of an order is a column and a direction', () => {
     const order = { column: 'best_so_far', descending: true }
     expect(ORDER.read(ORDER.write(order)!)).toEqual(order)
     expect(ORDER.read('name')).toEqual({ column: 'name', descending: false })
     expect(ORDER.read('<x>')).toBeUndefined()
   })
 
-  test('is written only where it is not as usual', () => {
+  test('is omitted for the default', () => {
     expect(flag(true).write(true)).toBeNull()
     expect(flag(true).read(flag(true).write(false)!)).toBe(false)
     expect(flag(true).read('perhaps')).toBeUndefined()
@@ -41,7 +41,7 @@ describe('a selection in an address', () => {
   const named = { ...source, name: 'a:b', low: 1, high: 100, logarithmic: true }
   const { axes } = buildModel([linear, named], new Float32Array([1, 2]))
 
-  test('comes back as it was, also of names with colons and logarithmic axes', () => {
+  test('is restored exactly, also for names with colons and logarithmic axes', () => {
     const words = brushWords(
       axes,
       new Map([
@@ -59,7 +59,7 @@ describe('a selection in an address', () => {
     expect(brushWords(axes, new Map())).toBeNull()
   })
 
-  test('leaves out axes that are not there and what is no stretch', () => {
+  test('skips unknown axes and invalid ranges', () => {
     const { brushes, unknown } = brushesOf(axes, 'none:1:2,FI1R:5:2,FI1R,FI1R:1:')
     expect(brushes.size).toBe(0)
     expect(unknown).toHaveLength(4)

@@ -26,12 +26,12 @@ test('a path of a job leads back to the job', () => {
   })
 })
 
-test('what is not set is left out of a query', () => {
+test('unset values are omitted from a query', () => {
   const query = { job: 'k2', iteration: 0, particle: undefined, scenario: '' }
   expect(withQuery('/walk', query)).toBe('/walk?job=k2&iteration=0')
 })
 
-test('an address of the API has its parameters filled in and null left out', () => {
+test('an API path has its parameters filled in and null omitted', () => {
   expect(url('/v1/jobs/{job_id}/events', { job_id: 'a/b' }, { after: null, limit: 3 })).toBe(
     '/v1/jobs/a%2Fb/events?limit=3',
   )

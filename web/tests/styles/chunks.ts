@@ -1,29 +1,29 @@
-/** Which stylesheets are there when a module runs, by the imports that the sources state. */
+/** Stylesheets that are loaded with each module, derived from imports. */
 
 import ts from 'typescript'
 
-/** A module or a stylesheet. Paths are within the sources. */
+/** A module or a stylesheet, with paths relative to the sources. */
 interface Source {
   readonly path: string
   readonly text: string
-  /** What is loaded with it. */
+  /** Static imports. */
   readonly needs: readonly string[]
-  /** What it loads when it is wanted: the beginnings of other chunks. */
+  /** Dynamic imports, i.e. the entries of other chunks. */
   readonly later: readonly string[]
 }
 
 export type Sources = ReadonlyMap<string, Source>
 
-/** texts: of all modules and stylesheets, by path. */
+/** texts: all modules and stylesheets, by path. */
 export function sourcesOf(texts: Readonly<Record<string, string>>): Sources {
-  const found = (from: string, specifiers: readonly string[]) =>
+  const resolved = (from: string, specifiers: readonly string[]) =>
     specifiers
       .map((specifier) => new URL(specifier, `file:///${from}`).pathname.slice(1))
       .flatMap((path) => [path, `${path}.ts`, `${path}.tsx`].filter((name) => name in texts))
   return new Map(
     Object.entries(texts).map(([path, text]) => {
       const { needs, later } = path.endsWith('.css') ? sheetImports(text) : imports(path, text)
-      return [path, { path, text, needs: found(path, needs), later: found(path, later) }]
+      return [path, { path, text, needs: resolved(path, needs), later: resolved(path, later) }]
     }),
   )
 }
@@ -32,26 +32,26 @@ export function parsed(path: string, text: string): ts.SourceFile {
   return ts.createSourceFile(path, text, ts.ScriptTarget.Latest, true)
 }
 
-/** What a visit sees of a node and of all within it. */
+/** Visit a node and its descendants. */
 export function walk(node: ts.Node, visit: (node: ts.Node) => void): void {
   visit(node)
   ts.forEachChild(node, (child) => walk(child, visit))
 }
 
-/** For each module, the stylesheets that are there whatever else was looked at before. */
+/** Stylesheets that are certain to be loaded with each module, whatever was shown before. */
 export function sheetsOfModules(sources: Sources, main: string): Map<string, Set<string>> {
   const starts = new Set([main, ...[...sources.values()].flatMap(({ later }) => later)])
   const loaded = new Map([...starts].map((start) => [start, withNeeds(sources, start)]))
   const everything = new Set(sources.keys())
-  const there = new Map([...starts].map((start) => [start, everything]))
+  const available = new Map([...starts].map((start) => [start, everything]))
   const ofModule = (path: string) =>
-    common([...starts].filter((s) => loaded.get(s)!.has(path)).map((s) => there.get(s)!))
-  // What a chunk finds there depends on the chunks that load it: as often as they can be nested.
+    common([...starts].filter((s) => loaded.get(s)!.has(path)).map((s) => available.get(s)!))
+  // A chunk depends on the chunks that load it: iterate as often as they can be nested.
   for (const _ of starts) {
     for (const start of starts) {
       const loading = [...sources.values()].filter(({ later }) => later.includes(start))
       const before = start === main ? [] : common(loading.map(({ path }) => ofModule(path)))
-      there.set(start, new Set([...before, ...loaded.get(start)!]))
+      available.set(start, new Set([...before, ...loaded.get(start)!]))
     }
   }
   return new Map([...sources.keys()].map((path) => [path, ofModule(path)]))
@@ -72,7 +72,7 @@ function sheetImports(text: string) {
   return { needs: [...text.matchAll(/@import "([^"]+)"/g)].map((match) => match[1]), later: [] }
 }
 
-/** Types are not loaded. */
+/** Type imports are not loaded. */
 function imports(path: string, text: string) {
   const needs: string[] = []
   const later: string[] = []

@@ -1,9 +1,9 @@
-/** Classes that components give their elements, and that stylesheets name. */
+/** CSS classes used by components, and selectors of stylesheets. */
 
 import ts from 'typescript'
 import { parsed, walk } from './chunks'
 
-/** Classes in the `class` attributes of a module; `*` stands for a number in them. */
+/** Classes in the `class` attributes of a module; `*` stands for a number. */
 export function classesOf(path: string, text: string): ReadonlySet<string> {
   const file = parsed(path, text)
   const values: string[] = []
@@ -14,7 +14,7 @@ export function classesOf(path: string, text: string): ReadonlySet<string> {
   return new Set(values.flatMap((value) => value.split(' ')).filter((word) => /\w/.test(word)))
 }
 
-/** Texts that an expression can come to, in so far as its own file tells. */
+/** Possible texts of an expression, as far as its file determines them. */
 function valuesOf(node: ts.Node, file: ts.SourceFile): readonly string[] {
   const of = (...nodes: readonly ts.Node[]) => nodes.flatMap((each) => valuesOf(each, file))
   if (ts.isStringLiteralLike(node)) return [node.text]
@@ -41,7 +41,7 @@ function returnsOf(name: string, file: ts.SourceFile): readonly ts.Node[] {
   return returned
 }
 
-/** Selectors of a stylesheet, one by one. */
+/** Selectors of a stylesheet. */
 export function selectorsOf(sheet: string): readonly string[] {
   const rules = sheet.replace(/\/\*.*?\*\//gs, '').replace(/@import[^;]*;/g, '')
   return [...rules.matchAll(/([^{};]+)\{/g)]

@@ -9,19 +9,19 @@ const texts = import.meta.glob<string>('../../src/**/*.{ts,tsx,css}', {
   eager: true,
 })
 
-/** Where classes are used, and where they are named. */
+/** All uses of classes, and all rules. */
 function survey(sources: Sources) {
-  const there = sheetsOfModules(sources, 'main.tsx')
+  const available = sheetsOfModules(sources, 'main.tsx')
   const modules = [...sources.values()].filter(({ path }) => path.endsWith('.tsx'))
   const used = modules.flatMap(({ path, text }) =>
-    [...classesOf(path, text)].map((name) => ({ name, path, sheets: there.get(path)! })),
+    [...classesOf(path, text)].map((name) => ({ name, path, sheets: available.get(path)! })),
   )
   const rules = [...sources.values()]
     .filter(({ path }) => path.endsWith('.css'))
     .flatMap(({ path, text }) =>
       selectorsOf(text).map((selector) => ({ sheet: path, selector, names: classesIn(selector) })),
     )
-  return { used, rules, everywhere: there.get('main.tsx')! }
+  return { used, rules, everywhere: available.get('main.tsx')! }
 }
 
 type Survey = ReturnType<typeof survey>
@@ -30,7 +30,7 @@ function isNamed(use: string, name: string): boolean {
   return use === name || new RegExp(`^${use.replaceAll('*', String.raw`\d+`)}$`).test(name)
 }
 
-/** Classes of components whose styles need not be there when the component is shown. */
+/** Classes of components whose styles may not be loaded with the component. */
 function unstyled({ used, rules }: Survey): readonly string[] {
   return used
     .filter(
@@ -40,7 +40,7 @@ function unstyled({ used, rules }: Survey): readonly string[] {
     .map(({ name, path }) => `${name} in ${path}`)
 }
 
-/** Rules of a page or a part that are also for components that are shown without it. */
+/** Rules of a page that also match components shown without that page. */
 function leaking({ used, rules, everywhere }: Survey): readonly string[] {
   const isElsewhere = (sheet: string, name: string) =>
     used.some((use) => isNamed(use.name, name) && !use.sheets.has(sheet))
@@ -50,8 +50,8 @@ function leaking({ used, rules, everywhere }: Survey): readonly string[] {
     .map(({ sheet, selector }) => `${selector} in ${sheet}`)
 }
 
-/** Rules for classes that no component has. */
-function needless({ used, rules }: Survey): readonly string[] {
+/** Rules for unused classes. */
+function unused({ used, rules }: Survey): readonly string[] {
   const isUsed = (name: string) => used.some((use) => isNamed(use.name, name))
   return rules
     .filter(({ names }) => !names.every(isUsed))
@@ -64,20 +64,20 @@ const page = survey(
   ),
 )
 
-test('the styles of each class are there with the component that has it', () => {
+test('the styles of each class are loaded with its component', () => {
   expect(unstyled(page)).toEqual([])
 })
 
-test('what was looked at before changes no other page', () => {
+test('a visited page does not restyle other pages', () => {
   expect(leaking(page)).toEqual([])
 })
 
-test('each rule is for classes that components have', () => {
-  expect(needless(page)).toEqual([])
+test('every rule is for a class in use', () => {
+  expect(unused(page)).toEqual([])
 })
 
-test('a class whose stylesheet comes with another chunk is found, and so is a rule that leaks', () => {
-  const found = survey(
+test('a stylesheet of another chunk and a leaking rule are detected', () => {
+  const example = survey(
     sourcesOf({
       'main.tsx': "import './base.css'; import('./job/page'); import('./walk/page')",
       'base.css': '.card { margin: 0 }',
@@ -90,17 +90,17 @@ test('a class whose stylesheet comes with another chunk is found, and so is a ru
       'shared.tsx': 'const a = <i class={`bar walk-$' + '{k}`} />',
     }),
   )
-  expect(unstyled(found)).toEqual([
+  expect(unstyled(example)).toEqual([
     'a in walk/page.tsx',
     'b in walk/page.tsx',
     'bar in shared.tsx',
     'walk-* in shared.tsx',
   ])
-  expect(leaking(found)).toEqual([
+  expect(leaking(example)).toEqual([
     '.bar:is(.a, .b) in job/job.css',
     '.card in walk/walk.css',
     '.walk-1 in walk/walk.css',
     'summary in walk/walk.css',
   ])
-  expect(needless(found)).toEqual(['.gone in job/job.css'])
+  expect(unused(example)).toEqual(['.gone in job/job.css'])
 })

@@ -1,4 +1,4 @@
-/** A small catalogue of the kind that the API lists. */
+/** A small example of the API's catalogue. */
 
 import type { Catalogue } from '../../src/submission/draft/catalogue'
 import { fieldsOf, type OpenApiDocument } from '../../src/submission/fields/schema-fields'
@@ -141,7 +141,7 @@ export const CATALOGUE = {
         properties: {
           name: { const: 'simplex', default: 'simplex', type: 'string' },
           particles: PARTICLES,
-          restarts: { type: 'boolean', default: true, description: 'Whether it starts anew.' },
+          restarts: { type: 'boolean', default: true, description: 'Whether it restarts.' },
           steps: { type: 'array', default: [1, 2] },
           order: { anyOf: [{ type: 'integer', enum: [1, 2] }, { type: 'null' }], default: null },
         },

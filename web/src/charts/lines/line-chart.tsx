@@ -1,4 +1,4 @@
-/** Lines over one axis, drawn by uPlot: values under the pointer, zoom by dragging. */
+/** Line chart (uPlot) with a readout under the pointer and zoom by dragging. */
 
 import { useEffect, useRef } from 'preact/hooks'
 import uPlot from 'uplot'
@@ -16,21 +16,20 @@ export interface Series {
   /** Line width [px]; 0 draws no line, as for the edges of a band. */
   readonly width?: number
   readonly dash?: readonly number[]
-  /** Holds each value until the next. */
+  /** Hold each value until the next. */
   readonly stepped?: boolean
 }
 
-/** An area between two series, by their indices. */
+/** The area between two series, given by index. */
 export interface Band {
   readonly upper: number
   readonly lower: number
   readonly colour: `--${string}`
-  /** Opacity, 0 to 1. */
   readonly opacity: number
 }
 
 export interface LineChartProps {
-  /** What is drawn, for screen readers. */
+  /** Description for screen readers. */
   readonly label: string
   readonly x: ArrayLike<number>
   readonly xLabel: string
@@ -41,33 +40,33 @@ export interface LineChartProps {
   readonly bands?: readonly Band[]
   readonly logarithmic?: boolean
   readonly xLogarithmic?: boolean
-  /** Whether x is counted: ticks at whole numbers only. */
+  /** Integer ticks only. */
   readonly counted?: boolean
-  /** Room beside the first and the last x, in the unit of x. */
+  /** Margin before the first and after the last x, in the unit of x. */
   readonly xMargin?: number
-  /** Whether the y axis begins at zero. */
+  /** Start the y axis at zero. */
   readonly fromZero?: boolean
-  /** What the y axis shows; all values if missing. */
+  /** Range of the y axis; fitted to the values by default. */
   readonly yRange?: readonly [number, number] | null
-  /** Draws behind the lines. */
+  /** Draw behind the lines. */
   readonly paint?: (plot: uPlot) => void
-  /** Draws over the lines. */
+  /** Draw over the lines. */
   readonly paintOver?: (plot: uPlot) => void
-  /** Height [px] at the common size of type; larger type makes it larger. */
+  /** Height [px] at the default font size; scales with the font size. */
   readonly height?: number
-  /** Position of a vertical line, such as the moment that a replay shows. */
+  /** Position of a vertical line, such as the current time of a replay. */
   readonly marker?: number | null
-  /** Called with the x under the pointer when it is clicked. */
+  /** Called with the x under the pointer on a click. */
   readonly onPick?: (x: number) => void
-  /** Stretch of x that is shown at first; null for all. */
+  /** Initial range of x; null for all. */
   readonly zoom?: Zoom
-  /** Told when another stretch is shown by hand; null for all. */
+  /** Called when the user changes the range; null for all. */
   readonly onZoom?: (range: Zoom) => void
-  /** Charts of the same key move their pointers together. */
+  /** Charts with the same key share their pointer. */
   readonly sync?: string
 }
 
-/** Steps between ticks of what is counted. */
+/** Tick steps of an integer axis. */
 const WHOLE_STEPS = [0, 1, 2, 3, 4, 5, 6].flatMap((power) =>
   [1, 2, 5].map((factor) => factor * 10 ** power),
 )
@@ -91,10 +90,10 @@ export function LineChart(props: LineChartProps) {
       parent,
     )
     plot.current = drawn
-    const wanted = zoom.current
-    if (wanted) drawn.setScale('x', { min: wanted[0], max: wanted[1] })
-    // What it shows first was chosen by nobody. uPlot shows it in a microtask that is queued by now;
-    // whatever comes after that one is a change by hand.
+    const requested = zoom.current
+    if (requested) drawn.setScale('x', { min: requested[0], max: requested[1] })
+    // uPlot applies the initial range in a microtask that is already queued; later changes are the
+    // user's.
     queueMicrotask(() => {
       drawn.root.dataset.settled = 'true'
     })
@@ -129,17 +128,17 @@ export function LineChart(props: LineChartProps) {
 type Zoom = readonly [number, number] | null
 
 /**
- * The stretch of x that is wanted: the one that was last asked for, by hand or by whoever shows the
- * chart. Data may come before a change by hand has come back as a property, and must not undo it.
+ * Requested range of x: the latest of the user's choice and the property. New data may arrive before a
+ * choice comes back as a property, and must not undo it.
  */
 function useZoom({ zoom = null }: LineChartProps): { current: Zoom } {
-  const wanted = useRef<Zoom>(zoom)
-  const given = useRef<Zoom>(zoom)
-  if (zoom?.join() !== given.current?.join()) wanted.current = given.current = zoom
-  return wanted
+  const requested = useRef<Zoom>(zoom)
+  const previous = useRef<Zoom>(zoom)
+  if (zoom?.join() !== previous.current?.join()) requested.current = previous.current = zoom
+  return requested
 }
 
-/** What a new plot is needed for; other changes are only new data. */
+/** Everything that requires a new plot; other changes are data. */
 function shapeOf({
   series,
   bands,
@@ -157,9 +156,9 @@ function shapeOf({
   return JSON.stringify([lines, bands, axes])
 }
 
-/** New data under the same zoom, also one that the first data are to have; all where there is none. */
-function renew(plot: uPlot, data: uPlot.AlignedData, wanted: Zoom) {
-  const zoom = wanted ?? zoomOf(plot)
+/** Replace the data and keep the zoom. */
+function renew(plot: uPlot, data: uPlot.AlignedData, requested: Zoom) {
+  const zoom = requested ?? zoomOf(plot)
   if (!zoom) {
     plot.setData(data)
     return
@@ -170,7 +169,7 @@ function renew(plot: uPlot, data: uPlot.AlignedData, wanted: Zoom) {
   })
 }
 
-/** The stretch of x that is shown; null where it is all, and before anything is. */
+/** Visible range of x; null if it is all of x, or nothing has been drawn yet. */
 function zoomOf({ scales, data: [x] }: uPlot): Zoom {
   const { min, max } = scales.x
   if (x.length === 0 || typeof min !== 'number' || typeof max !== 'number') return null
@@ -184,10 +183,10 @@ function dataOf({ x, series, logarithmic }: LineChartProps): uPlot.AlignedData {
   return [x, ...columns] as unknown as uPlot.AlignedData
 }
 
-/** props: kept by reference, as callbacks outlive a rendering. */
+/** props: by reference, since callbacks outlive a render. */
 function options(
   props: { current: LineChartProps },
-  wanted: { current: Zoom },
+  requested: { current: Zoom },
   readout: HTMLElement,
 ) {
   const { series, bands = [], logarithmic, sync, counted, xMargin = 0 } = props.current
@@ -265,18 +264,18 @@ function options(
         (u) => props.current.paintOver?.(u),
         (u) => drawMarker(u.ctx, u, props.current.marker ?? null, devicePixelRatio),
       ],
-      // As tests and other tools read it.
+      // Tests read the range from the attribute.
       setScale: [
         (u, key) => {
           const { min, max } = u.scales.x
           if (key !== 'x') return
           u.root.dataset.range = `${min} ${max}`
           const range = zoomOf(u)
-          const before = wanted.current
-          // Data that are still to come may reach beyond those that are there.
+          const before = requested.current
+          // A requested range may reach beyond the data received so far.
           if (before?.[0] === min && before?.[1] === max) return
           if (!u.root.dataset.settled || range?.join() === before?.join()) return
-          wanted.current = range
+          requested.current = range
           props.current.onZoom?.(range)
         },
       ],
@@ -295,10 +294,10 @@ function options(
 
 function scaleOfY(props: { current: LineChartProps }): uPlot.Scale {
   const { logarithmic, fromZero, yRange } = props.current
-  const own = (low: number, high: number): [number, number] | null =>
+  const explicitRange = (low: number, high: number): [number, number] | null =>
     props.current.yRange ? [...props.current.yRange] : logarithmic ? logRange(low, high) : null
-  if (logarithmic) return { distr: 3, range: (_, low, high) => own(low, high)! }
-  if (yRange) return { range: (_, low, high) => own(low, high) ?? [low, high] }
+  if (logarithmic) return { distr: 3, range: (_, low, high) => explicitRange(low, high)! }
+  if (yRange) return { range: (_, low, high) => explicitRange(low, high) ?? [low, high] }
   return fromZero ? { range: (_, __, high) => [0, high > 0 ? high * 1.05 : 1] } : {}
 }
 
@@ -316,7 +315,7 @@ function showReadout(u: uPlot, props: LineChartProps, element: HTMLElement) {
   element.textContent = [`${props.xLabel} ${at}`, ...parts].join('  ·  ')
 }
 
-/** Room for the longest number of an axis [px]. */
+/** Space for the longest tick label [px]. */
 function axisWidth(texts: string[] | null): number {
   const longest = Math.max(3, ...(texts ?? []).map((text) => text.length))
   return Math.ceil(longest * remPixels(0.5) + remPixels(0.8))
@@ -330,7 +329,7 @@ function bodyFont(): string {
   return getComputedStyle(document.body).fontFamily
 }
 
-/** A colour `rgb(...)` with an opacity. */
+/** Add an opacity to a colour `rgb(...)`. */
 export function withAlpha(colour: string, opacity: number): string {
   return colour.replace(/^rgb\((.*)\)$/, (_, channels: string) =>
     channels.includes(',') ? `rgba(${channels}, ${opacity})` : `rgb(${channels} / ${opacity})`,

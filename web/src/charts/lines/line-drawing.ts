@@ -1,4 +1,4 @@
-/** A line chart drawn anew from its data as lines and words, under the zoom that is shown. */
+/** Redraws a line chart as vector graphics, at the current zoom. */
 
 import type uPlot from 'uplot'
 import { formatExact, withUnit } from '../../format/number'
@@ -9,11 +9,11 @@ import { withAlpha } from './line-chart'
 
 type Context = CanvasRenderingContext2D
 
-/** context: in CSS pixels, from the upper left corner of the chart's canvas. */
+/** context: in CSS pixels, origin at the upper left corner of the chart's canvas. */
 export function drawLines(context: Context, plot: uPlot, props: LineChartProps): void {
   const ratio = devicePixelRatio
   context.save()
-  // uPlot's places are those of the screen's pixels.
+  // uPlot positions are in device pixels.
   context.scale(1 / ratio, 1 / ratio)
   drawAxes(context, plot, props, ratio)
   const drawn: uPlot = Object.create(plot, { ctx: { value: context } })
@@ -26,13 +26,13 @@ export function drawLines(context: Context, plot: uPlot, props: LineChartProps):
   for (const band of props.bands ?? []) drawBand(context, plot, band)
   for (const [k, series] of props.series.entries()) drawSeries(context, plot, series, k + 1, ratio)
   context.restore()
-  // Marks and words may stand beside the plot.
+  // Marks and labels may lie outside the plot area.
   props.paintOver?.(drawn)
   drawMarker(context, plot, props.marker ?? null, ratio)
   context.restore()
 }
 
-/** The moment that a replay shows. */
+/** Draw the vertical line at the current time of a replay. */
 export function drawMarker(context: Context, plot: uPlot, marker: number | null, ratio: number) {
   if (marker === null) return
   const x = plot.valToPos(marker, 'x', true)
@@ -72,7 +72,7 @@ function drawAxes(context: Context, plot: uPlot, props: LineChartProps, ratio: n
     line(at, top, at, top + height)
     const text = formatExact(tick, 5)
     const half = context.measureText(text).width / 2
-    // Numbers of a narrow chart would run into each other.
+    // Labels of a narrow chart would overlap.
     if (at - half < free) continue
     context.fillText(text, at, top + height + 0.4 * em)
     free = at + half + 0.5 * em
@@ -93,9 +93,9 @@ function drawAxes(context: Context, plot: uPlot, props: LineChartProps, ratio: n
   context.restore()
 }
 
-function ticksOf({ min, max }: uPlot.Scale, logarithmic: boolean | undefined, wanted: number) {
+function ticksOf({ min, max }: uPlot.Scale, logarithmic: boolean | undefined, count: number) {
   if (min === undefined || max === undefined || !(max > min)) return []
-  return logarithmic ? logTicks(min, max) : linearTicks(min, max, Math.max(2, wanted))
+  return logarithmic ? logTicks(min, max) : linearTicks(min, max, Math.max(2, count))
 }
 
 function drawSeries(
@@ -115,7 +115,7 @@ function drawSeries(
   for (let k = 0; k < xs.length; k++) {
     const value = ys[k]
     if (value === null || value === undefined || Number.isNaN(value)) {
-      // Not known at a place of another series is no gap where uPlot has none either.
+      // Undefined: only another series has this x, so the line continues, as in uPlot.
       if (value !== undefined) before = null
       continue
     }
@@ -133,13 +133,13 @@ function drawSeries(
 
 function drawBand(context: Context, plot: uPlot, { upper, lower, colour, opacity }: Band): void {
   const [xs, above, below] = [plot.data[0], plot.data[upper + 1], plot.data[lower + 1]]
-  const known = Array.from(xs, (_, k) => k).filter(
+  const indices = Array.from(xs, (_, k) => k).filter(
     (k) => typeof above[k] === 'number' && typeof below[k] === 'number',
   )
-  if (known.length < 2) return
+  if (indices.length < 2) return
   const point = (values: ArrayLike<number | null | undefined>) => (k: number) =>
     [plot.valToPos(xs[k], 'x', true), plot.valToPos(values[k]!, 'y', true)] as const
-  const outline = [...known.map(point(above)), ...known.reverse().map(point(below))]
+  const outline = [...indices.map(point(above)), ...indices.reverse().map(point(below))]
   context.fillStyle = withAlpha(themeColour(colour), opacity)
   context.beginPath()
   context.moveTo(...outline[0])

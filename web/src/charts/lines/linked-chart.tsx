@@ -1,4 +1,4 @@
-/** A chart of lines whose zoom is in the address. */
+/** A line chart whose zoom is stored in the address. */
 
 import { RANGE, useQueryValue } from '../../router/query-value'
 import { LineChart, type LineChartProps } from './line-chart'
@@ -7,7 +7,7 @@ export function LinkedChart({
   zoomName = 'zoom',
   ...props
 }: Omit<LineChartProps, 'zoom' | 'onZoom'> & {
-  /** Of the query; charts that are zoomed together share one. */
+  /** Query parameter; charts with the same one zoom together. */
   zoomName?: string
 }) {
   const [zoom, setZoom] = useQueryValue(zoomName, RANGE, null)

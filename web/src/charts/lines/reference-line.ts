@@ -1,12 +1,12 @@
-/** A dashed line across a chart of lines for what others reached, with its name. */
+/** Dashed, labelled line across a line chart for a reference fitness. */
 
 import type uPlot from 'uplot'
 import { formatNumber } from '../../format/number'
 import { themeColour } from '../../theme'
 
-/** What jobs are measured against. */
+/** The fitness that a job is compared with. */
 export interface ReferenceLine {
-  /** `published A`, or `start design`. */
+  /** `published A` or `start design`, for example. */
   readonly label: string
   readonly fitness: number
 }
@@ -19,7 +19,7 @@ export function chartFont(): string {
   return `${Math.round(12 * devicePixelRatio)}px ${getComputedStyle(document.body).fontFamily}`
 }
 
-/** Nothing where it lies outside of what is shown. */
+/** Draw the line if it is in the visible range. */
 export function paintReference(plot: uPlot, reference: ReferenceLine): void {
   const { ctx, bbox } = plot
   const y = plot.valToPos(reference.fitness, 'y', true)

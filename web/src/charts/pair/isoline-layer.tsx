@@ -1,9 +1,9 @@
-/** Isolines over a map, with the level that each stands for. */
+/** Isolines over a map, labelled with their levels. */
 
 import type { Isoline } from './isolines'
 import './isolines.css'
 
-/** Thousandths of the map's width and height. */
+/** Size of the view box; the map's width and height are scaled to it. */
 const SIDE = 1000
 
 export function IsolineLayer({
@@ -11,13 +11,13 @@ export function IsolineLayer({
   words,
 }: {
   lines: readonly Isoline[]
-  /** How a level is called. */
+  /** Label of a level. */
   words: (level: number) => string
 }) {
   if (lines.length === 0) {
     return (
       <p class="isolines-none small" role="status">
-        No isolines: they need four cells beside each other that all have designs.
+        No isolines: they need four adjacent cells with designs.
       </p>
     )
   }

@@ -1,11 +1,11 @@
-/** Lines of equal mean rank over the cells of two axes: marching squares. Pure. */
+/** Isolines of the mean rank over the cells of two axes, by marching squares. */
 
 import { CELLS, type Cell } from './pair-model'
 
-/** Shares of both axes, from the left and from below. */
+/** Position as shares of both axes, from the lower left. */
 type Place = readonly [x: number, y: number]
 
-/** All of one level. */
+/** All segments of one level. */
 export interface Isoline {
   readonly level: number
   readonly pieces: readonly (readonly [from: Place, to: Place])[]
@@ -17,8 +17,8 @@ interface Corner {
 }
 
 /**
- * Where the mean buckets of cells, which count at the cells' middles, pass some levels. Only between four
- * cells that all have a mean: nothing is guessed over the others.
+ * Isolines between the centres of cells, only where four adjacent cells have a mean: nothing is
+ * extrapolated.
  */
 export function isolinesOf(cells: readonly Cell[], levels: readonly number[]): readonly Isoline[] {
   const grid = new Map<number, Corner>()
@@ -39,13 +39,13 @@ export function isolinesOf(cells: readonly Cell[], levels: readonly number[]): r
     .filter(({ pieces }) => pieces.length > 0)
 }
 
-/** corners: of a square, one after the other around it. */
+/** corners: of one square, in order around it. */
 function piecesIn(corners: readonly Corner[], level: number): (readonly [Place, Place])[] {
   const above = corners.map(({ value }) => value >= level)
   const crossed = [0, 1, 2, 3].filter((k) => above[k] !== above[(k + 1) % 4])
   const [a, b, c, d] = crossed.map((k) => crossing(corners[k], corners[(k + 1) % 4], level))
   if (crossed.length < 4) return crossed.length === 2 ? [[a, b]] : []
-  // A saddle: its middle tells which two corners hang together.
+  // A saddle: the mean decides which two corners are connected.
   const middle = corners.reduce((sum, { value }) => sum + value, 0) / 4
   const together = middle >= level === above[0]
   return together
@@ -59,7 +59,7 @@ function piecesIn(corners: readonly Corner[], level: number): (readonly [Place, 
       ]
 }
 
-/** Where the way from one corner to another passes a level. */
+/** Position between two corners at which a level is crossed. */
 function crossing(from: Corner, to: Corner, level: number): Place {
   const share = (level - from.value) / (to.value - from.value)
   const between = (k: 0 | 1) => from.at[k] + share * (to.at[k] - from.at[k])

@@ -1,4 +1,4 @@
-/** Ticks and titles around a chart of two axes. */
+/** Ticks and titles of a chart with two axes. */
 
 import type { ComponentChildren } from 'preact'
 import { withUnit } from '../../format/number'
@@ -14,7 +14,6 @@ export function PairAxes({
 }: {
   across: Axis
   up: Axis
-  /** The chart between them. */
   children: ComponentChildren
 }) {
   return (

@@ -1,4 +1,4 @@
-/** Rows over any two axes of parallel coordinates, as points or as cells by rank; a drag selects. */
+/** Designs over two axes of parallel coordinates, as points or as cells by rank; dragging selects. */
 
 import { useEffect, useLayoutEffect, useMemo, useRef, useState } from 'preact/hooks'
 import { describeCanvas } from '../../export/canvas-source'
@@ -13,11 +13,11 @@ import { CELLS, cellsOf, dragged, nearestRow, placeInWords, sampleOf, ticksOf } 
 import './pair-map.css'
 
 const HEIGHT_PX = 340
-/** Shorter drags are clicks, as a share of the box. */
+/** Shorter drags count as clicks, as a share of the box. */
 const LEAST_STROKE = 0.015
-/** How near to a point a click has to be, as a share of the box. */
+/** Largest distance of a click from a point, as a share of the box. */
 const REACH = 0.05
-/** Of isolines, as buckets from 0. */
+/** Levels of the isolines, as buckets from 0. */
 const LEVELS = [1, 3, 5, 7, 9]
 
 type Place = readonly [x: number, y: number]
@@ -36,18 +36,18 @@ export function PairMap({
   onChoose,
 }: {
   model: ParallelModel
-  /** Those that are selected, in the model's order. */
+  /** Selected rows, in the model's order. */
   rows: Uint32Array
   /** Indices of the axes. */
   x: number
   y: number
-  /** Mean rank by cell, in place of points. */
+  /** Show the mean rank by cell instead of points. */
   asCells: boolean
-  /** Lines of equal mean rank over the points or cells. */
+  /** Show lines of equal mean rank. */
   isolines: boolean
-  /** Stretches of the two axes that are selected; null for all. */
+  /** Selected ranges of the two axes; null for all. */
   brushes: readonly [Brush | null, Brush | null]
-  /** Row that stands out. */
+  /** Highlighted row. */
   chosen: number | null
   label: string
   onSelect: (x: Brush, y: Brush) => void
@@ -186,7 +186,7 @@ function paintPoints(
   const size = Math.max(2, Math.round(3 * devicePixelRatio))
   const [xs, ys] = [model.axes[x].places, model.axes[y].places]
   const sample = [...sampleOf(rows)]
-  // The best are drawn last, over the others.
+  // The best are drawn last, on top.
   sample.sort((a, b) => rankOf(model, b) - rankOf(model, a))
   for (const row of sample) {
     const bucket = model.buckets[row]

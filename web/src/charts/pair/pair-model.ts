@@ -1,4 +1,4 @@
-/** Two axes of parallel coordinates set against each other: points, cells, what a drag selects. Pure. */
+/** Two axes of parallel coordinates: points, cells and drag selection. */
 
 import { exactQuantity, formatCount, formatExact, formatNumber } from '../../format/number'
 import { inWords } from '../../format/words'
@@ -15,28 +15,27 @@ import {
   valueAt,
 } from '../parallel/parallel-model'
 
-/** Rows that are looked at; of more, a fair sample. */
+/** Rows considered; the first of the shuffled order, a fair sample. */
 export const SAMPLE = 4000
 
-/** Columns and rows of the cells. */
+/** Columns and rows of cells. */
 export const CELLS = 14
 
-/** Designs of one cell. */
 export interface Cell {
-  /** From the left and from below, from 0. */
+  /** Counted from the lower left, from 0. */
   readonly column: number
   readonly row: number
   readonly designs: number
-  /** Mean of the buckets of those that have a fitness; null where none has. */
+  /** Mean bucket of the designs with a fitness; null if there are none. */
   readonly bucket: number | null
 }
 
-/** A sample of some rows, in the model's order. */
+/** Sample of the given rows, in the model's order. */
 export function sampleOf(rows: Uint32Array): Uint32Array {
   return rows.subarray(0, SAMPLE)
 }
 
-/** Cells in which there are designs: how they rank on average. */
+/** Non-empty cells with their mean rank. */
 export function cellsOf(model: ParallelModel, rows: Uint32Array, x: number, y: number) {
   const [xs, ys] = [model.axes[x].places, model.axes[y].places]
   const counted = new Map<number, { designs: number; judged: number; sum: number }>()
@@ -62,7 +61,7 @@ export function cellsOf(model: ParallelModel, rows: Uint32Array, x: number, y: n
   )
 }
 
-/** Stretches of both axes that a drag from one place to another selects. */
+/** Ranges of both axes selected by dragging between two positions. */
 export function dragged(
   from: readonly [number, number],
   to: readonly [number, number],
@@ -74,7 +73,7 @@ export function dragged(
   return [stretch(0), stretch(1)]
 }
 
-/** The row of those sampled that is nearest to a place, within reach; null if none is. */
+/** The sampled row nearest to a position, within reach; null if there is none. */
 export function nearestRow(
   model: ParallelModel,
   rows: Uint32Array,
@@ -83,15 +82,15 @@ export function nearestRow(
   reach: number,
 ): number | null {
   const [xs, ys] = [model.axes[x].places, model.axes[y].places]
-  let [found, least]: [number | null, number] = [null, reach]
+  let [nearest, least]: [number | null, number] = [null, reach]
   for (const row of sampleOf(rows)) {
     const distance = Math.hypot(xs[row] - at[0], ys[row] - at[1])
-    if (distance < least) [found, least] = [row, distance]
+    if (distance < least) [nearest, least] = [row, distance]
   }
-  return found
+  return nearest
 }
 
-/** Where an axis is marked, and with what: round numbers, or names of choices. */
+/** Ticks of an axis: round numbers, or the names of choices. */
 export function ticksOf(axis: Axis): readonly { readonly place: number; readonly text: string }[] {
   if (axis.choices.length > 0) {
     return marksOf(axis).map((name, k) => ({ place: placeOf(axis, k), text: inWords(`${name}`) }))
@@ -103,7 +102,7 @@ export function ticksOf(axis: Axis): readonly { readonly place: number; readonly
     .filter(({ place }) => place >= 0 && place <= 1)
 }
 
-/** What is at a place, for people: the nearest design, or the cell; null where there is nothing. */
+/** Description of the nearest design or the cell at a position; null if there is none. */
 export function placeInWords(
   model: ParallelModel,
   rows: Uint32Array,
@@ -114,22 +113,22 @@ export function placeInWords(
   const axes = pair.map((index) => model.axes[index])
   if (asCells) {
     const cells = at.map(cellAt)
-    const found = cellsOf(model, rows, ...pair).find(
+    const cell = cellsOf(model, rows, ...pair).find(
       ({ column, row }) => column === cells[0] && row === cells[1],
     )
-    if (!found) return null
+    if (!cell) return null
     const [across, up] = axes.map((axis, k) => {
       const from = cells[k]!
       return `${inWords(axis.name)} ${stretchOf(axis, [from / CELLS, (from + 1) / CELLS])}`
     })
     const rank =
-      found.bucket === null
+      cell.bucket === null
         ? 'all failed'
-        : `mean rank ${formatNumber(found.bucket + 1, 3)} of ${BUCKETS}`
+        : `mean rank ${formatNumber(cell.bucket + 1, 3)} of ${BUCKETS}`
     return [
       across,
       up,
-      found.designs === 1 ? '1 design' : `${formatCount(found.designs)} designs`,
+      cell.designs === 1 ? '1 design' : `${formatCount(cell.designs)} designs`,
       rank,
     ].join('  ·  ')
   }

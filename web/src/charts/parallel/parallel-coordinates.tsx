@@ -1,4 +1,4 @@
-/** Rows as lines across one axis per column; dragging along an axis selects a stretch of it. */
+/** Parallel coordinates; dragging along an axis selects a range. */
 
 import { useEffect, useLayoutEffect, useMemo, useRef, useState } from 'preact/hooks'
 import { BrokenName } from '../../components/broken-name'
@@ -18,7 +18,7 @@ import './parallel.css'
 
 export type Brushes = ReadonlyMap<number, Brush>
 
-/** Strokes shorter than this share of the axis are clicks, which end a selection. */
+/** Shorter drags, as a share of the axis, count as clicks, which clear the selection. */
 const LEAST_STROKE = 0.01
 const AXIS_WIDTH_PX = 74
 
@@ -70,7 +70,7 @@ export function ParallelCoordinates({
 
   const least = model.axes.length * AXIS_WIDTH_PX
   return (
-    // A box that scrolls must take the keyboard.
+    // A scrollable box must be reachable by keyboard.
     <section class="parallel-scroll" tabIndex={0} aria-label={`${label}, by axis`}>
       <div ref={box} style={{ minWidth: `${least}px` }}>
         <div class="parallel-heads">
@@ -89,7 +89,7 @@ export function ParallelCoordinates({
         <div class="parallel-plot" style={{ height: `${height}px` }}>
           <canvas ref={canvas} role="img" aria-label={label} />
           {model.axes.map((axis, index) =>
-            // Those at the ends stand above and below.
+            // The first and the last choice are labelled below and above the axis.
             axis.choices.slice(1, -1).map((choice, k) => (
               <span
                 key={`${axis.name} ${choice}`}
@@ -129,7 +129,7 @@ function Mark({ mark }: { mark: number | string }) {
   return <BrokenName name={typeof mark === 'string' ? mark : formatExact(mark, 4)} />
 }
 
-/** The brushes with one of them changed; null takes it away. */
+/** Replace one brush; null removes it. */
 export function withBrush(brushes: Brushes, axis: number, brush: Brush | null): Brushes {
   const changed = new Map(brushes)
   if (brush === null) changed.delete(axis)
@@ -143,7 +143,7 @@ function AxisBrush({
   title,
   onBrush,
 }: {
-  /** Place of the axis as a share of the width. */
+  /** Position of the axis as a share of the width. */
   left: number
   brush: Brush | null
   title: string
@@ -194,7 +194,7 @@ function readBrush(model: ParallelModel, index: number, brushes: Brushes): strin
   return `${stretchOf(model.axes[index], brush)} selected`
 }
 
-/** From the best colour to the worst, through one between them. */
+/** Colours interpolated from best to worst through a middle one. */
 export function themePalette(): Palette {
   const stops = ['--rank-best', '--rank-middle', '--rank-worst'] as const
   const [best, middle, worst] = stops.map((name) => channels(themeColour(name)))

@@ -1,4 +1,4 @@
-/** Parallel coordinates as numbers: where each row crosses each axis, its colour, its selection. */
+/** Data of parallel coordinates: positions on the axes, colours and selection. */
 
 import { formatExact } from '../../format/number'
 import { inWords } from '../../format/words'
@@ -6,11 +6,11 @@ import { inWords } from '../../format/words'
 export interface AxisSource {
   readonly name: string
   readonly unit: string
-  /** Bounds; taken from the values where they are null. */
+  /** Bounds; derived from the values if null. */
   readonly low: number | null
   readonly high: number | null
   readonly logarithmic: boolean
-  /** Names of what the values are indices of; empty for quantities. */
+  /** Names of the choices that the values index; empty for quantities. */
   readonly choices: readonly string[]
   readonly values: Float32Array
 }
@@ -21,15 +21,14 @@ export interface Axis {
   readonly low: number
   readonly high: number
   readonly logarithmic: boolean
-  /** As those of its source. */
   readonly choices: readonly string[]
-  /** Place of each row on the axis, 0 at its low end and 1 at its high end; NaN for none. */
+  /** Position of each row, 0 at the low end and 1 at the high end; NaN for none. */
   readonly places: Float32Array
 }
 
 type Scale = Pick<Axis, 'low' | 'high' | 'logarithmic'>
 
-/** A stretch of an axis, in places. */
+/** A range of positions on an axis. */
 export type Brush = readonly [low: number, high: number]
 
 export const BUCKETS = 12
@@ -39,9 +38,9 @@ export const FAILED = 255
 export interface ParallelModel {
   readonly rows: number
   readonly axes: readonly Axis[]
-  /** Colour of each row by its rank in fitness: 0 for the best ones, FAILED for none. */
+  /** Colour of each row by rank of fitness: 0 for the best, FAILED for none. */
   readonly buckets: Uint8Array
-  /** All rows in an order in which any beginning is a fair sample. */
+  /** All rows, ordered so that any prefix is a fair sample. */
   readonly order: Uint32Array
   readonly fitness: Float32Array
 }
@@ -56,14 +55,14 @@ export function buildModel(sources: readonly AxisSource[], fitness: Float32Array
   }
 }
 
-/** What an axis is marked with, from its low end to its high end: bounds, or names of choices. */
+/** Labels from the low end to the high end: the bounds, or the names of choices. */
 export function marksOf(
   axis: Pick<Axis, 'low' | 'high' | 'choices'>,
 ): readonly (number | string)[] {
   return axis.choices.length > 0 ? axis.choices : [axis.low, axis.high]
 }
 
-/** A stretch of an axis in words: `2 to 5`, or the names inside. */
+/** Describe a range of an axis: `2 to 5`, or the choices in it. */
 export function stretchOf(axis: Axis, [low, high]: Brush): string {
   if (axis.choices.length > 0) {
     const inside = axis.choices.filter((_, k) => {
@@ -75,12 +74,12 @@ export function stretchOf(axis: Axis, [low, high]: Brush): string {
   return [low, high].map((place) => formatExact(valueAt(axis, place), 4)).join(' to ')
 }
 
-/** Value at a place of an axis. */
+/** Value at a position of an axis. */
 export function valueAt({ low, high, logarithmic }: Axis, place: number): number {
   return logarithmic ? low * (high / low) ** place : low + place * (high - low)
 }
 
-/** Place of a value on an axis. */
+/** Position of a value on an axis. */
 export function placeOf({ low, high, logarithmic }: Scale, value: number): number {
   return logarithmic ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low)
 }
@@ -113,7 +112,7 @@ export function selectRows(
   return selected.subarray(0, count)
 }
 
-/** The best rows among some, by fitness. */
+/** The best of the given rows by fitness, at most `most`. */
 export function bestRows({ fitness }: ParallelModel, rows: Uint32Array, most: number): number[] {
   const best: number[] = []
   for (const row of rows) {
@@ -142,7 +141,7 @@ function axisOf(source: AxisSource): Axis {
   return { ...scale, places: values.map((value) => placeOf(scale, value)) }
 }
 
-/** Equal numbers of rows in each bucket, so that a few very bad ones do not take all colours. */
+/** Buckets of equal size, so that a few very bad rows do not take up all colours. */
 function bucketsOf(fitness: Float32Array): Uint8Array {
   const finite = fitness.filter((value) => Number.isFinite(value)).sort()
   const limits = Array.from(
@@ -157,7 +156,7 @@ function bucketsOf(fitness: Float32Array): Uint8Array {
   })
 }
 
-/** Every row once, jumping by a stride that has no factor in common with their number. */
+/** All rows once, visited with a stride coprime to their number. */
 function shuffledOrder(rows: number): Uint32Array {
   const order = new Uint32Array(rows)
   let stride = Math.max(1, Math.round(rows * 0.618))

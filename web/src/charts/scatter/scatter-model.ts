@@ -1,11 +1,11 @@
-/** Where points, ticks and names of a scatter chart lie on its canvas. Pure. */
+/** Positions of points, ticks and labels of a scatter chart. */
 
 import { linearTicks, logRange, logTicks } from '../log-axis'
 
 /** Values by point. */
 export type Values = ArrayLike<number>
 
-/** An axis: what its ends stand for, and where its round numbers are. */
+/** Range, scale and ticks of an axis. */
 export interface Axis {
   readonly low: number
   readonly high: number
@@ -21,10 +21,10 @@ export interface Box {
   readonly height: number
 }
 
-/** Room beside the first and the last value, as a share of the range. */
+/** Margin before the first and after the last value, as a share of the range. */
 const ROOM = 0.05
 
-/** An axis that shows all values that are finite; logarithmic only if all are positive. */
+/** An axis for all finite values; logarithmic only if all are positive. */
 export function axisOf(columns: readonly Values[], logarithmic: boolean): Axis {
   let [low, high] = [Number.POSITIVE_INFINITY, Number.NEGATIVE_INFINITY]
   for (const values of columns) {
@@ -44,41 +44,41 @@ export function axisOf(columns: readonly Values[], logarithmic: boolean): Axis {
   return { low: from, high: to, logarithmic: false, ticks: linearTicks(from, to) }
 }
 
-/** Place of a value between the ends of an axis, 0 to 1. */
+/** Position of a value on an axis, 0 to 1. */
 export function shareOf({ low, high, logarithmic }: Axis, value: number): number {
   if (logarithmic) return Math.log(value / low) / Math.log(high / low)
   return (value - low) / (high - low)
 }
 
-/** Place of a point in a box [px], y upwards. */
+/** Position of a point in a box [px], y upwards. */
 export function placeIn(box: Box, x: Axis, y: Axis, px: number, py: number): [number, number] {
   return [box.left + shareOf(x, px) * box.width, box.top + (1 - shareOf(y, py)) * box.height]
 }
 
-/** The point that is nearest to a place, if it is within reach [px]; null if none is. */
+/** The point nearest to a position, within reach [px]; null if there is none. */
 export function nearest(
   places: readonly (readonly [number, number])[],
   at: readonly [number, number],
   reach: number,
 ): number | null {
-  let [found, least]: [number | null, number] = [null, reach]
+  let [closest, least]: [number | null, number] = [null, reach]
   for (const [index, [x, y]] of places.entries()) {
     const distance = Math.hypot(x - at[0], y - at[1])
-    if (distance <= least) [found, least] = [index, distance]
+    if (distance <= least) [closest, least] = [index, distance]
   }
-  return found
+  return closest
 }
 
-/** A name that is to stand beside a point. */
+/** A label to place near a point. */
 export interface Name {
   readonly at: readonly [number, number]
-  /** Of the text [px]. */
+  /** Width of the text [px]. */
   readonly width: number
 }
 
 /**
- * Places of names [px], left and middle of each: beside, above or below its point, inside the box and clear of
- * the names before; null where there is no such place.
+ * Positions of labels [px], left and middle of each: next to, above or below the point, inside the box
+ * and not overlapping earlier labels; null if there is no such position.
  */
 export function placeNames(
   names: readonly Name[],
@@ -86,7 +86,7 @@ export function placeNames(
   height: number,
   gap: number,
 ): readonly (readonly [number, number] | null)[] {
-  const taken: Box[] = []
+  const occupied: Box[] = []
   return names.map(({ at: [x, y], width }) => {
     const candidates = [
       [x + gap, y],
@@ -99,21 +99,21 @@ export function placeNames(
       [x - gap - width, y + height],
     ] as const
     for (const [left, middle] of candidates) {
-      const own = { left, top: middle - height / 2, width, height }
-      if (!isWithin(own, box) || taken.some((other) => overlap(own, other))) continue
-      taken.push(own)
+      const rect = { left, top: middle - height / 2, width, height }
+      if (!isWithin(rect, box) || occupied.some((other) => overlap(rect, other))) continue
+      occupied.push(rect)
       return [left, middle] as const
     }
     return null
   })
 }
 
-function isWithin(own: Box, box: Box): boolean {
+function isWithin(rect: Box, box: Box): boolean {
   return (
-    own.left >= box.left &&
-    own.top >= box.top &&
-    own.left + own.width <= box.left + box.width &&
-    own.top + own.height <= box.top + box.height
+    rect.left >= box.left &&
+    rect.top >= box.top &&
+    rect.left + rect.width <= box.left + box.width &&
+    rect.top + rect.height <= box.top + box.height
   )
 }
 

@@ -1,4 +1,4 @@
-/** Points over two axes, some with a name; a click chooses the nearest that can be chosen. */
+/** Scatter chart with labelled marks; a click chooses the nearest point. */
 
 import { useEffect, useLayoutEffect, useMemo, useRef, useState } from 'preact/hooks'
 import { describeCanvas } from '../../export/canvas-source'
@@ -21,11 +21,10 @@ export interface Cloud {
   readonly colour: `--${string}`
   /** Radius [px]. */
   readonly radius: number
-  /** 0 to 1. */
   readonly opacity: number
 }
 
-/** A point with a name. */
+/** A labelled point. */
 export interface Mark {
   readonly x: number
   readonly y: number
@@ -35,24 +34,24 @@ export interface Mark {
 }
 
 export interface ScatterProps {
-  /** What is drawn, for screen readers. */
+  /** Description for screen readers. */
   readonly label: string
   readonly xLabel: string
   readonly xUnit: string
   readonly yLabel: string
   readonly yUnit: string
-  /** Drawn in this order; points of the last can be chosen. */
+  /** In drawing order; points of the last one can be chosen. */
   readonly clouds: readonly Cloud[]
   readonly marks: readonly Mark[]
   readonly logarithmic?: boolean
   /** Index in the last cloud. */
   readonly chosen?: number | null
   readonly onChoose?: (index: number) => void
-  /** Height [px] at the common size of type. */
+  /** Height [px] at the default font size. */
   readonly height?: number
 }
 
-/** How near to a point a click has to be [px]. */
+/** Largest distance of a click from a point [px]. */
 const REACH = 24
 
 export function Scatter(props: ScatterProps) {
@@ -130,7 +129,7 @@ export function Scatter(props: ScatterProps) {
   )
 }
 
-/** The part of a canvas between the axes. */
+/** The area between the axes. */
 function areaOf(width: number, height: number, em: number, y: Axis): Box {
   const longest = Math.max(3, ...y.ticks.map((tick) => formatExact(tick, 4).length))
   const left = Math.ceil(longest * 0.5 * em + 2.2 * em)
@@ -138,7 +137,6 @@ function areaOf(width: number, height: number, em: number, y: Axis): Box {
   return { left, top, width: width - left - 0.7 * em, height: height - top - 3.2 * em }
 }
 
-/** One drawing of the chart. */
 class Painter {
   constructor(
     private readonly context: CanvasRenderingContext2D,
@@ -163,7 +161,7 @@ class Painter {
       this.line(at, area.top, at, bottom)
       const text = formatExact(tick, 4)
       const half = context.measureText(text).width / 2
-      // Numbers of a narrow chart would run into each other.
+      // Labels of a narrow chart would overlap.
       if (at - half < free) continue
       context.fillText(text, at, bottom + 0.3 * em)
       free = at + half + 0.5 * em
@@ -226,7 +224,7 @@ class Painter {
     context.lineJoin = 'round'
     for (const [k, place] of placeNames(names, this.area, em, em).entries()) {
       if (!place) continue
-      // Points behind a name would make it hard to read.
+      // An outline keeps labels readable in front of points.
       context.strokeStyle = themeColour('--surface')
       context.lineWidth = 3
       context.strokeText(marks[k].name, ...place)
@@ -235,7 +233,7 @@ class Painter {
     }
   }
 
-  /** Around a point that is chosen. */
+  /** Mark the chosen point. */
   ring([left, top]: readonly [number, number]): void {
     const { context, em } = this
     context.strokeStyle = themeColour('--text')

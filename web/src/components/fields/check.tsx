@@ -1,4 +1,4 @@
-/** A box to tick in the tools of a chart. */
+/** A checkbox among the tools of a chart. */
 
 export function Check({
   label,

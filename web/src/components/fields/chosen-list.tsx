@@ -1,4 +1,4 @@
-/** What has been chosen with a picker that takes several: one below the other, each removable. */
+/** Removable list of the items chosen with a picker. */
 
 import type { ComponentChildren } from 'preact'
 
@@ -9,9 +9,9 @@ export function ChosenList({
   onChange,
 }: {
   ids: readonly string[]
-  /** What an id is shown as. */
+  /** Displayed form of an id. */
   short?: (id: string) => string
-  /** What is known of one, beside its id. */
+  /** Details shown after the id. */
   children: (id: string) => ComponentChildren
   onChange: (ids: readonly string[]) => void
 }) {

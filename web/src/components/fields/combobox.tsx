@@ -1,10 +1,10 @@
-/** A field that offers choices and finds more of them on the server (combobox of the ARIA patterns). */
+/** A combobox (ARIA pattern) with local choices and server-side search. */
 
 import { useEffect, useId, useRef, useState } from 'preact/hooks'
 import { messageOf } from '../../api/problem'
 import './combobox.css'
 import { matching } from '../table/rows'
-import { type Choice, type Search, useFoundChoices } from './found-choices'
+import { type Choice, type Search, useChoiceSearch } from './choice-search'
 
 export interface ChoiceGroup {
   readonly label: string
@@ -15,47 +15,47 @@ const MORE = { value: '', label: 'Show more' }
 
 interface Props {
   readonly label: string
-  /** What is chosen, in words; '' for nothing. */
-  readonly shown: string
+  /** Label of the current choice; '' for none. */
+  readonly chosenLabel: string
   readonly placeholder?: string
-  /** Below the field. */
+  /** Help text below the field. */
   readonly hint?: string
-  /** Whether what is chosen was refused. */
-  readonly wrong?: boolean
-  /** Offered before any question to the server; those that contain what is typed. */
+  /** Whether the choice was rejected. */
+  readonly invalid?: boolean
+  /** Local choices, filtered by the text typed. */
   readonly groups?: readonly ChoiceGroup[]
-  /** Finds on the server, under a heading. */
-  readonly found?: { readonly label: string; readonly search: Search }
+  /** Server-side search, under a heading. */
+  readonly remote?: { readonly label: string; readonly search: Search }
   readonly onChoose: (value: string) => void
-  /** Takes what is pasted; false where it is to be searched for, as what is typed. */
+  /** Handle pasted text; false to search for it instead. */
   readonly onPaste?: (text: string) => boolean
 }
 
 export function Combobox({
   label,
-  shown,
+  chosenLabel,
   placeholder,
   hint,
-  wrong,
+  invalid,
   groups = [],
-  found,
+  remote,
   onChoose,
   onPaste,
 }: Props) {
   const id = useId()
   const [open, setOpen] = useState(false)
-  /** Typed since it was opened; null for nothing. */
+  /** Text typed since the list was opened; null for none. */
   const [typed, setTyped] = useState<string | null>(null)
   const [at, setAt] = useState(-1)
   const list = useRef<HTMLDivElement>(null)
   const input = useRef<HTMLInputElement>(null)
   const text = (typed ?? '').trim()
-  const jobs = useFoundChoices(open ? text : null, found?.search)
+  const jobs = useChoiceSearch(open ? text : null, remote?.search)
   const offered: ChoiceGroup[] = groups.map((group) => ({
     ...group,
     choices: matching(group.choices, text, (choice) => `${choice.label} ${choice.note ?? ''}`),
   }))
-  if (found) offered.push({ label: found.label, choices: jobs.items })
+  if (remote) offered.push({ label: remote.label, choices: jobs.items })
   const shownGroups = offered.filter(({ choices }) => choices.length > 0)
   const entries: Choice[] = shownGroups.flatMap(({ choices }) => choices)
   if (jobs.hasMore) entries.push(MORE)
@@ -92,17 +92,17 @@ export function Combobox({
   useEffect(() => {
     list.current?.querySelector('[aria-selected="true"]')?.scrollIntoView({ block: 'nearest' })
   }, [active])
-  // What is typed next takes the place of what is chosen.
+  // Typing replaces the current choice.
   useEffect(() => {
     if (!open && document.activeElement === input.current) input.current?.select()
-  }, [open, shown])
+  }, [open, chosenLabel])
 
   let next = 0
   const option = (choice: Choice) => {
     const index = next++
     return (
-      // biome-ignore lint/a11y/useKeyWithClickEvents: the field above takes the keys
-      // biome-ignore lint/a11y/useFocusableInteractive: the field above keeps the focus
+      // biome-ignore lint/a11y/useKeyWithClickEvents: the input handles keys
+      // biome-ignore lint/a11y/useFocusableInteractive: the input keeps the focus
       <div
         key={choice.value}
         id={`${id}-${index}`}
@@ -132,12 +132,12 @@ export function Combobox({
           aria-autocomplete="list"
           aria-controls={isListed ? `${id}-list` : undefined}
           aria-activedescendant={isListed && active >= 0 ? `${id}-${active}` : undefined}
-          aria-invalid={wrong}
+          aria-invalid={invalid}
           aria-describedby={hint === undefined ? undefined : `${id}-hint`}
           autocomplete="off"
           spellcheck={false}
-          placeholder={open && shown !== '' ? shown : placeholder}
-          value={typed ?? (open ? '' : shown)}
+          placeholder={open && chosenLabel !== '' ? chosenLabel : placeholder}
+          value={typed ?? (open ? '' : chosenLabel)}
           onFocus={(event) => event.currentTarget.select()}
           onClick={show}
           onInput={(event) => {
@@ -157,7 +157,7 @@ export function Combobox({
           {isListed && (
             <div role="listbox" id={`${id}-list`} aria-label={label} ref={list}>
               {shownGroups.map((group, k) => (
-                // biome-ignore lint/a11y/useSemanticElements: a listbox holds groups, no fields
+                // biome-ignore lint/a11y/useSemanticElements: a listbox holds groups, not fields
                 <div
                   key={group.label}
                   role="group"
@@ -188,8 +188,8 @@ export function Combobox({
   )
 }
 
-function statusOf(count: number, jobs: { awaited: boolean; error: unknown }): string {
-  if (jobs.error !== null) return `The server cannot be asked: ${messageOf(jobs.error)}`
-  if (jobs.awaited) return 'Looking …'
-  return count === 0 ? 'Nothing fits.' : ''
+function statusOf(count: number, jobs: { pending: boolean; error: unknown }): string {
+  if (jobs.error !== null) return `Search failed: ${messageOf(jobs.error)}`
+  if (jobs.pending) return 'Searching …'
+  return count === 0 ? 'No matches.' : ''
 }

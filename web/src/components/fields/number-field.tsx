@@ -1,12 +1,8 @@
-/** A field for a number that counts once it is left or Enter is pressed. */
+/** A number field that commits its text on Enter or blur. */
 
 import { useState } from 'preact/hooks'
 
-/**
- * What is being written outlasts the news that a running job brings: each draws the page again.
- *
- * onChange: gets the text as it was written; empty where it is no number.
- */
+/** onChange: receives the text typed; empty if it is not a number. */
 export function NumberField({
   label,
   value,
@@ -22,6 +18,7 @@ export function NumberField({
   narrow?: boolean
   onChange: (text: string) => void
 }) {
+  // Local, so that updates of a running job do not overwrite the text being typed.
   const [written, setWritten] = useState<string | null>(null)
   return (
     <input

@@ -1,4 +1,4 @@
-/** A choice of few, as buttons beside each other. */
+/** A choice among a few options, as adjacent buttons. */
 
 export function Segmented<K extends string>({
   label,
@@ -8,7 +8,7 @@ export function Segmented<K extends string>({
   roomy = false,
 }: {
   label: string
-  /** Several where they come to the same; an empty list where none fits. */
+  /** Several for equivalent options; empty if none applies. */
   value: K | readonly K[]
   options: readonly (readonly [key: K, text: string])[]
   onChoose: (key: K) => void

@@ -1,4 +1,4 @@
-/** Rows of a table: which are shown, and in which order. Pure. */
+/** Sorting, filtering and paging of table rows. */
 
 export type Cell = string | number | null
 
@@ -7,7 +7,7 @@ export interface SortOrder {
   readonly descending: boolean
 }
 
-/** Rows in order of a value; what has none comes last in both directions, ties keep their order. */
+/** Stable sort by a value; rows without one come last in both directions. */
 export function sorted<R>(
   rows: readonly R[],
   value: (row: R) => Cell,
@@ -22,24 +22,24 @@ export function sorted<R>(
   })
 }
 
-/** Rows in which each word of the text occurs, in upper or lower case. */
+/** Rows that contain each word of the text, ignoring case. */
 export function matching<R>(
   rows: readonly R[],
   text: string,
   words: (row: R) => string,
 ): readonly R[] {
-  const wanted = text
+  const terms = text
     .toLowerCase()
     .split(/\s+/)
     .filter((word) => word !== '')
-  if (wanted.length === 0) return rows
+  if (terms.length === 0) return rows
   return rows.filter((row) => {
-    const found = words(row).toLowerCase()
-    return wanted.every((word) => found.includes(word))
+    const content = words(row).toLowerCase()
+    return terms.every((word) => content.includes(word))
   })
 }
 
-/** A page of rows, from 0; a page past the end is the last one. */
+/** A page of rows, counted from 0; clamped to the last page. */
 export function paged<R>(
   rows: readonly R[],
   page: number,

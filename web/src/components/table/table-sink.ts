@@ -1,4 +1,4 @@
-/** Where tables put their rows when a file is made of them, rather than being shown. */
+/** Context in which tables pass their rows to an export instead of rendering. */
 
 import { createContext } from 'preact'
 import type { Column } from './table'

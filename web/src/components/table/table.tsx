@@ -1,4 +1,4 @@
-/** A table that sorts by its headers and is shown in pages. */
+/** A table with sortable columns and paging. */
 
 import type { ComponentChildren } from 'preact'
 import { useContext, useState } from 'preact/hooks'
@@ -10,18 +10,18 @@ import { type CollectedTable, TableSink } from './table-sink'
 export interface Column<R> {
   readonly key: string
   readonly label: string
-  /** Written into the header in brackets; `1` is not written. */
+  /** Shown in brackets in the header; `1` is omitted. */
   readonly unit?: string
   readonly numeric?: boolean
-  /** What the column is sorted by; a column without it cannot be sorted here. */
+  /** Sort key; columns without one cannot be sorted by the table. */
   readonly value?: (row: R) => Cell
-  /** What a file holds, in full; the value itself if missing, or else the text that is shown. */
+  /** Exported value; the sort key by default, otherwise the text shown. */
   readonly data?: (row: R) => Cell
-  /** Whether whoever gives the rows can sort them by it. */
+  /** Whether the owner of externally sorted rows can sort by this column. */
   readonly sortable?: boolean
-  /** What is shown; the value itself if missing. */
+  /** Cell content; the sort key by default. */
   readonly cell?: (row: R) => ComponentChildren
-  /** Left out on narrow screens. */
+  /** Hidden on narrow screens. */
   readonly minor?: boolean
   /** Whether the cell is the row's header. */
   readonly header?: boolean
@@ -38,48 +38,47 @@ export function Table<R>({
   paging,
   tall = false,
   rowData,
-  elsewhere,
+  external,
 }: {
-  /** What the table holds; read by screen readers, and shown unless it is all hidden by style. */
+  /** Caption for screen readers. */
   caption: string
   columns: readonly Column<R>[]
   rows: readonly R[]
   rowKey: (row: R) => string
   order?: SortOrder
-  /** Told of every other order. */
   onOrder?: (order: SortOrder) => void
   pageSize?: number
-  /** The page that is shown, from 0, where the address holds it; else the table holds it itself. */
+  /** Current page, from 0, if the address holds it; internal state by default. */
   paging?: readonly [page: number, onPage: (page: number) => void]
   /** Scroll inside a box of limited height. */
   tall?: boolean
-  /** data- attributes of a row. */
+  /** `data-` attributes of a row. */
   rowData?: (row: R) => Record<`data-${string}`, string | number>
-  /** Of rows that come sorted: how they are, and what sorts them by another column. */
-  elsewhere?: { readonly order: SortOrder; readonly onOrder: (column: string) => void }
+  /** For rows sorted by the caller: their order, and the handler that changes it. */
+  external?: { readonly order: SortOrder; readonly onOrder: (column: string) => void }
 }) {
-  const [own, setOrder] = useState<SortOrder | null>(initial ?? null)
-  const order = elsewhere?.order ?? own
+  const [localOrder, setOrder] = useState<SortOrder | null>(initial ?? null)
+  const order = external?.order ?? localOrder
   const ownPage = useState(0)
-  const [wanted, setWanted] = paging ?? ownPage
+  const [requestedPage, setRequestedPage] = paging ?? ownPage
   const sink = useContext(TableSink)
   if (sink) {
     sink({ caption, columns, rows } as unknown as CollectedTable)
     return null
   }
-  const by = elsewhere ? undefined : columns.find(({ key }) => key === order?.column)?.value
+  const by = external ? undefined : columns.find(({ key }) => key === order?.column)?.value
   const inOrder = order && by ? sorted(rows, by, order.descending) : rows
-  const page = paged(inOrder, wanted, pageSize)
+  const page = paged(inOrder, requestedPage, pageSize)
   const reorder = (chosen: SortOrder) => {
-    if (elsewhere) return elsewhere.onOrder(chosen.column)
+    if (external) return external.onOrder(chosen.column)
     setOrder(chosen)
     onOrder?.(chosen)
-    // What comes first by the new order is what is looked for.
-    setWanted(0)
+    // A new order starts at the first page.
+    setRequestedPage(0)
   }
   return (
     <div>
-      {/* A box that scrolls must take the keyboard. */}
+      {/* A scrollable box must be reachable by keyboard. */}
       <section
         class={tall ? 'table-scroll tall' : 'table-scroll'}
         tabIndex={0}
@@ -93,7 +92,7 @@ export function Table<R>({
                 <Header
                   key={column.key}
                   column={column}
-                  sortable={elsewhere ? column.sortable === true : column.value !== undefined}
+                  sortable={external ? column.sortable === true : column.value !== undefined}
                   order={order}
                   onOrder={reorder}
                 />
@@ -116,7 +115,7 @@ export function Table<R>({
           pages={page.pages}
           total={rows.length}
           size={pageSize}
-          onPage={setWanted}
+          onPage={setRequestedPage}
         />
       )}
     </div>
@@ -189,9 +188,9 @@ function Pager({
   size,
   onPage,
 }: {
-  /** Of the table. */
+  /** Caption of the table. */
   caption: string
-  /** From 0. */
+  /** Counted from 0. */
   page: number
   pages: number
   total: number
@@ -200,7 +199,7 @@ function Pager({
 }) {
   const last = Math.min(total, (page + 1) * size)
   return (
-    // A group, not a landmark: several tables of a page may have one.
+    // A group, not a landmark: a page may have several tables.
     <fieldset class="pager" aria-label={`Pages of ${caption}`}>
       <span>
         {formatCount(page * size + 1)}–{formatCount(last)} of {formatCount(total)}

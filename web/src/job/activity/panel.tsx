@@ -1,4 +1,4 @@
-/** What workers do for a job: a timeline, their health, and the log of the job. */
+/** Activity of a job: timeline of its tasks, workers, and log. */
 
 import { get } from '../../api/client'
 import { usePolling, useResource } from '../../api/resource'
@@ -19,35 +19,35 @@ const LEVEL = oneOf<Level>(LEVELS, 'INFO')
 
 export function ActivityPanel({ job }: { job: Job }) {
   const [level, setLevel] = useQueryValue('level', LEVEL, 'INFO')
-  const found = useResource(`activity ${job.id} ${level} ${job.state}`, (signal) =>
+  const activity = useResource(`activity ${job.id} ${level} ${job.state}`, (signal) =>
     get('/v1/jobs/{job_id}/activity', { path: { job_id: job.id }, query: { level }, signal }),
   )
-  usePolling(found.reload, POLL_MS, ['queued', 'running', 'pausing'].includes(job.state))
-  if (found.error && !found.data) {
+  usePolling(activity.reload, POLL_MS, ['queued', 'running', 'pausing'].includes(job.state))
+  if (activity.error && !activity.data) {
     return (
       <ErrorNotice
-        what="What workers do cannot be shown."
-        error={found.error}
-        retry={found.reload}
+        what="Could not load the activity."
+        error={activity.error}
+        retry={activity.reload}
       />
     )
   }
-  if (!found.data) return <Loading what="what workers do" />
-  if (found.data.reason !== null) {
+  if (!activity.data) return <Loading what="the activity" />
+  if (activity.data.reason !== null) {
     return (
       <section class="card">
-        <Empty title="Nothing is known of its run">
-          <p>{sentence(found.data.reason)}</p>
+        <Empty title="No activity recorded">
+          <p>{sentence(activity.data.reason)}</p>
         </Empty>
       </section>
     )
   }
   return (
     <div class="stack">
-      <TimelineCard activity={found.data} />
+      <TimelineCard activity={activity.data} />
       <div class="grid">
-        <WorkersCard workers={found.data.workers} />
-        <LogCard messages={found.data.messages} level={level} onLevel={setLevel} />
+        <WorkersCard workers={activity.data.workers} />
+        <LogCard messages={activity.data.messages} level={level} onLevel={setLevel} />
       </div>
     </div>
   )
@@ -73,7 +73,7 @@ const WORKER_COLUMNS: readonly Column<Worker>[] = [
     value: ({ name }) => name,
     cell: ({ name, error }) => (
       <>
-        {name || 'no answer'}
+        {name || 'no response'}
         {error && <span class="wrong block small">{error}</span>}
       </>
     ),
@@ -102,7 +102,7 @@ function WorkersCard({ workers }: { workers: readonly Worker[] }) {
     <section class="card" aria-labelledby="workers">
       <h2 id="workers">Workers</h2>
       {workers.length === 0 ? (
-        <Empty title="No worker has answered yet" />
+        <Empty title="No worker has responded yet" />
       ) : (
         <Table
           caption="Workers of the job"
@@ -129,26 +129,24 @@ function LogCard({
       <header class="row spread">
         <h2 id="log">Log</h2>
         <select
-          aria-label="Least grave messages"
+          aria-label="Minimum level"
           value={level}
           onChange={(event) => onLevel(event.currentTarget.value as Level)}
         >
           {LEVELS.map((name) => (
             <option key={name} value={name}>
-              from {name.toLowerCase()} on
+              {name.toLowerCase()} and above
             </option>
           ))}
         </select>
       </header>
       {messages.length === 0 ? (
-        <Empty title="Nothing was written">
-          <p>
-            The server keeps the last lines that belong to a job, as grave as its own log level.
-          </p>
+        <Empty title="No messages">
+          <p>The server keeps a job’s latest messages at or above its log level.</p>
         </Empty>
       ) : (
-        // A box that scrolls must take the keyboard.
-        <section class="log-lines" tabIndex={0} aria-label="Lines of the log, the newest first">
+        // A scrollable box must be reachable by keyboard.
+        <section class="log-lines" tabIndex={0} aria-label="Log messages, newest first">
           <ol>
             {[...messages].reverse().map((message, k) => (
               <li key={`${message.at} ${k}`} data-level={message.level}>

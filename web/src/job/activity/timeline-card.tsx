@@ -1,4 +1,4 @@
-/** A timeline of iterations and walks by worker. */
+/** Timeline of iterations and tasks by worker. */
 
 import { useMemo } from 'preact/hooks'
 import type { Activity } from '../../api/types'
@@ -9,9 +9,9 @@ import { formatCount, formatNumber } from '../../format/number'
 import { formatMoment } from '../../format/time'
 import { type Bar, type Lane, type Timeline, timelineOf } from './timeline'
 
-/** Tasks that are drawn; more of them are a blur. */
+/** Most tasks drawn; more would blur. */
 const MOST = 300
-/** Of a lane's own coordinates, which are stretched to its box. */
+/** Width of a lane's coordinate system, stretched to its box. */
 const WIDTH = 1000
 
 export function TimelineCard({ activity }: { activity: Activity }) {
@@ -20,23 +20,23 @@ export function TimelineCard({ activity }: { activity: Activity }) {
   return (
     <ChartFrame
       title="Timeline"
-      note={`The last ${formatCount(drawn)} tasks over ${formatNumber(timeline.seconds, 3)} s, by the machine that walked them; lines show where iterations begin.`}
+      note={`The last ${formatCount(drawn)} tasks over ${formatNumber(timeline.seconds, 3)} s by machine; lines mark the starts of iterations.`}
       legend={
         <>
           <LegendEntry of="task-computed" label="computing" />
-          <LegendEntry of="task-waiting" label="on its way or waiting" />
-          <LegendEntry of="task-failed" label="without a result" />
+          <LegendEntry of="task-waiting" label="in transit or waiting" />
+          <LegendEntry of="task-failed" label="failed" />
         </>
       }
       table={() => <TaskTable tasks={activity.tasks} />}
     >
       {drawn === 0 ? (
-        <Empty title="No task has ended yet" />
+        <Empty title="No task has finished yet" />
       ) : (
         <div class="timeline" role="img" aria-label={inWords(timeline)}>
           {timeline.workers.map(({ worker, lanes }) => (
             <div class="timeline-worker" key={worker} data-worker={worker}>
-              <span class="small">{worker || 'no answer'}</span>
+              <span class="small">{worker || 'no response'}</span>
               <div>
                 {lanes.map((lane, k) => (
                   <LaneRow key={k} lane={lane} timeline={timeline} />
@@ -66,7 +66,7 @@ function LaneRow({ lane, timeline }: { lane: Lane; timeline: Timeline }) {
       {lane.map((bar, k) => (
         <TaskBar key={k} bar={bar} x={x} />
       ))}
-      {timeline.iterations.map(({ iteration, begun }) => (
+      {timeline.iterations.map(({ iteration, start: begun }) => (
         <line key={iteration} x1={x(begun)} x2={x(begun)} y1={0} y2={10} />
       ))}
     </svg>
@@ -74,7 +74,7 @@ function LaneRow({ lane, timeline }: { lane: Lane; timeline: Timeline }) {
 }
 
 function TaskBar({ bar, x }: { bar: Bar; x: (seconds: number) => number }) {
-  const [left, width] = [x(bar.begun), Math.max(1, x(bar.ended - bar.begun))]
+  const [left, width] = [x(bar.start), Math.max(1, x(bar.end - bar.start))]
   const box = { y: 1, height: 8 }
   if (bar.task.error !== null) return <rect class="task-failed" x={left} width={width} {...box} />
   const computed = width * bar.computed
@@ -89,7 +89,7 @@ function TaskBar({ bar, x }: { bar: Bar; x: (seconds: number) => number }) {
 function inWords({ workers, seconds }: Timeline): string {
   const each = workers.map(({ worker, lanes }) => {
     const tasks = lanes.reduce((sum, lane) => sum + lane.length, 0)
-    return `${worker || 'no answer'}: ${tasks} tasks, at most ${lanes.length} at once`
+    return `${worker || 'no response'}: ${tasks} tasks, at most ${lanes.length} at once`
   })
   return `Timeline of ${formatNumber(seconds, 3)} s. ${each.join('; ')}`
 }
@@ -99,13 +99,13 @@ type Row = { readonly task: Activity['tasks'][number]; readonly number: number }
 const COLUMNS: readonly Column<Row>[] = [
   {
     key: 'begun',
-    label: 'Begun',
+    label: 'Started',
     header: true,
     value: ({ task }) => task.begun_at,
     cell: ({ task }) => formatMoment(task.begun_at),
   },
   { key: 'iteration', label: 'Iteration', numeric: true, value: ({ task }) => task.iteration },
-  { key: 'worker', label: 'Machine', value: ({ task }) => task.worker || 'no answer' },
+  { key: 'worker', label: 'Machine', value: ({ task }) => task.worker || 'no response' },
   { key: 'walks', label: 'Walks', numeric: true, value: ({ task }) => task.walks },
   {
     key: 'seconds',
@@ -123,14 +123,14 @@ const COLUMNS: readonly Column<Row>[] = [
     value: ({ task }) => task.compute_seconds,
     cell: ({ task }) => formatNumber(task.compute_seconds, 3),
   },
-  { key: 'error', label: 'Why without a result', value: ({ task }) => task.error ?? '' },
+  { key: 'error', label: 'Error', value: ({ task }) => task.error ?? '' },
 ]
 
 function TaskTable({ tasks }: { tasks: Activity['tasks'] }) {
   const rows = [...tasks].reverse().map((task, number) => ({ task, number }))
   return (
     <Table
-      caption="Tasks, the last first"
+      caption="Tasks, newest first"
       rows={rows}
       rowKey={({ number }) => String(number)}
       columns={COLUMNS}

@@ -1,4 +1,4 @@
-/** Whether the winner lies at a bound of the search, and the way to search beyond it. */
+/** Bounds that the winner touches, with a link to search beyond them. */
 
 import type { Importance, Job, VariableImportance } from '../../api/types'
 import { BrokenName } from '../../components/broken-name'
@@ -8,31 +8,35 @@ import { exactQuantity, formatExact } from '../../format/number'
 import { withQuery } from '../../router/routes'
 import { widenQuery } from './outputs'
 
-export function BoundsCard({ job, found }: { job: Job; found: Importance }) {
-  const held = found.variables.filter(({ at }) => at !== null)
-  const widen = widenQuery(found)
+export function BoundsCard({ job, importance }: { job: Job; importance: Importance }) {
+  const active = importance.variables.filter(({ at }) => at !== null)
+  const widen = widenQuery(importance)
   return (
-    <section class="card" aria-labelledby="bounds" data-held={held.map((v) => v.name).join(' ')}>
+    <section
+      class="card"
+      aria-labelledby="bounds"
+      data-active-bounds={active.map((v) => v.name).join(' ')}
+    >
       <header class="row spread">
-        <h2 id="bounds">Bounds that hold the winner</h2>
+        <h2 id="bounds">Active bounds</h2>
         {widen !== '' && (
           <a class="button" href={withQuery('/jobs/new', { clone: job.id, widen })}>
             Widen and run again
           </a>
         )}
       </header>
-      {held.length === 0 ? (
-        <Empty title={found.iteration === null ? 'No winner yet' : 'None'}>
+      {active.length === 0 ? (
+        <Empty title={importance.iteration === null ? 'No winner yet' : 'None'}>
           <p>
-            {found.iteration === null
-              ? 'It is told here as soon as a design has walked in every case.'
-              : 'The winner lies inside the bounds of every variable, by a hundredth of the range at least.'}
+            {importance.iteration === null
+              ? 'The active bounds appear here once a design has walked in every scenario.'
+              : 'The winner is at least 1 % of the range away from every bound.'}
           </p>
         </Empty>
       ) : (
         <Table
-          caption="Variables in which the winner lies at a bound"
-          rows={held}
+          caption="Variables with the winner at a bound"
+          rows={active}
           rowKey={({ name }) => name}
           columns={[
             {
@@ -44,7 +48,7 @@ export function BoundsCard({ job, found }: { job: Job; found: Importance }) {
             },
             {
               key: 'winner',
-              label: 'The winner',
+              label: 'Winner',
               numeric: true,
               value: ({ winner }) => winner,
               cell: ({ winner, unit }) => exactQuantity(winner, unit),
@@ -52,7 +56,7 @@ export function BoundsCard({ job, found }: { job: Job; found: Importance }) {
             { key: 'at', label: 'Bound', value: ({ at }) => at },
             {
               key: 'bounds',
-              label: 'Searched',
+              label: 'Search bounds',
               cell: ({ low, high }) => `${formatExact(low)} to ${formatExact(high)}`,
             },
             { key: 'widened', label: 'Wider bounds', cell: widerWords },
@@ -64,6 +68,6 @@ export function BoundsCard({ job, found }: { job: Job; found: Importance }) {
 }
 
 function widerWords({ widened }: VariableImportance): string {
-  if (!widened) return 'none known that can be simulated'
+  if (!widened) return 'none that can be simulated'
   return `${formatExact(widened.low)} to ${formatExact(widened.high)}`
 }

@@ -1,4 +1,4 @@
-/** How much of an output goes with each variable alone, with intervals. */
+/** Sobol’ indices of the variables, with confidence intervals. */
 
 import type { Importance, VariableImportance } from '../../api/types'
 import { ChartFrame } from '../../charts/chart-frame'
@@ -10,15 +10,15 @@ import { setQuery, usePlace } from '../../router/navigation'
 import { byImportance, indexOf, type Output, outputsOf, outputWords } from './outputs'
 import '../bars.css'
 
-export function ImportanceCard({ found }: { found: Importance }) {
+export function ImportanceCard({ importance }: { importance: Importance }) {
   const { query } = usePlace()
-  const outputs = outputsOf(found)
+  const outputs = outputsOf(importance)
   const output = outputs.find((name) => name === query.get('of')) ?? 'fitness'
-  const known = found.variables.some((variable) => indexOf(variable, output) !== null)
+  const hasEstimate = importance.variables.some((variable) => indexOf(variable, output) !== null)
   return (
     <ChartFrame
-      title="Which variables matter"
-      note={`Share of the variance of ${outputWords(output)}, by rank, that goes with a variable alone: first-order Sobol’ index, its interval of 95 % as a line.`}
+      title="Variable importance"
+      note={`Share of the variance of ${outputWords(output)}, by rank, explained by each variable alone: first-order Sobol’ index with its 95 % interval as a line.`}
       tools={
         <label class="row small">
           <span>For</span>
@@ -31,26 +31,26 @@ export function ImportanceCard({ found }: { found: Importance }) {
           </select>
         </label>
       }
-      table={() => <ImportanceTable found={found} outputs={outputs} />}
+      table={() => <ImportanceTable importance={importance} outputs={outputs} />}
     >
-      {known ? (
+      {hasEstimate ? (
         <ul class="bars" data-output={output}>
-          {byImportance(found, output).map((variable) => (
+          {byImportance(importance, output).map((variable) => (
             <Bar key={variable.name} variable={variable} output={output} />
           ))}
         </ul>
       ) : (
-        <Empty title="Too little is known yet">
+        <Empty title="Not enough designs yet">
           <p>
-            {formatCount(found.designs)} designs walk in every case; from some twenty on that differ
-            in what they are worth, it is told here what goes with which variable.
+            {formatCount(importance.designs)} designs walk in every scenario. The estimate needs
+            about twenty with different values.
           </p>
         </Empty>
       )}
       <p class="muted small table-note">
-        Among {formatCount(found.sampled)} designs that the search tried, of which those that fail
-        count for failing alone. A search does not draw at random: variables that moved together
-        share what either does, and what two do only together is in neither.
+        Based on {formatCount(importance.sampled)} designs of the search; failed ones count only
+        towards failing. The search does not sample independently: correlated variables share their
+        effect, and interactions between variables are not included.
       </p>
     </ChartFrame>
   )
@@ -82,13 +82,13 @@ function Bar({ variable, output }: { variable: VariableImportance; output: Outpu
             </>
           )}
         </span>
-        <span class="bar-value">{index ? percent(index.value, 2) : 'not known'}</span>
+        <span class="bar-value">{index ? percent(index.value, 2) : 'unknown'}</span>
       </span>
     </li>
   )
 }
 
-/** A correlation from which on one of two variables may only seem to matter. */
+/** Correlation above which the importance of one of two variables may be spurious. */
 const TOGETHER = 0.5
 
 function Companion({ variable: { moved_with, correlation } }: { variable: VariableImportance }) {
@@ -96,12 +96,18 @@ function Companion({ variable: { moved_with, correlation } }: { variable: Variab
   return (
     <span class="muted small">
       {' '}
-      moved with {moved_with} ({formatNumber(correlation, 2)})
+      correlated with {moved_with} ({formatNumber(correlation, 2)})
     </span>
   )
 }
 
-function ImportanceTable({ found, outputs }: { found: Importance; outputs: readonly Output[] }) {
+function ImportanceTable({
+  importance,
+  outputs,
+}: {
+  importance: Importance
+  outputs: readonly Output[]
+}) {
   const columns: Column<VariableImportance>[] = [
     {
       key: 'name',
@@ -121,7 +127,7 @@ function ImportanceTable({ found, outputs }: { found: Importance; outputs: reado
     ),
     {
       key: 'moved_with',
-      label: 'Moved with',
+      label: 'Correlated with',
       value: ({ correlation }) => correlation,
       cell: ({ moved_with, correlation }) =>
         moved_with === null ? NONE : `${moved_with} (${formatNumber(correlation, 2)})`,
@@ -130,7 +136,7 @@ function ImportanceTable({ found, outputs }: { found: Importance; outputs: reado
   return (
     <Table
       caption="Importance of every variable"
-      rows={found.variables}
+      rows={importance.variables}
       rowKey={({ name }) => name}
       order={{ column: 'fitness', descending: true }}
       columns={columns}

@@ -1,20 +1,21 @@
-/** What the importance of variables is told for: fitness, failing, and each objective. Pure. */
+/** Outputs for which importance is estimated: fitness, failure and each objective. */
 
 import type { Importance, ImportanceIndex, VariableImportance } from '../../api/types'
 import { inWords } from '../../format/words'
 
-/** Name of an output, as it stands in the address. */
+/** Name of an output, as in the address. */
 export type Output = string
 
-/** Outputs of which something is known of at least one variable, and the fitness. */
-export function outputsOf(found: Importance): readonly Output[] {
-  const all = ['fitness', ...found.objectives, 'failing']
-  const known = (output: Output) => found.variables.some((v) => indexOf(v, output) !== null)
-  return all.filter((output) => output === 'fitness' || known(output))
+/** The fitness, and the outputs with an estimate for at least one variable. */
+export function outputsOf(importance: Importance): readonly Output[] {
+  const all = ['fitness', ...importance.objectives, 'failing']
+  const hasEstimate = (output: Output) =>
+    importance.variables.some((v) => indexOf(v, output) !== null)
+  return all.filter((output) => output === 'fitness' || hasEstimate(output))
 }
 
 export function outputWords(output: Output): string {
-  return output === 'failing' ? 'whether a design fails' : inWords(output)
+  return output === 'failing' ? 'failing' : inWords(output)
 }
 
 export function indexOf(variable: VariableImportance, output: Output): ImportanceIndex | null {
@@ -23,15 +24,18 @@ export function indexOf(variable: VariableImportance, output: Output): Importanc
   return variable.objectives[output] ?? null
 }
 
-/** Variables by what they do to an output, those that matter most first. */
-export function byImportance(found: Importance, output: Output): readonly VariableImportance[] {
+/** Variables by decreasing importance for an output. */
+export function byImportance(
+  importance: Importance,
+  output: Output,
+): readonly VariableImportance[] {
   const value = (variable: VariableImportance) => indexOf(variable, output)?.value ?? -1
-  return [...found.variables].sort((a, b) => value(b) - value(a))
+  return [...importance.variables].sort((a, b) => value(b) - value(a))
 }
 
-/** Bounds to search anew, as the form of a new job takes them: `P:0.05:1.5,I:0:2`. */
-export function widenQuery(found: Importance): string {
-  return found.variables
+/** Wider bounds as a query value of the new-job form: `P:0.05:1.5,I:0:2`. */
+export function widenQuery(importance: Importance): string {
+  return importance.variables
     .flatMap(({ name, widened }) => (widened ? [`${name}:${widened.low}:${widened.high}`] : []))
     .join(',')
 }

@@ -1,4 +1,4 @@
-/** What decides what designs are worth: which variables matter, and which bounds hold the winner. */
+/** Analysis of a job: importance of its variables, and active bounds. */
 
 import { useRef } from 'preact/hooks'
 import { get } from '../../api/client'
@@ -8,7 +8,7 @@ import { Empty, ErrorNotice, Loading } from '../../components/feedback'
 import { BoundsCard } from './bounds-card'
 import { ImportanceCard } from './importance-card'
 
-/** How often a running job is asked again [ms]. */
+/** Polling interval of a running job [ms]. */
 const RENEW_MS = 8000
 
 export function AnalysisPanel({ job }: { job: Job }) {
@@ -17,7 +17,7 @@ export function AnalysisPanel({ job }: { job: Job }) {
     return (
       <section class="card">
         <Empty title="Nothing to analyse yet">
-          <p>Which variables matter is told here from the first committed iteration on.</p>
+          <p>Variable importance appears here after the first iteration.</p>
         </Empty>
       </section>
     )
@@ -26,26 +26,26 @@ export function AnalysisPanel({ job }: { job: Job }) {
 }
 
 function Analysis({ job, iterations }: { job: Job; iterations: number }) {
-  const found = useResource(`${job.id} ${iterations}`, (signal) =>
+  const importance = useResource(`${job.id} ${iterations}`, (signal) =>
     get('/v1/jobs/{job_id}/importance', { path: { job_id: job.id }, signal }),
   )
-  // While a newer one is on its way, the one before stays to be looked at.
+  // Keep the previous result while the next one loads.
   const shown = useRef<Importance | null>(null)
-  if (found.data) shown.current = found.data
+  if (importance.data) shown.current = importance.data
   return (
     <div class="stack">
-      {found.error && (
+      {importance.error && (
         <ErrorNotice
-          what="Which variables matter cannot be told."
-          error={found.error}
-          retry={found.reload}
+          what="Could not load the variable importance."
+          error={importance.error}
+          retry={importance.reload}
         />
       )}
-      {!shown.current && found.loading && <Loading what="which variables matter" />}
+      {!shown.current && importance.loading && <Loading what="variable importance" />}
       {shown.current && (
         <>
-          <ImportanceCard found={shown.current} />
-          <BoundsCard job={job} found={shown.current} />
+          <ImportanceCard importance={shown.current} />
+          <BoundsCard job={job} importance={shown.current} />
         </>
       )}
     </div>

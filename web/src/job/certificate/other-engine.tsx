@@ -1,4 +1,4 @@
-/** What another engine makes of a certificate's nominal world, beside what ours makes of it. */
+/** A certificate's nominal world in another physics engine, compared with gaitswarm. */
 
 import type { Compared, ComparedEngine, Job } from '../../api/types'
 import { type Column, Table } from '../../components/table/table'
@@ -9,9 +9,9 @@ interface Row {
   readonly scenario: string
   readonly quantity: string
   readonly unit: string
-  /** How both walks ended, if one of them failed. */
+  /** Both final statuses, if either failed. */
   readonly ended: string
-  readonly found: Compared
+  readonly comparison: Compared
 }
 
 export function OtherEngine({
@@ -28,9 +28,9 @@ export function OtherEngine({
   const id = `engine-${name}`
   return (
     <section class="card" aria-labelledby={id} data-engine={name}>
-      <h2 id={id}>The nominal world in {name}</h2>
+      <h2 id={id}>Nominal world in {name}</h2>
       <p>
-        {engine.description}. It walks in <strong>{walked}</strong> of {scenarios.length} scenarios,
+        {engine.description}. <strong>{walked}</strong> of {scenarios.length} scenarios succeed,
         with a fitness of {formatNumber(engine.fitness.theirs)} instead of{' '}
         {formatNumber(engine.fitness.ours)}: {asPercent(engine.fitness)}.
       </p>
@@ -46,22 +46,22 @@ export function OtherEngine({
 }
 
 function rowsOf(engine: ComparedEngine, objectives: Job['objectives']): readonly Row[] {
-  return Object.entries(engine.scenarios).flatMap(([scenario, found]) => {
-    const { ours, theirs } = found
+  return Object.entries(engine.scenarios).flatMap(([scenario, comparison]) => {
+    const { ours, theirs } = comparison
     const ended = ours === 'ok' && theirs === 'ok' ? '' : `${ours}, ${theirs}`
     const one = (quantity: string, unit: string, compared: Compared): Row => ({
       scenario,
       quantity,
       unit,
       ended,
-      found: compared,
+      comparison: compared,
     })
     return [
       ...objectives.flatMap(({ name, unit }) => {
-        const compared = found.objectives[name]
+        const compared = comparison.objectives[name]
         return compared ? [one(name, unit, compared)] : []
       }),
-      one('utility', '1', found.utility),
+      one('utility', '1', comparison.utility),
     ]
   })
 }
@@ -85,20 +85,21 @@ function columnsOf(name: string): readonly Column<Row>[] {
       key: 'ours',
       label: 'gaitswarm',
       numeric: true,
-      cell: ({ found }) => formatNumber(found.ours),
+      cell: ({ comparison }) => formatNumber(comparison.ours),
     },
     {
       key: 'theirs',
       label: name,
       numeric: true,
-      cell: ({ found }) => formatNumber(found.theirs),
+      cell: ({ comparison }) => formatNumber(comparison.theirs),
     },
     {
       key: 'difference',
       label: 'Difference',
       numeric: true,
-      value: ({ found }) => (found.difference === null ? null : Math.abs(found.difference)),
-      cell: ({ found }) => asPercent(found),
+      value: ({ comparison }) =>
+        comparison.difference === null ? null : Math.abs(comparison.difference),
+      cell: ({ comparison }) => asPercent(comparison),
     },
   ]
 }

@@ -1,4 +1,4 @@
-/** What a design comes to in many worlds: how often it fails, how bad it gets, and where. */
+/** Robustness of a design over many worlds: failures, distribution of utility, worst worlds. */
 
 import { get } from '../../api/client'
 import { usePolling, useResource } from '../../api/resource'
@@ -16,10 +16,10 @@ import { type Column, Table } from '../../components/table/table'
 import { change, formatCount, formatNumber, percent } from '../../format/number'
 import { inWords } from '../../format/words'
 import { withQuery } from '../../router/routes'
-import { isComputed } from '../state'
+import { isRunning } from '../state'
 import { OtherEngine } from './other-engine'
 
-/** How often the certificate of a job that runs is asked for again [ms]. */
+/** Polling interval while the job runs [ms]. */
 const RENEW_MS = 15_000
 
 interface Row {
@@ -35,7 +35,7 @@ export function CertificatePanel({ job }: { job: Job }) {
     return (
       <section class="card">
         <Empty title="No world yet">
-          <p>The summary appears here as soon as the first batch of worlds has walked.</p>
+          <p>The summary appears here once the first batch of worlds has been simulated.</p>
         </Empty>
       </section>
     )
@@ -44,73 +44,78 @@ export function CertificatePanel({ job }: { job: Job }) {
 }
 
 function Certified({ job }: { job: Job }) {
-  const found = useResource(job.id, (signal) =>
+  const certificate = useResource(job.id, (signal) =>
     get('/v1/jobs/{job_id}/certificate', {
       path: { job_id: job.id },
       query: { most: 20 },
       signal,
     }),
   )
-  usePolling(found.reload, RENEW_MS, isComputed(job))
+  usePolling(certificate.reload, RENEW_MS, isRunning(job))
   return (
     <div class="stack">
-      {found.error && (
+      {certificate.error && (
         <ErrorNotice
-          what="The certificate cannot be shown."
-          error={found.error}
-          retry={found.reload}
+          what="Could not load the certificate."
+          error={certificate.error}
+          retry={certificate.reload}
         />
       )}
-      {found.loading && !found.data && <Loading what="the certificate" />}
-      {found.data && (
+      {certificate.loading && !certificate.data && <Loading what="the certificate" />}
+      {certificate.data && (
         <>
-          <Scenarios found={found.data} />
-          {Object.entries(found.data.engines ?? {}).map(([name, engine]) => (
+          <Scenarios certificate={certificate.data} />
+          {Object.entries(certificate.data.engines ?? {}).map(([name, engine]) => (
             <OtherEngine key={name} name={name} engine={engine} objectives={job.objectives} />
           ))}
-          <Worlds job={job} worlds={found.data.worst} />
-          <Influences influences={found.data.influences} />
+          <Worlds job={job} worlds={certificate.data.worst} />
+          <Influences influences={certificate.data.influences} />
         </>
       )}
     </div>
   )
 }
 
-function Scenarios({ found }: { found: Certificate }) {
-  const { failed, fell } = found
+function Scenarios({ certificate }: { certificate: Certificate }) {
+  const { failed, fell } = certificate
   return (
     <section class="card" aria-labelledby="certificate">
-      <h2 id="certificate">The design in {formatCount(found.worlds)} worlds</h2>
+      <h2 id="certificate">Failures in {formatCount(certificate.worlds)} worlds</h2>
       <p data-failed={failed.count} data-fell={fell.count}>
-        A walk failed in <strong>{formatCount(failed.count)}</strong> of them
-        {failed.count > 0 && <>, the robot fell in {formatCount(fell.count)}</>}. In such worlds a
-        walk fails with a probability of {percent(failed.low, 2)} to {percent(failed.high, 2)}: an
-        exact interval of 95&nbsp;%.
+        A simulation failed in <strong>{formatCount(failed.count)}</strong> of them
+        {failed.count > 0 && <>; the robot fell in {formatCount(fell.count)}</>}. The probability of
+        a failure in such a world is {percent(failed.low, 2)} to {percent(failed.high, 2)} (exact
+        95&nbsp;% interval).
       </p>
       <Table
         caption="Utility by scenario"
-        rows={rowsOf(found)}
+        rows={rowsOf(certificate)}
         rowKey={({ name }) => name}
         columns={COLUMNS}
         rowData={({ name }) => ({ 'data-scenario': name })}
       />
       <p class="muted small table-note">
-        Less is better. CVaR is the mean of the worst 5&nbsp;% of worlds, in which a failed walk
-        counts as the worst that did not fail. Held-out scenarios are none of table 4.2.
+        Lower is better. CVaR is the mean of the worst 5&nbsp;% of worlds; a failure counts as the
+        worst success. Held-out scenarios are not among those of table 4.2.
       </p>
     </section>
   )
 }
 
-function rowsOf(found: Certificate): readonly Row[] {
-  const one = ([name, scenario]: [string, CertifiedScenario]): Row => ({
+function rowsOf(certificate: Certificate): readonly Row[] {
+  const rowOf = ([name, scenario]: [string, CertifiedScenario]): Row => ({
     name,
     heldOut: scenario.held_out,
     failed: scenario.failed,
     spread: scenario.utility,
   })
-  const all = { name: 'all', heldOut: false, failed: found.failed, spread: found.fitness }
-  return [...Object.entries(found.scenarios).map(one), all]
+  const all = {
+    name: 'all',
+    heldOut: false,
+    failed: certificate.failed,
+    spread: certificate.fitness,
+  }
+  return [...Object.entries(certificate.scenarios).map(rowOf), all]
 }
 
 const COLUMNS: readonly Column<Row>[] = [
@@ -130,7 +135,7 @@ const COLUMNS: readonly Column<Row>[] = [
   },
   {
     key: 'high',
-    label: 'At most',
+    label: 'Failure rate at most',
     numeric: true,
     minor: true,
     value: ({ failed }) => failed.high,
@@ -192,7 +197,7 @@ function Worlds({ job, worlds }: { job: Job; worlds: readonly World[] }) {
           },
         ]}
       />
-      <p class="muted small table-note">A world’s number leads to its walk.</p>
+      <p class="muted small table-note">A world’s number links to its simulation.</p>
     </section>
   )
 }
@@ -201,9 +206,9 @@ function Influences({ influences }: { influences: readonly Influence[] }) {
   if (influences.length === 0) return null
   return (
     <section class="card" aria-labelledby="influences">
-      <h2 id="influences">What goes with bad worlds</h2>
+      <h2 id="influences">Perturbations that correlate with poor fitness</h2>
       <Table
-        caption="Rank correlation of perturbations with the fitness"
+        caption="Rank correlation of perturbations with fitness"
         rows={influences}
         rowKey={({ name }) => name}
         columns={[
@@ -223,7 +228,7 @@ function Influences({ influences }: { influences: readonly Influence[] }) {
           },
           {
             key: 'interval',
-            label: 'Interval of 95 %',
+            label: '95 % interval',
             numeric: true,
             cell: ({ low, high }) => `${change(low, '1', 2)} to ${change(high, '1', 2)}`,
           },

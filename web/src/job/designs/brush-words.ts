@@ -1,9 +1,9 @@
-/** A selection over axes as a part of an address: `FI1R:1500:3000,fitness:10:12`. Pure. */
+/** Selections on axes as query values: `FI1R:1500:3000,fitness:10:12`. */
 
 import type { Brushes } from '../../charts/parallel/parallel-coordinates'
 import { type Axis, type Brush, placeOf, valueAt } from '../../charts/parallel/parallel-model'
 
-/** Axes by value rather than by place, so that a link means the same when bounds have moved. */
+/** Write brushes by value, not by position, so that links stay valid when bounds change. */
 export function brushWords(axes: readonly Axis[], brushes: Brushes): string | null {
   const words = [...brushes].map(([index, brush]) => {
     const ends = brush.map((place) => Number(valueAt(axes[index], place).toPrecision(6)))
@@ -12,7 +12,7 @@ export function brushWords(axes: readonly Axis[], brushes: Brushes): string | nu
   return words.length === 0 ? null : words.join(',')
 }
 
-/** Axes that are not shown, and what means nothing, are told by `unknown`. */
+/** Parse brushes; `unknown` collects those of hidden axes and invalid ones. */
 export function brushesOf(
   axes: readonly Axis[],
   text: string | null,

@@ -1,4 +1,4 @@
-/** All designs of a job as columns of numbers, as /v1/jobs/{id}/particles sends them. */
+/** All designs of a job as numeric columns, decoded from /v1/jobs/{id}/particles. */
 
 import type { DataTable } from '../../export/csv'
 import { withUnit } from '../../format/number'
@@ -7,19 +7,19 @@ import { named } from '../../format/value'
 export interface ParticleColumn {
   readonly name: string
   readonly unit: string
-  /** Bounds of a searched variable; null for what has none. */
+  /** Bounds of a searched variable; null for other columns. */
   readonly low: number | null
   readonly high: number | null
   readonly kind: string
-  /** Names of what a categorical variable's values are indices of; else none. */
+  /** Names of the choices that the values index; empty unless categorical. */
   readonly choices: readonly string[]
-  /** One per design; NaN where there is none. */
+  /** One value per design; NaN if missing. */
   readonly values: Float32Array
 }
 
 export interface Particles {
   readonly rows: number
-  /** Designs that the job has; more than `rows` if they were thinned. */
+  /** Number of designs of the job; greater than `rows` if the response was thinned. */
   readonly total: number
   readonly columns: readonly ParticleColumn[]
 }
@@ -30,7 +30,7 @@ interface Header {
   columns: Omit<ParticleColumn, 'values'>[]
 }
 
-/** Read the answer: length of the header (uint32), header (JSON, padded), columns (float32). */
+/** Decode: length of the header (uint32), header (JSON, padded), columns (float32). */
 export function decodeParticles(buffer: ArrayBuffer): Particles {
   const length = new DataView(buffer).getUint32(0, true)
   const text = new TextDecoder().decode(new Uint8Array(buffer, 4, length))
@@ -46,7 +46,7 @@ export function columnNamed(particles: Particles, name: string): ParticleColumn 
   return particles.columns.find((column) => column.name === name) ?? null
 }
 
-/** Some of the designs, with every column. rows: in the order wanted. */
+/** The given rows with all columns, in the given order. */
 export function particlesTable({ columns }: Particles, rows: Iterable<number>): DataTable {
   return {
     name: 'Designs',
@@ -59,7 +59,7 @@ export function particlesTable({ columns }: Particles, rows: Iterable<number>): 
   }
 }
 
-/** The shortest number that is the same float32, so that 0.1 is not 0.10000000149011612. */
+/** Shortest decimal that is the same float32: 0.1, not 0.10000000149011612. */
 function written(value: number): number {
   for (let digits = 6; digits < 9; digits++) {
     const short = Number(value.toPrecision(digits))

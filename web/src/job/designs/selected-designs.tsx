@@ -1,4 +1,4 @@
-/** Some designs of a job as a table, each with the way to its walk. */
+/** Table of designs with links to their simulations. */
 
 import type { Job } from '../../api/types'
 import { type Column, Table } from '../../components/table/table'
@@ -20,9 +20,9 @@ export function SelectedDesigns({
 }: {
   job: Job
   particles: Particles
-  /** Rows of `particles`, in the order wanted. */
+  /** Rows of `particles`, in order. */
   rows: readonly number[]
-  /** Row that stands out. */
+  /** Highlighted row. */
   marked?: number | null
 }) {
   const iteration = columnNamed(particles, 'iteration')!.values
@@ -61,7 +61,7 @@ export function SelectedDesigns({
   )
 }
 
-/** Place of a design, leading to its walk; where nothing walks, to its iteration. */
+/** Link to a design's simulation, or to its iteration if it has none. */
 export function Where({
   job,
   iteration,
@@ -84,6 +84,6 @@ export function Where({
 }
 
 function labelOf({ name, kind }: ParticleColumn, job: Job): string {
-  if (kind === 'utility') return name.replace(/^utility:/, `${caseWords(job.kind).worth} `)
+  if (kind === 'utility') return name.replace(/^utility:/, `${caseWords(job.kind).measure} `)
   return kind === 'objective' ? inWords(name.replace(/^objective:/, '')) : name
 }

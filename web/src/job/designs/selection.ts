@@ -1,4 +1,4 @@
-/** Designs that were selected by stretches of axes, on whatever part of the job's page. Pure. */
+/** Selection of designs shared by the tabs of a job. */
 
 import { type AxisSource, buildModel, selectRows } from '../../charts/parallel/parallel-model'
 import { brushesOf } from './brush-words'
@@ -7,22 +7,22 @@ import { columnNamed, type Particles } from './particles'
 /** Kinds of columns that are variables. */
 const VARIABLES = new Set(['continuous', 'integer', 'categorical'])
 
-/** What of an address parts of a job's page have in common: the selection and the marked design. */
+/** Query parameters shared by the tabs: the selection and the highlighted design. */
 export const SHARED = ['brush', 'objectives', 'utilities', 'design'] as const
 
-/** Variables, what else is asked for by its kind, and the fitness last. */
+/** Variables, the requested kinds of columns, and finally the fitness. */
 export function axesOf(
   { columns }: Particles,
   more: { readonly utility: boolean; readonly objective: boolean },
 ): readonly AxisSource[] {
-  const wanted = columns.filter(
+  const selected = columns.filter(
     ({ kind }) =>
       VARIABLES.has(kind) ||
       (kind === 'utility' && more.utility) ||
       (kind === 'objective' && more.objective),
   )
   const fitness = columns.filter(({ kind }) => kind === 'fitness')
-  return [...wanted, ...fitness].map((column) => ({
+  return [...selected, ...fitness].map((column) => ({
     name: column.name.replace(/^(utility|objective):/, ''),
     unit: column.unit,
     low: column.low,
@@ -33,7 +33,7 @@ export function axesOf(
   }))
 }
 
-/** Rows that an address selects, as `brushWords` wrote it; null where it selects none or all. */
+/** Rows selected by a query value written by `brushWords`; null if it selects none or all. */
 export function selectedRows(particles: Particles, words: string | null): Uint32Array | null {
   if (!words) return null
   const sources = axesOf(particles, { utility: true, objective: true })

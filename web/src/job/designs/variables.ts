@@ -1,9 +1,9 @@
-/** The variables of a job, as its spec writes them out. */
+/** Variables of a job's spec. */
 
 import type { Job, Variable } from '../../api/types'
 
-/** What the optimizer searches, with bounds and units. */
+/** The searched variables, with bounds and units. */
 export function searchedVariables(spec: Job['spec']): readonly Variable[] {
-  // A stored spec names no presets, every variable is written out.
+  // Presets are resolved in a stored spec.
   return (spec.variables ?? []).filter((v): v is Variable => typeof v !== 'string')
 }

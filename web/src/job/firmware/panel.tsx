@@ -1,4 +1,4 @@
-/** The best design as C for a microcontroller: what it takes of flash and RAM, and the download. */
+/** Firmware of the best design: memory use, contents and download. */
 
 import { useState } from 'preact/hooks'
 import { get, url } from '../../api/client'
@@ -10,7 +10,7 @@ import { Table } from '../../components/table/table'
 import { formatCount, formatNumber, NONE, percent, quantity } from '../../format/number'
 import { inWords } from '../../format/words'
 
-/** Bits of a fuzzy table's indices, of angle error and current. */
+/** Index bits of a fuzzy table, for angle error and current. */
 const TABLE_BITS = ['10x6', '9x6', '8x6', '8x5']
 const [USUAL_BITS] = TABLE_BITS
 
@@ -18,8 +18,8 @@ export function FirmwarePanel({ job }: { job: Job }) {
   if (job.best_fitness === null) {
     return (
       <section class="card">
-        <Empty title="No design to write yet">
-          <p>Its firmware can be downloaded as soon as a design has walked in every scenario.</p>
+        <Empty title="No firmware yet">
+          <p>Firmware is available once a design has walked in every scenario.</p>
         </Empty>
       </section>
     )
@@ -29,11 +29,11 @@ export function FirmwarePanel({ job }: { job: Job }) {
 
 function OfBest({ job }: { job: Job }) {
   const [bits, setBits] = useState(USUAL_BITS)
-  const asked = { table_bits: bits === USUAL_BITS ? undefined : bits }
-  const found = useResource(`${job.id} ${job.best_iteration} ${bits}`, (signal) =>
-    get('/v1/jobs/{job_id}/firmware/summary', { path: { job_id: job.id }, query: asked, signal }),
+  const query = { table_bits: bits === USUAL_BITS ? undefined : bits }
+  const summary = useResource(`${job.id} ${job.best_iteration} ${bits}`, (signal) =>
+    get('/v1/jobs/{job_id}/firmware/summary', { path: { job_id: job.id }, query, signal }),
   )
-  const firmware = found.data
+  const firmware = summary.data
   const hasTables = firmware === null || firmware.tables.length > 0
   return (
     <div class="stack">
@@ -55,7 +55,7 @@ function OfBest({ job }: { job: Job }) {
             )}
             <a
               class="button primary compact"
-              href={url('/v1/jobs/{job_id}/firmware', { job_id: job.id }, asked)}
+              href={url('/v1/jobs/{job_id}/firmware', { job_id: job.id }, query)}
               download={`${job.id}-firmware.zip`}
             >
               Download
@@ -64,22 +64,22 @@ function OfBest({ job }: { job: Job }) {
         </header>
         <div class="stack">
           <p class="muted small">
-            A folder of C99 for the microcontroller of a leg, without floating point, and a test
-            that repeats the winner’s simulated walks sample by sample:
+            C99 source for the microcontroller of one leg, without floating point, with a test that
+            replays the winner’s simulations sample by sample:
           </p>
           <CopyBlock
             label="the test"
             text={`unzip ${job.id}-firmware.zip -d firmware && make -C firmware test`}
           />
-          {found.error && (
+          {summary.error && (
             <ErrorNotice
-              what="Its firmware cannot be written."
-              error={found.error}
-              retry={found.reload}
+              what="Could not generate the firmware."
+              error={summary.error}
+              retry={summary.reload}
             />
           )}
-          {found.loading && !firmware && (
-            <Loading what="the firmware; the winner walks for its test" />
+          {summary.loading && !firmware && (
+            <Loading what="the firmware; simulating the winner for its test" />
           )}
           {firmware && <Memory firmware={firmware} />}
         </div>
@@ -98,14 +98,14 @@ interface MemoryRow {
 function Memory({ firmware: { memory, table_difference: difference } }: { firmware: Firmware }) {
   const rows: readonly MemoryRow[] = [
     { name: 'Fuzzy tables', flash: memory.tables, ram: null },
-    { name: 'Trajectories of a leg', flash: memory.trajectories_of_a_leg, ram: null },
-    { name: 'Controller, from tick to tick', flash: null, ram: memory.remembered },
+    { name: 'Trajectories of one leg', flash: memory.trajectories_of_a_leg, ram: null },
+    { name: 'Controller state', flash: null, ram: memory.remembered },
     {
-      name: 'In all',
+      name: 'Total',
       flash: memory.tables + memory.trajectories_of_a_leg,
       ram: memory.remembered,
     },
-    { name: `An ${memory.processor} has`, flash: memory.flash, ram: memory.ram },
+    { name: `${memory.processor} capacity`, flash: memory.flash, ram: memory.ram },
   ]
   return (
     <>
@@ -114,26 +114,26 @@ function Memory({ firmware: { memory, table_difference: difference } }: { firmwa
         rows={rows}
         rowKey={({ name }) => name}
         columns={[
-          { key: 'name', label: 'Of a leg', header: true, cell: ({ name }) => name },
+          { key: 'name', label: 'Per leg', header: true, cell: ({ name }) => name },
           memoryColumn('flash', 'Flash', memory.flash),
           memoryColumn('ram', 'RAM', memory.ram),
         ]}
       />
       <p>
-        {memory.fits ? 'Controller and tables fit; ' : 'It does not fit. '}
+        {memory.fits ? 'Controller and tables fit; ' : 'Does not fit. '}
         {memory.remarks.length > 0
           ? memory.remarks.join(' ')
-          : 'so do the trajectories of a leg in all scenarios beside them.'}{' '}
+          : 'so do the trajectories of one leg in all scenarios.'}{' '}
         <span class="muted small">
           The thesis’s microcontroller has {formatCount(Math.round(memory.flash / 1024))}&nbsp;kB of
           flash, {formatCount(Math.round(memory.ram / 1024))}&nbsp;kB of RAM and{' '}
-          {formatCount(memory.cycles)} cycles for a sample of three joints. Code is not in the
-          table.
+          {formatCount(memory.cycles)} cycles per sample of three joints. The table does not include
+          the code.
         </span>
       </p>
       {difference && (
         <p data-table-difference>
-          With this smaller table the walks differ from those of the usual one by at most{' '}
+          With this smaller table, simulations differ from those with the default one by at most{' '}
           {Object.entries(difference)
             .map(([name, share]) => `${percent(share, 2)} in ${inWords(name)}`)
             .join(', ')}
@@ -166,9 +166,9 @@ function Contents({ firmware }: { firmware: Firmware }) {
   const walks = new Map(firmware.walks.map((walk) => [walk.scenario, walk]))
   return (
     <section class="card" aria-labelledby="firmware-walks">
-      <h2 id="firmware-walks">Trajectories and walks in it</h2>
+      <h2 id="firmware-walks">Trajectories and simulations</h2>
       <Table
-        caption="Trajectories and walks by scenario"
+        caption="Trajectories and simulations by scenario"
         rows={firmware.trajectories}
         rowKey={({ scenario }) => scenario}
         columns={[
@@ -176,7 +176,7 @@ function Contents({ firmware }: { firmware: Firmware }) {
           { key: 'rows', label: 'Rows', numeric: true, value: ({ rows }) => rows },
           {
             key: 'leg',
-            label: 'Of a leg',
+            label: 'One leg',
             unit: 'B',
             numeric: true,
             value: (row) => row.bytes_of_a_leg,
@@ -200,13 +200,13 @@ function Contents({ firmware }: { firmware: Firmware }) {
           },
           {
             key: 'status',
-            label: 'The walk',
+            label: 'Status',
             value: ({ scenario }) => walks.get(scenario)?.status ?? null,
           },
         ]}
       />
       <p class="muted small table-note">
-        {formatCount(firmware.samples)} samples are compared in all.{' '}
+        {formatCount(firmware.samples)} samples compared in total,{' '}
         {formatCount(Object.keys(firmware.files).length)} files,{' '}
         {formatNumber(total(firmware) / 1e6, 2)}&nbsp;MB.
       </p>

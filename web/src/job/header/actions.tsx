@@ -1,4 +1,4 @@
-/** Pause, resume, extend, fork, keep, cancel, delete and clone, as far as the job's state allows. */
+/** Commands that the state of a job allows. */
 
 import { useState } from 'preact/hooks'
 import { get, post, put, remove } from '../../api/client'
@@ -14,23 +14,23 @@ import { canFork, ForkButton } from './fork-dialog'
 import { LabelDialog } from './label-dialog'
 import { PriorityDialog } from './priority-dialog'
 
-type Asking = 'cancel' | 'delete' | 'extend' | 'label' | 'priority' | null
+type Dialog = 'cancel' | 'delete' | 'extend' | 'label' | 'priority' | null
 
 interface Props {
   readonly job: StoredJob
   readonly onJob: (job: StoredJob) => void
-  /** A deletion begins, or did not come about; the page asks nothing of the job meanwhile. */
+  /** Called with true when a deletion starts and with false if it fails; requests stop meanwhile. */
   readonly onDeleting: (deleting: boolean) => void
 }
 
 export function JobActions({ job, onJob, onDeleting }: Props) {
-  const [asking, setAsking] = useState<Asking>(null)
+  const [dialog, setDialog] = useState<Dialog>(null)
   const [busy, setBusy] = useState(false)
   const [error, setError] = useState<unknown>(null)
   const command = (send: () => Promise<StoredJob>) => {
     setBusy(true)
     setError(null)
-    setAsking(null)
+    setDialog(null)
     send()
       .then(onJob, setError)
       .finally(() => setBusy(false))
@@ -60,23 +60,23 @@ export function JobActions({ job, onJob, onDeleting }: Props) {
           </button>
         )}
         {can('extend') && (
-          <button type="button" disabled={busy} onClick={() => setAsking('extend')}>
+          <button type="button" disabled={busy} onClick={() => setDialog('extend')}>
             Extend…
           </button>
         )}
         {can('priority') && (
-          <button type="button" disabled={busy} onClick={() => setAsking('priority')}>
+          <button type="button" disabled={busy} onClick={() => setDialog('priority')}>
             Priority…
           </button>
         )}
-        <button type="button" disabled={busy} onClick={() => setAsking('label')}>
+        <button type="button" disabled={busy} onClick={() => setDialog('label')}>
           Label…
         </button>
         <button
           type="button"
           disabled={busy}
-          title={job.kept ? 'so that it can be deleted' : 'so that it cannot be deleted'}
-          onClick={() => command(() => (job.kept ? released(job.id) : kept(job.id)))}
+          title={job.kept ? 'Allow deletion' : 'Protect from deletion'}
+          onClick={() => command(() => (job.kept ? release(job.id) : keep(job.id)))}
         >
           {job.kept ? 'Release' : 'Keep'}
         </button>
@@ -88,45 +88,45 @@ export function JobActions({ job, onJob, onDeleting }: Props) {
         )}
         {isReadable(job) && job.kind === 'tuning' && job.best_fitness !== null && (
           <a class="button" href={withQuery('/jobs/new', { clone: job.id, start: job.id })}>
-            Start from its best
+            Start from best design
           </a>
         )}
         {can('cancel') && (
-          <button type="button" class="danger" disabled={busy} onClick={() => setAsking('cancel')}>
+          <button type="button" class="danger" disabled={busy} onClick={() => setDialog('cancel')}>
             Cancel…
           </button>
         )}
         {can('delete') && (
-          <button type="button" class="danger" disabled={busy} onClick={() => setAsking('delete')}>
+          <button type="button" class="danger" disabled={busy} onClick={() => setDialog('delete')}>
             Delete…
           </button>
         )}
       </div>
-      {error !== null && <ErrorNotice what="That was not done." error={error} />}
+      {error !== null && <ErrorNotice what="The command failed." error={error} />}
       <ConfirmDialog
-        open={asking === 'cancel'}
-        title="Cancel this job for good?"
+        open={dialog === 'cancel'}
+        title="Cancel this job permanently?"
         confirm="Cancel the job"
-        dismiss="Keep it"
+        dismiss="Back"
         dangerous
         onConfirm={() => command(() => post('/v1/jobs/{job_id}/cancel', { path }))}
-        onDismiss={() => setAsking(null)}
+        onDismiss={() => setDialog(null)}
       >
         <p>
-          It cannot be resumed. The {formatCount(job.iterations)} iterations that are committed
-          stay; the one under way is lost. To go on later, pause it instead.
+          A cancelled job cannot be resumed. The {formatCount(job.iterations)} committed iterations
+          are kept; the current one is lost. To continue later, pause the job instead.
         </p>
       </ConfirmDialog>
       <ConfirmDialog
-        open={asking === 'delete'}
-        title="Delete this job and all that it has found?"
+        open={dialog === 'delete'}
+        title="Delete this job and its results?"
         confirm="Delete the job"
-        dismiss="Keep it"
+        dismiss="Back"
         dangerous
         onConfirm={() => {
           setBusy(true)
           setError(null)
-          setAsking(null)
+          setDialog(null)
           onDeleting(true)
           remove('/v1/jobs/{job_id}', { path })
             .then(
@@ -138,49 +138,48 @@ export function JobActions({ job, onJob, onDeleting }: Props) {
             )
             .finally(() => setBusy(false))
         }}
-        onDismiss={() => setAsking(null)}
+        onDismiss={() => setDialog(null)}
       >
         <p>
           {formatCount(job.iterations)} iterations with {formatCount(job.evaluations)} evaluated
-          designs are lost for good. Forks of the job keep their copies but lose their parent, and
-          certificates of its designs stay as jobs of their own.
+          designs are permanently lost. Forks of the job keep their copies but lose their parent;
+          certificates of its designs are separate jobs and remain.
         </p>
       </ConfirmDialog>
       <PriorityDialog
-        key={`priority ${job.id} ${asking === 'priority'}`}
+        key={`priority ${job.id} ${dialog === 'priority'}`}
         job={job}
-        open={asking === 'priority'}
+        open={dialog === 'priority'}
         onPrioritize={(priority) =>
           command(() => put('/v1/jobs/{job_id}/priority', { path, body: { priority } }))
         }
-        onDismiss={() => setAsking(null)}
+        onDismiss={() => setDialog(null)}
       />
       <LabelDialog
-        key={`label ${job.id} ${asking === 'label'}`}
+        key={`label ${job.id} ${dialog === 'label'}`}
         job={job}
-        open={asking === 'label'}
+        open={dialog === 'label'}
         onLabel={command}
-        onDismiss={() => setAsking(null)}
+        onDismiss={() => setDialog(null)}
       />
       <ExtendDialog
-        key={`extend ${job.id} ${asking === 'extend'}`}
+        key={`extend ${job.id} ${dialog === 'extend'}`}
         job={job}
-        open={asking === 'extend'}
+        open={dialog === 'extend'}
         onExtend={(iterations) =>
           command(() => post('/v1/jobs/{job_id}/extend', { path, body: { iterations } }))
         }
-        onDismiss={() => setAsking(null)}
+        onDismiss={() => setDialog(null)}
       />
     </div>
   )
 }
 
-/** Protected from deletion. */
-function kept(id: string): Promise<StoredJob> {
+function keep(id: string): Promise<StoredJob> {
   return put('/v1/jobs/{job_id}/keep', { path: { job_id: id } })
 }
 
-async function released(id: string): Promise<StoredJob> {
+async function release(id: string): Promise<StoredJob> {
   await remove('/v1/jobs/{job_id}/keep', { path: { job_id: id } })
   return get('/v1/jobs/{job_id}', { path: { job_id: id } })
 }
@@ -197,26 +196,26 @@ function ExtendDialog({
   onDismiss: () => void
 }) {
   const [budget, setBudget] = useState(String(job.iterations_planned + 25))
-  const wanted = Number(budget)
+  const iterations = Number(budget)
   const [spent, least] = [budgetSpent(job), iterationsSpent(job)]
-  const valid = Number.isInteger(wanted) && wanted > least
+  const valid = Number.isInteger(iterations) && iterations > least
   return (
     <ConfirmDialog
       open={open}
-      title="Give the job another budget"
-      confirm={`Run ${valid ? formatCount(wanted) : '…'} iterations in all`}
+      title="Extend the budget"
+      confirm={`Run ${valid ? formatCount(iterations) : '…'} iterations in total`}
       disabled={!valid}
-      onConfirm={() => onExtend(wanted)}
+      onConfirm={() => onExtend(iterations)}
       onDismiss={onDismiss}
     >
       <p>
-        {spentInWords(spent)} {spent.unit} are done; the job goes on after them.
+        {spentInWords(spent)} {spent.unit} are done.
         {spent.unit === 'designs' &&
           ` The budget counts iterations of ${formatCount(job.particles)} designs each.`}
       </p>
       <div class="field">
         <label for="extend-budget">
-          Iterations in all <span class="unit">[1]</span>
+          Iterations in total <span class="unit">[1]</span>
         </label>
         <input
           id="extend-budget"
@@ -227,7 +226,7 @@ function ExtendDialog({
           aria-invalid={!valid}
           onInput={(event) => setBudget(event.currentTarget.value)}
         />
-        {!valid && <span class="wrong">a whole number above {formatCount(least)}</span>}
+        {!valid && <span class="wrong">must be an integer above {formatCount(least)}</span>}
       </div>
     </ConfirmDialog>
   )

@@ -1,4 +1,4 @@
-/** The best design of a job, walking in the first of its scenarios. */
+/** Replay of a job's best design in its first scenario. */
 
 import type { Job } from '../../api/types'
 import { resolveDesign } from '../../walk/design/resolve-design'
@@ -11,7 +11,7 @@ export default function BestWalk({
   visible,
 }: {
   job: Job
-  /** Iteration of the best design that is to be seen. */
+  /** Iteration of the best design to show. */
   best: number
   visible: boolean
 }) {
@@ -23,7 +23,7 @@ export default function BestWalk({
     <WalkStage
       name={`walk ${job.id} ${best}`}
       record={record}
-      label="The best design walking"
+      label="Replay of the best design"
       visible={visible}
     />
   )

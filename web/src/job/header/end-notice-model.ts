@@ -1,40 +1,40 @@
-/** What is said of a notice of the browser. Pure. */
+/** Texts of the notification when a job ends. */
 
 import type { StoredJob } from '../../api/types'
 import { formatCount, formatNumber } from '../../format/number'
 
 export interface NoticeState {
-  /** Of the button; null where there is nothing to press. */
+  /** Label of the button; null if there is none. */
   readonly label: string | null
   readonly on: boolean
-  /** What there is to know; null for nothing. */
+  /** Additional information; null for none. */
   readonly hint: string | null
 }
 
 export function noticeState(
   permission: NotificationPermission | 'missing',
-  wanted: boolean,
+  enabled: boolean,
 ): NoticeState {
   if (permission === 'missing') {
-    return { label: null, on: false, hint: 'This browser has no notices.' }
+    return { label: null, on: false, hint: 'This browser does not support notifications.' }
   }
   if (permission === 'denied') {
     return {
       label: null,
       on: false,
-      hint: 'This browser refuses notices of this page; its settings allow them.',
+      hint: 'Notifications from this site are blocked in the browser’s settings.',
     }
   }
-  if (!wanted) return { label: 'Tell me when it ends', on: false, hint: null }
-  return { label: 'Tell me when it ends', on: true, hint: 'as long as this page is open' }
+  if (!enabled) return { label: 'Notify me when it ends', on: false, hint: null }
+  return { label: 'Notify me when it ends', on: true, hint: 'while this page is open' }
 }
 
-/** The notice itself. */
+/** Content of the notification. */
 export function endInWords(
   job: Pick<StoredJob, 'id' | 'name' | 'state' | 'iterations' | 'best_fitness' | 'error'>,
 ): { readonly title: string; readonly body: string } {
   const title = `${job.name || job.id}: ${job.state}`
-  if (job.state === 'failed') return { title, body: job.error ?? 'It says no reason.' }
+  if (job.state === 'failed') return { title, body: job.error ?? 'No reason given.' }
   const best =
     job.best_fitness === null
       ? 'no design walks in every scenario'

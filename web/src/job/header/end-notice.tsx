@@ -1,4 +1,4 @@
-/** A notice of the browser when a job ends, for those who ask for it. */
+/** Opt-in browser notification when a job ends. */
 
 import { useEffect, useRef, useState } from 'preact/hooks'
 import type { StoredJob } from '../../api/types'
@@ -6,37 +6,37 @@ import { hasEnded } from '../state'
 import { endInWords, type NoticeState, noticeState } from './end-notice-model'
 
 export function EndNotice({ job }: { job: StoredJob }) {
-  const [wanted, setWanted] = useState(false)
+  const [enabled, setEnabled] = useState(false)
   const [permission, setPermission] = useState(permissionNow)
   const before = useRef(job.state)
   const ended = hasEnded(job)
   useEffect(() => {
     const changed = before.current !== job.state
     before.current = job.state
-    if (!changed || !ended || !wanted || permission !== 'granted') return
+    if (!changed || !ended || !enabled || permission !== 'granted') return
     const { title, body } = endInWords(job)
     const notice = new Notification(title, { body, tag: job.id })
     notice.onclick = () => window.focus()
-  }, [job.state, wanted, permission])
+  }, [job.state, enabled, permission])
   if (ended) return null
-  const ask = () => {
-    if (wanted) return setWanted(false)
-    if (permission !== 'default') return setWanted(permission === 'granted')
+  const toggle = () => {
+    if (enabled) return setEnabled(false)
+    if (permission !== 'default') return setEnabled(permission === 'granted')
     Notification.requestPermission().then((answer) => {
       setPermission(answer)
-      setWanted(answer === 'granted')
+      setEnabled(answer === 'granted')
     })
   }
-  return <Asked state={noticeState(permission, wanted)} onAsk={ask} />
+  return <NoticeToggle state={noticeState(permission, enabled)} onToggle={toggle} />
 }
 
-function Asked({ state, onAsk }: { state: NoticeState; onAsk: () => void }) {
+function NoticeToggle({ state, onToggle }: { state: NoticeState; onToggle: () => void }) {
   if (state.hint !== null && state.label === null) {
     return <span class="muted small">{state.hint}</span>
   }
   return (
     <span class="row">
-      <button type="button" class="compact" aria-pressed={state.on} onClick={onAsk}>
+      <button type="button" class="compact" aria-pressed={state.on} onClick={onToggle}>
         {state.label}
       </button>
       {state.hint !== null && (

@@ -1,4 +1,4 @@
-/** Asks from which iteration a job is forked, and what is to be different from there on. */
+/** Dialog to fork a job. */
 
 import { useState } from 'preact/hooks'
 import { get, post } from '../../api/client'
@@ -12,16 +12,16 @@ import { jobPath } from '../../router/routes'
 import { ChoiceField } from '../../submission/fields/number-field'
 import { TextField } from '../../submission/fields/text-field'
 
-const AS_PARENT = 'as its parent'
+const AS_PARENT = 'same as parent'
 
-/** A button that asks, and then leads to the fork. */
+/** A button that opens the dialog. */
 export function ForkButton({
   job,
   from,
   compact = false,
 }: {
   job: StoredJob
-  /** First iteration of the fork's own. */
+  /** First iteration that the fork does not copy. */
   from: number
   compact?: boolean
 }) {
@@ -82,22 +82,24 @@ function ForkDialog({
       onDismiss={onDismiss}
     >
       <p>
-        A new job begins with iterations of this one, of which nothing changes. With the same
-        preference and method it goes on as this one did. Else it is told all again, or starts from
-        the best designs.
+        The fork copies the iterations before the chosen one. With the same preference and method,
+        the search continues unchanged. Otherwise the method either replays the copied iterations or
+        starts from their best designs.
       </p>
       <TextField
-        label="First iteration of its own"
+        label="First new iteration"
         value={first}
-        hint={`1 to ${formatCount(job.iterations)}; those before it are copied`}
-        error={startValid ? undefined : `a whole number from 1 to ${formatCount(job.iterations)}`}
+        hint={`1 to ${formatCount(job.iterations)}; earlier ones are copied`}
+        error={
+          startValid ? undefined : `must be an integer from 1 to ${formatCount(job.iterations)}`
+        }
         onChange={setFirst}
       />
       <TextField
-        label="Iterations in all"
+        label="Iterations in total"
         value={budget}
-        hint="with those that are copied"
-        error={valid || !startValid ? undefined : `a whole number above ${formatCount(start)}`}
+        hint="including the copied ones"
+        error={valid || !startValid ? undefined : `must be an integer above ${formatCount(start)}`}
         onChange={setBudget}
       />
       <TextField label="Name" value={name} onChange={setName} />
@@ -115,7 +117,7 @@ function ForkDialog({
         value={method}
         onChange={setMethod}
       />
-      {error !== null && <ErrorNotice what="It was not forked." error={error} />}
+      {error !== null && <ErrorNotice what="Could not fork the job." error={error} />}
     </ConfirmDialog>
   )
 }
@@ -135,7 +137,7 @@ async function choicesOf(signal: AbortSignal) {
   }
 }
 
-/** Whether the server lets a job be forked from this iteration on. */
+/** Whether the server allows a fork from this iteration. */
 export function canFork(job: Pick<Job, 'links' | 'iterations'>, from: number): boolean {
   return 'fork' in job.links && from >= 1 && from <= job.iterations
 }

@@ -1,4 +1,4 @@
-/** A job's name, state, figures and commands. */
+/** Name, state, figures and commands of a job. */
 
 import { isReadable } from '../../api/readable'
 import { useNow } from '../../api/resource'
@@ -23,13 +23,13 @@ export function JobHeader({ live, job, gain }: { live: LiveJob; job: StoredJob; 
   const { followed } = live
   const spent = budgetSpent(job, followed.iterations)
   const tone = STATE_TONES[job.state]
-  const marks = [
+  const labels = [
     ...(job.kept ? ['kept'] : []),
     ...(job.archived ? ['archived'] : []),
     ...(job.tags ?? []),
   ]
   return (
-    <section class="card job-header" aria-label="The job">
+    <section class="card job-header" aria-label="Job summary">
       <div class="job-summary">
         <div class="page-header">
           <div>
@@ -42,9 +42,9 @@ export function JobHeader({ live, job, gain }: { live: LiveJob; job: StoredJob; 
               <EndNotice job={job} />
             </div>
             <Subtitle job={job} />
-            {(marks.length > 0 || job.note) && (
+            {(labels.length > 0 || job.note) && (
               <p class="small" data-labels>
-                {marks.join(' · ')}
+                {labels.join(' · ')}
                 {job.note && <span class="job-note">{job.note}</span>}
               </p>
             )}
@@ -55,18 +55,18 @@ export function JobHeader({ live, job, gain }: { live: LiveJob; job: StoredJob; 
         </div>
         {job.waiting && (
           <div class="notice" data-tone="warn" role="status" data-waiting>
-            <strong>It waits, and goes on by itself.</strong>
+            <strong>Waiting; the job will continue automatically.</strong>
             <p>{job.waiting}</p>
           </div>
         )}
         {job.error && (
           <div class="notice" data-tone="bad" role="alert" data-error>
-            <strong>{isReadable(job) ? 'It failed.' : 'It cannot be read.'}</strong>
+            <strong>{isReadable(job) ? 'The job failed.' : 'The job cannot be read.'}</strong>
             <p>{job.error}</p>
             {isReadable(job) && (
               <p class="small">
-                What was committed before is kept. Resume tries the iteration again; clone lets you
-                change the job.
+                Committed iterations are kept. Resume retries the failed iteration; clone creates a
+                new job that you can change.
               </p>
             )}
           </div>
@@ -97,7 +97,7 @@ function Figures({ job, gain, committed }: { job: StoredJob; gain: Gain; committ
   return (
     <dl class="figures">
       <Figure
-        label={search ? 'Best fitness, in double' : 'Best fitness'}
+        label={search ? 'Best fitness (double precision)' : 'Best fitness'}
         value={quantity(job.best_fitness, unit, search ? 7 : 5)}
       />
       {gain.reference && (
@@ -111,21 +111,23 @@ function Figures({ job, gain, committed }: { job: StoredJob; gain: Gain; committ
       )}
       {search && (
         <Figure
-          label={`Its fitness in the search, in ${search.precision}`}
+          label={`Fitness in the search (${search.precision} precision)`}
           value={`${quantity(search.fitness, unit, 7)} (${change(100 * search.difference, '%', 2)})`}
         />
       )}
-      {merit !== null && <Figure label="F of eq. 3.1, maximized" value={formatNumber(merit, 5)} />}
+      {merit !== null && (
+        <Figure label="Figure of merit F (eq. 3.1)" value={formatNumber(merit, 5)} />
+      )}
       <Figure
         label="Iterations"
         value={
           budgetSpent(job).unit === 'iterations'
             ? `${formatCount(committed)} of ${formatCount(job.iterations_planned)}`
-            : `${formatCount(committed)}, of ${formatCount(job.particles)} designs at most`
+            : `${formatCount(committed)}, at most ${formatCount(job.particles)} designs each`
         }
       />
       <Figure
-        label="Found in iteration"
+        label="Best in iteration"
         value={job.best_iteration === null ? '–' : formatCount(job.best_iteration)}
       />
       <Figure
@@ -134,18 +136,13 @@ function Figures({ job, gain, committed }: { job: StoredJob; gain: Gain; committ
       />
       {job.evaluations_saved > 0 && (
         <Figure
-          label="Known without a walk"
+          label="Reused evaluations"
           value={`${formatCount(job.evaluations_saved)} (${percent(job.evaluations_saved / job.evaluations, 2)})`}
         />
       )}
-      {started > 0 && (
-        <Figure
-          label="Began with"
-          value={`${formatCount(started)} known design${started === 1 ? '' : 's'}`}
-        />
-      )}
+      {started > 0 && <Figure label="Start designs" value={formatCount(started)} />}
       <Figure label="Evaluation rate" value={quantity(job.evaluations_per_second, '1/s', 3)} />
-      <Figure label="Walk rate" value={quantity(job.simulations_per_second, '1/s', 3)} />
+      <Figure label="Simulation rate" value={quantity(job.simulations_per_second, '1/s', 3)} />
       <Figure label="Time left" value={timeLeft(job)} />
       <Figure label="Computing time" value={formatDuration(job.compute_seconds)} />
     </dl>
@@ -167,13 +164,13 @@ function Figure({ label, value }: { label: string; value: string }) {
   )
 }
 
-/** Whether what is shown is what is. */
+/** Connection status of the live data. */
 function StreamNote({ live }: { live: LiveJob }) {
   const { connection, staleSince } = live.followed
   if (connection === 'stale' && staleSince !== null) {
     return (
       <span class="badge" data-tone="warn" role="status">
-        data is stale since {formatClock(staleSince)}; reconnecting
+        stale since {formatClock(staleSince)}; reconnecting
       </span>
     )
   }
@@ -181,23 +178,23 @@ function StreamNote({ live }: { live: LiveJob }) {
   return null
 }
 
-/** What it is, and since when. */
+/** Key settings, and the time of submission. */
 function Subtitle({ job }: { job: StoredJob }) {
   const now = useNow(1000)
   const words = caseWords(job.kind ?? 'tuning')
-  const asked = isReadable(job)
+  const settings = isReadable(job)
     ? [
         job.controller ?? job.kind,
-        ...(job.robot ? [job.robot === 'own' ? 'a robot of its own' : job.robot] : []),
-        `${formatCount(job.scenarios.length)} ${job.scenarios.length === 1 ? words.one : words.many}`,
+        ...(job.robot ? [job.robot === 'own' ? 'custom robot' : job.robot] : []),
+        `${formatCount(job.scenarios.length)} ${job.scenarios.length === 1 ? words.item : words.items}`,
         ...(job.preference ? [`preference ${job.preference}`] : []),
         job.optimizer,
-        `${formatCount(job.particles)} designs an iteration`,
+        `${formatCount(job.particles)} designs per iteration`,
         `seed ${job.spec.seed}`,
         `${job.precision} precision`,
       ]
     : []
   const priority = job.priority === 0 ? [] : [`priority ${job.priority}`]
   const submitted = `submitted ${formatMoment(job.created_at)}, ${formatAge(job.created_at, now)} ago`
-  return <p class="muted small">{[job.id, ...asked, ...priority, submitted].join(' · ')}</p>
+  return <p class="muted small">{[job.id, ...settings, ...priority, submitted].join(' · ')}</p>
 }

@@ -1,4 +1,4 @@
-/** What people write on a job: its name, a note, tags, and whether it is out of the way. */
+/** Dialog to edit the name, note, tags and archive flag of a job. */
 
 import { useState } from 'preact/hooks'
 import { patch } from '../../api/client'
@@ -36,7 +36,7 @@ export function LabelDialog({
     <ConfirmDialog
       open={open}
       title="Name, note and tags"
-      confirm="Write them down"
+      confirm="Save"
       onConfirm={() =>
         onLabel(() => patch('/v1/jobs/{job_id}', { path: { job_id: job.id }, body }))
       }
@@ -52,7 +52,7 @@ export function LabelDialog({
           />
         </label>
         <label class="field">
-          Tags, separated by commas
+          Tags, comma-separated
           <input
             value={labels.tags.join(',')}
             onInput={(event) => change({ tags: event.currentTarget.value.split(',') })}
@@ -73,9 +73,9 @@ export function LabelDialog({
             checked={labels.archived}
             onChange={(event) => change({ archived: event.currentTarget.checked })}
           />
-          archived: out of the way in lists, nothing is deleted
+          archived: hidden in lists, but not deleted
         </label>
-        <p class="muted small">Nothing of it determines results.</p>
+        <p class="muted small">Labels do not affect results.</p>
       </div>
     </ConfirmDialog>
   )

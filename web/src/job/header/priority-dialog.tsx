@@ -1,4 +1,4 @@
-/** Asks for another priority of a job. */
+/** Dialog to change the priority of a job. */
 
 import { useState } from 'preact/hooks'
 import type { StoredJob } from '../../api/types'
@@ -21,8 +21,8 @@ export function PriorityDialog({
   return (
     <ConfirmDialog
       open={open}
-      title="Give the job another priority"
-      confirm="Change the priority"
+      title="Change the priority"
+      confirm="Change priority"
       disabled={!valid}
       onConfirm={() => onPrioritize(Number(text))}
       onDismiss={onDismiss}
@@ -44,7 +44,7 @@ export function PriorityDialog({
         />
         {!valid && (
           <span class="wrong">
-            a whole number from {LOWEST} to {HIGHEST}
+            must be an integer from {LOWEST} to {HIGHEST}
           </span>
         )}
       </div>

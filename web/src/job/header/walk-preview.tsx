@@ -1,4 +1,4 @@
-/** The walk of a job's best design beside its figures; loaded when the page has come to rest. */
+/** Replay of a job's best design; loaded once the page is idle. */
 
 import { useEffect, useRef, useState } from 'preact/hooks'
 import { useSlowly } from '../../api/resource'
@@ -10,34 +10,34 @@ import '../../walk/player/walk-stage.css'
 
 const BestWalk = lazyPage('the walk', () => import('./best-walk'))
 
-/** After what comes first [ms]. */
+/** Delay before loading [ms]. */
 const REST_MS = 1200
-/** How often a running job's newer best is walked [ms]. */
+/** Interval at which a running job's newer best is simulated [ms]. */
 const RENEW_MS = 30_000
 
 export function WalkPreview({ job }: { job: Job }) {
   const box = useRef<HTMLDivElement>(null)
   const visible = useVisible(box)
-  const [wanted, setWanted] = useState(false)
+  const [active, setActive] = useState(false)
   const best = useSlowly(job.best_iteration ?? 0, RENEW_MS)
   useEffect(() => {
-    if (wanted || !visible || matchMedia('(prefers-reduced-motion: reduce)').matches) return
-    const timer = setTimeout(() => setWanted(true), REST_MS)
+    if (active || !visible || matchMedia('(prefers-reduced-motion: reduce)').matches) return
+    const timer = setTimeout(() => setActive(true), REST_MS)
     return () => clearTimeout(timer)
-  }, [visible, wanted])
+  }, [visible, active])
   return (
-    <div class="walk-preview" ref={box} data-wanted={wanted}>
-      {wanted ? (
+    <div class="walk-preview" ref={box} data-loaded={active}>
+      {active ? (
         <BestWalk job={job} best={best} visible={visible} />
       ) : (
         <div class="walk-preview-stage">
-          <button type="button" onClick={() => setWanted(true)}>
-            Show its walk
+          <button type="button" onClick={() => setActive(true)}>
+            Show the replay
           </button>
         </div>
       )}
       <a class="small" href={withQuery('/walk', { job: job.id })}>
-        The whole walk, with its numbers
+        Full replay with plots
       </a>
     </div>
   )

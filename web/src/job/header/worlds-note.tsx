@@ -1,4 +1,4 @@
-/** That a job is robust: in how many worlds it judges designs, and by what. */
+/** Summary of a robust job's worlds. */
 
 import type { Job, TuningWorlds } from '../../api/types'
 import { formatCount, formatExact, percent } from '../../format/number'
@@ -9,23 +9,23 @@ export function WorldsNote({ job }: { job: Job }) {
   const { count, seed, ranges } = worlds
   return (
     <p class="small" data-worlds={count}>
-      <strong>Robust job</strong>: every design walks in {formatCount(count)} world
-      {count === 1 ? '' : 's'} that differ from the model
-      {ranges && ` in ${formatCount(ranges.length)} perturbations`}, drawn with seed {seed}. A
-      scenario counts by {judgedBy(worlds)}.
+      <strong>Robust job</strong>: every design is simulated in {formatCount(count)} world
+      {count === 1 ? '' : 's'} with perturbed models
+      {ranges && ` (${formatCount(ranges.length)} perturbations)`}, seed {seed}. The utility of a
+      scenario is {judgedBy(worlds)}.
     </p>
   )
 }
 
-/** What utilities in many worlds come to, in words. */
+/** Description of the aggregation over worlds. */
 function judgedBy({ aggregate, level = 0.75 }: TuningWorlds): string {
   switch (aggregate) {
     case 'mean':
-      return 'the mean of its utilities in all of them'
+      return 'the mean over all worlds'
     case 'quantile':
-      return `the ${percent(level, 2)} quantile of its utilities`
+      return `the ${percent(level, 2)} quantile over all worlds`
     case 'worst':
-      return 'the worst of its utilities'
+      return 'the worst over all worlds'
     default:
       return `the conditional value at risk of its utilities: the mean of the worst ${formatExact(
         (1 - level) * 100,

@@ -1,4 +1,4 @@
-/** The designs of one iteration; each leads to its walks and its controller. */
+/** Designs of one iteration, with links to their simulations and controllers. */
 
 import { get } from '../../api/client'
 import { useResource } from '../../api/resource'
@@ -44,7 +44,7 @@ export function IterationPanel({ job, index }: { job: Job; index: number }) {
       </header>
       {evaluations.error && (
         <ErrorNotice
-          what="The designs cannot be shown."
+          what="Could not load the designs."
           error={evaluations.error}
           retry={evaluations.reload}
         />
@@ -97,7 +97,7 @@ function columns(job: Job): readonly Column<Evaluation>[] {
     ...scenarioNames(job).map(
       (scenario): Column<Evaluation> => ({
         key: `utility ${scenario}`,
-        label: `${caseWords(job.kind).worth} ${scenario}`,
+        label: `${caseWords(job.kind).measure} ${scenario}`,
         unit,
         numeric: true,
         value: (e) => e.scenarios[scenario]?.utility ?? null,

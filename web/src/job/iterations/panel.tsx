@@ -1,4 +1,4 @@
-/** Every committed iteration, to look through and to take away. */
+/** Table of all committed iterations, with filters and downloads. */
 
 import type { Iteration, Job } from '../../api/types'
 import { Empty } from '../../components/feedback'
@@ -13,7 +13,7 @@ import type { LiveJob } from '../live/use-job'
 
 const NEWEST = { column: 'index', descending: true }
 
-/** A number as it was written, or nothing. */
+/** A number as typed, or empty. */
 const AT_MOST: Codec<string> = {
   read: (text) => (text !== '' && Number.isFinite(Number(text)) ? text : undefined),
   write: (text) => text || null,
@@ -46,7 +46,7 @@ export function IterationsPanel({ live, job }: { live: LiveJob; job: Job }) {
       </header>
       {iterations.length === 0 ? (
         <Empty title="No iteration yet">
-          <p>They appear here as they are committed.</p>
+          <p>Iterations appear here as they are committed.</p>
         </Empty>
       ) : (
         <div class="stack">
@@ -61,11 +61,7 @@ export function IterationsPanel({ live, job }: { live: LiveJob; job: Job }) {
                 onInput={(event) => setLeast(event.currentTarget.value)}
               />
             </label>
-            <Check
-              label="only those that improved the best"
-              checked={improved}
-              onChange={setImproved}
-            />
+            <Check label="only improvements" checked={improved} onChange={setImproved} />
             <span class="muted small" aria-live="polite">
               {shown.length} of {iterations.length}
             </span>

@@ -1,53 +1,53 @@
-/** A job's events: every committed iteration once and in order, whatever happens to the network. */
+/** Stream of a job's events: every committed iteration once and in order, despite network failures. */
 
 import type { Iteration, JobState } from '../../api/types'
 import { hasEnded } from '../state'
 
 export type Connection = 'connecting' | 'open' | 'stale' | 'ended'
 
-/** What is known of a job from its events. */
+/** State of a job as received from its events. */
 export interface Followed {
-  /** Without gap or repeat, from index 0. */
+  /** Consecutive, from index 0. */
   readonly iterations: readonly Iteration[]
   readonly state: JobState | null
   readonly error: string | null
-  /** What it waits for, such as workers that are away. */
+  /** Reason for waiting, such as unavailable workers. */
   readonly waiting: string | null
   readonly connection: Connection
-  /** When the stream broke [ms]; null while it is whole. */
+  /** Time at which the stream broke [ms]; null while it is connected. */
   readonly staleSince: number | null
 }
 
-/** The part of EventSource that is used. */
+/** The subset of EventSource in use. */
 export interface Source {
   addEventListener(type: string, listener: (event: MessageEvent<string>) => void): void
   close(): void
 }
 
 export interface StreamPorts {
-  /** Open the stream after an iteration, from the start if null. */
+  /** Open the stream after an iteration; from the beginning if null. */
   open(after: number | null): Source
   now(): number
-  /** Call back after some time [ms]; returns what cancels it. */
+  /** Schedule a call; returns the function that cancels it. */
   later(call: () => void, milliseconds: number): () => void
 }
 
 const FIRST_WAIT_MS = 500
 const LONGEST_WAIT_MS = 8000
-/** Events that come together are told together. */
+/** Events within this time are reported together. */
 const GATHER_MS = 40
 
 /**
  * Follows one job.
  *
- * | event | what happens |
+ * | event | reaction |
  * | --- | --- |
- * | the iteration after the last | it is appended |
- * | an iteration that is there already | it is dropped |
- * | an iteration further on | reconnect after the last, so that the gap is filled |
- * | the stream breaks | stale; reconnect after the last, waiting longer each time |
- * | the job was deleted | ended; asking for the job then says that it is gone |
- * | a final state | ended; `restart` follows a job that was resumed or extended |
+ * | next iteration | append it |
+ * | duplicate iteration | drop it |
+ * | later iteration | reconnect after the last one, to fill the gap |
+ * | connection lost | stale; reconnect after the last iteration, with exponential backoff |
+ * | job deleted | ended |
+ * | final state | ended; `restart` follows a job that was resumed or extended |
  */
 export class EventStream {
   private readonly iterations: Iteration[]
@@ -59,15 +59,15 @@ export class EventStream {
   private source: Source | null = null
   private failures = 0
   private cancelRetry: (() => void) | null = null
-  private cancelTell: (() => void) | null = null
+  private cancelNotify: (() => void) | null = null
 
   constructor(
     private readonly ports: StreamPorts,
     private readonly changed: (followed: Followed) => void,
-    /** Iterations that are known already, from index 0; the stream goes on after them. */
-    known: readonly Iteration[] = [],
+    /** Iterations already loaded, from index 0; the stream continues after them. */
+    loaded: readonly Iteration[] = [],
   ) {
-    this.iterations = [...known]
+    this.iterations = [...loaded]
     this.connect()
   }
 
@@ -76,14 +76,14 @@ export class EventStream {
     return this.iterations.at(-1)?.index ?? null
   }
 
-  /** Follow on, at once: after an end that was none, or when the network is said to be back. */
+  /** Reconnect immediately: after the job continues, or when the network is back. */
   restart(): void {
     if (this.connection === 'open') return
     this.failures = 0
     this.connect()
   }
 
-  /** The network is said to be gone; the stream itself may notice much later. */
+  /** The browser went offline; the stream itself may notice much later. */
   interrupt(): void {
     if (this.connection === 'open' || this.connection === 'connecting') this.broken()
   }
@@ -91,7 +91,7 @@ export class EventStream {
   close(): void {
     this.drop()
     this.cancelRetry?.()
-    this.cancelTell?.()
+    this.cancelNotify?.()
   }
 
   private connect(): void {
@@ -99,29 +99,29 @@ export class EventStream {
     this.cancelRetry?.()
     const source = this.ports.open(this.last)
     this.source = source
-    const heard = (handle: (data: string) => void) => (event: MessageEvent<string>) => {
-      // Events of a stream that was given up may still come.
+    const ifCurrent = (handle: (data: string) => void) => (event: MessageEvent<string>) => {
+      // Events of a closed stream may still arrive.
       if (this.source === source) handle(event.data)
     }
     source.addEventListener(
       'open',
-      heard(() => this.opened()),
+      ifCurrent(() => this.opened()),
     )
     source.addEventListener(
       'iteration',
-      heard((data) => this.arrived(JSON.parse(data))),
+      ifCurrent((data) => this.arrived(JSON.parse(data))),
     )
     source.addEventListener(
       'state',
-      heard((data) => this.moved(JSON.parse(data))),
+      ifCurrent((data) => this.stateChanged(JSON.parse(data))),
     )
     source.addEventListener(
       'deleted',
-      heard(() => this.deleted()),
+      ifCurrent(() => this.deleted()),
     )
     source.addEventListener(
       'error',
-      heard(() => this.broken()),
+      ifCurrent(() => this.broken()),
     )
   }
 
@@ -129,7 +129,7 @@ export class EventStream {
     this.connection = 'open'
     this.staleSince = null
     this.failures = 0
-    this.tell()
+    this.notify()
   }
 
   private arrived(iteration: Iteration): void {
@@ -140,27 +140,31 @@ export class EventStream {
       return
     }
     this.iterations.push(iteration)
-    this.tell()
+    this.notify()
   }
 
-  private moved(news: { state: JobState; error: string | null; waiting?: string | null }): void {
-    this.state = news.state
-    this.error = news.error
-    this.waiting = news.waiting ?? null
-    if (hasEnded(news)) {
+  private stateChanged(update: {
+    state: JobState
+    error: string | null
+    waiting?: string | null
+  }): void {
+    this.state = update.state
+    this.error = update.error
+    this.waiting = update.waiting ?? null
+    if (hasEnded(update)) {
       this.connection = 'ended'
       this.staleSince = null
       this.drop()
     }
-    this.tell()
+    this.notify()
   }
 
   private deleted(): void {
-    this.error = 'This job was deleted.'
+    this.error = 'The job was deleted.'
     this.connection = 'ended'
     this.staleSince = null
     this.drop()
-    this.tell()
+    this.notify()
   }
 
   private broken(): void {
@@ -171,7 +175,7 @@ export class EventStream {
     this.failures += 1
     this.cancelRetry?.()
     this.cancelRetry = this.ports.later(() => this.connect(), wait)
-    this.tell()
+    this.notify()
   }
 
   private drop(): void {
@@ -179,10 +183,10 @@ export class EventStream {
     this.source = null
   }
 
-  private tell(): void {
-    if (this.cancelTell) return
-    this.cancelTell = this.ports.later(() => {
-      this.cancelTell = null
+  private notify(): void {
+    if (this.cancelNotify) return
+    this.cancelNotify = this.ports.later(() => {
+      this.cancelNotify = null
       this.changed({
         iterations: [...this.iterations],
         state: this.state,

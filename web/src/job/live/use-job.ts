@@ -1,4 +1,4 @@
-/** One job, live: its events, and the rest of it asked for again whenever they tell news. */
+/** A job as live component state: its event stream, and its other fields by polling. */
 
 import { useCallback, useEffect, useRef, useState } from 'preact/hooks'
 import { get, url } from '../../api/client'
@@ -10,10 +10,10 @@ export interface LiveJob {
   readonly job: StoredJob | null
   readonly error: unknown
   readonly followed: Followed
-  /** Show what a command answered, and follow the job if it goes on. */
+  /** Show the response to a command, and follow the job if it continues. */
   readonly replace: (job: StoredJob) => void
   readonly reload: () => void
-  /** Nothing is asked of the job until `hold(false)`: of one that is being deleted, say. */
+  /** True while all requests are suspended, for example during deletion. */
   readonly held: boolean
   readonly hold: (held: boolean) => void
 }
@@ -27,11 +27,11 @@ const NOTHING_YET: Followed = {
   staleSince: null,
 }
 
-/** Iterations that are asked for first, so that there is something to see at once, and then. */
+/** Page sizes: a small first page, to show something early, and larger ones after it. */
 const FIRST = 100
 const FURTHER = 1000
 
-/** Rates and times are worth a question at most this often [ms]. */
+/** Shortest interval between requests [ms]. */
 const ASK_MS = 1000
 
 export function useJob(id: string): LiveJob {
@@ -39,35 +39,35 @@ export function useJob(id: string): LiveJob {
   const [error, setError] = useState<unknown>(null)
   const [followed, setFollowed] = useState<Followed>(NOTHING_YET)
   const stream = useRef<EventStream | null>(null)
-  const asked = useRef(0)
+  const lastRequest = useRef(0)
   const missing = useRef(false)
-  // Questions and commands are numbered: what was asked before the job that is shown is no news.
+  // Requests and commands are numbered; a response older than the job shown is dropped.
   const sent = useRef(0)
   const shown = useRef(0)
-  // Ends what is asked when nobody wants the answer any more; null while the job is held.
-  const questions = useRef<AbortController | null>(null)
+  // Aborts requests in flight; null while suspended.
+  const abortController = useRef<AbortController | null>(null)
   const [held, setHeld] = useState(false)
 
-  const ask = useCallback(() => {
-    const signal = questions.current?.signal
+  const refresh = useCallback(() => {
+    const signal = abortController.current?.signal
     if (!signal) return
-    asked.current = Date.now()
-    const question = ++sent.current
-    const isNews = () => {
-      if (signal.aborted || question < shown.current) return false
-      shown.current = question
+    lastRequest.current = Date.now()
+    const request = ++sent.current
+    const isNewer = () => {
+      if (signal.aborted || request < shown.current) return false
+      shown.current = request
       return true
     }
     get('/v1/jobs/{job_id}', { path: { job_id: id }, signal }).then(
       (answer) => {
-        if (!isNews()) return
+        if (!isNewer()) return
         setJob(answer)
         setError(null)
       },
       (problem: unknown) => {
-        if (!isNews()) return
+        if (!isNewer()) return
         setError(problem)
-        // There is nothing to follow, and asking again does not help.
+        // A missing job will not appear; stop following it.
         missing.current = problem instanceof ApiProblem && problem.status === 404
         if (missing.current) stream.current?.close()
       },
@@ -75,8 +75,8 @@ export function useJob(id: string): LiveJob {
   }, [id])
 
   const stop = useCallback(() => {
-    questions.current?.abort()
-    questions.current = null
+    abortController.current?.abort()
+    abortController.current = null
     stream.current?.close()
     stream.current = null
   }, [])
@@ -85,34 +85,34 @@ export function useJob(id: string): LiveJob {
     if (held) return
     const abort = new AbortController()
     const { signal } = abort
-    questions.current = abort
-    ask()
+    abortController.current = abort
+    refresh()
     const show = (iterations: readonly Iteration[]) => {
       if (!signal.aborted) setFollowed({ ...NOTHING_YET, iterations })
     }
-    committedSoFar(id, show, signal).then((known) => {
+    committedSoFar(id, show, signal).then((loaded) => {
       if (signal.aborted || missing.current) return
-      stream.current = new EventStream(browserPorts(id), setFollowed, known)
+      stream.current = new EventStream(browserPorts(id), setFollowed, loaded)
     })
-    const back = () => stream.current?.restart()
-    const gone = () => stream.current?.interrupt()
-    addEventListener('online', back)
-    addEventListener('offline', gone)
+    const online = () => stream.current?.restart()
+    const offline = () => stream.current?.interrupt()
+    addEventListener('online', online)
+    addEventListener('offline', offline)
     return () => {
-      removeEventListener('online', back)
-      removeEventListener('offline', gone)
+      removeEventListener('online', online)
+      removeEventListener('offline', offline)
       stop()
     }
   }, [id, held])
 
-  // A new state is asked about at once, new iterations now and then.
+  // Refresh at once on a new state, and at intervals on new iterations.
   useEffect(() => {
-    if (followed.state !== null) ask()
+    if (followed.state !== null) refresh()
   }, [followed.state, followed.waiting, followed.connection])
   useEffect(() => {
     if (followed.iterations.length === 0) return
-    const wait = Math.max(0, asked.current + ASK_MS - Date.now())
-    const timer = setTimeout(ask, wait)
+    const wait = Math.max(0, lastRequest.current + ASK_MS - Date.now())
+    const timer = setTimeout(refresh, wait)
     return () => clearTimeout(timer)
   }, [followed.iterations.length])
 
@@ -121,34 +121,34 @@ export function useJob(id: string): LiveJob {
     setJob(answer)
     stream.current?.restart()
   }, [])
-  const hold = useCallback((wanted: boolean) => {
-    // At once, not after the next drawing: the answer to what is under way may be that it is gone.
-    if (wanted) stop()
-    setHeld(wanted)
+  const hold = useCallback((suspended: boolean) => {
+    // Immediately, not after the next render: a request in flight may find the job deleted.
+    if (suspended) stop()
+    setHeld(suspended)
   }, [])
-  return { job, error, followed, replace, reload: ask, held, hold }
+  return { job, error, followed, replace, reload: refresh, held, hold }
 }
 
-/** Thousands of iterations come faster in pages than as events; if not all come, the stream does. */
+/** Load committed iterations in pages, faster than as events; on failure the stream has the rest. */
 async function committedSoFar(
   id: string,
   show: (iterations: readonly Iteration[]) => void,
   signal: AbortSignal,
 ): Promise<readonly Iteration[]> {
-  const known: Iteration[] = []
+  const loaded: Iteration[] = []
   try {
     for (;;) {
       const page = await get('/v1/jobs/{job_id}/iterations', {
         path: { job_id: id },
-        query: { after: known.at(-1)?.index, limit: known.length === 0 ? FIRST : FURTHER },
+        query: { after: loaded.at(-1)?.index, limit: loaded.length === 0 ? FIRST : FURTHER },
         signal,
       })
-      known.push(...page.items)
-      show([...known])
-      if (page.next === null) return known
+      loaded.push(...page.items)
+      show([...loaded])
+      if (page.next === null) return loaded
     }
   } catch {
-    return known
+    return loaded
   }
 }
 

@@ -1,21 +1,21 @@
-/** How far a job is, for pages that show something else of it. */
+/** Progress of a job, for other pages. */
 
 import { useState } from 'preact/hooks'
 import { get } from '../../api/client'
 import { usePolling } from '../../api/resource'
 import type { StoredJob } from '../../api/types'
-import { isUnderWay, progressInWords } from '../state'
+import { isActive, progressInWords } from '../state'
 
-/** How often a job under way is asked for again [ms]. */
+/** Polling interval [ms]. */
 const RENEW_MS = 4000
 
-/** Progress of a job under way, as it was known and then as it is; null for others, and for none. */
-export function useProgress(known: StoredJob | undefined): string | null {
-  const [renewed, setRenewed] = useState(known)
-  const job = renewed?.id === known?.id ? renewed : known
-  const active = job !== undefined && isUnderWay(job)
+/** Current progress of an active job; null for any other. */
+export function useProgress(initial: StoredJob | undefined): string | null {
+  const [renewed, setRenewed] = useState(initial)
+  const job = renewed?.id === initial?.id ? renewed : initial
+  const active = job !== undefined && isActive(job)
   const renew = (id: string) =>
-    // What was known stays until there is an answer.
+    // Keep the previous state until a response arrives.
     get('/v1/jobs/{job_id}', { path: { job_id: id } }).then(setRenewed, () => undefined)
   usePolling(() => active && renew(job.id), RENEW_MS, active)
   return active ? progressInWords(job) : null

@@ -1,4 +1,4 @@
-/** Best, median and quantiles of fitness over the iterations. */
+/** Best, median and quantiles of the fitness by iteration. */
 
 import { useCallback, useMemo, useRef } from 'preact/hooks'
 import type uPlot from 'uplot'
@@ -25,7 +25,7 @@ import {
 import { type Painted, paintDots, paintOver } from './convergence-painter'
 import type { Distribution } from './use-distribution'
 
-/** How often the single designs of a running job are asked for again [ms]. */
+/** Polling interval for single designs of a running job [ms]. */
 const RENEW_MS = 8000
 
 export function ConvergenceChart({
@@ -37,7 +37,7 @@ export function ConvergenceChart({
   job: Job
   iterations: readonly Iteration[]
   distribution: Distribution
-  /** What the best is measured against. */
+  /** Reference fitness. */
   reference: ReferenceLine | null
 }) {
   const [logarithmic, setLogarithmic] = useQueryValue('log', flag(true), true)
@@ -58,7 +58,7 @@ export function ConvergenceChart({
   return (
     <ChartFrame
       title="Convergence"
-      note="Fitness over the iterations; less is better. Drag to zoom, double-click to see all."
+      note="Fitness by iteration; lower is better. Drag to zoom, double-click to reset."
       tools={
         <>
           <Check label="single designs" checked={single} onChange={setSingle} />
@@ -77,7 +77,7 @@ export function ConvergenceChart({
           )}
           {dots && <span data-dots={dots.fitness.length}>{dotsInWords(dots)}</span>}
           {painted.above.size > 0 && (
-            <span data-above={painted.above.size}>▴ worse designs lie above what is shown</span>
+            <span data-above={painted.above.size}>▴ worse designs outside the range shown</span>
           )}
         </>
       }
@@ -105,8 +105,8 @@ export function ConvergenceChart({
 }
 
 function describe(iterations: number, best: number | null, { reference }: Painted): string {
-  const beside = reference ? `, ${lineLabel(reference)}` : ''
-  return `Convergence over ${iterations} iterations; best fitness ${formatNumber(best)}${beside}`
+  const referenceText = reference ? `, ${lineLabel(reference)}` : ''
+  return `Convergence over ${iterations} iterations; best fitness ${formatNumber(best)}${referenceText}`
 }
 
 function dotsInWords({ fitness, total }: Dots): string {
@@ -116,10 +116,10 @@ function dotsInWords({ fitness, total }: Dots): string {
     : `dots: ${drawn} designs`
 }
 
-/** Single designs, asked for when they are wanted, of a job under way now and then. */
-function useDots(job: Job, committed: number, wanted: boolean): Dots | null {
+/** Load single designs when enabled, and refresh them while the job is running. */
+function useDots(job: Job, committed: number, enabled: boolean): Dots | null {
   const renewed = useSlowly(committed, RENEW_MS)
-  const found = useResource(wanted ? `dots ${job.id} ${renewed}` : null, (signal) =>
+  const particles = useResource(enabled ? `dots ${job.id} ${renewed}` : null, (signal) =>
     getBytes('/v1/jobs/{job_id}/particles', {
       path: { job_id: job.id },
       query: { max_points: MOST_DOTS },
@@ -127,8 +127,8 @@ function useDots(job: Job, committed: number, wanted: boolean): Dots | null {
     }).then((bytes) => dotsOf(decodeParticles(bytes))),
   )
   const shown = useRef<Dots | null>(null)
-  if (found.data) shown.current = found.data
-  return wanted ? shown.current : null
+  if (particles.data) shown.current = particles.data
+  return enabled ? shown.current : null
 }
 
 function paintedOf({
@@ -143,7 +143,7 @@ function paintedOf({
   best: number | null
   dots: Dots | null
   range: readonly [number, number] | null
-  /** Of the spread that is drawn. */
+  /** Upper edge of the band drawn. */
   highest: Line | null
   reference: ReferenceLine | null
 }): Painted {

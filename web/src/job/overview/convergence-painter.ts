@@ -1,4 +1,4 @@
-/** Draws on the convergence chart what is no line: designs, the reference, marks and a label. */
+/** Draws designs, the reference, marks and a label on the convergence chart. */
 
 import type uPlot from 'uplot'
 import { withAlpha } from '../../charts/lines/line-chart'
@@ -9,13 +9,13 @@ import type { Dots } from './convergence-model'
 export interface Painted {
   readonly dots: Dots | null
   readonly reference: ReferenceLine | null
-  /** Where the best line ends, and what is written there. */
+  /** End of the best line, with its label. */
   readonly end: { readonly x: number; readonly y: number; readonly label: string } | null
-  /** Iterations in which something lies above the range. */
+  /** Iterations with values above the range. */
   readonly above: ReadonlySet<number>
 }
 
-/** Single designs, behind the lines. */
+/** Draw single designs behind the lines. */
 export function paintDots(plot: uPlot, { dots }: Painted): void {
   if (dots === null) return
   const { ctx, bbox } = plot
@@ -31,7 +31,7 @@ export function paintDots(plot: uPlot, { dots }: Painted): void {
   })
 }
 
-/** The reference, marks and the label, over the lines. */
+/** Draw the reference, marks and the label over the lines. */
 export function paintOver(plot: uPlot, painted: Painted): void {
   const { ctx } = plot
   if (painted.reference) paintReference(plot, painted.reference)
@@ -42,7 +42,7 @@ export function paintOver(plot: uPlot, painted: Painted): void {
   ctx.restore()
 }
 
-/** A small triangle at the upper edge for each iteration. */
+/** Draw a small triangle at the upper edge for each iteration. */
 function paintAbove(plot: uPlot, above: ReadonlySet<number>): void {
   const { ctx, bbox } = plot
   const size = 4 * devicePixelRatio
@@ -67,7 +67,7 @@ function paintEnd(plot: uPlot, end: Painted['end']): void {
   if (x < bbox.left || y < bbox.top || y > bbox.top + bbox.height) return
   ctx.fillStyle = themeColour('--text')
   ctx.textAlign = 'right'
-  // Below the line there is room, as nothing is better than the best.
+  // Below the best line, nothing else is drawn.
   const low = bbox.top + bbox.height - y < 20 * devicePixelRatio
   ctx.textBaseline = low ? 'bottom' : 'top'
   ctx.fillText(end.label, x - 2 * devicePixelRatio, y + (low ? -4 : 4) * devicePixelRatio)

@@ -1,4 +1,4 @@
-/** The distribution of fitness, iteration by iteration (fig. 4.6 of the thesis). */
+/** Distribution of fitness by iteration (fig. 4.6). */
 
 import { useMemo } from 'preact/hooks'
 import type uPlot from 'uplot'
@@ -13,7 +13,7 @@ import { fitnessUnit } from '../fitness'
 import { grouped, type Strip } from './grouped'
 import type { Distribution } from './use-distribution'
 
-/** More could not be told apart on a common screen. */
+/** More strips could not be distinguished on a common screen. */
 const MOST_STRIPS = 250
 
 export function DistributionChart({
@@ -44,7 +44,7 @@ export function DistributionChart({
   return (
     <ChartFrame
       title="Distribution of fitness"
-      note="Every iteration is a strip; the darker, the more of the designs have that fitness."
+      note="Each iteration is a strip; darker areas contain more designs."
       legend={
         <>
           <LegendEntry colour="--series-2" label="median" />
@@ -89,7 +89,7 @@ export function DistributionChart({
   )
 }
 
-/** Between two quantiles lies a known share of the designs: the closer they are, the darker. */
+/** The share of designs between two quantiles is known: the closer they are, the darker. */
 function paintStrips(plot: uPlot, quantiles: readonly number[], strips: readonly Strip[]): void {
   const { ctx, bbox } = plot
   const colour = themeColour('--series-1')

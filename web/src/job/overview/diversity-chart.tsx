@@ -1,4 +1,4 @@
-/** How far designs are spread over the design space. */
+/** Spread of the designs over the search space. */
 
 import { useMemo } from 'preact/hooks'
 import { ChartFrame } from '../../charts/chart-frame'
@@ -27,8 +27,8 @@ export function DiversityChart({ distribution }: { distribution: Distribution })
       title="Diversity of the designs"
       note={
         items.some(({ diversity }) => diversity !== null)
-          ? 'Spread of the designs as a share of each variable’s range: near zero, the search has gathered.'
-          : 'The method asks for one design at a time, which has no spread.'
+          ? 'Spread of the designs as a share of each variable’s range; near zero, the search has converged.'
+          : 'The method evaluates one design at a time, which has no spread.'
       }
       table={() => (
         <ByIteration

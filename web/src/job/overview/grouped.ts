@@ -1,17 +1,17 @@
-/** Many iterations as a few, so that each can be seen. */
+/** Grouping of iterations, so that each group is visible. */
 
 import type { DistributionItem } from '../../api/types'
 
 export interface Strip {
-  /** First and last iteration, and the place between them. */
+  /** First and last iteration, and their middle. */
   readonly from: number
   readonly to: number
   readonly middle: number
-  /** Mean of each quantile over the iterations in which not every design failed. */
+  /** Mean of each quantile, ignoring iterations in which every design failed. */
   readonly fitness: readonly (number | null)[]
 }
 
-/** At most `most` strips of equal width; one for each iteration if there are no more of them. */
+/** At most `most` strips of equal width; one per iteration if possible. */
 export function grouped(items: readonly DistributionItem[], most: number): readonly Strip[] {
   const size = Math.max(1, Math.ceil(items.length / most))
   const strips: Strip[] = []
@@ -25,6 +25,8 @@ export function grouped(items: readonly DistributionItem[], most: number): reado
 }
 
 function mean(values: readonly (number | null)[]): number | null {
-  const known = values.filter((value) => value !== null)
-  return known.length === 0 ? null : known.reduce((sum, value) => sum + value, 0) / known.length
+  const present = values.filter((value) => value !== null)
+  return present.length === 0
+    ? null
+    : present.reduce((sum, value) => sum + value, 0) / present.length
 }

@@ -1,4 +1,4 @@
-/** What limits the winner now, in words and numbers. */
+/** Factors that limit the winner. */
 
 import type { Job, JobSpec, Preference } from '../../api/types'
 import { ChartFrame } from '../../charts/chart-frame'
@@ -8,13 +8,13 @@ import { inWords } from '../../format/words'
 import { type Analysis, analyse, type Factor } from '../preference'
 
 export function LimitsCard({ job, spec }: { job: Job; spec: JobSpec }) {
-  // The API writes every preset out.
+  // A stored spec has its presets resolved.
   const analysis = job.best && analyse(job.best.scenarios, spec.preference as Preference)
   if (!analysis) return null
   const units = new Map(job.objectives.map((o) => [o.name, o.unit]))
   return (
     <ChartFrame
-      title="What limits the winner"
+      title="Limiting factors"
       table={() => <FactorTable analysis={analysis} units={units} />}
     >
       <div class="stack">
@@ -39,19 +39,18 @@ function explain(
     <>
       {several && (
         <>
-          The scenario <strong>{worstScenario}</strong> holds it back most: its utility is{' '}
-          {formatNumber(excess, 3)} times the geometric mean of all scenarios. What it has more of
-          than the others is above all <strong>{inWords(worstFactor.objective)}</strong> ({value}
-          ).{' '}
+          Scenario <strong>{worstScenario}</strong> limits the winner most: its utility is{' '}
+          {formatNumber(excess, 3)} times the geometric mean of all scenarios, mainly because of{' '}
+          <strong>{inWords(worstFactor.objective)}</strong> ({value}).{' '}
         </>
       )}
-      The most to gain is in {inWords(steepest.objective)} of {steepest.scenario}: 10&nbsp;% less of
-      it lowers the fitness by some {percent(gain, 2)}.
+      The most effective improvement is in {inWords(steepest.objective)} of {steepest.scenario}:
+      reducing it by 10&nbsp;% lowers the fitness by about {percent(gain, 2)}.
     </>
   )
 }
 
-/** What each objective adds to a scenario's utility over that of all; rows add up. */
+/** Contribution of each objective to a scenario's utility relative to the mean; rows add up. */
 function ContributionTable({ analysis }: { analysis: Analysis }) {
   const scenarios = Object.keys(analysis.utilities)
   const objectives = [...new Set(analysis.factors.map((f) => f.objective))]
@@ -61,7 +60,7 @@ function ContributionTable({ analysis }: { analysis: Analysis }) {
   return (
     <div>
       <Table
-        caption="What each objective adds to the logarithm of a scenario's utility over that of all"
+        caption="Contributions of the objectives to the logarithm of a scenario’s relative utility"
         rows={scenarios}
         rowKey={(scenario) => scenario}
         order={{ column: 'sum', descending: true }}
@@ -84,18 +83,18 @@ function ContributionTable({ analysis }: { analysis: Analysis }) {
         ]}
       />
       <p class="muted small table-note">
-        Each number is e ln((b + f) / the geometric mean of b + f over the scenarios); a sum is the
+        Each number is e ln((b + f) / geometric mean of b + f over the scenarios). A sum is the
         logarithm of the scenario’s utility over the geometric mean of all.
       </p>
     </div>
   )
 }
 
-/** Every objective of every scenario: what it is, what it adds, and what a change of it is worth. */
+/** Value, contribution and sensitivity of every objective in every scenario. */
 function FactorTable({ analysis, units }: { analysis: Analysis; units: Map<string, string> }) {
   return (
     <Table
-      caption="What limits the winner"
+      caption="Limiting factors"
       rows={analysis.factors}
       rowKey={({ scenario, objective }) => `${scenario} ${objective}`}
       order={{ column: 'sensitivity', descending: true }}
@@ -112,14 +111,14 @@ function FactorTable({ analysis, units }: { analysis: Analysis; units: Map<strin
         { key: 'unit', label: 'Unit', value: (f) => units.get(f.objective) ?? '1' },
         {
           key: 'contribution',
-          label: 'Adds to the logarithm of the utility',
+          label: 'Contribution to log utility',
           numeric: true,
           value: (f) => f.contribution,
           cell: (f) => formatNumber(f.contribution, 3),
         },
         {
           key: 'sensitivity',
-          label: 'Change of the fitness per change of it',
+          label: 'Sensitivity of the fitness',
           numeric: true,
           value: (f) => f.sensitivity,
           cell: (f) => formatNumber(f.sensitivity, 3),

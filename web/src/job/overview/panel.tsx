@@ -1,4 +1,4 @@
-/** How a job converges: best and spread over the iterations, diversity, and what limits the winner. */
+/** Overview of a job: convergence, distribution, diversity, winner and limiting factors. */
 
 import type { Job } from '../../api/types'
 import { Empty, ErrorNotice } from '../../components/feedback'
@@ -29,8 +29,8 @@ export function OverviewPanel({
         <Empty title={job.state === 'queued' ? 'Waiting for a runner' : 'No iteration yet'}>
           <p>
             {job.state === 'queued'
-              ? 'A runner takes the job up when it has room; this page shows it at once.'
-              : 'The first iteration appears here as soon as it is committed.'}
+              ? 'The job starts when a runner has capacity; this page updates automatically.'
+              : 'The first iteration appears here once it is committed.'}
           </p>
         </Empty>
       </section>
@@ -40,7 +40,7 @@ export function OverviewPanel({
     <div class="stack">
       {distribution.error !== null && distribution.error !== undefined && (
         <ErrorNotice
-          what="The distribution of fitness cannot be shown."
+          what="Could not load the distribution of fitness."
           error={distribution.error}
         />
       )}

@@ -1,11 +1,11 @@
-/** The distribution of fitness by iteration, extended as iterations are committed. */
+/** Distribution of fitness by iteration, extended as iterations are committed. */
 
 import { useEffect, useRef, useState } from 'preact/hooks'
 import { get } from '../../api/client'
 import type { DistributionItem } from '../../api/types'
 
 export interface Distribution {
-  /** Shares to which the columns of `items[].fitness` belong. */
+  /** Quantile shares of the columns of `items[].fitness`. */
   readonly quantiles: readonly number[]
   readonly items: readonly DistributionItem[]
   readonly error: unknown
@@ -13,19 +13,19 @@ export interface Distribution {
 
 const EMPTY: Distribution = { quantiles: [], items: [], error: null }
 
-/** committed: iterations that there are; what is missing of them is asked for, once at a time. */
+/** committed: number of iterations; missing ones are loaded, one request at a time. */
 export function useDistribution(id: string, committed: number): Distribution {
-  const [known, setKnown] = useState(EMPTY)
+  const [distribution, setDistribution] = useState(EMPTY)
   const latest = useRef(EMPTY)
-  const asking = useRef(false)
-  const wanted = useRef(committed)
-  wanted.current = committed
+  const loading = useRef(false)
+  const target = useRef(committed)
+  target.current = committed
 
   useEffect(() => {
-    if (asking.current) return
-    asking.current = true
+    if (loading.current) return
+    loading.current = true
     const fill = async () => {
-      while (latest.current.items.length < wanted.current) {
+      while (latest.current.items.length < target.current) {
         const last = latest.current.items.at(-1)?.index
         const page = await get('/v1/jobs/{job_id}/distribution', {
           path: { job_id: id },
@@ -34,14 +34,14 @@ export function useDistribution(id: string, committed: number): Distribution {
         if (page.items.length === 0) return
         const items = [...latest.current.items, ...page.items]
         latest.current = { quantiles: page.quantiles, items, error: null }
-        setKnown(latest.current)
+        setDistribution(latest.current)
       }
     }
     fill()
-      .catch((error: unknown) => setKnown({ ...latest.current, error }))
+      .catch((error: unknown) => setDistribution({ ...latest.current, error }))
       .finally(() => {
-        asking.current = false
+        loading.current = false
       })
   }, [id, committed])
-  return known
+  return distribution
 }

@@ -1,4 +1,4 @@
-/** The winner: each variable's value, and where in its bounds it lies. */
+/** Values of the winner and their positions between the bounds. */
 
 import type { Job } from '../../api/types'
 import { ChartFrame } from '../../charts/chart-frame'
@@ -9,34 +9,34 @@ import { placeWord } from '../../format/place'
 import { exactValueQuantity } from '../../format/value'
 import { withQuery } from '../../router/routes'
 import { searchedVariables } from '../designs/variables'
-import { type Placed, placed } from './winner-model'
+import { type WinnerVariable, winnerVariables } from './winner-model'
 
 export function WinnerCard({ job }: { job: Job }) {
   const best = job.best!
-  const rows = placed(best.design, searchedVariables(job.spec))
-  const held = rows.filter(({ at }) => at !== null)
+  const rows = winnerVariables(best.design, searchedVariables(job.spec))
+  const atBound = rows.filter(({ at }) => at !== null)
   const place = { job: job.id, iteration: best.iteration, particle: best.particle }
   return (
     <ChartFrame
-      title="The winner"
-      note={`Design ${placeWord(best)}. Each bar is the range that was searched.${
-        held.length > 0 ? ` At a bound: ${held.map(({ name }) => name).join(', ')}.` : ''
+      title="Winner"
+      note={`Design ${placeWord(best)}. Bars show the search ranges.${
+        atBound.length > 0 ? ` At a bound: ${atBound.map(({ name }) => name).join(', ')}.` : ''
       }`}
       tools={
         job.kind === 'tuning' && (
           <>
             <a class="button compact" href={withQuery('/walk', place)}>
-              See it walk
+              Show replay
             </a>
             <a class="button compact" href={withQuery('/controller', place)}>
-              Its controller
+              Show controller
             </a>
           </>
         )
       }
       table={() => <WinnerTable rows={rows} />}
     >
-      <dl class="design" data-held={held.map(({ name }) => name).join(' ')}>
+      <dl class="design" data-active-bounds={atBound.map(({ name }) => name).join(' ')}>
         {rows.map((row) => (
           <div key={row.name}>
             <dt>
@@ -53,11 +53,11 @@ export function WinnerCard({ job }: { job: Job }) {
   )
 }
 
-function Unplaced({ row }: { row: Placed }) {
-  return <span class="muted small">{row.fixed ? 'held fixed' : 'chosen among names'}</span>
+function Unplaced({ row }: { row: WinnerVariable }) {
+  return <span class="muted small">{row.fixed ? 'fixed' : 'categorical'}</span>
 }
 
-function RangeBar({ row }: { row: Placed }) {
+function RangeBar({ row }: { row: WinnerVariable }) {
   return (
     <>
       <div class="range-bar" role="img" aria-label={inWords(row)} data-at={row.at ?? undefined}>
@@ -66,22 +66,22 @@ function RangeBar({ row }: { row: Placed }) {
       </div>
       <span class="range-ends muted small" aria-hidden="true">
         <span>{formatExact(row.low, 4)}</span>
-        {row.at !== null && <strong>at its bound</strong>}
+        {row.at !== null && <strong>at bound</strong>}
         <span>{formatExact(row.high, 4)}</span>
       </span>
     </>
   )
 }
 
-function inWords({ low, high, share, at }: Placed): string {
+function inWords({ low, high, share, at }: WinnerVariable): string {
   const range = `of the range from ${formatExact(low)} to ${formatExact(high)}`
-  return `at ${percent(share, 3)} ${range}${at === null ? '' : `, its ${at === 'low' ? 'lower' : 'upper'} bound`}`
+  return `at ${percent(share, 3)} ${range}${at === null ? '' : `, at the ${at === 'low' ? 'lower' : 'upper'} bound`}`
 }
 
-function WinnerTable({ rows }: { rows: readonly Placed[] }) {
+function WinnerTable({ rows }: { rows: readonly WinnerVariable[] }) {
   return (
     <Table
-      caption="The winner in its bounds"
+      caption="Winner and search bounds"
       rows={rows}
       rowKey={({ name }) => name}
       pageSize={60}
@@ -116,7 +116,7 @@ function WinnerTable({ rows }: { rows: readonly Placed[] }) {
         },
         {
           key: 'share',
-          label: 'Place in the range',
+          label: 'Position in range',
           numeric: true,
           value: ({ share }) => share,
           cell: ({ share }) => percent(share, 3),
@@ -124,7 +124,7 @@ function WinnerTable({ rows }: { rows: readonly Placed[] }) {
         {
           key: 'at',
           label: 'Bound',
-          value: ({ at, fixed }) => (fixed ? 'held fixed' : (at ?? '–')),
+          value: ({ at, fixed }) => (fixed ? 'fixed' : (at ?? '–')),
         },
       ]}
     />

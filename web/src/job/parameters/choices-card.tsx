@@ -1,4 +1,4 @@
-/** Categorical parameters: the least fitness that was found with each of their choices. */
+/** Best fitness for each choice of the categorical parameters. */
 
 import type { FittedParameter } from '../../api/types'
 import { BrokenName } from '../../components/broken-name'
@@ -18,11 +18,11 @@ export function ChoicesCard({
   labels,
   unit,
 }: {
-  /** Those that have choices. */
+  /** The parameters with choices. */
   shown: readonly FittedParameter[]
-  /** Of the runs. */
+  /** Labels of the runs. */
   labels: readonly string[]
-  /** Of fitness. */
+  /** Unit of the fitness. */
   unit: string
 }) {
   const rows = shown.flatMap(({ name, choices }) =>
@@ -33,12 +33,12 @@ export function ChoicesCard({
       <header>
         <h2 id="choices">Choices</h2>
         <p class="muted small">
-          The least fitness of all designs with each choice. A choice remains if a run has it among
-          the designs that count as good as its best.
+          Best fitness of all designs with each choice. A choice remains possible if any run has it
+          among the designs considered as good as its best.
         </p>
       </header>
       <Table
-        caption="Least fitness by choice"
+        caption="Best fitness by choice"
         rows={rows}
         rowKey={({ parameter, choice }) => `${parameter} ${choice.name}`}
         columns={columns(labels, unit)}
@@ -67,7 +67,7 @@ function columns(labels: readonly string[], unit: string): readonly Column<Row>[
     },
     {
       key: 'fitness',
-      label: 'Least fitness',
+      label: 'Best fitness',
       unit,
       numeric: true,
       value: ({ choice }) => choice.fitness,
@@ -88,7 +88,7 @@ function columns(labels: readonly string[], unit: string): readonly Column<Row>[
       : []),
     {
       key: 'remains',
-      label: 'Remains',
+      label: 'Possible',
       value: ({ choice }) => (choice.remains ? 'yes' : 'no'),
     },
   ]

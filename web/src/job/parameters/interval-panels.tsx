@@ -1,4 +1,4 @@
-/** Small charts of the intervals, one for each parameter (fig. 2.14). */
+/** Interval charts of the parameters (fig. 2.14). */
 
 import type { FittedParameter, Identifiability } from '../../api/types'
 import { ChartFrame } from '../../charts/chart-frame'
@@ -10,33 +10,33 @@ import { exactValueQuantity, type Value, valueQuantity } from '../../format/valu
 import { DECISIVE, outline, placeOf, shareOf } from './intervals'
 import { TrustBadge } from './verdicts'
 
-/** Of a chart's own coordinates, which are stretched to its box. */
+/** Size of a chart's coordinate system, stretched to its box. */
 const WIDTH = 100
 const HEIGHT = 60
 
 export function IntervalPanels({
-  found,
+  identifiability,
   shown,
   labels,
   judgedAt,
 }: {
-  found: Identifiability
-  /** Those that have intervals. */
+  identifiability: Identifiability
+  /** The parameters with intervals. */
   shown: readonly FittedParameter[]
   labels: readonly string[]
-  /** The threshold at which agreement is judged; null if none is. */
+  /** Threshold at which agreement is judged; null if none. */
   judgedAt: number | null
 }) {
-  const { thresholds } = found
+  const { thresholds } = identifiability
   const [least, most] = [Math.min(...thresholds), Math.max(...thresholds)]
   const runs = labels.length > 1 ? `${labels.length} runs` : 'the run'
   return (
     <ChartFrame
-      title="Intervals against the threshold"
+      title="Intervals by threshold"
       note={
-        `Values among the designs of ${runs} whose fitness lies within a threshold of their run’s` +
-        ` best. Across: the threshold from ${percent(least, 1)} to ${percent(most, 1)}, logarithmic;` +
-        ' upwards: the whole range that was searched.'
+        `Values of designs of ${runs} whose fitness is within a threshold of the run’s best.` +
+        ` x: the threshold from ${percent(least, 1)} to ${percent(most, 1)}, logarithmic;` +
+        ' y: the search range.'
       }
       legend={
         <>
@@ -46,7 +46,7 @@ export function IntervalPanels({
           </span>
           <span>
             <i class="interval-best" aria-hidden="true" />
-            best of all
+            overall best
           </span>
           {labels.length > 1 && (
             <span>
@@ -56,24 +56,30 @@ export function IntervalPanels({
           )}
           <span>
             dotted: {percent(DECISIVE, 1)}
-            {judgedAt === DECISIVE && ', where it is judged'}
+            {judgedAt === DECISIVE && ', the threshold of the verdict'}
           </span>
         </>
       }
-      table={() => <IntervalTable found={found} shown={shown} />}
+      table={() => <IntervalTable identifiability={identifiability} shown={shown} />}
     >
       <div class="intervals">
         {shown.map((parameter) => (
-          <Panel key={parameter.name} found={found} parameter={parameter} />
+          <Panel key={parameter.name} identifiability={identifiability} parameter={parameter} />
         ))}
       </div>
     </ChartFrame>
   )
 }
 
-function Panel({ found, parameter }: { found: Identifiability; parameter: FittedParameter }) {
+function Panel({
+  identifiability,
+  parameter,
+}: {
+  identifiability: Identifiability
+  parameter: FittedParameter
+}) {
   const { name, unit, low, high, best, bests, trust } = parameter
-  const { thresholds } = found
+  const { thresholds } = identifiability
   const decisive = parameter.intervals[thresholds.indexOf(DECISIVE)]
   const middle = placeOf(DECISIVE, thresholds) * WIDTH
   const y = (value: Value) => (1 - shareOf(value, parameter)) * HEIGHT
@@ -94,7 +100,7 @@ function Panel({ found, parameter }: { found: Identifiability; parameter: Fitted
           role="img"
           aria-label={`${name}: best ${valueQuantity(best, unit)}, at 5 % ${text ?? 'unknown'}`}
         >
-          <path class="area" d={outline(found, parameter, WIDTH, HEIGHT)} />
+          <path class="area" d={outline(identifiability, parameter, WIDTH, HEIGHT)} />
           <line class="decisive" x1={middle} x2={middle} y1={0} y2={HEIGHT} />
           {bests.length > 1 &&
             bests.map((value, run) => (
@@ -113,10 +119,10 @@ function Panel({ found, parameter }: { found: Identifiability; parameter: Fitted
 }
 
 function IntervalTable({
-  found,
+  identifiability,
   shown,
 }: {
-  found: Identifiability
+  identifiability: Identifiability
   shown: readonly FittedParameter[]
 }) {
   const columns: Column<FittedParameter>[] = [
@@ -132,7 +138,7 @@ function IntervalTable({
         </>
       ),
     },
-    ...found.thresholds.map(
+    ...identifiability.thresholds.map(
       (threshold, k): Column<FittedParameter> => ({
         key: String(threshold),
         label: `within ${formatExact(threshold * 100)} %`,

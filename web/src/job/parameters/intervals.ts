@@ -1,11 +1,11 @@
-/** Intervals of fitted parameters among good designs (fig. 2.14 of the thesis). Pure. */
+/** Intervals of fitted parameters among good designs (fig. 2.14). */
 
 import type { FittedParameter, Identifiability } from '../../api/types'
 import type { Value } from '../../format/value'
 
 export type Trust = NonNullable<FittedParameter['trust']>
 
-/** From the best to the worst. */
+/** From best to worst. */
 const TRUSTS: readonly Trust[] = ['trusted', 'rough', 'unknown']
 
 /** Thresholds whose widths are listed. */
@@ -14,12 +14,12 @@ export const LISTED = [0.2, 0.1, 0.05, 0.02] as const
 /** Threshold at which a parameter is judged. */
 export const DECISIVE = 0.05
 
-/** Whether a parameter is one of several choices, between which there are no intervals. */
+/** Whether a parameter is categorical, and thus has no intervals. */
 export function isCategorical({ choices }: FittedParameter): boolean {
   return choices.length > 0
 }
 
-/** Width of the interval at a threshold, as a share of the range searched; null if there is none. */
+/** Width of the interval at a threshold, as a share of the search range; null if there is none. */
 export function widthAt(
   { thresholds }: Identifiability,
   parameter: FittedParameter,
@@ -32,32 +32,32 @@ export function widthAt(
     : null
 }
 
-/** A parameter's verdict as a number to sort by; those without one come last. */
+/** Sort key of the verdict; null without one. */
 export function rankOf({ trust }: FittedParameter): number | null {
   return trust === null ? null : TRUSTS.indexOf(trust)
 }
 
-/** The verdicts that were given, each with its meaning and the number of parameters. */
+/** All verdicts with their explanations and counts. */
 export function verdicts({ parameters }: Identifiability) {
   return TRUSTS.map((trust) => {
-    const found = parameters.filter((parameter) => parameter.trust === trust)
-    return { trust, count: found.length, explanation: found[0]?.explanation ?? null }
+    const matches = parameters.filter((parameter) => parameter.trust === trust)
+    return { trust, count: matches.length, explanation: matches[0]?.explanation ?? null }
   })
 }
 
-/** Where a threshold lies from the least (0) to the greatest (1), by its logarithm. */
+/** Position of a threshold from the smallest (0) to the largest (1), logarithmic. */
 export function placeOf(threshold: number, thresholds: readonly number[]): number {
   const [least, greatest] = [Math.min(...thresholds), Math.max(...thresholds)]
   if (least === greatest) return 0
   return Math.log(threshold / least) / Math.log(greatest / least)
 }
 
-/** The share of its range at which a value lies: 0 at the lower bound, 1 at the upper. */
+/** Position of a value between the bounds, 0 to 1. */
 export function shareOf(value: Value, { low, high }: FittedParameter): number {
   return (Number(value) - low) / (high - low)
 }
 
-/** Outline of the intervals over the thresholds, as an SVG path in a box of that size. */
+/** Outline of the intervals over the thresholds, as an SVG path in a box of the given size. */
 export function outline(
   { thresholds }: Identifiability,
   parameter: FittedParameter,

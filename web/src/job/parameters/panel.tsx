@@ -1,4 +1,4 @@
-/** Which fitted parameters can be trusted: how far runs of the same problem agree (fig. 2.14). */
+/** Fitted parameters: values, and their agreement between runs (fig. 2.14). */
 
 import { useState } from 'preact/hooks'
 import { get } from '../../api/client'
@@ -10,7 +10,7 @@ import { Empty, ErrorNotice, Loading } from '../../components/feedback'
 import { matching } from '../../components/table/rows'
 import { setQuery, usePlace } from '../../router/navigation'
 import { caseWords, fitnessUnit } from '../fitness'
-import { isComputed } from '../state'
+import { isRunning } from '../state'
 import { ChoicesCard } from './choices-card'
 import { IntervalPanels } from './interval-panels'
 import { DECISIVE, isCategorical, type Trust } from './intervals'
@@ -20,14 +20,14 @@ import { RunPicker } from './run-picker'
 import { labelsOf, runsOf, wordOfRuns } from './runs'
 import { Verdicts } from './verdicts'
 
-/** How often the parameters of a job that runs are asked for again [ms]. */
+/** Polling interval while the job runs [ms]. */
 const RENEW_MS = 15_000
 
-/** Share of the designs, or distance from the best design, within which runs must agree. */
+/** Designs among which the runs must agree. */
 function agreementOf(kind: Job['kind']): string {
   return kind === 'calibration'
     ? 'among designs whose sum of squared differences, in tolerances, exceeds that of their run’s' +
-        ' best by 4 at most'
+        ' best by at most 4'
     : 'at 5 %'
 }
 
@@ -38,8 +38,8 @@ export function ParametersPanel({ job }: { job: Job }) {
       <section class="card">
         <Empty title="No parameters yet">
           <p>
-            No set of parameters has walked through every {caseWords(job.kind).one} so far. The
-            first one that does appears here.
+            No parameter set has succeeded in every {caseWords(job.kind).item} yet. The first one
+            that does appears here.
           </p>
         </Empty>
       </section>
@@ -50,7 +50,7 @@ export function ParametersPanel({ job }: { job: Job }) {
 
 function Fitted({ job, also }: { job: Job; also: readonly string[] }) {
   const key = [job.id, ...also].join()
-  const found = useResource(key, (signal) =>
+  const identifiability = useResource(key, (signal) =>
     get('/v1/jobs/{job_id}/parameters', {
       path: { job_id: job.id },
       query: { also: [...also] },
@@ -58,58 +58,66 @@ function Fitted({ job, also }: { job: Job; also: readonly string[] }) {
     }),
   )
   const runs = useResource(key, (signal) => Promise.all(also.map((id) => readableJob(id, signal))))
-  usePolling(found.reload, RENEW_MS, isComputed(job))
+  usePolling(identifiability.reload, RENEW_MS, isRunning(job))
   const choose = (ids: readonly string[]) => setQuery({ also: wordOfRuns(ids) })
   const compared = [job, ...(runs.data ?? [])]
   return (
     <div class="stack">
       <RunPicker job={job} runs={compared} also={also} onChoose={choose} />
-      {found.error && (
+      {identifiability.error && (
         <>
           <ErrorNotice
-            what="These runs cannot be compared."
-            error={found.error}
-            retry={isMissing(found.error) ? undefined : found.reload}
+            what="Could not compare these runs."
+            error={identifiability.error}
+            retry={isMissing(identifiability.error) ? undefined : identifiability.reload}
           />
           {also.length > 0 && (
             <p class="row">
               <button type="button" onClick={() => choose([])}>
-                Leave the other runs out
+                Remove the other runs
               </button>
               <span class="muted">
-                Or take out of the list above what does not belong here or has no parameters yet.
+                Or remove the runs above that do not belong here or have no parameters yet.
               </span>
             </p>
           )}
         </>
       )}
-      {!found.data && found.loading && <Loading what="all designs of these runs" />}
-      {found.data && (
-        <Parameters job={job} found={found.data} labels={labelsOf(found.data.jobs, compared)} />
+      {!identifiability.data && identifiability.loading && (
+        <Loading what="all designs of these runs" />
+      )}
+      {identifiability.data && (
+        <Parameters
+          job={job}
+          identifiability={identifiability.data}
+          labels={labelsOf(identifiability.data.jobs, compared)}
+        />
       )}
     </div>
   )
 }
 
-/** A job that is not there will not come. */
+/** A missing job will not appear. */
 function isMissing(error: Error): boolean {
   return error instanceof ApiProblem && error.status === 404
 }
 
 function Parameters({
   job,
-  found,
+  identifiability,
   labels,
 }: {
   job: Job
-  found: Identifiability
+  identifiability: Identifiability
   labels: readonly string[]
 }) {
   const [text, setText] = useState('')
   const [trust, setTrust] = useState<Trust | null>(null)
-  const judged = found.jobs.length > 1
-  const wanted = found.parameters.filter((p) => !judged || trust === null || p.trust === trust)
-  const shown: readonly FittedParameter[] = matching(wanted, text, ({ name }) =>
+  const judged = identifiability.jobs.length > 1
+  const withVerdict = identifiability.parameters.filter(
+    (p) => !judged || trust === null || p.trust === trust,
+  )
+  const shown: readonly FittedParameter[] = matching(withVerdict, text, ({ name }) =>
     name.replaceAll('_', ' '),
   )
   const categorical = shown.filter(isCategorical)
@@ -117,7 +125,7 @@ function Parameters({
   return (
     <>
       <Verdicts
-        found={found}
+        identifiability={identifiability}
         chosen={judged ? trust : null}
         onChoose={setTrust}
         text={text}
@@ -125,7 +133,7 @@ function Parameters({
       />
       {shown.length === 0 ? (
         <section class="card">
-          <Empty title="No parameter fits the filter">
+          <Empty title="No matching parameters">
             <button
               type="button"
               onClick={() => {
@@ -140,7 +148,7 @@ function Parameters({
       ) : (
         <div class="fitted">
           <ParametersTable
-            found={found}
+            identifiability={identifiability}
             shown={shown}
             labels={labels}
             agreement={agreementOf(job.kind)}
@@ -150,7 +158,7 @@ function Parameters({
           )}
           {others.length > 0 && (
             <IntervalPanels
-              found={found}
+              identifiability={identifiability}
               shown={others}
               labels={labels}
               judgedAt={job.kind === 'calibration' ? null : DECISIVE}

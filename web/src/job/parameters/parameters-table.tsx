@@ -1,4 +1,4 @@
-/** The fitted parameters as a table: values, widths of their intervals, verdicts. */
+/** Table of the fitted parameters: values, interval widths, verdicts. */
 
 import type { FittedParameter, Identifiability } from '../../api/types'
 import { BrokenName } from '../../components/broken-name'
@@ -10,16 +10,16 @@ import { LISTED, rankOf, widthAt } from './intervals'
 import { TrustBadge } from './verdicts'
 
 export function ParametersTable({
-  found,
+  identifiability,
   shown,
   labels,
   agreement,
 }: {
-  found: Identifiability
+  identifiability: Identifiability
   shown: readonly FittedParameter[]
-  /** Of the runs. */
+  /** Labels of the runs. */
   labels: readonly string[]
-  /** Among which designs agreement is judged, in words. */
+  /** Description of the designs among which agreement is judged. */
   agreement: string
 }) {
   return (
@@ -27,16 +27,15 @@ export function ParametersTable({
       <header>
         <h2 id="fitted">Parameters</h2>
         <p class="muted small">
-          Widths are shares of the range that was searched, among all designs whose fitness lies
-          within 20, 10, 5 and 2&nbsp;% of their run’s best. The verdict is about agreement{' '}
-          {agreement}, not about truth.
+          Widths are shares of the search range, among designs with a fitness within 20, 10, 5 and
+          2&nbsp;% of their run’s best. Verdicts state the agreement {agreement}, not correctness.
         </p>
       </header>
       <Table
         caption="Fitted parameters"
         rows={shown}
         rowKey={({ name }) => name}
-        columns={columns(found, labels)}
+        columns={columns(identifiability, labels)}
         rowData={({ name, trust }) => ({ 'data-parameter': name, 'data-verdict': trust ?? 'none' })}
         pageSize={60}
       />
@@ -45,7 +44,7 @@ export function ParametersTable({
 }
 
 function columns(
-  found: Identifiability,
+  identifiability: Identifiability,
   labels: readonly string[],
 ): readonly Column<FittedParameter>[] {
   const several = labels.length > 1
@@ -95,15 +94,15 @@ function columns(
         key: `width ${threshold}`,
         label: `Width ${threshold * 100} %`,
         numeric: true,
-        value: (p) => widthAt(found, p, threshold),
-        cell: (p) => percent(widthAt(found, p, threshold), 2),
+        value: (p) => widthAt(identifiability, p, threshold),
+        cell: (p) => percent(widthAt(identifiability, p, threshold), 2),
       }),
     ),
     ...(several
       ? labels.map(
           (label, run): Column<FittedParameter> => ({
             key: `run ${run}`,
-            label: label,
+            label,
             numeric: true,
             value: (p) => p.bests[run],
             cell: (p) => formatValue(p.bests[run]),
@@ -112,14 +111,14 @@ function columns(
       : []),
     {
       key: 'range',
-      label: 'Searched',
+      label: 'Search range',
       numeric: true,
       cell: searched,
     },
   ]
 }
 
-/** Bounds of the search, or its choices. */
+/** Search bounds, or choices. */
 function searched({ low, high, choices }: FittedParameter): string {
   if (choices.length > 0) return choices.map(({ name }) => inWords(name)).join(', ')
   return `${formatExact(low, 3)} – ${formatExact(high, 3)}`

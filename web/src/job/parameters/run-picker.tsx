@@ -1,7 +1,7 @@
-/** The runs that are compared: this job, and others that may have fitted the same. */
+/** Choice of the runs to compare: this job and others with the same fit. */
 
 import { get } from '../../api/client'
-import { foundJobs } from '../../api/found-jobs'
+import { jobSearch } from '../../api/job-search'
 import { useResource } from '../../api/resource'
 import type { Job, JobSummary } from '../../api/types'
 import { ErrorNotice } from '../../components/feedback'
@@ -11,7 +11,7 @@ import { jobPath, withQuery } from '../../router/routes'
 import { caseWords, fitnessUnit } from '../fitness'
 import { furtherRuns, isSameFit, MOST_RUNS, repeatedSeeds } from './runs'
 
-/** Newest jobs among which runs of the same fit are offered; a search finds all others. */
+/** Number of newest jobs searched for runs of the same fit. */
 const OFFERED = 100
 
 export function RunPicker({
@@ -21,9 +21,9 @@ export function RunPicker({
   onChoose,
 }: {
   job: Job
-  /** Those compared, as far as they are known. */
+  /** The compared runs loaded so far. */
   runs: readonly Job[]
-  /** Ids of those compared with the job. */
+  /** Ids of the runs compared with the job. */
   also: readonly string[]
   onChoose: (also: readonly string[]) => void
 }) {
@@ -32,8 +32,8 @@ export function RunPicker({
   )
   const words = caseWords(job.kind)
   const same = furtherRuns(listed.data?.items ?? [], job)
-  const known = new Set(same.map(({ id }) => id))
-  const added = also.filter((id) => !known.has(id))
+  const offered = new Set(same.map(({ id }) => id))
+  const added = also.filter((id) => !offered.has(id))
   const all = same.map(({ id }) => id).slice(0, MOST_RUNS)
   const repeated = repeatedSeeds(runs)
   const toggle = (id: string, on: boolean) =>
@@ -55,17 +55,17 @@ export function RunPicker({
   return (
     <section class="card run-card" aria-labelledby="runs">
       <header class="row spread">
-        <h2 id="runs">Runs that are compared</h2>
+        <h2 id="runs">Compared runs</h2>
         <span class="row">
           {all.length > 0 && all.some((id) => !also.includes(id)) && (
             <button type="button" class="compact primary" onClick={() => onChoose(all)}>
               {listed.data?.next
                 ? `Compare the ${all.length + 1} runs listed here`
-                : `Compare all ${all.length + 1} runs on these ${words.many}`}
+                : `Compare all ${all.length + 1} runs on these ${words.items}`}
             </button>
           )}
           <a class="button compact" href={nextRun(job, [...runs])}>
-            Run it with another seed
+            Run with another seed
           </a>
         </span>
       </header>
@@ -83,18 +83,18 @@ export function RunPicker({
       {also.length < MOST_RUNS && (
         <Combobox
           label="Add a run"
-          shown=""
+          chosenLabel=""
           placeholder="name, id, note or tag"
           hint={
             listed.data?.next
-              ? `Above: those of the newest ${OFFERED} jobs on these ${words.many}. All others are found here.`
+              ? `Listed above: runs among the newest ${OFFERED} jobs on these ${words.items}. Search for others here.`
               : undefined
           }
-          found={{
-            label: 'Jobs, the newest first',
-            search: foundJobs(job.kind, {
-              without: [job.id, ...also],
-              note: (other) => (isSameFit(other, job) ? '' : `other ${words.many}`),
+          remote={{
+            label: 'Jobs, newest first',
+            search: jobSearch(job.kind, {
+              exclude: [job.id, ...also],
+              note: (other) => (isSameFit(other, job) ? '' : `different ${words.items}`),
             }),
           }}
           onChoose={(id) => toggle(id, true)}
@@ -102,16 +102,12 @@ export function RunPicker({
       )}
       {repeated.length > 0 && (
         <p class="notice" data-tone="warn">
-          Seed {repeated.join(' and ')} occurs more than once. Runs that differ in nothing are the
-          same run: their agreement says nothing.
+          Seed {repeated.join(' and ')} occurs more than once. Identical runs always agree, which
+          proves nothing.
         </p>
       )}
       {listed.error && (
-        <ErrorNotice
-          what="Other runs cannot be listed."
-          error={listed.error}
-          retry={listed.reload}
-        />
+        <ErrorNotice what="Could not load other runs." error={listed.error} retry={listed.reload} />
       )}
     </section>
   )
@@ -129,11 +125,11 @@ function Run({
   summary: JobSummary | null
   job: Job | null
   chosen: boolean
-  /** Whether no more can be chosen. */
+  /** Whether the maximum number of runs is selected. */
   full: boolean
   onToggle: (chosen: boolean) => void
 }) {
-  const known = summary ?? job
+  const details = summary ?? job
   return (
     <li data-run={id}>
       <label class="check">
@@ -143,9 +139,9 @@ function Run({
           disabled={!chosen && full}
           onChange={(event) => onToggle(event.currentTarget.checked)}
         />
-        {known?.name ? `${known.name} (${id})` : id}
+        {details?.name ? `${details.name} (${id})` : id}
       </label>
-      {known && <span class="muted small">{described(known, job?.spec.seed)}</span>}
+      {details && <span class="muted small">{described(details, job?.spec.seed)}</span>}
       <a class="small" href={jobPath(id)} aria-label={`Open job ${id}`}>
         open
       </a>
@@ -167,7 +163,7 @@ function described(job: JobSummary | Job, seed: number | undefined): string {
   return parts.filter((part) => part !== null).join(' · ')
 }
 
-/** The form of the same job with a seed that none of the runs has. */
+/** New-job form of the same job with an unused seed. */
 function nextRun(job: Job, runs: readonly Job[]): string {
   const seed = Math.max(...runs.map(({ spec }) => spec.seed ?? 0)) + 1
   return withQuery('/jobs/new', { clone: job.id, seed })

@@ -1,48 +1,51 @@
-/** Which jobs may be further runs of the same fit. Pure. */
+/** Runs of the same fit. */
 
 import type { Job, JobSummary } from '../../api/types'
 import { idsOf } from '../../router/query-value'
 
-/** Runs that the API compares at once, besides the first. */
+/** Most runs that the API compares, besides the first. */
 export const MOST_RUNS = 31
 
-/** Job ids of an address such as `?also=a,b`, each once, without the job itself. */
-export function runsOf(query: URLSearchParams, own: string): readonly string[] {
+/** Distinct job ids of a query such as `?also=a,b`, without the job itself. */
+export function runsOf(query: URLSearchParams, job: string): readonly string[] {
   return idsOf(query.get('also'))
-    .filter((id) => id !== own)
+    .filter((id) => id !== job)
     .slice(0, MOST_RUNS)
 }
 
-/** The query of such an address; null for none. */
+/** Inverse of `runsOf`; null for no ids. */
 export function wordOfRuns(ids: readonly string[]): string | null {
   return ids.length === 0 ? null : ids.join(',')
 }
 
 type Fitted = Pick<JobSummary, 'kind' | 'scenarios'>
 
-/** Whether two jobs are of one kind and were fitted to the same. */
+/** Whether two jobs are of the same kind and fitted to the same data. */
 export function isSameFit(one: Fitted, other: Fitted): boolean {
   const cases = (job: Fitted) => [...job.scenarios].sort().join()
   return one.kind === other.kind && cases(one) === cases(other)
 }
 
-/** Other jobs that were fitted to the same and have a design. */
+/** Other jobs of the same fit that have a result. */
 export function furtherRuns(
   jobs: readonly JobSummary[],
-  own: Fitted & Pick<JobSummary, 'id'>,
+  reference: Fitted & Pick<JobSummary, 'id'>,
 ): readonly JobSummary[] {
-  return jobs.filter((job) => job.id !== own.id && job.best_fitness !== null && isSameFit(job, own))
+  return jobs.filter(
+    (job) => job.id !== reference.id && job.best_fitness !== null && isSameFit(job, reference),
+  )
 }
 
-/** Short names of runs: their seeds where these tell them apart, else their ids. */
+/** Short labels of runs: their seeds if distinct, otherwise their ids. */
 export function labelsOf(ids: readonly string[], jobs: readonly Job[]): readonly string[] {
   const seeds = ids.map((id) => jobs.find((job) => job.id === id)?.spec.seed)
-  const known = seeds.filter((seed) => seed !== undefined)
-  const apart = known.length === ids.length && new Set(known).size === known.length
-  return ids.map((id, k) => (apart ? `seed ${seeds[k]}` : id))
+  const knownSeeds = seeds.filter((seed) => seed !== undefined)
+  const distinct =
+    knownSeeds.length === ids.length && new Set(knownSeeds).size === knownSeeds.length
+  return ids.map((id, k) => (distinct ? `seed ${seeds[k]}` : id))
 }
 
-/** Seeds that more than one run has. */
+/** Seeds used by more than one run. */
 export function repeatedSeeds(jobs: readonly Job[]): readonly number[] {
   const seeds = jobs.map((job) => job.spec.seed)
   return [...new Set(seeds.filter((seed, k) => seeds.indexOf(seed) !== k))]

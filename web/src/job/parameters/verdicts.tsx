@@ -1,4 +1,4 @@
-/** What the runs say of the parameters as a whole, and which of them are to be shown. */
+/** Summary of the verdicts, and filters of the parameters. */
 
 import type { Identifiability } from '../../api/types'
 import { Segmented } from '../../components/fields/segmented'
@@ -20,29 +20,29 @@ export function TrustBadge({ trust }: { trust: Trust }) {
 }
 
 export function Verdicts({
-  found,
+  identifiability,
   chosen,
   onChoose,
   text,
   onText,
 }: {
-  found: Identifiability
-  /** The verdict that is shown alone; null for all. */
+  identifiability: Identifiability
+  /** Verdict to filter by; null for all. */
   chosen: Trust | null
   onChoose: (trust: Trust | null) => void
-  /** Words that the names shown must have. */
+  /** Text to filter names by. */
   text: string
   onText: (text: string) => void
 }) {
-  const count = found.parameters.length
+  const count = identifiability.parameters.length
   return (
     <section class="card stack verdict-card" aria-labelledby="verdicts">
-      <h2 id="verdicts">Which parameters can be trusted</h2>
-      {found.jobs.length === 1 ? (
+      <h2 id="verdicts">Confidence in the parameters</h2>
+      {identifiability.jobs.length === 1 ? (
         <OneRun />
       ) : (
         <dl class="verdicts">
-          {verdicts(found)
+          {verdicts(identifiability)
             .filter((verdict) => verdict.count > 0)
             .map(({ trust, count, explanation }) => (
               <div key={trust} data-verdict={trust} data-count={count}>
@@ -64,13 +64,13 @@ export function Verdicts({
             onInput={(event) => onText(event.currentTarget.value)}
           />
         </label>
-        {found.jobs.length > 1 && (
+        {identifiability.jobs.length > 1 && (
           <Segmented<Trust | 'all'>
             label="Verdict"
             value={chosen ?? 'all'}
             options={[
               ['all', `all ${formatCount(count)}`],
-              ...verdicts(found).map(({ trust, count }) => words(trust, count)),
+              ...verdicts(identifiability).map(({ trust, count }) => words(trust, count)),
             ]}
             onChoose={(trust) => onChoose(trust === 'all' ? null : trust)}
           />
@@ -87,11 +87,11 @@ function words(trust: Trust, count: number): readonly [Trust, string] {
 function OneRun() {
   return (
     <div class="notice" data-tone="warn" data-single-run>
-      <strong>One run cannot tell.</strong>
+      <strong>One run is not enough.</strong>
       <p>
-        A search gathers at some value of every parameter, whether or not the walks depend on it, so
-        one run always narrows down. Only runs that differ in their seed and still find the same
-        value show that it can be trusted: choose some above, or run this job with another seed.
+        A search converges to some value of every parameter, whether or not the results depend on
+        it. Only agreement between runs with different seeds shows that a value can be trusted:
+        select other runs above, or run this job with another seed.
       </p>
     </div>
   )

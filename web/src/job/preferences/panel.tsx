@@ -1,4 +1,4 @@
-/** What if other things mattered: the job's whole history ranked anew, without simulating. */
+/** What-if analysis: ranking of a job's history under another preference, without simulation. */
 
 import { useEffect, useState } from 'preact/hooks'
 import { get, post } from '../../api/client'
@@ -13,12 +13,13 @@ import { PreferenceSliders, same } from './sliders'
 import './what-if.css'
 
 export function PreferencesPanel({ job }: { job: Job }) {
-  const own = (job.spec as JobSpec).preference as Preference
+  const jobPreference = (job.spec as JobSpec).preference as Preference
   const codec = {
     read: preferenceOf,
-    write: (wanted: Preference) => (same(wanted, own) ? null : preferenceQuery(wanted)),
+    write: (preference: Preference) =>
+      same(preference, jobPreference) ? null : preferenceQuery(preference),
   }
-  const [preference, setPreference] = useQueryValue('preference', codec, own)
+  const [preference, setPreference] = useQueryValue('preference', codec, jobPreference)
   const { ranking, error } = useRanking(job, preference)
   const presets = useResource('preferences', (signal) =>
     get('/v1/preferences', { signal }).then((answer) => answer.items),
@@ -28,13 +29,13 @@ export function PreferencesPanel({ job }: { job: Job }) {
     <div class="what-if">
       <PreferenceSliders
         preference={preference}
-        own={own}
+        jobPreference={jobPreference}
         presets={presets.data ?? []}
         units={units}
         onChange={setPreference}
       />
       <div class="stack" aria-live="polite">
-        {error !== null && <ErrorNotice what="It could not be ranked anew." error={error} />}
+        {error !== null && <ErrorNotice what="Could not rank the designs." error={error} />}
         {ranking ? (
           <RankingResult job={job} ranking={ranking} preference={preference} />
         ) : (
@@ -45,7 +46,7 @@ export function PreferencesPanel({ job }: { job: Job }) {
   )
 }
 
-/** Renewed with every other preference, and with what a running job commits. */
+/** Ranking, updated when the preference changes or the job commits. */
 function useRanking(job: Job, preference: Preference) {
   const [ranking, setRanking] = useState<Ranking | null>(null)
   const [error, setError] = useState<unknown>(null)

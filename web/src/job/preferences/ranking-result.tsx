@@ -1,4 +1,4 @@
-/** What another preference makes of a job's designs. */
+/** Ranking of a job's designs under another preference. */
 
 import { useMemo } from 'preact/hooks'
 import type { Job, Preference, RankedDesign, Ranking } from '../../api/types'
@@ -28,7 +28,7 @@ export function RankingResult({
     return (
       <section class="card">
         <Empty title="Nothing to rank yet">
-          <p>No design has walked in every scenario so far.</p>
+          <p>No design has succeeded in every scenario yet.</p>
         </Empty>
       </section>
     )
@@ -37,9 +37,9 @@ export function RankingResult({
     <>
       <Winners job={job} ranking={ranking} winner={winner} preference={preference} />
       <section class="card" aria-labelledby="moves">
-        <h2 id="moves">The best under this preference</h2>
+        <h2 id="moves">Best designs under this preference</h2>
         <Table
-          caption="The best designs under this preference"
+          caption="Best designs under this preference"
           rows={ranking.top}
           rowKey={(d) => `${d.iteration} ${d.particle}`}
           columns={rankColumns(job)}
@@ -50,7 +50,7 @@ export function RankingResult({
   )
 }
 
-/** The new winner beside the old one, and the way on. */
+/** Comparison of the new winner with the job's, and a link to start a job from it. */
 function Winners({
   job,
   ranking,
@@ -80,7 +80,7 @@ function Winners({
       data-evaluations={ranking.evaluations}
     >
       <header class="row spread">
-        <h2 id="new-winner">{stays ? 'The winner stays' : 'Another design wins'}</h2>
+        <h2 id="new-winner">{stays ? 'Same winner' : 'New winner'}</h2>
         <a class="button primary compact" href={target}>
           Start a job from here
         </a>
@@ -88,21 +88,21 @@ function Winners({
       <p>
         {stays ? (
           <>
-            <Where job={job} iteration={winner.iteration} particle={winner.particle} /> is best
-            under this preference too, with a fitness of {formatNumber(winner.fitness, 5)}.
+            <Where job={job} iteration={winner.iteration} particle={winner.particle} /> is also the
+            best under this preference, with a fitness of {formatNumber(winner.fitness, 5)}.
           </>
         ) : (
           <>
             <Where job={job} iteration={winner.iteration} particle={winner.particle} /> has a
             fitness of <strong>{formatNumber(winner.fitness, 5)}</strong>
-            {gain !== null && <> ({change(gain, '%')} against the job’s own winner)</>}; under the
-            job’s preference it was number {formatCount(winner.rank_before)}.
+            {gain !== null && <> ({change(gain, '%')} relative to the job’s winner)</>}. Under the
+            job’s preference, its rank is {formatCount(winner.rank_before)}.
           </>
         )}
       </p>
       <p class="muted small">
-        {formatCount(ranking.evaluations)} designs ranked; rank correlation with the job’s own
-        preference {formatNumber(ranking.correlation, 3)}.
+        {formatCount(ranking.evaluations)} designs ranked; rank correlation with the job’s
+        preference: {formatNumber(ranking.correlation, 3)}.
       </p>
       {!stays && <DesignChange job={job} winner={winner} />}
     </section>
@@ -113,7 +113,7 @@ function DesignChange({ job, winner }: { job: Job; winner: RankedDesign }) {
   const variables = searchedVariables(job.spec)
   return (
     <Table
-      caption="Design of the new winner and of the job's own"
+      caption="Designs of the new winner and of the job's winner"
       rows={variables}
       rowKey={(v) => v.name}
       columns={[
@@ -132,8 +132,8 @@ function DesignChange({ job, winner }: { job: Job; winner: RankedDesign }) {
         },
         { key: 'unit', label: 'Unit', cell: (v) => (v.unit === '1' ? '–' : v.unit) },
         {
-          key: 'moved',
-          label: 'Moved by',
+          key: 'change',
+          label: 'Change',
           unit: '% of range',
           numeric: true,
           cell: (v) => {
@@ -152,7 +152,7 @@ function rankColumns(job: Job): readonly Column<RankedDesign>[] {
     { key: 'rank', label: 'Rank', numeric: true, value: (d) => d.rank },
     {
       key: 'before',
-      label: 'Before',
+      label: 'Previous rank',
       numeric: true,
       value: (d) => d.rank_before,
       cell: (d) => <RankMove design={d} />,
@@ -173,7 +173,7 @@ function rankColumns(job: Job): readonly Column<RankedDesign>[] {
     },
     {
       key: 'fitness_before',
-      label: 'Fitness before',
+      label: 'Previous fitness',
       numeric: true,
       value: (d) => d.fitness_before,
       cell: (d) => formatNumber(d.fitness_before, 5),
@@ -183,22 +183,23 @@ function rankColumns(job: Job): readonly Column<RankedDesign>[] {
 
 function RankMove({ design: { rank, rank_before } }: { design: RankedDesign }) {
   if (rank_before === null) return <>–</>
-  const moved = rank_before - rank
-  const word = moved > 0 ? `up ${formatCount(moved)}` : `down ${formatCount(-moved)}`
+  const steps = rank_before - rank
+  const word = steps > 0 ? `up ${formatCount(steps)}` : `down ${formatCount(-steps)}`
   return (
     <>
       {formatCount(rank_before)}
-      {moved !== 0 && <span class="muted small"> ({word})</span>}
+      {steps !== 0 && <span class="muted small"> ({word})</span>}
     </>
   )
 }
 
-/** When the best was found; one late find alone does not say that more would follow. */
+/** Iteration of the best; a late improvement alone does not predict further ones. */
 function lastGain({ best_so_far }: Ranking): string {
-  const found = best_so_far.findIndex(({ fitness }) => fitness === best_so_far.at(-1)?.fitness)
-  if (found < 0 || best_so_far.at(-1)?.fitness === null) return 'No design walks in every scenario.'
-  const since = best_so_far.length - 1 - found
-  return `The best was found in iteration ${best_so_far[found].index}; ${since === 0 ? 'it is the last one' : `nothing better in the ${since} after it`}.`
+  const bestIndex = best_so_far.findIndex(({ fitness }) => fitness === best_so_far.at(-1)?.fitness)
+  if (bestIndex < 0 || best_so_far.at(-1)?.fitness === null)
+    return 'No design succeeds in every scenario.'
+  const since = best_so_far.length - 1 - bestIndex
+  return `The best is from iteration ${best_so_far[bestIndex].index}; ${since === 0 ? 'the last one' : `no improvement in the ${since} iterations after it`}.`
 }
 
 function BestSoFar({ ranking }: { ranking: Ranking }) {

@@ -1,4 +1,4 @@
-/** Biases and exponents of the objectives to move, and the published preferences. */
+/** Sliders for biases and exponents, and a choice of published preferences. */
 
 import type { Preference, PreferencePreset } from '../../api/types'
 import { NumberField } from '../../components/fields/number-field'
@@ -9,19 +9,19 @@ import { weighed } from '../preference'
 
 type Part = 'bias' | 'exponent'
 
-/** Sliders reach this far, or to the present value; fields take whatever the API takes. */
+/** Range of the sliders, extended to the current value; fields accept any value that the API accepts. */
 const REACH = 2
 
 export function PreferenceSliders({
   preference,
-  own,
+  jobPreference,
   presets,
   units,
   onChange,
 }: {
   preference: Preference
-  /** The job's own. */
-  own: Preference
+  /** The job's preference. */
+  jobPreference: Preference
   presets: readonly PreferencePreset[]
   units: ReadonlyMap<string, string>
   onChange: (preference: Preference) => void
@@ -33,7 +33,7 @@ export function PreferenceSliders({
     onChange({ ...preference, [part]: values as Preference[Part] })
   }
   const offered: readonly (readonly [name: string, preference: Preference])[] = [
-    ['the job’s own', own],
+    ['job’s preference', jobPreference],
     ...presets.map((preset) => [preset.name, preset] as const),
   ]
   return (
@@ -42,7 +42,7 @@ export function PreferenceSliders({
       <div class="stack">
         <p class="muted small">
           A scenario’s utility is the product of (b + f)<sup>e</sup> over the objectives f. A larger
-          e makes an objective matter more, a larger b makes small values of it matter less.
+          e increases the weight of an objective; a larger b reduces the influence of small values.
         </p>
         <Segmented
           label="Published preferences"

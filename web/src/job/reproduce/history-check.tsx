@@ -1,4 +1,4 @@
-/** The head of a job's history, and on request whether all that it stands for is as it was. */
+/** Digest of a job's history, and its verification on request. */
 
 import { useState } from 'preact/hooks'
 import { post } from '../../api/client'
@@ -7,17 +7,17 @@ import { CopyButton } from '../../components/copy-button'
 import { ErrorNotice } from '../../components/feedback'
 
 export function HistoryCheck({ job }: { job: Job }) {
-  const [found, setFound] = useState<HistoryVerification | null>(null)
+  const [verification, setVerification] = useState<HistoryVerification | null>(null)
   const [busy, setBusy] = useState(false)
   const [error, setError] = useState<unknown>(null)
   if (!job.head) {
-    return <p class="muted small">History: not chained, as no digest of it was stored.</p>
+    return <p class="muted small">History: not chained, since no digest was stored.</p>
   }
   const verify = () => {
     setBusy(true)
     setError(null)
     post('/v1/jobs/{job_id}/verify', { path: { job_id: job.id }, body: { replay: 0 } })
-      .then(setFound, setError)
+      .then(setVerification, setError)
       .finally(() => setBusy(false))
   }
   return (
@@ -31,16 +31,20 @@ export function HistoryCheck({ job }: { job: Job }) {
           Verify
         </button>
       </div>
-      {/* Always there, so that what appears in it is read out. */}
-      <p class="small" role="status" data-verified={found ? String(found.verified) : undefined}>
-        {found && sentence(found)}
+      {/* Always present, so that screen readers announce its content. */}
+      <p
+        class="small"
+        role="status"
+        data-verified={verification ? String(verification.verified) : undefined}
+      >
+        {verification && sentence(verification)}
       </p>
-      {error !== null && <ErrorNotice what="The history cannot be verified." error={error} />}
+      {error !== null && <ErrorNotice what="Could not verify the history." error={error} />}
     </div>
   )
 }
 
 function sentence({ verified, checks }: HistoryVerification): string {
-  const said = checks.map(({ detail }) => detail).join('; ')
-  return verified ? `History verified: ${said}.` : `The history was changed: ${said}.`
+  const details = checks.map(({ detail }) => detail).join('; ')
+  return verified ? `History verified: ${details}.` : `The history was modified: ${details}.`
 }

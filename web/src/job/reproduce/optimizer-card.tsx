@@ -1,4 +1,4 @@
-/** The search method of a job, with the settings that are not its defaults. */
+/** Search method of a job and its settings. */
 
 import { get } from '../../api/client'
 import { useResource } from '../../api/resource'
@@ -28,7 +28,7 @@ export function OptimizerCard({ job }: { job: Job }) {
             </thead>
             <tbody>
               {settings.map(([key, value]) => (
-                <Row key={key} name={key} value={value} usual={usualOf(method, key)} />
+                <Row key={key} name={key} value={value} defaultValue={defaultOf(method, key)} />
               ))}
             </tbody>
           </table>
@@ -38,19 +38,33 @@ export function OptimizerCard({ job }: { job: Job }) {
   )
 }
 
-function Row({ name, value, usual }: { name: string; value: string; usual: string | null }) {
-  const changed = usual !== null && usual !== value
+function Row({
+  name,
+  value,
+  defaultValue,
+}: {
+  name: string
+  value: string
+  defaultValue: string | null
+}) {
+  const changed = defaultValue !== null && defaultValue !== value
   return (
     <tr data-setting={name} data-changed={changed}>
       <th scope="row">{inWords(name)}</th>
       <td>{changed ? <strong>{value}</strong> : value}</td>
-      <td>{changed ? usual : <span class="muted">{usual === null ? '' : 'the same'}</span>}</td>
+      <td>
+        {changed ? (
+          defaultValue
+        ) : (
+          <span class="muted">{defaultValue === null ? '' : 'the same'}</span>
+        )}
+      </td>
     </tr>
   )
 }
 
-/** null while it is not known. */
-function usualOf(method: OptimizerPreset | undefined, setting: string): string | null {
+/** null if unknown. */
+function defaultOf(method: OptimizerPreset | undefined, setting: string): string | null {
   if (!method) return null
   return settingText(new Map<string, unknown>(Object.entries(method.settings)).get(setting))
 }

@@ -1,4 +1,4 @@
-/** The job as it was asked for, and commands that ask for the same again. */
+/** Spec of a job, commands to run it again, evidence and provenance. */
 
 import { url } from '../../api/client'
 import type { Job } from '../../api/types'
@@ -14,15 +14,15 @@ export function ReproducePanel({ job }: { job: Job }) {
     <div class="stack">
       <section class="card" aria-labelledby="again">
         <header class="row spread">
-          <h2 id="again">Run the same again</h2>
+          <h2 id="again">Run this job again</h2>
           <a class="button compact" href={withQuery('/jobs/new', { clone: job.id })}>
             Clone in the form
           </a>
         </header>
         <div class="stack">
           <p class="muted small">
-            The same spec with the same seed gives the same designs and the same bits, where its
-            numbers depend on the same.
+            The same spec with the same seed yields the same designs, bit for bit, if the provenance
+            below is the same.
           </p>
           <div class="stack-tight">
             <h3>With the command line</h3>
@@ -39,7 +39,7 @@ export function ReproducePanel({ job }: { job: Job }) {
       <StartCard job={job} />
       <ProvenanceCard job={job} />
       <section class="card" aria-labelledby="spec">
-        <h2 id="spec">The spec as JSON</h2>
+        <h2 id="spec">Spec as JSON</h2>
         <CopyBlock label="the spec" text={JSON.stringify(job.spec, null, 2)} />
       </section>
     </div>
@@ -61,10 +61,10 @@ function EvidenceCard({ job }: { job: Job }) {
       </header>
       <div class="stack">
         <p class="muted small">
-          One file with spec, robot, provenance and every evaluation, which can be checked anywhere,
-          to the bit.
+          One file with spec, robot, provenance and every evaluation. It can be verified anywhere,
+          bit for bit.
         </p>
-        <CopyBlock label="the check" text={`gaitswarm verify ${job.id}.zip --replay 50`} />
+        <CopyBlock label="the verification" text={`gaitswarm verify ${job.id}.zip --replay 50`} />
       </div>
     </section>
   )

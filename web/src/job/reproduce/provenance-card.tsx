@@ -1,19 +1,17 @@
-/** What a job's numbers depend on beside its spec, since which iteration. */
+/** Provenance of a job's numbers, by iteration. */
 
 import type { Job } from '../../api/types'
 import { HistoryCheck } from './history-check'
 
-/** Digits of a digest that tell it from others. */
+/** Digits of a digest that are shown. */
 const SHOWN = 8
 
 export function ProvenanceCard({ job }: { job: Job }) {
   return (
     <section class="card" aria-labelledby="provenance">
-      <h2 id="provenance">What its numbers depend on</h2>
+      <h2 id="provenance">Provenance</h2>
       {job.provenance.length === 0 ? (
-        <p class="muted small">
-          Unknown: the job was stored before gaitswarm recorded it, and has not been resumed since.
-        </p>
+        <p class="muted small">Unknown: the job was stored by a version that did not record it.</p>
       ) : (
         <div class="table-scroll">
           <table>
@@ -25,7 +23,7 @@ export function ProvenanceCard({ job }: { job: Job }) {
                 <th scope="col">Backend</th>
                 <th scope="col">Robot</th>
                 <th scope="col">Simulation code</th>
-                <th scope="col">Search and judgement</th>
+                <th scope="col">Search code</th>
                 <th scope="col">Libraries</th>
               </tr>
             </thead>

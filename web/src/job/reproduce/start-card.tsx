@@ -1,4 +1,4 @@
-/** The designs that a job began with. */
+/** Start designs of a job. */
 
 import type { Job } from '../../api/types'
 import { type Column, Table } from '../../components/table/table'
@@ -13,13 +13,13 @@ export function StartCard({ job }: { job: Job }) {
   const rows = designs.map((design, number) => ({ design, number }))
   return (
     <section class="card" aria-labelledby="start">
-      <h2 id="start">Start</h2>
+      <h2 id="start">Start designs</h2>
       <p class="muted small">
-        {formatCount(designs.length)} known designs that were judged first, and that the search
-        began with if its method can.
+        {formatCount(designs.length)} given designs that were evaluated first; the search starts
+        from them if its method supports it.
       </p>
       <Table
-        caption="Designs that the job began with"
+        caption="Start designs"
         rows={rows}
         rowKey={({ number }) => String(number)}
         pageSize={20}

@@ -1,4 +1,4 @@
-/** How robust the winner is against small changes of its variables, by scenario and variable. */
+/** Sensitivity of the winner to small changes of its variables, by scenario and variable. */
 
 import { post } from '../../api/client'
 import { useResource } from '../../api/resource'
@@ -14,39 +14,39 @@ import '../bars.css'
 
 const LEAST_SAMPLES = 128
 
-/** What was asked since the page was loaded; a design and its walks do not change. */
-const asked = new Map<string, Promise<Robustness>>()
+/** Responses since the page was loaded; the result for a design does not change. */
+const cache = new Map<string, Promise<Robustness>>()
 
 export function RobustnessPanel({ job }: { job: Job }) {
   const best = job.best
   const key = best ? `${job.id} ${best.iteration} ${best.particle}` : null
-  const robustness = useResource(key, () => estimate(job, key!))
+  const response = useResource(key, () => estimate(job, key!))
   if (!best) {
     return (
       <section class="card">
         <Empty title="No winner yet">
-          <p>Its robustness can be estimated as soon as a design has walked in every scenario.</p>
+          <p>Robustness can be estimated once a design has succeeded in every scenario.</p>
         </Empty>
       </section>
     )
   }
-  const found = robustness.data
+  const robustness = response.data
   return (
-    <div class="stack" data-robustness={found?.index?.value ?? ''}>
-      {robustness.error && (
+    <div class="stack" data-robustness={robustness?.index?.value ?? ''}>
+      {response.error && (
         <ErrorNotice
-          what="The robustness of the winner cannot be estimated."
-          error={robustness.error}
-          retry={robustness.reload}
+          what="Could not estimate the robustness."
+          error={response.error}
+          retry={response.reload}
         />
       )}
-      {found ? (
+      {robustness ? (
         <>
-          <ByScenario found={found} />
-          <ByVariable found={found} />
+          <ByScenario robustness={robustness} />
+          <ByVariable robustness={robustness} />
         </>
       ) : (
-        robustness.loading && <Loading what="walks of designs around the winner" />
+        response.loading && <Loading what="simulations of designs around the winner" />
       )}
       <RobustPreferencesCard job={job} />
     </div>
@@ -54,8 +54,8 @@ export function RobustnessPanel({ job }: { job: Job }) {
 }
 
 function estimate(job: Job, key: string): Promise<Robustness> {
-  const known = asked.get(key)
-  if (known) return known
+  const cached = cache.get(key)
+  if (cached) return cached
   const { robot, controller, scenarios } = job.spec as JobSpec
   const variables = searchedVariables(job.spec)
   const answer = post('/v1/robustness', {
@@ -71,8 +71,8 @@ function estimate(job: Job, key: string): Promise<Robustness> {
       precision: 'double',
     },
   })
-  asked.set(key, answer)
-  answer.catch(() => asked.delete(key))
+  cache.set(key, answer)
+  answer.catch(() => cache.delete(key))
   return answer
 }
 
@@ -83,25 +83,25 @@ interface IndexRow {
   readonly failed: number | null
 }
 
-function ByScenario({ found }: { found: Robustness }) {
+function ByScenario({ robustness }: { robustness: Robustness }) {
   const rows: readonly IndexRow[] = [
-    ...Object.entries(found.scenarios).map(([name, part]) => ({
+    ...Object.entries(robustness.scenarios).map(([name, part]) => ({
       name,
       index: part.index,
       byObjective: part.by_objective,
       failed: part.failed,
     })),
-    { name: 'all', index: found.index, byObjective: found.by_objective, failed: null },
+    { name: 'all', index: robustness.index, byObjective: robustness.by_objective, failed: null },
   ]
   const most = Math.max(...rows.map((row) => row.index?.high ?? 0), 1e-12)
   return (
     <ChartFrame
       title="Robustness index by scenario"
-      note="How much the objectives change, relatively, with the variables over their whole bounds; less is more robust."
+      note="Relative change of the objectives with the variables over their entire bounds; lower is more robust."
       legend={
         <>
           <LegendEntry colour="--series-1" label="winner" area />
-          <LegendEntry colour="--text" label="interval of 95 %" />
+          <LegendEntry colour="--text" label="95 % interval" />
         </>
       }
       table={() => (
@@ -109,7 +109,7 @@ function ByScenario({ found }: { found: Robustness }) {
           caption="Robustness index by scenario"
           rows={rows}
           rowKey={(row) => row.name}
-          columns={indexColumns(found)}
+          columns={indexColumns(robustness)}
         />
       )}
     >
@@ -119,14 +119,15 @@ function ByScenario({ found }: { found: Robustness }) {
         ))}
       </ul>
       <p class="muted small table-note">
-        From {found.samples} designs within {percent(found.radius, 2)} of each variable’s bounds.
-        {found.held.length > 0 && <> Not changed: {found.held.join(', ')}.</>}
+        From {robustness.samples} designs within {percent(robustness.radius, 2)} of each variable’s
+        bounds.
+        {robustness.held.length > 0 && <> Fixed: {robustness.held.join(', ')}.</>}
       </p>
     </ChartFrame>
   )
 }
 
-function indexColumns(found: Robustness): readonly Column<IndexRow>[] {
+function indexColumns(robustness: Robustness): readonly Column<IndexRow>[] {
   return [
     { key: 'name', label: 'Scenario', header: true, value: (row) => row.name },
     {
@@ -138,13 +139,13 @@ function indexColumns(found: Robustness): readonly Column<IndexRow>[] {
     },
     {
       key: 'interval',
-      label: 'Interval of 95 %',
+      label: '95 % interval',
       numeric: true,
       data: (row) => (row.index ? `${row.index.low} – ${row.index.high}` : null),
       cell: (row) =>
         row.index ? `${formatNumber(row.index.low, 3)} – ${formatNumber(row.index.high, 3)}` : NONE,
     },
-    ...found.objectives.map(
+    ...robustness.objectives.map(
       ({ name }): Column<IndexRow> => ({
         key: name,
         label: inWords(name),
@@ -155,22 +156,22 @@ function indexColumns(found: Robustness): readonly Column<IndexRow>[] {
     ),
     {
       key: 'failed',
-      label: 'Walks that failed',
+      label: 'Failures',
       numeric: true,
       value: (row) => row.failed,
     },
   ]
 }
 
-function ByVariable({ found }: { found: Robustness }) {
-  const rows = [...found.variables].sort(
-    (a, b) => (found.by_variable[b.name] ?? 0) - (found.by_variable[a.name] ?? 0),
+function ByVariable({ robustness }: { robustness: Robustness }) {
+  const rows = [...robustness.variables].sort(
+    (a, b) => (robustness.by_variable[b.name] ?? 0) - (robustness.by_variable[a.name] ?? 0),
   )
-  const most = Math.max(...rows.map((row) => found.by_variable[row.name] ?? 0), 1e-12)
+  const most = Math.max(...rows.map((row) => robustness.by_variable[row.name] ?? 0), 1e-12)
   return (
     <ChartFrame
-      title="To which variables it is sensitive"
-      note="The same by variable, over all scenarios and objectives."
+      title="Sensitivity by variable"
+      note="The robustness index by variable, over all scenarios and objectives."
       table={() => (
         <Table
           caption="Sensitivity by variable"
@@ -182,10 +183,10 @@ function ByVariable({ found }: { found: Robustness }) {
               key: 'all',
               label: 'all',
               numeric: true,
-              value: (row) => found.by_variable[row.name] ?? null,
-              cell: (row) => formatNumber(found.by_variable[row.name], 3),
+              value: (row) => robustness.by_variable[row.name] ?? null,
+              cell: (row) => formatNumber(robustness.by_variable[row.name], 3),
             },
-            ...Object.entries(found.scenarios).map(
+            ...Object.entries(robustness.scenarios).map(
               ([scenario, part]): Column<Robustness['variables'][number]> => ({
                 key: scenario,
                 label: scenario,
@@ -200,7 +201,7 @@ function ByVariable({ found }: { found: Robustness }) {
     >
       <ul class="bars">
         {rows.map(({ name }) => (
-          <Bar key={name} name={name} value={found.by_variable[name] ?? null} most={most} />
+          <Bar key={name} name={name} value={robustness.by_variable[name] ?? null} most={most} />
         ))}
       </ul>
     </ChartFrame>
@@ -237,7 +238,7 @@ function Bar({
             />
           )}
         </span>
-        <span class="bar-value">{value === null ? 'not known' : formatNumber(value, 3)}</span>
+        <span class="bar-value">{value === null ? 'unknown' : formatNumber(value, 3)}</span>
       </span>
     </li>
   )

@@ -1,4 +1,4 @@
-/** Which preference's winner is the most robust: A, B and C compared, and preferences that are drawn. */
+/** Comparison of preferences by the robustness of their winners: A, B, C and random ones. */
 
 import { useState } from 'preact/hooks'
 import { post } from '../../api/client'
@@ -13,24 +13,24 @@ import { Where } from '../designs/selected-designs'
 import { searchedVariables } from '../designs/variables'
 import { preferenceQuery } from '../preference'
 
-/** Designs that walk around each winner, at least. */
+/** Fewest designs simulated around each winner. */
 const LEAST_SAMPLES = 48
 
-/** Winners that are compared; a server allows walks of some length only. */
+/** Number of winners compared; servers limit the length of simulations. */
 const CANDIDATES = 5
 
-/** What was asked since the page was loaded; it takes walks. */
-const asked = new Map<string, Promise<RobustPreferences>>()
+/** Responses since the page was loaded; computing one requires simulations. */
+const cache = new Map<string, Promise<RobustPreferences>>()
 
 export function RobustPreferencesCard({ job }: { job: Job }) {
   const [walked, setWalked] = useState(false)
   const key = `${job.id} ${job.evaluations} ${walked}`
   const samples = Math.max(LEAST_SAMPLES, 4 * (searchedVariables(job.spec).length + 1))
-  const found = useResource(key, () => ask(job.id, key, walked ? samples : 0))
-  // Without walks the same winners are known, but not how robust they are.
-  const [before, setBefore] = useState<RobustPreferences | null>(null)
-  if (found.data && found.data !== before) setBefore(found.data)
-  const shown = found.data ?? before
+  const preferences = useResource(key, () => request(job.id, key, walked ? samples : 0))
+  // Keep the winners visible while their robustness is computed.
+  const [previous, setPrevious] = useState<RobustPreferences | null>(null)
+  if (preferences.data && preferences.data !== previous) setPrevious(preferences.data)
+  const shown = preferences.data ?? previous
   return (
     <section
       class="card"
@@ -38,31 +38,33 @@ export function RobustPreferencesCard({ job }: { job: Job }) {
       data-most-robust={shown && shown.samples > 0 ? mostRobust(shown) : ''}
     >
       <header class="row spread">
-        <h2 id="robust-preferences">Which preference wins robustly</h2>
+        <h2 id="robust-preferences">Robustness by preference</h2>
         {!walked && (
           <button type="button" class="compact" onClick={() => setWalked(true)}>
-            Let designs walk around the winners
+            Simulate designs around the winners
           </button>
         )}
       </header>
       <div class="stack">
-        {found.error && (
+        {preferences.error && (
           <ErrorNotice
-            what="Preferences cannot be compared."
-            error={found.error}
-            retry={found.reload}
+            what="Could not compare the preferences."
+            error={preferences.error}
+            retry={preferences.reload}
           />
         )}
-        {found.loading && <Loading what={walked ? 'walks around the winners' : 'the winners'} />}
-        {shown && <Winners job={job} found={shown} />}
+        {preferences.loading && (
+          <Loading what={walked ? 'simulations around the winners' : 'the winners'} />
+        )}
+        {shown && <Winners job={job} preferences={shown} />}
       </div>
     </section>
   )
 }
 
-function ask(id: string, key: string, samples: number): Promise<RobustPreferences> {
-  const known = asked.get(key)
-  if (known) return known
+function request(id: string, key: string, samples: number): Promise<RobustPreferences> {
+  const cached = cache.get(key)
+  if (cached) return cached
   const answer = post('/v1/jobs/{job_id}/preferences', {
     path: { job_id: id },
     body: {
@@ -74,8 +76,8 @@ function ask(id: string, key: string, samples: number): Promise<RobustPreference
       precision: 'single',
     },
   })
-  asked.set(key, answer)
-  answer.catch(() => asked.delete(key))
+  cache.set(key, answer)
+  answer.catch(() => cache.delete(key))
   return answer
 }
 
@@ -83,41 +85,44 @@ function mostRobust({ candidates: [first] }: RobustPreferences): string {
   return first ? placeWord(first) : ''
 }
 
-function Winners({ job, found }: { job: Job; found: RobustPreferences }) {
-  const [first] = found.candidates
+function Winners({ job, preferences }: { job: Job; preferences: RobustPreferences }) {
+  const [first] = preferences.candidates
   return (
     <>
       {first?.index && (
         <p>
-          The most robust is <Where job={job} {...first} />, best under {winsUnder(first)}: its
-          robustness index is {formatNumber(first.index.value, 3)}; less is more robust.
+          The most robust winner is <Where job={job} {...first} />, best under {winsUnder(first)}.
+          Its robustness index is {formatNumber(first.index.value, 3)}; lower is more robust.
         </p>
       )}
       <Table
-        caption="Winners under A, B, C and drawn preferences"
-        rows={found.candidates}
+        caption="Winners under A, B, C and random preferences"
+        rows={preferences.candidates}
         rowKey={({ iteration, particle }) => `${iteration} ${particle}`}
         rowData={({ named }) => ({ 'data-wins-under': named.join(' ') })}
-        columns={winnerColumns(job, found)}
+        columns={winnerColumns(job, preferences)}
       />
       <p class="muted small">
-        All designs ranked anew under A, B, C and {formatCount(found.drawn)} drawn preferences:{' '}
-        {formatCount(found.winners)} of them win under any.{' '}
-        {found.samples > 0
-          ? `The index is from ${formatCount(found.samples)} designs around each, with its interval of 95 %. `
+        All designs ranked under A, B, C and {formatCount(preferences.drawn)} random preferences:{' '}
+        {formatCount(preferences.winners)} of them win under at least one.{' '}
+        {preferences.samples > 0
+          ? `The index is estimated from ${formatCount(preferences.samples)} designs around each, with a 95 % interval. `
           : ''}
-        Only designs that the job has tried can win: a job of its own says what a preference finds.
+        Only evaluated designs can win; to search under a preference, run another job.
       </p>
     </>
   )
 }
 
 function winsUnder({ named, share }: PreferenceWinner): string {
-  const drawn = `${percent(share, 2)} of the drawn preferences`
+  const drawn = `${percent(share, 2)} of the random preferences`
   return named.length > 0 ? `${named.join(', ')} and ${drawn}` : drawn
 }
 
-function winnerColumns(job: Job, found: RobustPreferences): readonly Column<PreferenceWinner>[] {
+function winnerColumns(
+  job: Job,
+  preferences: RobustPreferences,
+): readonly Column<PreferenceWinner>[] {
   const index: Column<PreferenceWinner> = {
     key: 'index',
     label: 'Robustness index',
@@ -131,21 +136,21 @@ function winnerColumns(job: Job, found: RobustPreferences): readonly Column<Pref
       label: 'Best under',
       header: true,
       value: ({ named }) => named.join(', ') || null,
-      cell: ({ named }) => named.join(', ') || 'drawn ones only',
+      cell: ({ named }) => named.join(', ') || 'random ones only',
     },
     {
       key: 'share',
-      label: 'Of the drawn',
+      label: 'Share of random',
       numeric: true,
       minor: true,
       value: ({ share }) => share,
       cell: ({ share }) => percent(share, 2),
     },
     { key: 'design', label: 'Design', cell: (winner) => <Where job={job} {...winner} /> },
-    ...(found.samples > 0 ? [index] : []),
+    ...(preferences.samples > 0 ? [index] : []),
     {
       key: 'fitness',
-      label: 'Fitness by the job’s own',
+      label: 'Fitness (job’s preference)',
       numeric: true,
       value: ({ fitness }) => fitness,
       cell: ({ fitness }) => formatNumber(fitness),

@@ -1,4 +1,4 @@
-/** Which scenarios of a job matter: what it would have found without each, and the fewest that do. */
+/** Scenarios that matter: regret without each, and the smallest sufficient set. */
 
 import { useState } from 'preact/hooks'
 import { get } from '../../api/client'
@@ -10,19 +10,19 @@ import { exactQuantity, formatCount, formatNumber, NONE, percent } from '../../f
 import { withQuery } from '../../router/routes'
 import { Where } from '../designs/selected-designs'
 
-/** Largest regret of a smallest set, by choice. */
+/** Choices for the largest tolerated regret. */
 const TOLERANCES = [0.005, 0.01, 0.02, 0.05]
 
 export function ScenarioFamiliesCard({ job }: { job: Job }) {
   const [tolerance, setTolerance] = useState(0.01)
-  const found = useResource(`${job.id} ${job.best_iteration} ${tolerance}`, (signal) =>
+  const families = useResource(`${job.id} ${job.best_iteration} ${tolerance}`, (signal) =>
     get('/v1/jobs/{job_id}/scenarios', { path: { job_id: job.id }, query: { tolerance }, signal }),
   )
-  const { data } = found
+  const { data } = families
   return (
     <section class="card" aria-labelledby="families" data-smallest={smallestOf(data)}>
       <header class="row spread">
-        <h2 id="families">Which scenarios matter</h2>
+        <h2 id="families">Required scenarios</h2>
         <label class="row small">
           <span>Tolerated regret</span>
           <select
@@ -37,50 +37,50 @@ export function ScenarioFamiliesCard({ job }: { job: Job }) {
           </select>
         </label>
       </header>
-      {found.error && (
+      {families.error && (
         <ErrorNotice
-          what="Which scenarios matter cannot be told."
-          error={found.error}
-          retry={found.reload}
+          what="Could not analyse the scenarios."
+          error={families.error}
+          retry={families.reload}
         />
       )}
-      {found.loading && !data && <Loading what="what fewer scenarios would have found" />}
+      {families.loading && !data && <Loading what="results of fewer scenarios" />}
       {data &&
         (data.left_out.length === 0 ? (
-          <Empty title="One scenario only">
-            <p>A job of several scenarios is told here which of them it needs.</p>
+          <Empty title="Only one scenario">
+            <p>This analysis requires a job with several scenarios.</p>
           </Empty>
         ) : (
-          <Families job={job} found={data} />
+          <Families job={job} families={data} />
         ))}
     </section>
   )
 }
 
-function smallestOf(found: ScenarioFamilies | null): string {
-  return found?.smallest?.scenarios.join(' ') ?? ''
+function smallestOf(families: ScenarioFamilies | null): string {
+  return families?.smallest?.scenarios.join(' ') ?? ''
 }
 
-function Families({ job, found }: { job: Job; found: ScenarioFamilies }) {
+function Families({ job, families }: { job: Job; families: ScenarioFamilies }) {
   return (
     <div class="stack">
-      <Smallest job={job} found={found} />
+      <Smallest job={job} families={families} />
       <Table
-        caption="What the job would have found without a scenario"
-        rows={found.left_out}
+        caption="Results without one scenario"
+        rows={families.left_out}
         rowKey={({ scenario }) => scenario}
         rowData={({ scenario }) => ({ 'data-left-out': scenario })}
         columns={leftOutColumns(job)}
       />
       <Table
-        caption="Sets of scenarios by their size"
-        rows={found.sizes}
+        caption="Sets of scenarios by size"
+        rows={families.sizes}
         rowKey={({ size }) => String(size)}
         columns={[
           { key: 'size', label: 'Scenarios', header: true, value: ({ size }) => size },
           {
             key: 'families',
-            label: 'Sets looked at',
+            label: 'Sets considered',
             numeric: true,
             value: ({ families }) => families,
           },
@@ -100,17 +100,17 @@ function Families({ job, found }: { job: Job; found: ScenarioFamilies }) {
           },
           {
             key: 'within',
-            label: 'Within what is tolerated',
+            label: 'Within tolerance',
             numeric: true,
             value: ({ within }) => within,
           },
         ]}
       />
       <p class="muted small">
-        Regret: by how much the design that is best without a scenario is worse over all of them
-        than the job’s best; in brackets its interval of 95&nbsp;%. From{' '}
-        {formatCount(found.designs)} designs that were found by a search over all scenarios: a
-        search over fewer goes elsewhere, so check it by a job of its own.
+        Regret: how much worse than the job’s best the best design without a scenario is over all
+        scenarios, with its 95&nbsp;% interval. Estimated from {formatCount(families.designs)}{' '}
+        designs of a search over all scenarios. A search over fewer takes another course; confirm
+        with a separate job.
       </p>
     </div>
   )
@@ -118,16 +118,16 @@ function Families({ job, found }: { job: Job; found: ScenarioFamilies }) {
 
 function Smallest({
   job,
-  found: { smallest, tolerance, scenarios },
+  families: { smallest, tolerance, scenarios },
 }: {
   job: Job
-  found: ScenarioFamilies
+  families: ScenarioFamilies
 }) {
   if (!smallest) {
     return (
       <p>
-        No smaller set of scenarios finds a design within {percent(tolerance, 1)} of the job’s best:
-        it needs all {formatCount(scenarios.length)}.
+        No smaller set of scenarios yields a design within {percent(tolerance, 1)} of the job’s
+        best: all {formatCount(scenarios.length)} are required.
       </p>
     )
   }
@@ -135,9 +135,9 @@ function Smallest({
   return (
     <div class="row spread">
       <p>
-        <strong>{names.join(', ')}</strong> would have been enough: {formatCount(names.length)} of{' '}
-        {formatCount(scenarios.length)} scenarios, whose best is {shareWords(smallest.regret.value)}{' '}
-        worse over all ({intervalWords(smallest.regret)}).
+        <strong>{names.join(', ')}</strong> would have sufficed: {formatCount(names.length)} of{' '}
+        {formatCount(scenarios.length)} scenarios, whose best design is{' '}
+        {shareWords(smallest.regret.value)} worse over all ({intervalWords(smallest.regret)}).
       </p>
       <a
         class="button compact"
@@ -161,14 +161,14 @@ function leftOutColumns(job: Job): readonly Column<ScenarioLeftOut>[] {
     },
     {
       key: 'loss',
-      label: 'Loss in it',
+      label: 'Loss in this scenario',
       numeric: true,
       value: ({ loss }) => loss.value,
       cell: ({ loss }) => <LossCell loss={loss} />,
     },
     {
       key: 'similar',
-      label: 'Most like it',
+      label: 'Most similar',
       value: ({ similarity }) => similarity,
       cell: ({ similar, similarity }) =>
         similar === null ? NONE : `${similar} (${formatNumber(similarity, 2)})`,
@@ -183,7 +183,7 @@ function leftOutColumns(job: Job): readonly Column<ScenarioLeftOut>[] {
     },
     {
       key: 'winner',
-      label: 'Would have won',
+      label: 'Winner',
       minor: true,
       cell: ({ family }) => <Where job={job} {...family} />,
     },
@@ -203,7 +203,7 @@ function intervalWords({ low, high }: ScenarioLoss): string {
   return `${shareWords(low)} to ${shareWords(high)}`
 }
 
-/** In hundredths of a per cent; a design that fails has no share. */
+/** Rounded to 0.01 %; null for a failed design. */
 function shareWords(share: number | null): string {
   return share === null ? 'fails' : exactQuantity(Math.round(share * 10_000) / 100, '%', 3)
 }

@@ -1,4 +1,4 @@
-/** What each objective of a job is, in the API's words. */
+/** Descriptions of a job's objectives. */
 
 import type { Job } from '../../api/types'
 import { inWords } from '../../format/words'
@@ -7,7 +7,7 @@ import './notes.css'
 export function ObjectiveNotes({ job }: { job: Job }) {
   return (
     <details class="small notes-fold">
-      <summary>What the objectives are</summary>
+      <summary>Descriptions of the objectives</summary>
       <dl class="notes">
         {job.objectives.map(({ name, description }) => (
           <div key={name}>

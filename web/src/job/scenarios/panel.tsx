@@ -1,4 +1,4 @@
-/** The winner scenario by scenario: utilities and objectives, beside those of a reference. */
+/** Utilities and objectives of the winner by scenario, compared with a reference. */
 
 import { isPublished } from '../../api/robots'
 import type { Job, JobSpec, Preference, ScenarioResult } from '../../api/types'
@@ -18,9 +18,9 @@ import { UtilityBars } from './utility-bars'
 
 interface Row {
   readonly scenario: string
-  /** What people call it. */
+  /** Display name. */
   readonly label: string
-  readonly own: ScenarioResult
+  readonly winner: ScenarioResult
   readonly other: ScenarioResult | null
   readonly utility: number | null
   readonly otherUtility: number | null
@@ -40,8 +40,7 @@ export function ScenariosPanel({ job }: { job: Job }) {
       <section class="card">
         <Empty title="No winner yet">
           <p>
-            No design has walked in every {words.one} so far. Its results appear here as soon as one
-            has.
+            No design has succeeded in every {words.item} yet. Results appear here once one has.
           </p>
         </Empty>
       </section>
@@ -65,7 +64,7 @@ export function ScenariosPanel({ job }: { job: Job }) {
       {reference.loading && <Loading what="the reference" />}
       {reference.error && (
         <ErrorNotice
-          what="The reference cannot be shown."
+          what="Could not load the reference."
           error={reference.error}
           retry={reference.reload}
         />
@@ -73,22 +72,22 @@ export function ScenariosPanel({ job }: { job: Job }) {
       <UtilityBars
         unit={fitnessUnit(job)}
         words={words}
-        rows={rows.map((r) => ({ name: r.label, own: r.utility, other: r.otherUtility }))}
+        rows={rows.map((r) => ({ name: r.label, winner: r.utility, other: r.otherUtility }))}
         label={reference.data?.label ?? null}
         table={() => <UtilityTable job={job} rows={rows} reference={reference.data} />}
       />
       <section class="card" aria-labelledby="objectives">
         <h2 id="objectives">Objectives of the winner</h2>
         <Table
-          caption={`Objectives of the winner by ${words.one}`}
+          caption={`Objectives of the winner by ${words.item}`}
           rows={rows}
           rowKey={(row) => row.scenario}
           columns={objectiveColumns(job, reference.data)}
         />
         {reference.data && (
           <p class="muted small table-note">
-            In each cell: the winner, then {reference.data.label} and how much the winner is above
-            or below it.{isRanked(job) && ' Less is better everywhere.'}
+            Each cell shows the winner, the reference ({reference.data.label}) and the relative
+            difference.{isRanked(job) && ' Lower is better.'}
           </p>
         )}
         <ObjectiveNotes job={job} />
@@ -98,7 +97,7 @@ export function ScenariosPanel({ job }: { job: Job }) {
   )
 }
 
-/** Whether less is better; the results of a calibration are to come near to its targets instead. */
+/** Whether lower is better; for a calibration, closer to the targets is. */
 function isRanked({ kind }: Job): boolean {
   return kind !== 'calibration'
 }
@@ -109,23 +108,23 @@ function rowsOf(
   recordings: readonly RecordingSummary[] | null,
 ): readonly Row[] {
   const preference = job.spec.kind === 'tuning' ? (job.spec.preference as Preference) : null
-  return Object.entries(job.best!.scenarios).map(([scenario, own]) => {
+  return Object.entries(job.best!.scenarios).map(([scenario, winner]) => {
     const other = reference?.scenarios[scenario] ?? null
-    // Another job may have another preference: its utilities are not to be compared, its objectives are.
+    // Preferences may differ between jobs: recompute utilities under this job's preference.
     const otherUtility = other && (preference ? utilityOf(other, preference) : other.utility)
     const label = caseLabel(scenario, recordings)
-    return { scenario, label, own, other, utility: own.utility, otherUtility }
+    return { scenario, label, winner, other, utility: winner.utility, otherUtility }
   })
 }
 
-/** Fitness of both over the scenarios that both have walked in. */
+/** Relative fitness over the scenarios in which both succeeded. */
 function Summary({ job, rows, label }: { job: Job; rows: readonly Row[]; label: string }) {
   const words = caseWords(job.kind)
   const both = rows.filter((row) => row.utility !== null && row.otherUtility !== null)
   if (both.length === 0)
     return (
       <p>
-        {label} has no {words.one} in common with this job.
+        {label} has no {words.item} in common with this job.
       </p>
     )
   const ratio =
@@ -140,14 +139,14 @@ function Summary({ job, rows, label }: { job: Job; rows: readonly Row[]; label: 
   const share = Math.abs(ratio - 1) * 100
   return (
     <p data-ratio={ratio}>
-      Over {both.length === rows.length ? 'all' : `the ${both.length} common`} {words.many} the
+      Over {both.length === rows.length ? 'all' : `the ${both.length} common`} {words.items}, the
       winner is <strong>{formatNumber(share, 3)}&nbsp;%</strong> {ratio < 1 ? 'better' : 'worse'}{' '}
       than {label}.
     </p>
   )
 }
 
-/** Geometric mean of utilities (eq. 4.2); of an identification's errors the plain mean. */
+/** Geometric mean of utilities (eq. 4.2); arithmetic mean of an identification's errors. */
 function fitnessOf(job: Job, utilities: readonly number[]): number {
   const mean = (values: readonly number[]) => values.reduce((a, b) => a + b, 0) / values.length
   return job.kind === 'tuning' ? Math.exp(mean(utilities.map(Math.log))) : mean(utilities)
@@ -167,12 +166,12 @@ function UtilityTable({
   const columns: Column<Row>[] = [
     {
       key: 'scenario',
-      label: capitalized(words.one),
+      label: capitalized(words.item),
       header: true,
       value: (r) => r.label,
     },
     {
-      key: 'own',
+      key: 'winner',
       label: 'Winner',
       unit,
       numeric: true,
@@ -192,7 +191,7 @@ function UtilityTable({
   }
   return (
     <Table
-      caption={`${capitalized(words.worth)} by ${words.one}`}
+      caption={`${capitalized(words.measure)} by ${words.item}`}
       rows={rows}
       rowKey={(r) => r.scenario}
       columns={columns}
@@ -207,11 +206,11 @@ function objectiveColumns(job: Job, reference: Reference | null): readonly Colum
   return [
     {
       key: 'scenario',
-      label: capitalized(caseWords(job.kind).one),
+      label: capitalized(caseWords(job.kind).item),
       header: true,
       value: (row) => row.label,
       cell: (row) =>
-        // A scenario of one of a job's worlds is no preset.
+        // Scenarios of perturbed worlds are not presets.
         job.spec.kind === 'tuning' && !job.spec.worlds ? (
           <a href={walk(row.scenario)}>{row.label}</a>
         ) : (
@@ -224,11 +223,11 @@ function objectiveColumns(job: Job, reference: Reference | null): readonly Colum
         label: inWords(objective.name),
         unit: objective.unit,
         numeric: true,
-        value: (row) => row.own.objectives[objective.name] ?? null,
+        value: (row) => row.winner.objectives[objective.name] ?? null,
         cell: (row) => (
           <Compared
             ranked={isRanked(job)}
-            own={row.own.objectives[objective.name]}
+            winner={row.winner.objectives[objective.name]}
             other={reference ? (row.other?.objectives[objective.name] ?? null) : undefined}
           />
         ),
@@ -239,23 +238,23 @@ function objectiveColumns(job: Job, reference: Reference | null): readonly Colum
 
 function Compared({
   ranked,
-  own,
+  winner,
   other,
 }: {
-  /** Whether less is better. */
+  /** Whether lower is better. */
   ranked: boolean
-  own: number | null
+  winner: number | null
   other: number | null | undefined
 }) {
-  if (other === undefined) return <>{formatNumber(own)}</>
-  // Between numbers that change their sign, a share says nothing.
-  const comparable = own !== null && other !== null && own > 0 && other > 0
-  const share = comparable ? (own / other - 1) * 100 : null
+  if (other === undefined) return <>{formatNumber(winner)}</>
+  // A ratio of values with different signs is meaningless.
+  const comparable = winner !== null && other !== null && winner > 0 && other > 0
+  const share = comparable ? (winner / other - 1) * 100 : null
   const tone =
     !ranked || share === null || Math.abs(share) < 0.05 ? 'same' : share < 0 ? 'better' : 'worse'
   return (
     <span class="compared">
-      <span>{formatNumber(own)}</span>
+      <span>{formatNumber(winner)}</span>
       <span class="muted small">
         {formatNumber(other)}{' '}
         {share !== null && <span data-tone={tone}>{change(share, '%', 2)}</span>}

@@ -1,4 +1,4 @@
-/** The recorded walks that an identification is fitted to. */
+/** Recordings that an identification is fitted to. */
 
 import { get } from '../../api/client'
 import { type Resource, useResource } from '../../api/resource'
@@ -7,13 +7,13 @@ import { ErrorNotice, Loading } from '../../components/feedback'
 import { Table } from '../../components/table/table'
 import { formatNumber } from '../../format/number'
 
-/** A recording without its numbers, which are many. */
+/** A recording without its samples. */
 export interface RecordingSummary extends RecordingView {
-  /** As results name it: the beginning of its id. */
+  /** Name in the results: the beginning of its id. */
   readonly caseName: string
 }
 
-/** Those of the job, in its order; of other jobs none are asked for. */
+/** Recordings of an identification, in its order; no requests for other jobs. */
 export function useRecordings(job: Job): Resource<readonly RecordingSummary[]> {
   const { spec } = job
   const ids = spec.kind === 'identification' ? spec.recordings : []
@@ -29,13 +29,13 @@ export function useRecordings(job: Job): Resource<readonly RecordingSummary[]> {
   )
 }
 
-/** What a case is called: a recording also by the scenario that was walked. */
+/** Label of a case; for a recording with its scenario. */
 export function caseLabel(
   caseName: string,
   recordings: readonly RecordingSummary[] | null,
 ): string {
-  const found = recordings?.find((recording) => recording.caseName === caseName)
-  return found ? `${found.scenario} (${caseName})` : caseName
+  const match = recordings?.find((recording) => recording.caseName === caseName)
+  return match ? `${match.scenario} (${caseName})` : caseName
 }
 
 export function RecordingsCard({
@@ -45,11 +45,11 @@ export function RecordingsCard({
 }) {
   return (
     <section class="card" aria-labelledby="recordings">
-      <h2 id="recordings">What was recorded</h2>
+      <h2 id="recordings">Recordings</h2>
       {recordings.loading && <Loading what="the recordings" />}
       {recordings.error && (
         <ErrorNotice
-          what="The recordings cannot be shown."
+          what="Could not load the recordings."
           error={recordings.error}
           retry={recordings.reload}
         />
@@ -71,7 +71,7 @@ export function RecordingsCard({
             },
             {
               key: 'seconds',
-              label: 'Compared',
+              label: 'Duration',
               unit: 's',
               numeric: true,
               value: (r) => r.seconds,

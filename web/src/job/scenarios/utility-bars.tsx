@@ -1,4 +1,4 @@
-/** Utilities of the winner by scenario as bars, beside those of a reference. */
+/** Bar chart of the winner's utilities by scenario, with those of a reference. */
 
 import type { ComponentChildren } from 'preact'
 import { ChartFrame, LegendEntry } from '../../charts/chart-frame'
@@ -9,7 +9,7 @@ import '../bars.css'
 
 interface Bar {
   readonly name: string
-  readonly own: number | null
+  readonly winner: number | null
   readonly other: number | null
 }
 
@@ -23,15 +23,15 @@ export function UtilityBars({
   rows: readonly Bar[]
   unit: string
   words: CaseWords
-  /** Name of the reference; null if there is none. */
+  /** Label of the reference; null without one. */
   label: string | null
   table: () => ComponentChildren
 }) {
-  const most = Math.max(...rows.flatMap((row) => [row.own ?? 0, row.other ?? 0]), 1e-12)
+  const most = Math.max(...rows.flatMap((row) => [row.winner ?? 0, row.other ?? 0]), 1e-12)
   return (
     <ChartFrame
-      title={`${capitalized(words.worth)} by ${words.one}`}
-      note={`${words.bars}; less is better. The longest bar is the ${words.one} that limits the winner.`}
+      title={`${capitalized(words.measure)} by ${words.item}`}
+      note={`${words.note}; lower is better. The ${words.item} with the longest bar limits the winner.`}
       legend={
         <>
           <LegendEntry colour="--series-1" label="winner" area />
@@ -45,7 +45,7 @@ export function UtilityBars({
           <li key={row.name}>
             <span class="bar-name">{row.name}</span>
             <span class="bar-lines">
-              <BarLine value={row.own} most={most} unit={unit} colour="--series-1" />
+              <BarLine value={row.winner} most={most} unit={unit} colour="--series-1" />
               {label !== null && (
                 <BarLine value={row.other} most={most} unit={unit} colour="--series-6" />
               )}
@@ -78,7 +78,7 @@ function BarLine({
           aria-hidden="true"
         />
       </span>
-      <span class="bar-value">{value === null ? 'not walked' : quantity(value, unit)}</span>
+      <span class="bar-value">{value === null ? 'not simulated' : quantity(value, unit)}</span>
     </span>
   )
 }

@@ -1,4 +1,4 @@
-/** How near the best design of a calibration comes to its targets. */
+/** Targets of a calibration compared with its best design. */
 
 import { get } from '../../api/client'
 import { usePolling, useResource } from '../../api/resource'
@@ -9,10 +9,10 @@ import { change, formatExact, formatNumber, percent, quantity } from '../../form
 import { placeWord } from '../../format/place'
 import { inWords } from '../../format/words'
 import { setQuery, usePlace } from '../../router/navigation'
-import { isComputed } from '../state'
+import { isRunning } from '../state'
 import { isWithin, LEFT_OUT, type LeaveOut, leaveOutOf, withinCount } from './targets'
 
-/** How often the targets of a job that runs are asked for again [ms]. */
+/** Polling interval while the job runs [ms]. */
 const RENEW_MS = 15_000
 
 export function TargetsPanel({ job }: { job: Job }) {
@@ -20,7 +20,7 @@ export function TargetsPanel({ job }: { job: Job }) {
     return (
       <section class="card">
         <Empty title="Nothing to compare yet">
-          <p>No design has walked every walk so far. The first one that does appears here.</p>
+          <p>No design has succeeded in every walk yet. The first one that does appears here.</p>
         </Empty>
       </section>
     )
@@ -30,25 +30,29 @@ export function TargetsPanel({ job }: { job: Job }) {
 
 function Compared({ job }: { job: Job }) {
   const leaveOut = leaveOutOf(usePlace().query)
-  const found = useResource(`${job.id} ${leaveOut}`, (signal) =>
+  const targets = useResource(`${job.id} ${leaveOut}`, (signal) =>
     get('/v1/jobs/{job_id}/targets', {
       path: { job_id: job.id },
       query: leaveOut === null ? {} : { leave_out: leaveOut },
       signal,
     }),
   )
-  usePolling(found.reload, RENEW_MS, isComputed(job))
+  usePolling(targets.reload, RENEW_MS, isRunning(job))
   return (
     <section class="card" aria-labelledby="targets">
       <header class="row spread">
         <h2 id="targets">Targets</h2>
         <LeaveOutPicker chosen={leaveOut} />
       </header>
-      {found.error && (
-        <ErrorNotice what="The targets cannot be shown." error={found.error} retry={found.reload} />
+      {targets.error && (
+        <ErrorNotice
+          what="Could not load the targets."
+          error={targets.error}
+          retry={targets.reload}
+        />
       )}
-      {found.loading && !found.data && <Loading what="the targets" />}
-      {found.data && <TargetsTable found={found.data} predicts={leaveOut !== null} />}
+      {targets.loading && !targets.data && <Loading what="the targets" />}
+      {targets.data && <TargetsTable targets={targets.data} predicts={leaveOut !== null} />}
     </section>
   )
 }
@@ -72,21 +76,21 @@ function LeaveOutPicker({ chosen }: { chosen: LeaveOut | null }) {
   )
 }
 
-function TargetsTable({ found, predicts }: { found: Targets; predicts: boolean }) {
-  const { within, fitted } = withinCount(found)
+function TargetsTable({ targets, predicts }: { targets: Targets; predicts: boolean }) {
+  const { within, fitted } = withinCount(targets)
   return (
     <>
       <p data-within={within} data-fitted={fitted}>
-        The best design, {placeWord(found)}, meets{' '}
+        The best design, {placeWord(targets)}, is within tolerance of{' '}
         <strong>
           {within} of {fitted}
         </strong>{' '}
-        fitted targets within their tolerance. Its misfit, the root mean square over them, is{' '}
-        {formatNumber(found.fitness)} tolerances.
+        fitted targets. Its misfit, the root mean square over them, is{' '}
+        {formatNumber(targets.fitness)} tolerances.
       </p>
       <Table
-        caption="Targets and what the best design comes to"
-        rows={found.targets}
+        caption="Targets and results of the best design"
+        rows={targets.targets}
         rowKey={({ walk, relative_to, quantity }) => `${walk} ${relative_to} ${quantity}`}
         columns={columns(predicts)}
         rowData={({ walk, quantity, use }) => ({
@@ -97,8 +101,8 @@ function TargetsTable({ found, predicts }: { found: Targets; predicts: boolean }
       />
       {predicts && (
         <p class="muted small table-note">
-          Left out: what the design comes to that is best without that target, among all that were
-          tried. Nothing is simulated anew.
+          Left out: result of the best design without that target, among all evaluated designs. This
+          requires no simulation.
         </p>
       )}
     </>
@@ -142,7 +146,7 @@ function columns(predicts: boolean): readonly Column<TargetResult>[] {
     },
     {
       key: 'off',
-      label: 'Off, in tolerances',
+      label: 'Deviation, in tolerances',
       numeric: true,
       value: (t) => (t.difference === null ? null : Math.abs(t.difference)),
       cell: (t) => <Off difference={t.difference} />,
@@ -157,7 +161,7 @@ function columns(predicts: boolean): readonly Column<TargetResult>[] {
           },
           {
             key: 'left-out-off',
-            label: 'Off then',
+            label: 'Deviation, left out',
             numeric: true,
             cell: (t) => <Off difference={t.left_out?.difference ?? null} />,
           },

@@ -1,4 +1,4 @@
-/** Targets of a calibration: which are met, and which are left out. Pure. */
+/** Targets of a calibration: tolerance checks and leave-one-out. */
 
 import type { Targets } from '../../api/types'
 
@@ -9,18 +9,18 @@ export const LEFT_OUT: readonly { readonly what: LeaveOut; readonly words: strin
   { what: 'walk', words: 'all targets of its walk' },
 ]
 
-/** What an address such as `?leave_out=walk` leaves out; null for nothing. */
+/** Parse a query such as `?leave_out=walk`; null for nothing. */
 export function leaveOutOf(query: URLSearchParams): LeaveOut | null {
   const word = query.get('leave_out')
   return LEFT_OUT.find(({ what }) => what === word)?.what ?? null
 }
 
-/** Whether a difference in tolerances is at most one; that of a walk that failed is not. */
+/** Whether a difference in tolerances is at most one; false for a failure. */
 export function isWithin(difference: number | null): boolean {
   return difference !== null && Math.abs(difference) <= 1
 }
 
-/** How many targets are fitted, and how many of these lie within their tolerance. */
+/** Number of fitted targets, and of those within tolerance. */
 export function withinCount({ targets }: Pick<Targets, 'targets'>): {
   readonly within: number
   readonly fitted: number

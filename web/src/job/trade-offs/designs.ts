@@ -1,4 +1,4 @@
-/** Designs of a front: how they are named, pointed at and drawn. Pure. */
+/** Designs of a Pareto front: names, axes and drawing. */
 
 import type { Front, ScenarioResult } from '../../api/types'
 import type { Cloud, Mark } from '../../charts/scatter/scatter'
@@ -6,23 +6,25 @@ import { placeWord } from '../../format/place'
 import { columnNamed, type Particles } from '../designs/particles'
 import type { Reference } from '../reference'
 
-/** Axes at first: shaking less costs speed. */
+/** Default axes: less vibration costs speed. */
 const USUAL = ['reciprocal_speed', 'acceleration']
 
-/** Whose preference it is, in words. */
+/** Owner of a preference as text. */
 export function ownerWords(owner: string): string {
-  return owner === 'job' ? 'the job’s own' : owner
+  return owner === 'job' ? 'the job’s preference' : owner
 }
 
-/** Two objectives to draw: those that were asked for, else what most preferences set against each other. */
+/** The two objectives to draw: the requested ones, or the default trade-off. */
 export function axesOf(front: Front, x: string | null, y: string | null): [string, string] {
   const names = front.objectives.map(({ name }) => name)
-  const wanted = [x, y, ...USUAL, ...names].filter((name) => name !== null && names.includes(name))
-  const [first, second] = new Set(wanted)
+  const candidates = [x, y, ...USUAL, ...names].filter(
+    (name) => name !== null && names.includes(name),
+  )
+  const [first, second] = new Set(candidates)
   return [first!, second!]
 }
 
-/** All designs in two objectives, those of the front among them. */
+/** All designs in two objectives, including the front. */
 export function allCloud(particles: Particles, x: string, y: string): Cloud | null {
   const values = (name: string) => columnNamed(particles, `objective:${name}`)?.values
   const [xs, ys] = [values(x), values(y)]
@@ -30,7 +32,7 @@ export function allCloud(particles: Particles, x: string, y: string): Cloud | nu
   return { x: xs, y: ys, colour: '--series-6', radius: 2, opacity: 0.35 }
 }
 
-/** Some of all designs, drawn as rings around what stands there. rows: of `particles`. */
+/** Selected designs as rings. rows: of `particles`. */
 export function selectedCloud(
   particles: Particles,
   rows: Uint32Array,
@@ -43,7 +45,7 @@ export function selectedCloud(
   return { x: of(all.x), y: of(all.y), colour: '--text', radius: 5.5, opacity: 1 }
 }
 
-/** The front in two objectives; its order is that of `designs`. */
+/** The front in two objectives, in the order of `designs`. */
 export function frontCloud({ designs }: Front, x: string, y: string): Cloud {
   return {
     x: designs.map(({ objectives }) => objectives[x]),
@@ -54,13 +56,13 @@ export function frontCloud({ designs }: Front, x: string, y: string): Cloud {
   }
 }
 
-/** A published design by its objectives over all scenarios. */
+/** A published design with its objectives over all scenarios. */
 export interface PublishedDesign {
   readonly label: string
   readonly objectives: Readonly<Record<string, number>>
 }
 
-/** What a published design comes to; null if a walk of it failed. */
+/** Objectives of a published design; null if a simulation failed. */
 export function publishedDesign(front: Front, reference: Reference): PublishedDesign | null {
   const walks = Object.values(reference.scenarios)
   if (walks.some(({ status }) => status !== 'ok')) return null
@@ -73,7 +75,7 @@ function geometricMean(walks: readonly ScenarioResult[], objective: string): num
   return Math.exp(logarithms.reduce((a, b) => a + b, 0) / walks.length)
 }
 
-/** Published designs among those of the job. */
+/** Marks of the published designs. */
 export function publishedMarks(
   designs: readonly PublishedDesign[],
   x: string,
@@ -88,12 +90,12 @@ export function publishedMarks(
   }))
 }
 
-/** Knees, and where the best of A, B, C and of the job are; one mark for each design. */
+/** Knees, and the best designs under A, B, C and the job's preference; one mark per design. */
 export function marksOf(front: Front, x: string, y: string): readonly Mark[] {
   const winners = new Map<string, Mark>()
   for (const winner of front.winners) {
     const word = placeWord(winner)
-    const name = winner.preference === 'job' ? 'own' : winner.preference
+    const name = winner.preference
     const before = winners.get(word)
     winners.set(word, {
       x: winner.objectives[x],

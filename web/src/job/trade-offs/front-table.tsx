@@ -1,4 +1,4 @@
-/** The designs of a front as a table: what is remarkable of them, and all their objectives. */
+/** Table of the designs of a front, with their properties and objectives. */
 
 import type { Front, FrontDesign, Job, Objective } from '../../api/types'
 import { type Column, Table } from '../../components/table/table'
@@ -9,7 +9,7 @@ import { PAGE_NUMBER, useQueryValue } from '../../router/query-value'
 import { Where } from '../designs/selected-designs'
 import type { PublishedDesign } from './designs'
 
-/** What every design of a front is told by. */
+/** Common to all designs listed with objectives. */
 interface ByObjective {
   readonly objectives: Readonly<Record<string, number>>
 }
@@ -35,8 +35,7 @@ export function FrontTable({
     },
     {
       key: 'marks',
-      label: 'Remarkable',
-      // Those with a mark first.
+      label: 'Property',
       value: ({ marks }) => (marks.length === 0 ? null : marks.join(', ')),
       cell: ({ marks }) => (marks.length === 0 ? NONE : marks.map(inWords).join(', ')),
     },
@@ -64,7 +63,7 @@ export function FrontTable({
   )
 }
 
-/** Published designs beside those of a front, by the same objectives. */
+/** Table of published designs with the same objectives. */
 export function PublishedTable({
   front,
   designs,
@@ -85,7 +84,7 @@ export function PublishedTable({
   )
 }
 
-/** A column for each objective. */
+/** One column per objective. */
 export function objectiveColumns<R extends ByObjective>(
   objectives: readonly Objective[],
 ): readonly Column<R>[] {
@@ -99,7 +98,7 @@ export function objectiveColumns<R extends ByObjective>(
   }))
 }
 
-/** A button that asks for the preference of a row's design. */
+/** Column of buttons that fit a preference to the row's design. */
 export function chooseColumn<R extends Place>(
   chosen: Place | null,
   onChoose: (place: Place) => void,
@@ -112,10 +111,10 @@ export function chooseColumn<R extends Place>(
         type="button"
         class="compact"
         aria-pressed={chosen !== null && placeWord(chosen) === placeWord(design)}
-        aria-label={`Which preference chooses design ${placeWord(design)}`}
+        aria-label={`Find the preference that selects design ${placeWord(design)}`}
         onClick={() => onChoose(design)}
       >
-        Which?
+        Find
       </button>
     ),
   }

@@ -1,4 +1,4 @@
-/** How far the front had come, iteration by iteration. */
+/** Hypervolume of the front by iteration. */
 
 import { useMemo } from 'preact/hooks'
 import type { Front } from '../../api/types'
@@ -27,7 +27,7 @@ export function HypervolumeCard({ front }: { front: Front }) {
   return (
     <ChartFrame
       title="Hypervolume"
-      note={`Share of the box between ideal and reference point that the front dominates, in logarithms; it never falls. Now ${now}.`}
+      note={`Share of the box between ideal and reference point that the front dominates, on logarithmic axes. It never decreases. Current value: ${now}.`}
       table={() => (
         <ByIteration
           caption="Hypervolume by iteration"

@@ -1,4 +1,4 @@
-/** What the designs of a job trade: its Pareto front, and the preference that would choose a design. */
+/** Pareto front of a job, and the preferences that select its designs. */
 
 import { useRef } from 'preact/hooks'
 import { get, getBytes } from '../../api/client'
@@ -14,9 +14,9 @@ import { PreferenceCard } from './preference-card'
 import { ScatterCard } from './scatter-card'
 import { WinnersCard } from './winners-card'
 
-/** How often a running job's front is asked for again [ms]. */
+/** Polling interval while the job runs [ms]. */
 const RENEW_MS = 8000
-/** Designs that are drawn behind the front; of more, some. */
+/** Most designs drawn behind the front. */
 const MOST_DRAWN = 5000
 
 export function TradeOffsPanel({ job }: { job: Job }) {
@@ -24,7 +24,7 @@ export function TradeOffsPanel({ job }: { job: Job }) {
     return (
       <section class="card">
         <Empty title="No front yet">
-          <p>It appears here as soon as a design has walked in every scenario.</p>
+          <p>The front appears here once a design has succeeded in every scenario.</p>
         </Empty>
       </section>
     )
@@ -34,15 +34,15 @@ export function TradeOffsPanel({ job }: { job: Job }) {
 
 function TradeOffs({ job }: { job: Job }) {
   const { query } = usePlace()
-  const wanted = useSlowly(job.iterations, RENEW_MS)
-  const found = useResource(`${job.id} ${wanted}`, (signal) =>
+  const iterations = useSlowly(job.iterations, RENEW_MS)
+  const loadedFront = useResource(`${job.id} ${iterations}`, (signal) =>
     get('/v1/jobs/{job_id}/front', { path: { job_id: job.id }, signal }),
   )
-  // While a newer one is on its way, the one before stays to be looked at.
+  // Keep the previous result while the next one loads.
   const shown = useRef<Front | null>(null)
-  if (found.data) shown.current = found.data
+  if (loadedFront.data) shown.current = loadedFront.data
   const front = shown.current
-  const particles = useResource(`${job.id} ${wanted} all`, (signal) =>
+  const particles = useResource(`${job.id} ${iterations} all`, (signal) =>
     getBytes('/v1/jobs/{job_id}/particles', {
       path: { job_id: job.id },
       query: { objectives: true, max_points: MOST_DRAWN },
@@ -55,16 +55,20 @@ function TradeOffs({ job }: { job: Job }) {
   const choose = (place: Place) => setQuery({ design: placeWord(place) })
   return (
     <div class="stack">
-      {found.error && (
-        <ErrorNotice what="The front cannot be shown." error={found.error} retry={found.reload} />
+      {loadedFront.error && (
+        <ErrorNotice
+          what="Could not load the front."
+          error={loadedFront.error}
+          retry={loadedFront.reload}
+        />
       )}
-      {!front && found.loading && <Loading what="the front" />}
+      {!front && loadedFront.loading && <Loading what="the front" />}
       {front && (
         <>
           <p data-front={front.size} data-knees={front.knees.length}>
             <strong>{formatCount(front.size)}</strong> of {formatCount(front.designs_judged)}{' '}
-            designs that walk in every scenario are on the Pareto front: no other is as good in
-            every objective and better in one.
+            successful designs are on the Pareto front: no other design is at least as good in every
+            objective and better in one.
           </p>
           <ScatterCard
             job={job}

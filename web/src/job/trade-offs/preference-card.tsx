@@ -1,4 +1,4 @@
-/** The preference that would have chosen a design: the usual question the other way round. */
+/** Preferences under which a chosen design wins. */
 
 import { get } from '../../api/client'
 import { useResource } from '../../api/resource'
@@ -15,7 +15,7 @@ import { ownerWords } from './designs'
 
 export function PreferenceCard({ job, chosen }: { job: Job; chosen: Place | null }) {
   const key = chosen && `${job.id} ${job.iterations} ${placeWord(chosen)}`
-  const found = useResource(key, (signal) =>
+  const preferenceFor = useResource(key, (signal) =>
     get('/v1/jobs/{job_id}/preference-for', { path: { job_id: job.id }, query: chosen!, signal }),
   )
   return (
@@ -25,57 +25,58 @@ export function PreferenceCard({ job, chosen }: { job: Job; chosen: Place | null
       aria-live="polite"
       data-chosen={chosen ? placeWord(chosen) : ''}
     >
-      <h2 id="preference-for">Which preference would have chosen a design</h2>
+      <h2 id="preference-for">Preference for a design</h2>
       {!chosen && (
         <Empty title="No design chosen">
-          <p>Click one in the chart, or choose one in a table.</p>
+          <p>Click a design in the chart, or choose one in a table.</p>
         </Empty>
       )}
-      {found.error && (
+      {preferenceFor.error && (
         <ErrorNotice
-          what="Its preference cannot be told."
-          error={found.error}
-          retry={found.reload}
+          what="Could not find a preference."
+          error={preferenceFor.error}
+          retry={preferenceFor.reload}
         />
       )}
-      {chosen && found.loading && !found.data && <Loading what="its preference" />}
-      {chosen && found.data && <Fits job={job} found={found.data} />}
+      {chosen && preferenceFor.loading && !preferenceFor.data && <Loading what="the preference" />}
+      {chosen && preferenceFor.data && <Fits job={job} preferenceFor={preferenceFor.data} />}
     </section>
   )
 }
 
-function Fits({ job, found }: { job: Job; found: PreferenceFor }) {
-  const { chosen, fits, wins } = found
+function Fits({ job, preferenceFor }: { job: Job; preferenceFor: PreferenceFor }) {
+  const { chosen, fits, wins } = preferenceFor
   const [best] = fits
-  const asked = { preference: preferenceQuery(best.preference) }
+  const query = { preference: preferenceQuery(best.preference) }
   const start = withQuery('/jobs/new', {
     clone: job.id,
-    ...asked,
+    ...query,
     iteration: chosen.iteration,
     particle: chosen.particle,
   })
   return (
     <div class="stack" data-wins={wins}>
       <p>
-        <Where job={job} iteration={chosen.iteration} particle={chosen.particle} /> {verdict(found)}
+        <Where job={job} iteration={chosen.iteration} particle={chosen.particle} />{' '}
+        {verdict(preferenceFor)}
       </p>
       <p class="row">
-        <a class="button compact" href={withQuery(jobPath(job.id, 'preferences'), asked)}>
-          Rank the history under it
+        <a class="button compact" href={withQuery(jobPath(job.id, 'preferences'), query)}>
+          Rank the history with it
         </a>
         <a class="button primary compact" href={start}>
           Start a job with it
         </a>
       </p>
       <Table
-        caption="Preferences that suit the design, by their biases"
+        caption="Preferences for the design, by biases"
         rows={fits}
         rowKey={({ biases_of }) => biases_of.join()}
         columns={fitColumns(job, best)}
       />
       <p class="muted small table-note">
-        For each set of biases the exponents under which the design leads by the most; where it
-        cannot win, those of its best rank that was found. Exponents sum to 1.
+        For each set of biases: the exponents with the largest lead of the design, or, if it cannot
+        win, with its best rank found. Exponents sum to 1.
       </p>
     </div>
   )
@@ -85,14 +86,14 @@ function verdict({ wins, certain, on_front, fits: [best] }: PreferenceFor): stri
   const whose = best.biases_of.map(ownerWords).join(', ')
   if (wins) {
     const lead =
-      best.margin === null ? '' : `; the next one is ${percent(best.margin, 2)} worse under it`
-    return `is the best of the job with the biases of ${whose} and the exponents below${lead}.`
+      best.margin === null ? '' : `; under it, the next design is ${percent(best.margin, 2)} worse`
+    return `is the best design of the job with the biases of ${whose} and the exponents below${lead}.`
   }
-  const front = on_front ? '' : ' Others dominate it.'
+  const front = on_front ? '' : ' Other designs dominate it.'
   const proof = certain
-    ? 'With these biases there is no preference under which it is the best.'
+    ? 'With these biases, there is no preference under which it is the best.'
     : 'No preference was found under which it is the best.'
-  return `is number ${formatCount(best.rank)} at best, with the biases of ${whose}.${front} ${proof}`
+  return `has rank ${formatCount(best.rank)} at best, with the biases of ${whose}.${front} ${proof}`
 }
 
 function fitColumns(job: Job, best: PreferenceFit): readonly Column<PreferenceFit>[] {
@@ -127,7 +128,7 @@ function fitColumns(job: Job, best: PreferenceFit): readonly Column<PreferenceFi
     },
     {
       key: 'rival',
-      label: 'Before the best of the others',
+      label: 'Closest rival',
       cell: ({ rival }) => (rival ? <Where job={job} {...rival} /> : NONE),
     },
   ]

@@ -1,4 +1,4 @@
-/** The front over any two objectives, with what is remarkable of it; as a table with all of them. */
+/** Scatter chart of the front over two objectives, with marked designs; tables of both. */
 
 import { useMemo } from 'preact/hooks'
 import { useResource } from '../../api/resource'
@@ -36,7 +36,7 @@ export function ScatterCard({
 }: {
   job: Job
   front: Front
-  /** Designs of the job to be drawn behind the front; null while there are none. */
+  /** Designs drawn behind the front; null while loading. */
   all: Particles | null
   chosen: Place | null
   onChoose: (place: Place) => void
@@ -51,11 +51,11 @@ export function ScatterCard({
     const marked = all && selected && selectedCloud(all, selected, x, y)
     return [behind, marked, frontCloud(front, x, y)].filter((cloud) => cloud !== null)
   }, [front, all, selected, x, y])
-  // In worlds an objective is no mean over scenarios.
+  // With worlds, an objective is not a mean over scenarios.
   const { worlds, robot } = job.spec as JobSpec
   const comparable = !worlds && isPublished(robot)
-  const asked = comparable && query.has('published')
-  const published = usePublished(job, front, asked)
+  const showPublished = comparable && query.has('published')
+  const published = usePublished(job, front, showPublished)
   const marks = useMemo(
     () => [...marksOf(front, x, y), ...publishedMarks(published.data ?? [], x, y)],
     [front, published.data, x, y],
@@ -66,12 +66,12 @@ export function ScatterCard({
   const unit = (name: string) => front.objectives.find((o) => o.name === name)!.unit
   const listed =
     front.designs.length < front.size
-      ? ` ${formatCount(front.designs.length)} of them are shown, which cover it evenly.`
+      ? ` An evenly spaced subset of ${formatCount(front.designs.length)} is shown.`
       : ''
   return (
     <ChartFrame
       title="Pareto front"
-      note={`Each objective is its geometric mean over the scenarios; less is better in both.${listed} Click a design to see which preference would have chosen it.`}
+      note={`Each objective is its geometric mean over the scenarios; lower is better.${listed} Click a design to find the preference that selects it.`}
       tools={
         <>
           <AxisPicker
@@ -92,8 +92,8 @@ export function ScatterCard({
             <label class="check small">
               <input
                 type="checkbox"
-                checked={asked}
-                onChange={() => setQuery({ published: asked ? null : '' })}
+                checked={showPublished}
+                onChange={() => setQuery({ published: showPublished ? null : '' })}
               />
               published designs
             </label>
@@ -118,17 +118,17 @@ export function ScatterCard({
           {selected && (
             <LegendEntry
               colour="--text"
-              label={`${formatCount(selected.length)} selected on Variables`}
+              label={`${formatCount(selected.length)} selected in Variables`}
               area
             />
           )}
           <LegendEntry
             colour="--series-5"
-            label="best under A, B, C and the job’s own preference"
+            label="best under A, B, C and the job’s preference"
             area
           />
           {published.data && <LegendEntry colour="--series-4" label="published designs" area />}
-          {published.loading && <span role="status">published designs walk…</span>}
+          {published.loading && <span role="status">simulating published designs…</span>}
           {front.knees.length > 0 && <LegendEntry colour="--series-2" label="knees" area />}
         </>
       }
@@ -141,7 +141,7 @@ export function ScatterCard({
     >
       {published.error && (
         <ErrorNotice
-          what="The published designs cannot be shown."
+          what="Could not load the published designs."
           error={published.error}
           retry={published.reload}
         />
@@ -162,9 +162,9 @@ export function ScatterCard({
   )
 }
 
-/** Published designs that walk in all scenarios of the job; they walk when they are asked for. */
-function usePublished(job: Job, front: Front, asked: boolean) {
-  return useResource(asked ? `published ${job.id}` : null, async () => {
+/** Published designs that succeed in all scenarios of the job; simulated on demand. */
+function usePublished(job: Job, front: Front, showPublished: boolean) {
+  return useResource(showPublished ? `published ${job.id}` : null, async () => {
     const walks = await publishedWalks(job)
     return walks.map((walk) => publishedDesign(front, walk)).filter((design) => design !== null)
   })
@@ -180,7 +180,7 @@ function AxisPicker({
   label: string
   front: Front
   chosen: string
-  /** The objective of the other axis. */
+  /** Objective of the other axis. */
   other: string
   onChoose: (name: string) => void
 }) {

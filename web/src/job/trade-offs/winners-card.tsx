@@ -1,4 +1,4 @@
-/** Where the best designs under A, B, C and the job's own preference lie with respect to the front. */
+/** Best designs under the known preferences, and their positions relative to the front. */
 
 import type { Front, FrontWinner, Job } from '../../api/types'
 import { Table } from '../../components/table/table'
@@ -20,9 +20,9 @@ export function WinnersCard({
 }) {
   return (
     <section class="card" aria-labelledby="front-winners">
-      <h2 id="front-winners">Where preferences lie</h2>
+      <h2 id="front-winners">Winners by preference</h2>
       <Table
-        caption="Best designs under the known preferences"
+        caption="Best designs by preference"
         rows={front.winners}
         rowKey={({ preference }) => preference}
         rowData={(winner) => ({
@@ -54,8 +54,8 @@ export function WinnersCard({
         ]}
       />
       <p class="muted small table-note">
-        The biases of a preference count in every scenario for itself, so that a design that is
-        dominated over all scenarios can win.
+        Biases apply in each scenario separately, so a design that is dominated over all scenarios
+        can still win.
       </p>
     </section>
   )
@@ -63,5 +63,5 @@ export function WinnersCard({
 
 function frontWords({ on_front, dominated_by, behind }: FrontWinner): string {
   if (on_front) return 'yes'
-  return `no: ${formatCount(dominated_by)} dominate it, one by ${percent(behind, 2)} throughout`
+  return `no: dominated by ${formatCount(dominated_by)}, one of them ${percent(behind, 2)} better in every objective`
 }

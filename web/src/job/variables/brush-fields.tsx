@@ -1,4 +1,4 @@
-/** The same selection by numbers, for keyboards and for exact bounds. */
+/** Numeric fields for the selection, for keyboards and exact bounds. */
 
 import { type Brushes, withBrush } from '../../charts/parallel/parallel-coordinates'
 import {
@@ -31,7 +31,7 @@ export function BrushFields({
           const change = (end: 'low' | 'high', text: string) => {
             const place = text === '' ? (end === 'low' ? 0 : 1) : placeOf(axis, Number(text))
             if (Number.isNaN(place)) return
-            // Bounds in the wrong order are those of the same stretch.
+            // Bounds in the wrong order are swapped.
             const ends = end === 'low' ? [place, high] : [low, place]
             const brush = [Math.min(...ends), Math.max(...ends)] as const
             const whole = brush[0] <= 0 && brush[1] >= 1

@@ -1,4 +1,4 @@
-/** Designs over any two of their axes: slices and ranks, with the selection of the other charts. */
+/** Designs over two of their axes, linked to the selection of the other charts. */
 
 import { ChartFrame, LegendEntry } from '../../charts/chart-frame'
 import { PairMap } from '../../charts/pair/pair-map'
@@ -25,24 +25,24 @@ export function PairCard({
   selected: Uint32Array
   brushes: Brushes
   onBrush: (brushes: Brushes) => void
-  /** Row that stands out; null for none. */
+  /** Highlighted row; null for none. */
   chosen: number | null
   onChoose: (row: number) => void
 }) {
   const { query } = usePlace()
   const index = (name: string | null) => model.axes.findIndex((axis) => axis.name === name)
   const x = Math.max(0, index(query.get('x')))
-  const asked = index(query.get('y'))
-  // A slice: what designs are worth over one of their variables.
-  const y = asked >= 0 && asked !== x ? asked : model.axes.length - 1
+  const requestedY = index(query.get('y'))
+  // Default: fitness over the x axis.
+  const y = requestedY >= 0 && requestedY !== x ? requestedY : model.axes.length - 1
   const asCells = query.get('as') === 'ranks'
   const [isolines, setIsolines] = useQueryValue('isolines', flag(false), false)
   const [across, up] = [model.axes[x], model.axes[y]]
-  const sampled = selected.length > SAMPLE ? ` Of more, ${formatCount(SAMPLE)} are drawn.` : ''
+  const sampled = selected.length > SAMPLE ? ` A sample of ${formatCount(SAMPLE)} is drawn.` : ''
   return (
     <ChartFrame
       title="Two axes"
-      note={`Drag over a box to select designs in all charts; click a design to mark it.${sampled}`}
+      note={`Drag to select designs in all charts; click a design to highlight it.${sampled}`}
       tools={
         <>
           <AxisPicker label="Across" axes={model.axes} chosen={x} other={y} name="x" />

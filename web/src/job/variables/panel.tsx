@@ -1,4 +1,4 @@
-/** All designs of a job across their variables, coloured by fitness; brushing selects some. */
+/** All designs of a job by variable, coloured by fitness, with brushing. */
 
 import { useMemo, useRef, useState } from 'preact/hooks'
 import { getBytes } from '../../api/client'
@@ -26,25 +26,25 @@ import { BrushFields } from './brush-fields'
 import { PairCard } from './pair-card'
 
 const NONE: Brushes = new Map()
-/** How often a running job's designs are asked for again [ms]. */
+/** Polling interval while the job runs [ms]. */
 const RENEW_MS = 8000
 
 export function VariablesPanel({ job }: { job: Job }) {
-  const wanted = useSlowly(job.iterations, RENEW_MS)
-  const particles = useResource(`${job.id} ${wanted}`, (signal) =>
+  const iterations = useSlowly(job.iterations, RENEW_MS)
+  const particles = useResource(`${job.id} ${iterations}`, (signal) =>
     getBytes('/v1/jobs/{job_id}/particles', {
       path: { job_id: job.id },
       query: { objectives: job.kind === 'tuning' },
       signal,
     }).then(decodeParticles),
   )
-  // While newer ones are on their way, those before stay to be looked at.
+  // Keep the previous designs while newer ones load.
   const shown = useRef<Particles | null>(null)
   if (particles.data) shown.current = particles.data
   if (particles.error && !shown.current) {
     return (
       <ErrorNotice
-        what="The designs cannot be shown."
+        what="Could not load the designs."
         error={particles.error}
         retry={particles.reload}
       />
@@ -55,7 +55,7 @@ export function VariablesPanel({ job }: { job: Job }) {
     return (
       <section class="card">
         <Empty title="No designs yet">
-          <p>They appear here with the first committed iteration.</p>
+          <p>Designs appear here after the first iteration.</p>
         </Empty>
       </section>
     )
@@ -88,9 +88,11 @@ function Designs({ job, particles }: { job: Job; particles: Particles }) {
   return (
     <div class="stack" data-selected={selected.length}>
       <ChartFrame
-        title="Designs by their variables"
-        note={`Each line is a design. Drag along axes to select; click an axis to let go.${
-          thinned ? ` Thinned from ${formatCount(particles.total)} designs, the best kept.` : ''
+        title="Designs by variable"
+        note={`Each line is a design. Drag along an axis to select; click it to clear.${
+          thinned
+            ? ` Thinned from ${formatCount(particles.total)} designs; the best are included.`
+            : ''
         }`}
         tools={
           <>
@@ -103,7 +105,7 @@ function Designs({ job, particles }: { job: Job; particles: Particles }) {
                   setBrushes(NONE)
                 }}
               />
-              {words.worths} by {words.one} too
+              {words.measures} by {words.item}
             </label>
             {job.kind === 'tuning' && (
               <label class="check small">
@@ -115,7 +117,7 @@ function Designs({ job, particles }: { job: Job; particles: Particles }) {
                     setBrushes(NONE)
                   }}
                 />
-                objectives too
+                objectives
               </label>
             )}
             <button
@@ -156,7 +158,7 @@ function Designs({ job, particles }: { job: Job; particles: Particles }) {
         onChoose={(row) => setChosen(placeIn(particles, row))}
       />
       <section class="card" aria-labelledby="selected">
-        <h2 id="selected">The best of those selected</h2>
+        <h2 id="selected">Best selected designs</h2>
         {best.length === 0 ? (
           <Empty title="No design with a fitness is selected">
             <button type="button" onClick={() => setBrushes(NONE)}>
@@ -171,7 +173,7 @@ function Designs({ job, particles }: { job: Job; particles: Particles }) {
   )
 }
 
-/** The selection, which is part of the address; it holds for as long as its axes are there. */
+/** Selection stored in the address; discarded when its axes are hidden. */
 function useBrushes(model: ParallelModel): readonly [Brushes, (brushes: Brushes) => void] {
   const write = useDelayedQuery('brush')
   const [brushes, setBrushes] = useState<Brushes>(() => {
@@ -192,7 +194,7 @@ const DESIGN: Codec<Place | null> = {
   write: (place) => place && placeWord(place),
 }
 
-/** Rows change when newer designs come; places do not. */
+/** Row numbers change when designs are added; iteration and particle do not. */
 function placeIn(particles: Particles, row: number): Place {
   const [iteration, particle] = ['iteration', 'particle'].map(
     (name) => columnNamed(particles, name)!.values[row],

@@ -1,4 +1,4 @@
-/** A new search in the neighbourhood of a design. */
+/** Search in the neighbourhood of a design. */
 
 import type { Design } from '../../format/value'
 import type { Draft, VariableDraft } from './draft'
@@ -7,8 +7,8 @@ import type { Draft, VariableDraft } from './draft'
 const SHARE = 0.3
 
 /**
- * The draft with the bounds of searched variables drawn around a design, within those before;
- * choices of categorical ones stay.
+ * Narrow the bounds of the searched variables around a design, within their previous bounds. Choices of
+ * categorical variables stay.
  * whole: names of the integer variables.
  */
 export function around(draft: Draft, design: Design, whole: ReadonlySet<string>): Draft {

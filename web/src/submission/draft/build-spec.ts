@@ -1,4 +1,4 @@
-/** From the form's draft to a spec; and from the fields that the API blames to those of the form. */
+/** Conversion of the form's draft to a spec, and of API errors to form fields. */
 
 import type { FieldError } from '../../api/problem'
 import type { JobSpec, Scenario, Variable } from '../../api/types'
@@ -6,13 +6,10 @@ import type { Draft } from './draft'
 import { optimizerSettings } from './optimizer'
 import { startOf } from './start'
 
-/** Problems by the form's fields: `iterations`, `own.0.radius`, `variables.FI1R.low`, ... */
+/** Errors by form field: `iterations`, `custom.0.radius`, `variables.FI1R.low`, ... */
 export type FieldErrors = ReadonlyMap<string, string>
 
-/**
- * The spec that the draft asks for. What is not a number is left as it was written, so that the API
- * says at which field a number is missing.
- */
+/** Build a spec; invalid numbers are passed on as text, so that the API reports the field. */
 export function specOf(draft: Draft): JobSpec {
   const variables = Object.entries(draft.variables)
     .filter(([, { mode }]) => mode === 'searched')
@@ -30,7 +27,7 @@ export function specOf(draft: Draft): JobSpec {
     name: draft.name,
     robot: robotOf(draft),
     controller: draft.controller,
-    scenarios: [...draft.presets, ...draft.own.map(scenarioOf)],
+    scenarios: [...draft.presets, ...draft.custom.map(scenarioOf)],
     variables,
     fixed: Object.fromEntries(fixed),
     preference: preferenceOf(draft),
@@ -44,29 +41,29 @@ export function specOf(draft: Draft): JobSpec {
   } as unknown as JobSpec
 }
 
-/** Gives integer variables their kind, which bounds of one's own would otherwise lose. */
-export function withKinds(spec: JobSpec, known: readonly Variable[]): JobSpec {
-  const kinds = new Map(known.map(({ name, kind }) => [name, kind]))
+/** Set the kinds of the variables, which custom bounds would otherwise drop. */
+export function withKinds(spec: JobSpec, available: readonly Variable[]): JobSpec {
+  const kinds = new Map(available.map(({ name, kind }) => [name, kind]))
   const variables = spec.variables?.map((entry) =>
     typeof entry === 'string' ? entry : { ...entry, kind: kinds.get(entry.name) ?? 'continuous' },
   )
   return { ...spec, variables }
 }
 
-/** Where in the form the API's problems belong; what belongs nowhere is under the empty name. */
+/** Assign API errors to form fields; the others have an empty key. */
 export function errorsByField(errors: readonly FieldError[], draft: Draft): FieldErrors {
-  const found = new Map<string, string>()
+  const errorsByKey = new Map<string, string>()
   const searched = Object.keys(draft.variables).filter(
     (name) => draft.variables[name].mode === 'searched',
   )
   for (const { field, message } of errors) {
     const key = formField(field, draft, searched)
-    found.set(key, found.has(key) ? `${found.get(key)}; ${message}` : message)
+    errorsByKey.set(key, errorsByKey.has(key) ? `${errorsByKey.get(key)}; ${message}` : message)
   }
-  return found
+  return errorsByKey
 }
 
-/** The problem of a field or of anything inside of it. */
+/** Errors of a field and of the fields inside it. */
 export function errorsUnder(errors: FieldErrors, field: string): readonly string[] {
   return [...errors]
     .filter(([key]) => key === field || key.startsWith(`${field}.`))
@@ -79,7 +76,7 @@ function formField(field: string, draft: Draft, searched: readonly string[]): st
   const [first, second, ...rest] = field.split('.')
   if (first === 'scenarios' && second !== undefined) {
     const index = Number(second) - draft.presets.length
-    return index >= 0 ? ['own', index, ...rest].join('.') : 'scenarios'
+    return index >= 0 ? ['custom', index, ...rest].join('.') : 'scenarios'
   }
   if (first === 'variables' && second !== undefined) {
     return ['variables', searched[Number(second)] ?? second, ...rest].join('.')
@@ -88,7 +85,7 @@ function formField(field: string, draft: Draft, searched: readonly string[]): st
   return field
 }
 
-/** The robot that a draft says, as jobs and walks name it. */
+/** Robot of a draft, in the form used by jobs and simulations. */
 export function robotOf({ robot }: Pick<Draft, 'robot'>): JobSpec['robot'] {
   if (robot.kind === 'shipped') return robot.name as JobSpec['robot']
   if (robot.kind === 'files') return { toml: robot.toml, urdf: robot.urdf }
@@ -101,7 +98,7 @@ export function robotOf({ robot }: Pick<Draft, 'robot'>): JobSpec['robot'] {
 }
 
 function preferenceOf({ preference }: Draft): JobSpec['preference'] {
-  if (preference.kind !== 'own') return preference.kind as JobSpec['preference']
+  if (preference.kind !== 'custom') return preference.kind as JobSpec['preference']
   const { bias, exponent } = preference
   return {
     bias: bias.map(number),
@@ -109,7 +106,7 @@ function preferenceOf({ preference }: Draft): JobSpec['preference'] {
   } as unknown as JobSpec['preference']
 }
 
-/** undefined for a job that is judged in the model alone. */
+/** undefined for a job evaluated in the nominal model only. */
 function worldsOf({ worlds }: Draft): JobSpec['worlds'] | undefined {
   if (!worlds.robust) return undefined
   const values = Object.entries(worlds.values).map(([name, value]) => [name, number(value)])
@@ -117,18 +114,18 @@ function worldsOf({ worlds }: Draft): JobSpec['worlds'] | undefined {
   return { ...Object.fromEntries(values), ...ranges } as JobSpec['worlds']
 }
 
-function scenarioOf(own: Readonly<Record<string, string>>): Scenario {
-  const { name, ...rest } = own
+function scenarioOf(draft: Readonly<Record<string, string>>): Scenario {
+  const { name, ...rest } = draft
   return { name, ...numbers(rest) } as unknown as Scenario
 }
 
-/** Numbers and objects where they are, text elsewhere; what was left empty is left out. */
+/** Parse numbers and objects, keep other text, and omit empty values. */
 function numbers(values: Readonly<Record<string, string>>): Record<string, unknown> {
-  const given = Object.entries(values).filter(([, value]) => value.trim() !== '')
-  return Object.fromEntries(given.map(([name, value]) => [name, object(value) ?? number(value)]))
+  const filled = Object.entries(values).filter(([, value]) => value.trim() !== '')
+  return Object.fromEntries(filled.map(([name, value]) => [name, object(value) ?? number(value)]))
 }
 
-/** The object that a text is in JSON, if it is one. */
+/** Parse a JSON object; null for anything else. */
 function object(text: string): unknown {
   if (!text.trim().startsWith('{')) return null
   try {
@@ -138,7 +135,7 @@ function object(text: string): unknown {
   }
 }
 
-/** The text itself where it is no number. */
+/** A number, or the text itself if it is not one. */
 export function number(text: string): number | string {
   const value = Number(text)
   return text.trim() === '' || Number.isNaN(value) ? text : value

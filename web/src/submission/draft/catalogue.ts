@@ -1,4 +1,4 @@
-/** Everything that the form offers, as the API lists it. */
+/** Options of the form, as listed by the API. */
 
 import { get } from '../../api/client'
 import type {
@@ -18,29 +18,29 @@ export interface Catalogue {
   readonly scenarios: readonly ScenarioPreset[]
   readonly preferences: readonly PreferencePreset[]
   readonly optimizers: readonly OptimizerPreset[]
-  /** Of plug-ins. */
+  /** Cases of plug-ins. */
   readonly cases: readonly PluginCase[]
   readonly fields: {
     readonly job: ReadonlyMap<string, SchemaField>
     readonly scenario: ReadonlyMap<string, SchemaField>
     readonly variant: ReadonlyMap<string, SchemaField>
     readonly worlds: ReadonlyMap<string, SchemaField>
-    /** Of a calibration. */
+    /** Fields of a calibration's target. */
     readonly target: ReadonlyMap<string, SchemaField>
   }
 }
 
-/** All that a job may search or hold fixed with a controller. */
+/** All variables that a job can search or fix with a controller. */
 export function variablesOf(controller: Controller | undefined): readonly Variable[] {
   if (!controller) return []
   return [...controller.variables, ...controller.conventions, ...controller.gait_variables]
 }
 
-/** Those of the names that are variables of leg groups, as `stride[front]`. */
-export function ofLegGroups(known: readonly Variable[], names: Iterable<string>): Variable[] {
+/** Variables of leg groups among the names, such as `stride[front]`. */
+export function ofLegGroups(variables: readonly Variable[], names: Iterable<string>): Variable[] {
   return [...names].flatMap((name) => {
     const base = /^(\w+)\[[^[\]]+\]$/.exec(name)?.[1]
-    const whole = known.find((variable) => variable.name === base && variable.by_leg_group)
+    const whole = variables.find((variable) => variable.name === base && variable.by_leg_group)
     return whole ? [{ ...whole, name }] : []
   })
 }

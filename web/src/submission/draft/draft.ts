@@ -1,4 +1,4 @@
-/** A job as it stands in the form: numbers are still text, choices not yet a spec. */
+/** State of the new-job form: numbers as text, choices not yet resolved. */
 
 import type { JobSpec, Scenario, Variable } from '../../api/types'
 import type { SchemaField } from '../fields/schema-fields'
@@ -8,24 +8,24 @@ import { type OptimizerDraft, optimizerDraft } from './optimizer'
 import { NO_START, type StartDraft, startDraft } from './start'
 import { type WorldsDraft, worldsDraft } from './worlds'
 
-/** What becomes of a variable; `default` leaves a convention, or the gait to each scenario. */
+/** `default` keeps a convention's default, or the scenarios' gait. */
 export type VariableMode = 'searched' | 'fixed' | 'default'
 
 export interface VariableDraft {
   readonly mode: VariableMode
   readonly low: string
   readonly high: string
-  /** Of a categorical variable the name of a choice. */
+  /** Name of a choice for a categorical variable. */
   readonly value: string
-  /** Of a categorical variable those that are searched, in place of bounds; else none. */
+  /** Searched choices of a categorical variable; empty for others. */
   readonly choices: readonly string[]
 }
 
 export interface RobotDraft {
   readonly kind: 'shipped' | 'variant' | 'files'
-  /** Of a shipped robot, also of a variant's. */
+  /** Name of a shipped robot, or of the one a variant is based on. */
   readonly name: string
-  /** Empty where it is the robot's own, as planned_soles. */
+  /** Empty for the robot's default, as planned_soles. */
   readonly contact_law: string
   readonly planned_soles: string
   /** Coxa, femur, tibia [deg]. */
@@ -35,7 +35,7 @@ export interface RobotDraft {
 }
 
 export interface PreferenceDraft {
-  /** Name of a preset, or `own`. */
+  /** Name of a preset, or `custom`. */
   readonly kind: string
   readonly bias: readonly string[]
   readonly exponent: readonly string[]
@@ -45,15 +45,15 @@ export interface Draft {
   readonly name: string
   readonly robot: RobotDraft
   readonly controller: string
-  /** Names of the presets that are chosen. */
+  /** Names of the selected presets. */
   readonly presets: readonly string[]
-  /** Scenarios of one's own, by field. */
-  readonly own: readonly Readonly<Record<string, string>>[]
+  /** Custom scenarios, by field. */
+  readonly custom: readonly Readonly<Record<string, string>>[]
   readonly variables: Readonly<Record<string, VariableDraft>>
   readonly preference: PreferenceDraft
   readonly case: CaseDraft
   readonly worlds: WorldsDraft
-  /** Settings of the method that is its `name`. */
+  /** Settings of the method, including its `name`. */
   readonly optimizer: OptimizerDraft
   readonly start: StartDraft
   readonly iterations: string
@@ -61,7 +61,7 @@ export interface Draft {
   readonly precision: string
 }
 
-/** What the API does if nothing is said. */
+/** Defaults of the API. */
 export function emptyDraft(catalogue: Catalogue): Draft {
   const { job, variant } = catalogue.fields
   const controller = String(job.get('controller')?.default)
@@ -79,12 +79,12 @@ export function emptyDraft(catalogue: Catalogue): Draft {
     },
     controller,
     presets: names(job.get('scenarios')?.default),
-    own: [],
+    custom: [],
     variables: defaultVariables(catalogue, controller),
     preference: preferenceDraft(catalogue, preset),
     case: null,
     worlds: worldsDraft(catalogue.fields.worlds),
-    optimizer: optimizerDraft(catalogue.optimizers, undefined, usualMethod(catalogue)),
+    optimizer: optimizerDraft(catalogue.optimizers, undefined, defaultMethod(catalogue)),
     start: NO_START,
     iterations: text(job.get('iterations')?.default),
     seed: text(job.get('seed')?.default),
@@ -92,25 +92,25 @@ export function emptyDraft(catalogue: Catalogue): Draft {
   }
 }
 
-/** All variables of a controller searched within the catalogue's bounds, all others left alone. */
+/** Search all variables of a controller within the catalogue's bounds; keep the others at their defaults. */
 export function defaultVariables(
   catalogue: Catalogue,
   controller: string,
 ): Readonly<Record<string, VariableDraft>> {
-  const found = catalogue.controllers.find(({ name }) => name === controller)
-  if (!found) return {}
-  const published = found.published.A ?? Object.values(found.published)[0] ?? {}
+  const match = catalogue.controllers.find(({ name }) => name === controller)
+  if (!match) return {}
+  const published = match.published.A ?? Object.values(match.published)[0] ?? {}
   const entry = (variable: Variable, mode: VariableMode): [string, VariableDraft] => [
     variable.name,
     variableDraft(variable, mode, published[variable.name]),
   ]
   return Object.fromEntries([
-    ...found.variables.map((variable) => entry(variable, 'searched')),
-    ...[...found.conventions, ...found.gait_variables].map((v) => entry(v, 'default')),
+    ...match.variables.map((variable) => entry(variable, 'searched')),
+    ...[...match.conventions, ...match.gait_variables].map((v) => entry(v, 'default')),
   ])
 }
 
-/** A variable within the catalogue's bounds. value: that it has where it is fixed, if one is known. */
+/** A variable with the catalogue's bounds. value: initial value if it is fixed. */
 export function variableDraft(
   variable: Variable,
   mode: VariableMode,
@@ -120,12 +120,12 @@ export function variableDraft(
     mode,
     low: text(variable.low),
     high: text(variable.high),
-    value: shown(variable, value ?? variable.default ?? undefined) ?? text(middle(variable)),
+    value: textOf(variable, value ?? variable.default ?? undefined) ?? text(middle(variable)),
     choices: variable.choices ?? [],
   }
 }
 
-/** The form of a spec that was submitted before; presets are recognized by their values. */
+/** Draft of an existing spec; presets are recognized by their values. */
 export function draftOf(spec: JobSpec, catalogue: Catalogue): Draft {
   const empty = emptyDraft(catalogue)
   const controller = spec.controller ?? empty.controller
@@ -137,12 +137,12 @@ export function draftOf(spec: JobSpec, catalogue: Catalogue): Draft {
     robot: robotDraft(spec.robot, empty.robot),
     controller,
     presets: scenarios.filter((entry) => typeof entry === 'string'),
-    own: scenarios.filter((entry) => typeof entry !== 'string').map(texts),
+    custom: scenarios.filter((entry) => typeof entry !== 'string').map(texts),
     variables: variableDrafts(spec, catalogue, controller),
     preference: preferenceOf(spec.preference, catalogue) ?? empty.preference,
     case: caseOf(spec.case, catalogue.cases),
     worlds: worldsDraft(catalogue.fields.worlds, spec.worlds),
-    optimizer: optimizerDraft(catalogue.optimizers, spec.optimizer, usualMethod(catalogue)),
+    optimizer: optimizerDraft(catalogue.optimizers, spec.optimizer, defaultMethod(catalogue)),
     start: startDraft(spec.start),
     iterations: text(spec.iterations),
     seed: text(spec.seed),
@@ -150,26 +150,26 @@ export function draftOf(spec: JobSpec, catalogue: Catalogue): Draft {
   }
 }
 
-/** The draft with those of its scenarios that are named. */
-export function withScenarios(draft: Draft, wanted: readonly string[]): Draft {
+/** Keep only the named scenarios. */
+export function withScenarios(draft: Draft, selected: readonly string[]): Draft {
   return {
     ...draft,
-    presets: draft.presets.filter((name) => wanted.includes(name)),
-    own: draft.own.filter(({ name }) => wanted.includes(name)),
+    presets: draft.presets.filter((name) => selected.includes(name)),
+    custom: draft.custom.filter(({ name }) => selected.includes(name)),
   }
 }
 
-/** A scenario of one's own to start from: a preset's values, or those that have a default. */
+/** A custom scenario, based on a preset or on defaults. */
 export function scenarioDraft(
   fields: ReadonlyMap<string, SchemaField>,
   start: Scenario | null,
   name: string,
 ): Readonly<Record<string, string>> {
   const values = start === null ? {} : texts(start)
-  const known = Object.entries({ ...defaults(fields), ...values }).filter(([key]) =>
+  const match = Object.entries({ ...defaults(fields), ...values }).filter(([key]) =>
     fields.has(key),
   )
-  return { ...Object.fromEntries(known), name }
+  return { ...Object.fromEntries(match), name }
 }
 
 export function preferenceDraft(catalogue: Catalogue, kind: string): PreferenceDraft {
@@ -177,7 +177,7 @@ export function preferenceDraft(catalogue: Catalogue, kind: string): PreferenceD
   return { kind, bias: preset.bias.map(text), exponent: preset.exponent.map(text) }
 }
 
-/** The draft of a preference; one of the presets if it has a preset's values. */
+/** Draft of a preference; a preset if the values match. */
 export function preferenceOf(
   preference: JobSpec['preference'] | undefined,
   catalogue: Catalogue,
@@ -189,13 +189,17 @@ export function preferenceOf(
       JSON.stringify([bias, exponent]) === JSON.stringify([preference.bias, preference.exponent]),
   )
   if (preset) return preferenceDraft(catalogue, preset.name)
-  return { kind: 'own', bias: preference.bias.map(text), exponent: preference.exponent.map(text) }
+  return {
+    kind: 'custom',
+    bias: preference.bias.map(text),
+    exponent: preference.exponent.map(text),
+  }
 }
 
-/** The method of a job that names none. */
-function usualMethod({ fields, optimizers }: Catalogue): string {
-  const usual = fields.job.get('optimizer')?.default as { name?: string } | undefined
-  return usual?.name ?? optimizers[0].settings.name
+/** Method of a job that does not specify one. */
+function defaultMethod({ fields, optimizers }: Catalogue): string {
+  const optimizerDefault = fields.job.get('optimizer')?.default as { name?: string } | undefined
+  return optimizerDefault?.name ?? optimizers[0].settings.name
 }
 
 function variableDrafts(
@@ -204,14 +208,14 @@ function variableDrafts(
   controller: string,
 ): Readonly<Record<string, VariableDraft>> {
   const drafts = { ...defaultVariables(catalogue, controller) }
-  const known = catalogue.controllers.find(({ name }) => name === controller)
-  const own = variablesOf(known)
+  const entry = catalogue.controllers.find(({ name }) => name === controller)
+  const controllerVariables = variablesOf(entry)
   const named = (spec.variables ?? []).map((entry) =>
     typeof entry === 'string' ? entry : entry.name,
   )
-  const groups = ofLegGroups(own, [...named, ...Object.keys(spec.fixed ?? {})])
+  const groups = ofLegGroups(controllerVariables, [...named, ...Object.keys(spec.fixed ?? {})])
   for (const variable of groups) drafts[variable.name] = variableDraft(variable, 'default')
-  const variables = new Map([...own, ...groups].map((v) => [v.name, v]))
+  const variables = new Map([...controllerVariables, ...groups].map((v) => [v.name, v]))
   if (spec.variables) {
     for (const entry of spec.variables) {
       const name = typeof entry === 'string' ? entry : entry.name
@@ -225,7 +229,7 @@ function variableDrafts(
   for (const [name, value] of Object.entries(spec.fixed ?? {})) {
     const variable = variables.get(name)
     if (!variable) continue
-    drafts[name] = { ...drafts[name], value: shown(variable, value) ?? '', mode: 'fixed' }
+    drafts[name] = { ...drafts[name], value: textOf(variable, value) ?? '', mode: 'fixed' }
   }
   return drafts
 }
@@ -244,7 +248,7 @@ function robotDraft(robot: JobSpec['robot'], empty: RobotDraft): RobotDraft {
   }
 }
 
-/** Name of the preset with the same values in every field. */
+/** Name of the preset that is equal in every field. */
 function presetOf(scenario: Scenario, catalogue: Catalogue): string | null {
   const fields = [...catalogue.fields.scenario.keys()] as (keyof Scenario)[]
   const same = catalogue.scenarios.find((preset) =>
@@ -257,15 +261,15 @@ function defaults(fields: ReadonlyMap<string, SchemaField>): Record<string, stri
   return Object.fromEntries([...fields].map(([name, field]) => [name, text(field.default)]))
 }
 
-/** Of its bounds, or the first of its choices. */
+/** Middle of the bounds, or the first choice. */
 export function middle({ low, high, kind, choices }: Variable): number | string {
   if (kind === 'categorical') return choices?.[0] ?? ''
   const value = Number(((low + high) / 2).toPrecision(4))
   return kind === 'integer' ? Math.round(value) : value
 }
 
-/** A value as people read it: the name of a choice, where it is given by its index. */
-function shown({ choices }: Variable, value: number | string | undefined): string | null {
+/** A value as text; the name of a choice if given by index. */
+function textOf({ choices }: Variable, value: number | string | undefined): string | null {
   if (value === undefined) return null
   return choices?.[Number(value)] ?? text(value)
 }

@@ -1,11 +1,11 @@
-/** Search methods as the form has them: settings as text, with the defaults of their method. */
+/** Form draft of a search method: settings as text, based on the method's defaults. */
 
 import type { OptimizerPreset } from '../../api/types'
 import { fieldsIn, type ObjectSchema, type SchemaField } from '../fields/schema-fields'
 
 export type OptimizerDraft = Readonly<Record<string, string>>
 
-/** The entry that stands for a method with its default settings; its name is the method's. */
+/** The catalogue entry of a method with default settings, which is named like the method. */
 export function methodNamed(
   optimizers: readonly OptimizerPreset[],
   name: string | undefined,
@@ -13,12 +13,12 @@ export function methodNamed(
   return optimizers.find((entry) => entry.name === name && entry.settings.name === name)
 }
 
-/** Every method by its default settings, without further presets. */
+/** Entries with default settings, one per method. */
 export function methodsOf(optimizers: readonly OptimizerPreset[]): readonly OptimizerPreset[] {
   return optimizers.filter(({ name, settings }) => name === settings.name)
 }
 
-/** All entries of one method: its default settings, then further presets. */
+/** All entries of a method: default settings first, then presets. */
 export function presetsOf(
   optimizers: readonly OptimizerPreset[],
   method: string,
@@ -26,7 +26,7 @@ export function presetsOf(
   return optimizers.filter(({ settings }) => settings.name === method)
 }
 
-/** What can be set of a method, in the order of its schema; its name is chosen, not set. */
+/** Settings of a method in schema order, without its name. */
 export function settingsOf(entry: OptimizerPreset | undefined): readonly SchemaField[] {
   if (!entry) return []
   return [...fieldsIn(entry.settings_schema as ObjectSchema).values()].filter(
@@ -34,7 +34,7 @@ export function settingsOf(entry: OptimizerPreset | undefined): readonly SchemaF
   )
 }
 
-/** An optimizer with a preset's settings; how many designs an iteration has, presets leave open. */
+/** Apply a preset's settings; the number of designs per iteration is kept. */
 export function withPreset(
   optimizer: OptimizerDraft,
   { settings }: OptimizerPreset,
@@ -42,25 +42,25 @@ export function withPreset(
   return { ...settingTexts(settings), particles: optimizer.particles }
 }
 
-/** Settings of a spec as the form has them; what it leaves out has the method's default. */
+/** Draft of a spec's settings, completed with the method's defaults. */
 export function optimizerDraft(
   optimizers: readonly OptimizerPreset[],
-  asked: string | object | undefined,
-  usual: string,
+  requested: string | object | undefined,
+  defaultMethod: string,
 ): OptimizerDraft {
-  if (typeof asked === 'string') {
-    const found = optimizers.find(({ name }) => name === asked)
-    return settingTexts(found?.settings ?? { name: asked })
+  if (typeof requested === 'string') {
+    const preset = optimizers.find(({ name }) => name === requested)
+    return settingTexts(preset?.settings ?? { name: requested })
   }
-  const given = settingTexts(asked ?? {})
-  const method = methodNamed(optimizers, given.name ?? usual)
-  return { ...settingTexts(method?.settings ?? {}), ...given }
+  const overrides = settingTexts(requested ?? {})
+  const method = methodNamed(optimizers, overrides.name ?? defaultMethod)
+  return { ...settingTexts(method?.settings ?? {}), ...overrides }
 }
 
-/** The settings that a spec has for a draft; what was left empty has the default. */
+/** Settings for a spec; empty ones are omitted. */
 export function optimizerSettings(optimizer: OptimizerDraft): Record<string, unknown> {
-  const given = Object.entries(optimizer).filter(([, text]) => text.trim() !== '')
-  return Object.fromEntries(given.map(([name, text]) => [name, settingValue(text)]))
+  const overrides = Object.entries(optimizer).filter(([, text]) => text.trim() !== '')
+  return Object.fromEntries(overrides.map(([name, text]) => [name, settingValue(text)]))
 }
 
 export function settingTexts(settings: object): OptimizerDraft {
@@ -72,7 +72,7 @@ export function settingText(value: unknown): string {
   return typeof value === 'object' ? JSON.stringify(value) : String(value)
 }
 
-/** What is neither a number, a truth value nor a list is left as it was written. */
+/** Parse a number, boolean or list; keep other text. */
 function settingValue(text: string): unknown {
   if (text === 'true' || text === 'false') return text === 'true'
   const number = Number(text)

@@ -1,4 +1,4 @@
-/** Where the search of a new job begins: the best of earlier jobs, or designs of a cloned one. Pure. */
+/** Start of a search: the best of earlier jobs, or designs of a cloned one. */
 
 import type { JobSpec } from '../../api/types'
 import type { Design } from '../../format/value'
@@ -6,15 +6,15 @@ import type { Design } from '../../format/value'
 export interface StartDraft {
   /** Ids of jobs. */
   readonly jobs: readonly string[]
-  /** Designs of these jobs in all, at most. */
+  /** Total number of designs of these jobs, at most. */
   readonly count: string
-  /** Designs that a cloned job began with; they count where no job is named. */
+  /** Start designs of a cloned job; used if `jobs` is empty. */
   readonly designs: readonly Design[]
 }
 
 export const NO_START: StartDraft = { jobs: [], count: '5', designs: [] }
 
-/** The start of a spec that was submitted before; its jobs have become designs. */
+/** Draft of a spec's start, in which jobs were resolved to designs. */
 export function startDraft(start: JobSpec['start']): StartDraft {
   if (start === undefined) return NO_START
   if (Array.isArray(start)) return { ...NO_START, designs: start as readonly Design[] }
@@ -22,7 +22,7 @@ export function startDraft(start: JobSpec['start']): StartDraft {
   return { ...NO_START, jobs, count: String(count ?? NO_START.count) }
 }
 
-/** What the spec says of the start; undefined for a search that begins anywhere. */
+/** Start for a spec; undefined for none. */
 export function startOf({ jobs, count, designs }: StartDraft): JobSpec['start'] | undefined {
   if (jobs.length > 0) {
     const most = Number(count)

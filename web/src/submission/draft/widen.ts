@@ -1,14 +1,14 @@
-/** A new search within other bounds. Pure. */
+/** Search within other bounds. */
 
 import type { Draft } from './draft'
 
 /**
- * The draft with the bounds of some searched variables replaced.
- * asked: `name:low:high`, separated by commas; what cannot be read or is not searched is left out.
+ * Replace the bounds of searched variables.
+ * text: `name:low:high`, comma-separated; invalid entries and variables not searched are ignored.
  */
-export function widened(draft: Draft, asked: string): Draft {
+export function widened(draft: Draft, bounds: string): Draft {
   const variables = { ...draft.variables }
-  for (const part of asked.split(',')) {
+  for (const part of bounds.split(',')) {
     const [name, low, high, ...rest] = part.split(':')
     const variable = variables[name]
     const numbers = [low, high].every((end) => end && Number.isFinite(Number(end)))

@@ -1,39 +1,39 @@
-/** Worlds that a robust job is judged in, as the form has them. Pure. */
+/** Form draft of the worlds of a robust job. */
 
 import type { JobSpec, TuningWorlds } from '../../api/types'
 import type { SchemaField } from '../fields/schema-fields'
 
 export interface WorldsDraft {
-  /** Whether designs are judged in many worlds, or in the model alone. */
+  /** Whether designs are evaluated in many worlds, not just the nominal model. */
   readonly robust: boolean
-  /** Texts of the fields that can be set, by name. */
+  /** Field values as text, by name. */
   readonly values: Readonly<Record<string, string>>
-  /** Perturbations of a cloned job, with its bounds; null draws all with their usual ones. */
+  /** Perturbations of a cloned job with their bounds; null for all with default bounds. */
   readonly ranges: TuningWorlds['ranges'] | null
 }
 
-/** Aggregates that ask for a level. */
+/** Aggregates with a level. */
 const OF_A_LEVEL: readonly string[] = ['quantile', 'cvar']
 
-/** What the form sets, in the order of the schema: numbers and choices, no lists. */
+/** Fields that the form can set, in schema order: numbers and choices. */
 export function worldsFields(fields: ReadonlyMap<string, SchemaField>): readonly SchemaField[] {
   return [...fields.values()].filter(({ type }) => type !== 'other')
 }
 
-/** Whether a field makes a difference beside the others. */
-export function counts({ name }: SchemaField, { values }: WorldsDraft): boolean {
+/** Whether a field has an effect, given the others. */
+export function hasEffect({ name }: SchemaField, { values }: WorldsDraft): boolean {
   return name !== 'level' || OF_A_LEVEL.includes(values.aggregate)
 }
 
-/** The worlds of a spec that was submitted before; what it leaves out has the default. */
+/** Draft of a spec's worlds, completed with defaults. */
 export function worldsDraft(
   fields: ReadonlyMap<string, SchemaField>,
   worlds: JobSpec['worlds'] = null,
 ): WorldsDraft {
-  const given = new Map<string, unknown>(Object.entries(worlds ?? {}))
-  const values = worldsFields(fields).map(({ name, default: usual }) => [
+  const overrides = new Map<string, unknown>(Object.entries(worlds ?? {}))
+  const values = worldsFields(fields).map(({ name, default: defaultValue }) => [
     name,
-    String(given.get(name) ?? usual ?? ''),
+    String(overrides.get(name) ?? defaultValue ?? ''),
   ])
   return {
     robust: worlds !== null,
@@ -42,7 +42,7 @@ export function worldsDraft(
   }
 }
 
-/** How often a design walks in each scenario; NaN if that is no number. */
+/** Simulations of a design per scenario; NaN for an invalid number. */
 export function walksEach({ robust, values }: WorldsDraft): number {
   return robust ? Number.parseInt(values.count, 10) : 1
 }

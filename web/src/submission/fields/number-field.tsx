@@ -1,4 +1,4 @@
-/** A labelled number with unit, bounds and the problem that the API has with it. */
+/** Labelled form fields for numbers and choices, with bounds and errors. */
 
 import { useId } from 'preact/hooks'
 import { Unit } from '../../components/unit'
@@ -18,9 +18,9 @@ export function NumberField({
   field: SchemaField
   value: string
   error?: string
-  /** Shown beside the bounds; without it the description is the input's title. */
+  /** Shown after the bounds; without it, the description becomes the input's title. */
   help?: string
-  /** Whether it is to be marked as no default. */
+  /** Whether the value differs from its default. */
   changed?: boolean
   onChange: (value: string) => void
 }) {
@@ -49,7 +49,7 @@ export function NumberField({
   )
 }
 
-/** A labelled choice; an empty one leaves it to the robot. */
+/** A labelled choice; empty means the robot's value. */
 export function ChoiceField({
   label,
   choices,
@@ -64,7 +64,7 @@ export function ChoiceField({
   value: string
   error?: string
   hint?: string
-  /** Whether it is to be marked as no default. */
+  /** Whether the value differs from its default. */
   changed?: boolean
   onChange: (value: string) => void
 }) {
@@ -80,7 +80,7 @@ export function ChoiceField({
       >
         {choices.map((choice) => (
           <option key={choice} value={choice}>
-            {choice === '' ? 'as the robot’s own' : choice.replaceAll('_', ' ')}
+            {choice === '' ? 'robot’s default' : choice.replaceAll('_', ' ')}
           </option>
         ))}
       </select>
@@ -90,7 +90,7 @@ export function ChoiceField({
   )
 }
 
-/** Problems that belong to a part of the form rather than to one field. */
+/** Errors that concern a part of the form rather than one field. */
 export function Problems({ messages }: { messages: readonly string[] }) {
   if (messages.length === 0) return null
   return (

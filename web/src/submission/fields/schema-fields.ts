@@ -1,16 +1,16 @@
-/** What the API's OpenAPI document says of fields: bounds, units, defaults, choices. */
+/** Fields of OpenAPI schemas: bounds, units, defaults and choices. */
 
 import { formatExact } from '../../format/number'
 
 export interface SchemaField {
   readonly name: string
   readonly description: string
-  /** From the brackets in the description; `1` if there are none. */
+  /** Unit in the brackets of the description; `1` if there is none. */
   readonly unit: string
   readonly type: 'number' | 'integer' | 'string' | 'boolean' | 'other'
   readonly low: number | null
   readonly high: number | null
-  /** Whether the bound itself is not allowed. */
+  /** Whether the bound is exclusive. */
   readonly above: boolean
   readonly below: boolean
   readonly choices: readonly string[] | null
@@ -40,17 +40,17 @@ export interface ObjectSchema {
   readonly required?: readonly string[]
 }
 
-/** The fields of a schema by name, in its order. Throws if the document has no such schema. */
+/** Fields of a schema by name, in order. Throws if the schema is missing. */
 export function fieldsOf(
   document: OpenApiDocument,
   schema: string,
 ): ReadonlyMap<string, SchemaField> {
-  const found = document.components.schemas[schema]
-  if (!found?.properties) throw new Error(`the API's document has no schema ${schema}`)
-  return fieldsIn(found)
+  const objectSchema = document.components.schemas[schema]
+  if (!objectSchema?.properties) throw new Error(`the API's document has no schema ${schema}`)
+  return fieldsIn(objectSchema)
 }
 
-/** The fields of an object that a schema describes, by name and in its order. */
+/** Fields of an object schema by name, in order. */
 export function fieldsIn(schema: ObjectSchema): ReadonlyMap<string, SchemaField> {
   const required = new Set(schema.required ?? [])
   return new Map(
@@ -61,24 +61,24 @@ export function fieldsIn(schema: ObjectSchema): ReadonlyMap<string, SchemaField>
   )
 }
 
-/** The bounds in words: `0.2 to 10`, `above 0, at most 1`, `at least 0`; empty without bounds. */
+/** Bounds as text: `0.2 to 10`, `above 0, at most 1`, `at least 0`; empty without bounds. */
 export function boundsInWords({ low, high, above, below }: SchemaField): string {
   if (low === null && high === null) return ''
   const least = `${above ? 'above' : 'at least'} ${formatExact(low, 8)}`
   const most = `${below ? 'below' : 'at most'} ${formatExact(high, 8)}`
-  // Bounds that only keep numbers within what a computer holds are of no interest.
+  // Bounds that only prevent overflow are not shown.
   if (high === null || high > 1e15) return least
   if (low === null) return most
   return above || below ? `${least}, ${most}` : `${formatExact(low, 8)} to ${formatExact(high, 8)}`
 }
 
-/** Description without its unit, and without the marks of code. */
+/** Description without its unit and without backticks. */
 export function describe({ description }: SchemaField): string {
   return description.replace(/\s*\[[^\]]*\]/, '').replaceAll('`', '')
 }
 
-function fieldOf(name: string, given: Property, required: boolean): SchemaField {
-  const property = { ...given, ...orNull(given) }
+function fieldOf(name: string, declared: Property, required: boolean): SchemaField {
+  const property = { ...declared, ...orNull(declared) }
   const description = property.description ?? ''
   const { type } = property
   return {
@@ -102,7 +102,7 @@ function isPlain(type: string | undefined): type is Exclude<SchemaField['type'],
   return type !== undefined && ['number', 'integer', 'string', 'boolean'].includes(type)
 }
 
-/** Of a property that may be null instead: what else it may be. */
+/** The other alternative of a nullable property. */
 function orNull({ anyOf }: Property): Property | undefined {
   const others = anyOf?.filter(({ type }) => type !== 'null')
   return anyOf?.length === 2 && others?.length === 1 ? others[0] : undefined

@@ -1,4 +1,4 @@
-/** A labelled line of text, with a hint or what the API has against it. */
+/** A labelled text field with a hint or an error. */
 
 import { useId } from 'preact/hooks'
 import './fields.css'

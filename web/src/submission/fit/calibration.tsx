@@ -1,26 +1,26 @@
-/** The form of a new calibration: which parameters are fitted to what measured walks came to. */
+/** New-calibration form: parameters to fit to measured targets. */
 
 import { useMemo, useState } from 'preact/hooks'
 import type { Controller, RecordingView, Variable } from '../../api/types'
 import { EMPTY_FIT, type FitDraft } from './fit'
 import { FitForm } from './fit-form'
 import type { FitProps } from './page'
-import { calibrationSpec, shown, type TargetDraft, withRecordings } from './targets'
+import { calibrationSpec, selectedTargets, type TargetDraft, withRecordings } from './targets'
 import { TargetsTable } from './targets-table'
 
-/** Parameters that are fitted at first. */
-const USUAL = ['battery_voltage', 'efficiency']
+/** Parameters fitted by default. */
+const FITTED_BY_DEFAULT = ['battery_voltage', 'efficiency']
 
 interface Targets {
-  /** Recordings whose own targets have been put in: what is removed stays so. */
-  readonly seen: readonly string[]
+  /** Recordings whose targets were added; removed targets are not added again. */
+  readonly added: readonly string[]
   readonly rows: readonly TargetDraft[]
 }
 
 export function CalibrationForm({
   catalogue,
   robot,
-  known,
+  fittable,
   recordings,
 }: FitProps & { recordings: readonly RecordingView[] }) {
   const [draft, setDraft] = useState<FitDraft>({
@@ -28,25 +28,25 @@ export function CalibrationForm({
     name: 'calibration',
     iterations: '60',
   })
-  const [typed, setTyped] = useState<Targets>({ seen: [], rows: [] })
+  const [edited, setEdited] = useState<Targets>({ added: [], rows: [] })
   const targets = {
-    seen: recordings.map(({ id }) => id).concat(typed.seen),
-    rows: withRecordings(typed.rows, typed.seen, recordings),
+    added: recordings.map(({ id }) => id).concat(edited.added),
+    rows: withRecordings(edited.rows, edited.added, recordings),
   }
-  const rows = shown(targets.rows, recordings)
+  const rows = selectedTargets(targets.rows, recordings)
   const controllers = [...new Set(recordings.map(({ controller }) => controller))]
   const parameters = {
-    known: [
-      ...known.conventions,
-      ...known.parameters,
+    fittable: [
+      ...fittable.conventions,
+      ...fittable.parameters,
       ...ofWalks(catalogue.controllers, controllers),
     ],
-    usual: USUAL,
-    said: draft.said,
+    fittedByDefault: FITTED_BY_DEFAULT,
+    edited: draft.edited,
   }
   const spec = useMemo(
     () => calibrationSpec(draft, parameters, rows, robot, recordings, catalogue.optimizers),
-    [draft, known, JSON.stringify(rows), robot, recordings, catalogue],
+    [draft, fittable, JSON.stringify(rows), robot, recordings, catalogue],
   )
   return (
     <FitForm
@@ -62,19 +62,20 @@ export function CalibrationForm({
           catalogue={catalogue}
           recordings={recordings}
           targets={rows}
-          onChange={(change) => setTyped({ ...targets, rows: change(targets.rows) })}
+          onChange={(change) => setEdited({ ...targets, rows: change(targets.rows) })}
         />
       }
     />
   )
 }
 
-/** Conventions of the controllers that drive the walks, and what their gaits may be; each once. */
+/** Distinct conventions and gait variables of the controllers of the walks. */
 function ofWalks(all: readonly Controller[], driving: readonly string[]): readonly Variable[] {
-  const found = new Map<string, Variable>()
+  const variables = new Map<string, Variable>()
   for (const { name, conventions, gait_variables } of all) {
     if (!driving.includes(name)) continue
-    for (const variable of [...conventions, ...gait_variables]) found.set(variable.name, variable)
+    for (const variable of [...conventions, ...gait_variables])
+      variables.set(variable.name, variable)
   }
-  return [...found.values()]
+  return [...variables.values()]
 }

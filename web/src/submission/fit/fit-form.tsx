@@ -1,4 +1,4 @@
-/** The job of a fit: what is fitted and by which method, what it will cost, and its submission. */
+/** Form of a fit: parameters, method, estimate and submission. */
 
 import type { ComponentChildren } from 'preact'
 import { useState } from 'preact/hooks'
@@ -32,24 +32,28 @@ export function FitForm({
   draft: FitDraft
   onDraft: (changes: Partial<FitDraft>) => void
   spec: AnySpec
-  /** Parts of the spec that are no fields here, whose problems are told together. */
+  /** Parts of the spec without fields here; their errors are shown together. */
   parts: readonly string[]
-  /** What stands before the fields. */
+  /** Content before the fields. */
   before?: ComponentChildren
-  /** Fields of the kind's own, given the problems by part. */
+  /** Additional fields, given the errors by part. */
   children?: (errors: Readonly<Record<string, string>>) => ComponentChildren
 }) {
   const [asJson, setAsJson] = useState(false)
   const submission = useSubmission(spec)
   const { problem } = submission
-  const told = problem instanceof ApiProblem ? problem.errors : []
-  const errors = errorsByPart(told)
-  const placed = parameterErrors(told, parameters)
-  // What is wrong with all of them, or with one that is not in the table.
-  const unplaced = placed.size === 0 && errors.variables ? [errors.variables] : []
+  const fieldErrors = problem instanceof ApiProblem ? problem.errors : []
+  const errors = errorsByPart(fieldErrors)
+  const byParameter = parameterErrors(fieldErrors, parameters)
+  // Errors that concern all parameters, or one missing in the table.
+  const unassigned = byParameter.size === 0 && errors.variables ? [errors.variables] : []
   useFirstProblem(submission.attempts)
   if (asJson) return <JsonForm spec={spec} onBack={() => setAsJson(false)} />
-  const field = (name: Exclude<keyof FitDraft, 'method' | 'said'>, label: string, hint: string) => (
+  const field = (
+    name: Exclude<keyof FitDraft, 'method' | 'edited'>,
+    label: string,
+    hint: string,
+  ) => (
     <TextField
       label={label}
       value={draft[name]}
@@ -82,15 +86,15 @@ export function FitForm({
             onChange={(method) => onDraft({ method })}
           />
           {hasParticles(draft.method, catalogue.optimizers) &&
-            field('particles', 'Particles', 'designs of an iteration')}
+            field('particles', 'Particles', 'designs per iteration')}
           {field('iterations', 'Iterations', 'of the search')}
-          {field('seed', 'Seed', 'only runs of different seeds show what can be trusted')}
+          {field('seed', 'Seed', 'runs with different seeds show which parameters can be trusted')}
         </div>
-        <Problems messages={unplaced} />
+        <Problems messages={unassigned} />
         <ParametersTable
           parameters={parameters}
-          errors={placed}
-          onSaid={(said) => onDraft({ said })}
+          errors={byParameter}
+          onEdit={(edited) => onDraft({ edited })}
         />
       </section>
       <SubmitPanel spec={spec} submission={submission} onJson={() => setAsJson(true)} />

@@ -1,4 +1,4 @@
-/** What identifications and calibrations share: which variables are fitted, and how. Pure. */
+/** Common parts of identification and calibration specs. */
 
 import type { FieldError } from '../../api/problem'
 import type { OptimizerPreset } from '../../api/types'
@@ -6,11 +6,11 @@ import { number } from '../draft/build-spec'
 import type { VariableDraft } from '../draft/draft'
 import { fittedVariables, type Parameters } from './parameters'
 
-/** Everything as it was typed; the robot is that of the measured walk. */
+/** Form state; numbers as text. */
 export interface FitDraft {
   readonly name: string
-  /** What was said of parameters; all others are as usual. */
-  readonly said: Readonly<Record<string, VariableDraft>>
+  /** Edited parameters; all others have their defaults. */
+  readonly edited: Readonly<Record<string, VariableDraft>>
   readonly method: string
   readonly particles: string
   readonly iterations: string
@@ -19,14 +19,14 @@ export interface FitDraft {
 
 export const EMPTY_FIT: FitDraft = {
   name: '',
-  said: {},
+  edited: {},
   method: 'pso',
   particles: '48',
   iterations: '120',
   seed: '1',
 }
 
-/** The parts of a spec that the draft says. What is no number is sent as typed, to be refused. */
+/** Common parts of the spec. Invalid numbers are sent as text, for the API to reject. */
 export function fitOf(
   draft: FitDraft,
   parameters: Parameters,
@@ -41,29 +41,29 @@ export function fitOf(
   }
 }
 
-/** Whether a method has designs of an iteration to be told. */
+/** Whether a method has a number of designs per iteration. */
 export function hasParticles(method: string, methods: readonly OptimizerPreset[]): boolean {
-  const found = methods.find(({ settings }) => settings.name === method)
-  return found !== undefined && 'particles' in found.settings
+  const entry = methods.find(({ settings }) => settings.name === method)
+  return entry !== undefined && 'particles' in entry.settings
 }
 
-/** The API's messages by the first part of the field; of a list's entry, which one. */
+/** API errors by the first part of the field; entries of lists are numbered. */
 export function errorsByPart(errors: readonly FieldError[]): Readonly<Record<string, string>> {
-  const found: Record<string, string> = {}
+  const byPart: Record<string, string> = {}
   for (const { field, message } of errors) {
     const [first = '', ...rest] = field.split('.')
     const place = rest.map((part) => (/^\d+$/.test(part) ? `entry ${Number(part) + 1}` : part))
     const text = place.length > 0 ? `${place.join(', ')}: ${message}` : message
-    found[first] = found[first] === undefined ? text : `${found[first]}; ${text}`
+    byPart[first] = byPart[first] === undefined ? text : `${byPart[first]}; ${text}`
   }
-  return found
+  return byPart
 }
 
 export function words(text: string): string[] {
   return text.split(/[\s,]+/).filter((word) => word !== '')
 }
 
-/** Wide at first and narrow at last: there are many parameters, and one valley. */
+// Much exploration at first and little at last: many parameters, one valley.
 function methodOf({ method, particles }: FitDraft, methods: readonly OptimizerPreset[]) {
   return {
     name: method,

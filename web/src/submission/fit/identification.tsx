@@ -1,4 +1,4 @@
-/** The form of a new identification: which parameters are fitted to which recordings. */
+/** New-identification form: parameters to fit to recordings. */
 
 import { useMemo, useState } from 'preact/hooks'
 import type { IdentificationSpec, OptimizerPreset, RobotSource } from '../../api/types'
@@ -9,7 +9,6 @@ import { FitForm } from './fit-form'
 import type { FitProps } from './page'
 import type { Parameters } from './parameters'
 
-/** The spec of what was typed. */
 export function identificationSpec(
   draft: FitDraft,
   parameters: Parameters,
@@ -27,13 +26,13 @@ export function identificationSpec(
   } as unknown as IdentificationSpec
 }
 
-export function IdentificationForm({ catalogue, robot, known, ids }: FitProps) {
+export function IdentificationForm({ catalogue, robot, fittable, ids }: FitProps) {
   const [draft, setDraft] = useState<FitDraft>({ ...EMPTY_FIT, name: 'identification' })
   const [links, setLinks] = useState('1, 2, 3')
-  const parameters = { known: known.parameters, usual: null, said: draft.said }
+  const parameters = { fittable: fittable.parameters, fittedByDefault: null, edited: draft.edited }
   const spec = useMemo(
     () => identificationSpec(draft, parameters, links, robot, ids, catalogue.optimizers),
-    [draft, known, links, robot, ids.join(), catalogue],
+    [draft, fittable, links, robot, ids.join(), catalogue],
   )
   return (
     <FitForm
@@ -49,7 +48,7 @@ export function IdentificationForm({ catalogue, robot, known, ids }: FitProps) {
         <TextField
           label="Links"
           value={links}
-          hint="whose currents are compared: 1 coxa, 2 femur, 3 tibia"
+          hint="joints whose currents are compared: 1 coxa, 2 femur, 3 tibia"
           error={errors.links}
           onChange={setLinks}
         />

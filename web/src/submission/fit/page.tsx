@@ -1,4 +1,4 @@
-/** New jobs that fit a robot to measured walks: the walk, the recordings, and the form of the job. */
+/** New identification or calibration: measured log, recordings and form. */
 
 import { useMemo, useRef, useState } from 'preact/hooks'
 import { get } from '../../api/client'
@@ -14,8 +14,8 @@ import { type Catalogue, loadCatalogue } from '../draft/catalogue'
 import { emptyDraft } from '../draft/draft'
 import { RobotSection } from '../robot/section'
 import { CalibrationForm } from './calibration'
+import { type FittableParameters, useFittableParameters } from './fittable-parameters'
 import { IdentificationForm } from './identification'
-import { type KnownParameters, useKnownParameters } from './known-parameters'
 import { ChosenCard } from './recordings/chosen-card'
 import { UploadCard } from './recordings/upload-card'
 
@@ -26,7 +26,7 @@ const TITLES: Readonly<Record<FitKind, string>> = {
   calibration: 'New calibration',
 }
 
-/** The forms below tell them. */
+/** Errors are shown by the forms below. */
 const NO_ERRORS: FieldErrors = new Map()
 
 const WORDS = {
@@ -35,13 +35,13 @@ const WORDS = {
   calibration: 'a calibration to measured walks',
 }
 
-/** What the form of a kind needs. */
+/** Props of the forms. */
 export interface FitProps {
   readonly catalogue: Catalogue
   readonly robot: RobotSource
-  /** What may be fitted of it. */
-  readonly known: KnownParameters
-  /** Of the recordings that were chosen. */
+  /** Parameters that can be fitted. */
+  readonly fittable: FittableParameters
+  /** Ids of the selected recordings. */
   readonly ids: readonly string[]
 }
 
@@ -59,7 +59,7 @@ export function FitPage({ kind, query }: { kind: FitKind; query: URLSearchParams
       </header>
       {catalogue.error && (
         <ErrorNotice
-          what="The form cannot be filled in."
+          what="Could not load the form."
           error={catalogue.error}
           retry={catalogue.reload}
         />
@@ -81,7 +81,7 @@ function Fit({
 }) {
   const [draft, setDraft] = useState(() => emptyDraft(catalogue))
   const robot = useMemo(() => robotOf(draft) as RobotSource, [draft.robot])
-  const known = useKnownParameters(draft.robot, catalogue)
+  const fittable = useFittableParameters(draft.robot, catalogue)
   const recordings = useResource(ids.length === 0 ? null : ids.join(), (signal) =>
     Promise.all(
       ids.map((id) =>
@@ -93,7 +93,7 @@ function Fit({
     const text = idsOf(chosen.join()).join()
     setQuery({ recordings: text === '' ? null : text })
   }
-  const parts = { catalogue, robot, known, ids }
+  const parts = { catalogue, robot, fittable, ids }
   const shown = useLast(recordings.data)?.filter(({ id }) => ids.includes(id)) ?? []
   return (
     <div class="stack">
@@ -105,7 +105,7 @@ function Fit({
       />
       <UploadCard {...parts} onRead={({ recording }) => choose([...chosenNow(), recording.id])} />
       <ChosenCard ids={ids} recordings={recordings} onChange={choose} />
-      {/* Nothing is fitted to nothing: what the job costs cannot be asked before. */}
+      {/* Without recordings, there is nothing to estimate. */}
       {ids.length > 0 && kind === 'identification' && <IdentificationForm {...parts} />}
       {kind === 'calibration' && shown.length > 0 && (
         <CalibrationForm {...parts} recordings={shown} />
@@ -114,7 +114,7 @@ function Fit({
   )
 }
 
-/** Links to the forms of other kinds of jobs; recordings that were chosen stay chosen. */
+/** Links to the forms of other kinds of jobs; selected recordings are kept. */
 export function OtherKinds({
   kind,
   recordings = [],
@@ -142,14 +142,14 @@ export function OtherKinds({
   )
 }
 
-/** The answer before, while another one is awaited: what was typed beside it stays. */
+/** Previous data during loading, so that typed values are kept. */
 function useLast<T>(data: T | null): T | null {
   const last = useRef(data)
   if (data !== null) last.current = data
   return last.current
 }
 
-/** As the address says when an answer comes, which may have been asked for long before. */
+/** Selection in the address at this moment, which may have changed since the request. */
 function chosenNow(): string[] {
   return idsOf(new URLSearchParams(location.search).get('recordings'))
 }

@@ -1,4 +1,4 @@
-/** Which parameters a job fits, and within which bounds. Pure. */
+/** Parameters to fit, with bounds. */
 
 import type { FieldError } from '../../api/problem'
 import type { Variable } from '../../api/types'
@@ -6,56 +6,63 @@ import { type FieldErrors, number } from '../draft/build-spec'
 import { type VariableDraft, variableDraft } from '../draft/draft'
 
 export interface Parameters {
-  /** All that may be fitted. */
-  readonly known: readonly Variable[]
-  /** Names of those that are fitted unless something else is said; null for all. */
-  readonly usual: readonly string[] | null
-  /** What was said of some. */
-  readonly said: Readonly<Record<string, VariableDraft>>
+  /** All parameters that can be fitted. */
+  readonly fittable: readonly Variable[]
+  /** Names of those fitted by default; null for all. */
+  readonly fittedByDefault: readonly string[] | null
+  /** Edited parameters. */
+  readonly edited: Readonly<Record<string, VariableDraft>>
 }
 
-/** Every parameter as the form shows it. */
-export function parameterDrafts({ known, usual, said }: Parameters): Record<string, VariableDraft> {
-  const mode = (name: string) => (usual === null || usual.includes(name) ? 'searched' : 'default')
+/** Draft of every parameter. */
+export function parameterDrafts({
+  fittable,
+  fittedByDefault,
+  edited,
+}: Parameters): Record<string, VariableDraft> {
+  const mode = (name: string) =>
+    fittedByDefault === null || fittedByDefault.includes(name) ? 'searched' : 'default'
   return Object.fromEntries(
-    known.map((variable) => {
+    fittable.map((variable) => {
       const { name } = variable
-      return [name, said[name] ?? variableDraft(variable, mode(name))]
+      return [name, edited[name] ?? variableDraft(variable, mode(name))]
     }),
   )
 }
 
-/** Those that are fitted, in the order of the form. */
+/** Names of the fitted parameters, in form order. */
 export function fittedNames(parameters: Parameters): readonly string[] {
   const drafts = parameterDrafts(parameters)
   return Object.keys(drafts).filter((name) => drafts[name].mode === 'searched')
 }
 
-/** What a spec says of them: names where the bounds are the usual ones. */
+/** Variables for a spec: just names where the bounds are the defaults. */
 export function fittedVariables(parameters: Parameters) {
   const drafts = parameterDrafts(parameters)
   return fittedNames(parameters).map((name) => {
     const { low, high, choices } = drafts[name]
-    const variable = parameters.known.find((known) => known.name === name)!
-    const usual = variableDraft(variable, 'searched')
+    const variable = parameters.fittable.find((entry) => entry.name === name)!
+    const defaults = variableDraft(variable, 'searched')
     if (choices.length > 0) {
-      return choices.length === usual.choices.length ? name : { name, kind: 'categorical', choices }
+      return choices.length === defaults.choices.length
+        ? name
+        : { name, kind: 'categorical', choices }
     }
-    return low === usual.low && high === usual.high
+    return low === defaults.low && high === defaults.high
       ? name
       : { name, low: number(low), high: number(high) }
   })
 }
 
-/** All of the parameters fitted, or none. */
-export function allSaid(
-  { known }: Parameters,
+/** Mark all parameters as fitted or not fitted. */
+export function allEdited(
+  { fittable }: Parameters,
   mode: 'searched' | 'default',
 ): Record<string, VariableDraft> {
-  return Object.fromEntries(known.map((v) => [v.name, variableDraft(v, mode)]))
+  return Object.fromEntries(fittable.map((v) => [v.name, variableDraft(v, mode)]))
 }
 
-/** The API's messages by the parameter that they are of. */
+/** API errors by parameter. */
 export function parameterErrors(
   errors: readonly FieldError[],
   parameters: Parameters,

@@ -1,4 +1,4 @@
-/** The targets of a calibration, to be changed, added and removed. */
+/** Editable table of a calibration's targets. */
 
 import type { RecordingView } from '../../api/types'
 import { inWords } from '../../format/words'
@@ -15,7 +15,7 @@ export function TargetsTable({
 }: {
   catalogue: Catalogue
   recordings: readonly RecordingView[]
-  /** Those of the recordings. */
+  /** Targets of the selected recordings. */
   targets: readonly TargetDraft[]
   onChange: (change: Change) => void
 }) {
@@ -36,9 +36,9 @@ export function TargetsTable({
     <section class="stack-tight" aria-labelledby="part-targets">
       <h3 id="part-targets">Targets</h3>
       <p class="muted small">
-        A log tells the currents; speed, energy and other results are measured otherwise. A
-        tolerance is relative, 0.1 for a tenth; of height loss in metres. What is only predicted is
-        reported, not fitted.
+        A log contains currents only; speed, energy and other quantities are measured separately.
+        Tolerances are relative (0.1 is 10&nbsp;%), except for height loss (in metres). Predicted
+        targets are reported but not fitted.
       </p>
       <div class="table-scroll">
         <table class="variables">
@@ -68,7 +68,7 @@ export function TargetsTable({
       </div>
       <div class="row">
         <button type="button" class="compact" onClick={add}>
-          Add a target
+          Add target
         </button>
       </div>
     </section>
@@ -138,7 +138,7 @@ function TargetRow({
           onChange={(event) => set({ use: event.currentTarget.value as TargetDraft['use'] })}
         >
           <option value="fit">fitted</option>
-          <option value="predict">only predicted</option>
+          <option value="predict">predicted</option>
         </select>
       </td>
       <td>

@@ -1,14 +1,14 @@
-/** What measured walks came to, as targets of a calibration. Pure. */
+/** Targets of a calibration. */
 
 import type { CalibrationSpec, OptimizerPreset, RecordingView, RobotSource } from '../../api/types'
 import { number } from '../draft/build-spec'
 import { type FitDraft, fitOf } from './fit'
 import type { Parameters } from './parameters'
 
-/** One target as it was typed. */
+/** Form state of a target; numbers as text. */
 export interface TargetDraft {
   readonly key: number
-  /** Id of the recording that it is of. */
+  /** Id of its recording. */
   readonly recording: string
   readonly quantity: string
   readonly value: string
@@ -16,7 +16,7 @@ export interface TargetDraft {
   readonly use: 'fit' | 'predict'
 }
 
-/** What a log tells of its walk by itself: currents. Peaks are noise's too, and so only predicted. */
+/** Currents of a log as targets; peaks contain noise and are only predicted. */
 function targetsOf(recording: RecordingView, key: number): readonly TargetDraft[] {
   const common = { recording: recording.id }
   return [
@@ -39,15 +39,15 @@ function targetsOf(recording: RecordingView, key: number): readonly TargetDraft[
   ]
 }
 
-/** The targets of the recordings that are chosen: those there are, and the first ones of new recordings. */
+/** Add the default targets of new recordings. */
 export function withRecordings(
   targets: readonly TargetDraft[],
-  seen: readonly string[],
+  added: readonly string[],
   recordings: readonly RecordingView[],
 ): readonly TargetDraft[] {
   const all = [...targets]
   for (const recording of recordings) {
-    if (!seen.includes(recording.id)) all.push(...targetsOf(recording, nextKey(all)))
+    if (!added.includes(recording.id)) all.push(...targetsOf(recording, nextKey(all)))
   }
   return all
 }
@@ -56,12 +56,12 @@ export function nextKey(targets: readonly TargetDraft[]): number {
   return Math.max(-1, ...targets.map(({ key }) => key)) + 1
 }
 
-/** What a walk is called in the job. */
+/** Name of a walk in the job. */
 export function walkName(index: number): string {
   return `walk-${index + 1}`
 }
 
-/** Of the targets only those whose recording is chosen count. */
+/** Only targets of the selected recordings are included. */
 export function calibrationSpec(
   draft: FitDraft,
   parameters: Parameters,
@@ -80,19 +80,21 @@ export function calibrationSpec(
       design,
       scenarios: [walk],
     })),
-    targets: shown(targets, recordings).map(({ recording, quantity, value, tolerance, use }) => ({
-      walk: places.get(recording),
-      quantity,
-      value: number(value),
-      tolerance: number(tolerance),
-      use,
-    })),
+    targets: selectedTargets(targets, recordings).map(
+      ({ recording, quantity, value, tolerance, use }) => ({
+        walk: places.get(recording),
+        quantity,
+        value: number(value),
+        tolerance: number(tolerance),
+        use,
+      }),
+    ),
     ...fitOf(draft, parameters, methods),
   } as unknown as CalibrationSpec
 }
 
-/** Those of the chosen recordings. */
-export function shown(
+/** Targets of the selected recordings. */
+export function selectedTargets(
   targets: readonly TargetDraft[],
   recordings: readonly RecordingView[],
 ): readonly TargetDraft[] {

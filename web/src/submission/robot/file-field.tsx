@@ -1,4 +1,4 @@
-/** A file to choose; the same one again is read again. */
+/** A file input; choosing the same file again reads it again. */
 
 import { useId } from 'preact/hooks'
 
@@ -12,7 +12,7 @@ export function FileField({
   label: string
   accept: string
   hint: string
-  /** Whether nothing can go on without it. */
+  /** Whether the file is required. */
   missing?: boolean
   onFile: (file: File) => void
 }) {

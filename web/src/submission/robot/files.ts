@@ -1,21 +1,21 @@
-/** Files of a robot as they are chosen: text, or what is wrong with them. */
+/** Reading of a robot's files. */
 
-/** Of any file of a robot [B]: the API takes less, and says how much. */
+/** Size limit for any file [B]; the API has lower limits and reports them. */
 const MOST_BYTES = 4_000_000
 
-/** The text of a file. Throws with what is wrong and the way out. */
+/** Read a text file. Throws a message for the user. */
 export async function textOf(file: File): Promise<string> {
   if (file.size > MOST_BYTES) {
     throw new Error(
-      `${file.name} has ${(file.size / 1e6).toFixed(1)} MB; a robot's files are text of at most` +
-        ' 0.8 MB. Choose the URDF itself: it names its meshes, which no walk needs',
+      `${file.name} has ${(file.size / 1e6).toFixed(1)} MB; robot files are text of at most 0.8 MB.` +
+        ' Choose the URDF itself; meshes are not needed',
     )
   }
   let bytes: ArrayBuffer
   try {
     bytes = await file.arrayBuffer()
   } catch {
-    throw new Error(`${file.name} cannot be read; it may have changed meanwhile: choose it again`)
+    throw new Error(`cannot read ${file.name}; it may have changed: choose it again`)
   }
   try {
     return new TextDecoder('utf-8', { fatal: true }).decode(bytes)
@@ -24,7 +24,7 @@ export async function textOf(file: File): Promise<string> {
   }
 }
 
-/** A name for a robot, by the name of its file: what may name one of it, or else `robot`. */
+/** Name of a robot derived from its file name, restricted to allowed characters. */
 export function robotName(file: string): string {
   const stem = file.replace(/\.[^.]*$/, '')
   const allowed = stem.replace(/[^\p{L}\p{N}_. -]/gu, '').replace(/^[^\p{L}\p{N}_]+/u, '')

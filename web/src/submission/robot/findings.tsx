@@ -1,4 +1,4 @@
-/** What was seen of a robot: mass, legs, how it stands, what is wrong, what was guessed. */
+/** Results of a robot's check: mass, legs, stance, warnings and guesses. */
 
 import type { CheckedLeg, RobotCheck } from '../../api/types'
 import { type Column, Table } from '../../components/table/table'
@@ -14,20 +14,20 @@ const COLUMNS: readonly Column<CheckedLeg>[] = [
 
 export function Findings({ check, guesses }: { check: RobotCheck; guesses: readonly string[] }) {
   const { standing } = check
-  const held = Object.entries(check.held)
+  const fixedJoints = Object.entries(check.held)
   return (
-    <section class="stack" aria-label="What was found" data-warnings={check.warnings.length}>
+    <section class="stack" aria-label="Check results" data-warnings={check.warnings.length}>
       <p>
         <strong>{check.name}</strong>: {check.legs.length} legs, {check.joints} joints,{' '}
-        {quantity(check.mass, 'kg')}. Standing for {exactQuantity(standing.seconds, 's')}, its soles
-        carry {quantity(standing.normal_forces, 'N')} of {quantity(standing.weight, 'N')}; its body
-        is at {quantity(standing.height, 'm', 3)}.
-        {held.length > 0 &&
-          ` Held: ${held.map(([name, at]) => `${name} at ${formatExact(at)} rad`).join(', ')}.`}
+        {quantity(check.mass, 'kg')}. After standing for {exactQuantity(standing.seconds, 's')}, its
+        soles carry {quantity(standing.normal_forces, 'N')} of {quantity(standing.weight, 'N')}; its
+        body is at {quantity(standing.height, 'm', 3)}.
+        {fixedJoints.length > 0 &&
+          ` Fixed joints: ${fixedJoints.map(([name, at]) => `${name} at ${formatExact(at)} rad`).join(', ')}.`}
       </p>
       {check.warnings.length > 0 && (
         <div class="notice" data-tone="warn">
-          <strong>Look at this; it can be submitted all the same.</strong>
+          <strong>Warnings (the job can still be submitted)</strong>
           <ul>
             {check.warnings.map((warning) => (
               <li key={warning}>{warning}</li>
@@ -38,7 +38,7 @@ export function Findings({ check, guesses }: { check: RobotCheck; guesses: reado
       <Table caption="Legs" columns={COLUMNS} rows={check.legs} rowKey={({ name }) => name} />
       {guesses.length > 0 && (
         <div>
-          <p>Guessed, so worth a look in robot.toml:</p>
+          <p>Guessed values, to be verified in robot.toml:</p>
           <ul>
             {guesses.map((guess) => (
               <li key={guess}>{guess}</li>

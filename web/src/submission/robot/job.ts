@@ -1,31 +1,28 @@
-/** What a robot's own folder says of its jobs: `job.json`, as `gaitswarm robot init` writes it. */
+/** Job settings of a robot folder: `job.json`, as written by `gaitswarm robot init`. */
 
 import type { JobSpec } from '../../api/types'
 import { specOf } from '../draft/build-spec'
 import type { Catalogue } from '../draft/catalogue'
 import { type Draft, draftOf } from '../draft/draft'
 
-/**
- * The draft with what the robot says of scenarios, controller, variables and all else; its name and
- * robot stay. Throws with what is wrong with the text.
- */
+/** Apply a job.json to the draft, except name and robot. Throws a message for the user. */
 export function withRobotJob(draft: Draft, catalogue: Catalogue, text: string): Draft {
   return withJob(draft, catalogue, objectIn(text))
 }
 
-/** The same of what was read already. Throws where its controller is not known here. */
-export function withJob(draft: Draft, catalogue: Catalogue, own: Partial<JobSpec>): Draft {
-  const controller = own.controller ?? draft.controller
+/** Apply parsed settings. Throws if the controller is unknown. */
+export function withJob(draft: Draft, catalogue: Catalogue, settings: Partial<JobSpec>): Draft {
+  const controller = settings.controller ?? draft.controller
   if (!catalogue.controllers.some(({ name }) => name === controller)) {
-    throw new Error(`job.json names a controller ${String(controller)} that is not known here`)
+    throw new Error(`job.json names the unknown controller ${String(controller)}`)
   }
-  // Of another robot, and of another controller.
+  // Settings of the previous robot and controller do not apply.
   const { scenarios: _scenarios, variables: _variables, fixed: _fixed, ...rest } = specOf(draft)
   const { name, robot } = draft
-  return { ...draftOf({ ...rest, ...own } as JobSpec, catalogue), name, robot }
+  return { ...draftOf({ ...rest, ...settings } as JobSpec, catalogue), name, robot }
 }
 
-/** A robot's own files are no hexapod's: its presets go, and come back with a robot that ships. */
+/** Change the kind of robot; presets do not apply to custom robots. */
 export function ofKind(draft: Draft, kind: Draft['robot']['kind'], empty: Draft): Partial<Draft> {
   const robot = { ...draft.robot, kind }
   if ((kind === 'files') === (draft.robot.kind === 'files')) return { robot }
@@ -33,12 +30,12 @@ export function ofKind(draft: Draft, kind: Draft['robot']['kind'], empty: Draft)
 }
 
 function objectIn(text: string): Partial<JobSpec> {
-  let found: unknown
+  let value: unknown
   try {
-    found = JSON.parse(text)
+    value = JSON.parse(text)
   } catch (error) {
-    throw new Error(`job.json is no JSON: ${error instanceof Error ? error.message : error}`)
+    throw new Error(`job.json is not valid JSON: ${error instanceof Error ? error.message : error}`)
   }
-  if (typeof found === 'object' && found !== null && !Array.isArray(found)) return found
+  if (typeof value === 'object' && value !== null && !Array.isArray(value)) return value
   throw new Error('job.json must hold one JSON object')
 }

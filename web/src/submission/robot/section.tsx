@@ -1,17 +1,17 @@
-/** The robot: as it is, a variant of it, or one's own from its files. */
+/** Robot of the job: shipped, a variant, or custom. */
 
 import { Segmented } from '../../components/fields/segmented'
 import { errorsUnder } from '../draft/build-spec'
 import { emptyDraft, type RobotDraft } from '../draft/draft'
 import { ChoiceField, NumberField, Problems } from '../fields/number-field'
 import type { SectionProps } from '../sections/section'
+import { CustomRobotForm } from './custom-robot'
 import { ofKind } from './job'
-import { OwnRobot } from './own-robot'
 
 const KINDS = [
-  ['shipped', 'as it ships'],
-  ['variant', 'a variant'],
-  ['files', 'a robot of one’s own'],
+  ['shipped', 'shipped'],
+  ['variant', 'variant'],
+  ['files', 'custom'],
 ] as const
 
 const LINKS = ['coxa', 'femur', 'tibia']
@@ -35,7 +35,7 @@ export function RobotSection(props: SectionProps) {
         />
         {robot.kind !== 'files' && (
           <ChoiceField
-            label="Robot that ships"
+            label="Shipped robot"
             choices={catalogue.robots.map(({ name }) => name)}
             value={robot.name}
             hint={shipped?.description}
@@ -45,7 +45,7 @@ export function RobotSection(props: SectionProps) {
         {robot.kind === 'variant' && (
           <div class="fields">
             <ChoiceField
-              label="Law of friction"
+              label="Contact law"
               choices={['', ...(variant.get('contact_law')?.choices ?? [])]}
               value={robot.contact_law}
               error={errors.get('robot.contact_law')}
@@ -53,7 +53,7 @@ export function RobotSection(props: SectionProps) {
               onChange={(contact_law) => change({ contact_law })}
             />
             <ChoiceField
-              label="Soles that gaits are planned for"
+              label="Planned soles"
               choices={['', ...(variant.get('planned_soles')?.choices ?? [])]}
               value={robot.planned_soles}
               error={errors.get('robot.planned_soles')}
@@ -74,7 +74,7 @@ export function RobotSection(props: SectionProps) {
             ))}
           </div>
         )}
-        {robot.kind === 'files' && <OwnRobot {...props} />}
+        {robot.kind === 'files' && <CustomRobotForm {...props} />}
         <Problems
           messages={errorsUnder(errors, 'robot').filter((message) =>
             robot.kind === 'files'

@@ -1,12 +1,12 @@
-/** A design to look at before there is a job: the middle of all that a job searches. */
+/** Preview design: the middle of the search space. */
 
 import type { JobSpec, Variable } from '../../api/types'
 import type { Design } from '../../format/value'
 import { middle } from '../draft/draft'
 
-/** What is fixed stays; of a choice the first. known: by name, for whole numbers. */
-export function startDesign(spec: JobSpec, known: readonly Variable[]): Design {
-  const kinds = new Map(known.map((variable) => [variable.name, variable]))
+/** Fixed values stay; categorical variables take their first choice. variables: all of the controller. */
+export function startDesign(spec: JobSpec, variables: readonly Variable[]): Design {
+  const kinds = new Map(variables.map((variable) => [variable.name, variable]))
   const searched = (spec.variables ?? []).map((entry) => {
     const variable =
       typeof entry === 'string' ? kinds.get(entry) : { ...kinds.get(entry.name), ...entry }

@@ -1,4 +1,4 @@
-/** The robot walking before there is a job, with the middle of all that is searched. */
+/** Simulation of the preview design of a custom robot. */
 
 import { useRef, useState } from 'preact/hooks'
 import type { JobSpec, Scenario } from '../../api/types'
@@ -24,22 +24,22 @@ export function StartWalk({
   const box = useRef<HTMLDivElement>(null)
   const visible = useVisible(box)
   const [chosen, setChosen] = useState('')
-  /** What is walked: not what is typed after it. */
+  /** What was simulated, regardless of later edits. */
   const [walked, setWalked] = useState<string | null>(null)
-  const [ended, setEnded] = useState<ReplayHeader | null>(null)
+  const [finished, setFinished] = useState<ReplayHeader | null>(null)
   const scenario = scenarios.find((entry) => nameOf(entry) === chosen) ?? scenarios[0]
   if (scenario === undefined) {
-    return <p class="muted">Choose or add a scenario below to see it walk.</p>
+    return <p class="muted">Choose or add a scenario below to simulate it.</p>
   }
   const name = JSON.stringify([robot, controller, design, scenario])
   return (
     <section class="stack start-walk" aria-label="Start design" ref={box}>
       <div class="fields">
         <ChoiceField
-          label="Walk to look at"
+          label="Scenario to simulate"
           choices={scenarios.map(nameOf)}
           value={nameOf(scenario)}
-          hint="with the middle of what is searched"
+          hint="with the middle of the search space"
           onChange={setChosen}
         />
       </div>
@@ -61,9 +61,9 @@ export function StartWalk({
                 signal,
               )
             }
-            label="The start design walking"
+            label="Replay of the preview design"
             visible={visible}
-            onWalked={({ header }) => setEnded(header)}
+            onWalked={({ header }) => setFinished(header)}
           />
         </div>
       ) : (
@@ -71,19 +71,19 @@ export function StartWalk({
           <button
             type="button"
             onClick={() => {
-              setEnded(null)
+              setFinished(null)
               setWalked(name)
             }}
           >
-            Let it walk
+            Simulate
           </button>
         </div>
       )}
-      {walked === name && ended && (
-        <p data-ended={ended.status}>
-          {ended.status === 'ok'
-            ? 'It walks to the end. A job makes it walk better.'
-            : `${sentence(ended.explanation)} A job may find a design that walks; else look at stance and actuators in robot.toml.`}
+      {walked === name && finished && (
+        <p data-ended={finished.status}>
+          {finished.status === 'ok'
+            ? 'The simulation succeeded. A job can improve the gait.'
+            : `${sentence(finished.explanation)} A job may find a design that succeeds; otherwise check stance and actuators in robot.toml.`}
         </p>
       )}
     </section>

@@ -1,4 +1,4 @@
-/** What evaluates designs: gaitswarm's own simulator, or a case of a plug-in with its settings. */
+/** Evaluation of designs: gaitswarm's simulator, or a plug-in case with its settings. */
 
 import { capitalized, inWords, sentence } from '../../format/words'
 import { caseDraft, caseFields } from '../draft/case'
@@ -6,28 +6,26 @@ import { ChoiceField, NumberField, Problems } from '../fields/number-field'
 import { describe } from '../fields/schema-fields'
 import type { SectionProps } from './section'
 
-const OWN = 'gaitswarm'
+const BUILT_IN = 'gaitswarm'
 
 export function CaseSection({ draft, catalogue, errors, onChange }: SectionProps) {
   const { cases } = catalogue
   if (cases.length === 0) return null
   const chosen = cases.find(({ name }) => name === draft.case?.name)
   const fields = caseFields(chosen)
-  const known = new Set(fields.map(({ name }) => `case.${name}`))
+  const knownKeys = new Set(fields.map(({ name }) => `case.${name}`))
   const others = [...errors]
-    .filter(([key]) => key === 'case' || (key.startsWith('case.') && !known.has(key)))
+    .filter(([key]) => key === 'case' || (key.startsWith('case.') && !knownKeys.has(key)))
     .map(([, message]) => message)
-  const needs = chosen?.needs
-    ? ` It is not installed where the job would run: ${chosen.needs}.`
-    : ''
+  const needs = chosen?.needs ? ` Not installed where the job would run: ${chosen.needs}.` : ''
   return (
     <section class="card" aria-labelledby="part-case">
       <h2 id="part-case">Case</h2>
       <ChoiceField
-        label="Designs are evaluated by"
-        choices={[OWN, ...cases.map(({ name }) => name)]}
-        value={draft.case?.name ?? OWN}
-        hint={chosen ? sentence(chosen.description) + needs : 'A walk in gaitswarm’s simulator.'}
+        label="Evaluated by"
+        choices={[BUILT_IN, ...cases.map(({ name }) => name)]}
+        value={draft.case?.name ?? BUILT_IN}
+        hint={chosen ? sentence(chosen.description) + needs : 'gaitswarm’s simulator.'}
         onChange={(name) =>
           onChange({ case: caseDraft(cases.find((entry) => entry.name === name)) })
         }

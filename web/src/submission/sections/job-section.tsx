@@ -15,7 +15,7 @@ export function JobSection({ draft, catalogue, errors, onChange }: SectionProps)
             id="job-name"
             value={draft.name}
             maxLength={200}
-            placeholder="for people; need not be unique"
+            placeholder="optional; need not be unique"
             aria-invalid={errors.has('name')}
             onInput={(event) => onChange({ name: event.currentTarget.value })}
           />
@@ -40,7 +40,7 @@ export function JobSection({ draft, catalogue, errors, onChange }: SectionProps)
           choices={job.get('precision')!.choices!}
           value={draft.precision}
           error={errors.get('precision')}
-          hint="of the search; the best design is judged in double"
+          hint="of the search; the best design is evaluated in double precision"
           onChange={(precision) => onChange({ precision })}
         />
       </div>

@@ -1,4 +1,4 @@
-/** The search method and its settings, as the API describes them. */
+/** Search method and its settings, as described by the API. */
 
 import type { OptimizerPreset } from '../../api/types'
 import { Segmented } from '../../components/fields/segmented'
@@ -27,9 +27,9 @@ export function OptimizerSection({ draft, catalogue, errors, onChange }: Section
     const chosen = methodNamed(optimizers, name)
     if (chosen) onChange({ optimizer: withPreset(optimizer, chosen) })
   }
-  const known = new Set(fields.map(({ name }) => `optimizer.${name}`))
+  const knownKeys = new Set(fields.map(({ name }) => `optimizer.${name}`))
   const others = [...errors]
-    .filter(([key]) => key === 'optimizer' || (key.startsWith('optimizer.') && !known.has(key)))
+    .filter(([key]) => key === 'optimizer' || (key.startsWith('optimizer.') && !knownKeys.has(key)))
     .map(([, message]) => message)
   return (
     <section class="card" aria-labelledby="part-optimizer">
@@ -46,7 +46,7 @@ export function OptimizerSection({ draft, catalogue, errors, onChange }: Section
           <Segmented
             roomy
             label="Preset of the optimizer"
-            value={settings.flatMap(([name, each]) => (holds(each, optimizer) ? [name] : []))}
+            value={settings.flatMap(([name, each]) => (matches(each, optimizer) ? [name] : []))}
             options={presets.map(({ name }) => [name, name] as const)}
             onChoose={(chosen) => {
               onChange({ optimizer: settings.find(([name]) => name === chosen)![1] })
@@ -60,7 +60,7 @@ export function OptimizerSection({ draft, catalogue, errors, onChange }: Section
           <SettingField
             key={`${optimizer.name} ${field.name}`}
             field={field}
-            usual={settingText(method?.settings[field.name as keyof typeof method.settings])}
+            defaultValue={settingText(method?.settings[field.name as keyof typeof method.settings])}
             optimizer={optimizer}
             error={errors.get(`optimizer.${field.name}`)}
             onChange={(value) => onChange({ optimizer: { ...optimizer, [field.name]: value } })}
@@ -71,33 +71,33 @@ export function OptimizerSection({ draft, catalogue, errors, onChange }: Section
   )
 }
 
-function holds(settings: OptimizerDraft, optimizer: OptimizerDraft): boolean {
+function matches(settings: OptimizerDraft, optimizer: OptimizerDraft): boolean {
   return Object.keys(settings).every((key) => settings[key] === optimizer[key])
 }
 
 function hintOf({ description, needs }: OptimizerPreset): string {
-  const said = sentence(description)
-  return needs === null ? said : `${said} It is not installed where the job would run: ${needs}.`
+  const text = sentence(description)
+  return needs === null ? text : `${text} Not installed where the job would run: ${needs}.`
 }
 
-/** One setting; where it is not the method's default, it says what that is. */
+/** One setting; changed values show their default. */
 function SettingField({
   field,
-  usual,
+  defaultValue,
   optimizer,
   error,
   onChange,
 }: {
   field: SchemaField
-  usual: string
+  defaultValue: string
   optimizer: OptimizerDraft
   error?: string
   onChange: (value: string) => void
 }) {
   const value = optimizer[field.name] ?? ''
-  const changed = value !== usual
+  const changed = value !== defaultValue
   const help = sentence(describe(field))
-  const note = changed && usual !== '' ? `${help} Default: ${usual}.` : help
+  const note = changed && defaultValue !== '' ? `${help} Default: ${defaultValue}.` : help
   const shared = { label: capitalized(inWords(field.name)), value, error, changed, onChange }
   const choices = field.type === 'boolean' ? ['true', 'false'] : field.choices
   return choices ? (

@@ -1,4 +1,4 @@
-/** How objectives are weighed: a published preference or one's own. */
+/** Weights of the objectives: a published preference or custom values. */
 
 import { Segmented } from '../../components/fields/segmented'
 import { formatExact } from '../../format/number'
@@ -23,11 +23,11 @@ export function PreferenceSection({ draft, catalogue, errors, onChange }: Sectio
           roomy
           label="Preference"
           value={preference.kind}
-          options={[...names, 'own'].map((name) => [name, name] as const)}
+          options={[...names, 'custom'].map((name) => [name, name] as const)}
           onChoose={(kind) =>
             onChange({
               preference:
-                kind === 'own' ? { ...preference, kind } : preferenceDraft(catalogue, kind),
+                kind === 'custom' ? { ...preference, kind } : preferenceDraft(catalogue, kind),
             })
           }
         />
@@ -88,7 +88,7 @@ function Weight({
   onChange: (value: string) => void
 }) {
   const value = preference[part][index]
-  if (preference.kind !== 'own') return <>{formatExact(Number(value))}</>
+  if (preference.kind !== 'custom') return <>{formatExact(Number(value))}</>
   return (
     <>
       <input

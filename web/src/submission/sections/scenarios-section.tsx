@@ -1,4 +1,4 @@
-/** The walks in which designs are judged: presets with their numbers, and one's own. */
+/** Scenarios of the job: presets and custom ones. */
 
 import { useRef, useState } from 'preact/hooks'
 import type { ScenarioPreset } from '../../api/types'
@@ -11,28 +11,28 @@ import { ChoiceField, NumberField, Problems } from '../fields/number-field'
 import type { SchemaField } from '../fields/schema-fields'
 import type { SectionProps } from './section'
 
-type Own = Readonly<Record<string, string>>
+type CustomDraft = Readonly<Record<string, string>>
 
-/** What tells the thesis's walks apart. */
+/** Fields in which the thesis's scenarios differ. */
 const COMMON: ReadonlySet<string> = new Set(['cycle_time', 'load', 'slope', 'turn'])
 
 export function ScenariosSection({ draft, catalogue, errors, onChange }: SectionProps) {
-  const { presets, own } = draft
+  const { presets, custom } = draft
   const hasPresets = draft.robot.kind !== 'files' || presets.length > 0
   const toggle = (name: string) => {
-    const wanted = presets.includes(name) ? presets.filter((p) => p !== name) : [...presets, name]
-    // In the catalogue's order, however they were ticked.
-    const order = catalogue.scenarios.map((s) => s.name).filter((n) => wanted.includes(n))
+    const names = presets.includes(name) ? presets.filter((p) => p !== name) : [...presets, name]
+    // In the catalogue's order.
+    const order = catalogue.scenarios.map((s) => s.name).filter((n) => names.includes(n))
     onChange({ presets: order })
   }
-  const replace = (index: number, scenario: Own | null) => {
-    const rest = own.map((old, k) => (k === index ? scenario : old))
-    onChange({ own: rest.filter((s) => s !== null) })
+  const replace = (index: number, scenario: CustomDraft | null) => {
+    const rest = custom.map((old, k) => (k === index ? scenario : old))
+    onChange({ custom: rest.filter((s) => s !== null) })
   }
   const add = (start: string) => {
     const preset = catalogue.scenarios.find(({ name }) => name === start) ?? null
-    const name = `own-${own.length + 1}`
-    onChange({ own: [...own, scenarioDraft(catalogue.fields.scenario, preset, name)] })
+    const name = `custom-${custom.length + 1}`
+    onChange({ custom: [...custom, scenarioDraft(catalogue.fields.scenario, preset, name)] })
   }
   return (
     <section class="card" aria-labelledby="part-scenarios">
@@ -43,13 +43,13 @@ export function ScenariosSection({ draft, catalogue, errors, onChange }: Section
           <PresetTable catalogue={catalogue} chosen={presets} onToggle={toggle} />
         ) : (
           <p class="muted">
-            The presets are walks of Szabadka-II. This robot walks in scenarios of its own: those of
-            its job.json, or such as are added here.
+            The presets apply to Szabadka-II only. Add scenarios for this robot below, or load its
+            job.json.
           </p>
         )}
-        {own.map((scenario, index) => (
-          <OwnScenario
-            // The place is all that tells them apart.
+        {custom.map((scenario, index) => (
+          <CustomScenario
+            // Scenarios have no other identity than their position.
             key={index}
             scenario={scenario}
             index={index}
@@ -60,7 +60,7 @@ export function ScenariosSection({ draft, catalogue, errors, onChange }: Section
         ))}
         <div class="row">
           <label class="row">
-            <span class="label">Add a scenario of one’s own</span>
+            <span class="label">Add a custom scenario</span>
             <select
               value=""
               onChange={(event) => {
@@ -84,7 +84,7 @@ export function ScenariosSection({ draft, catalogue, errors, onChange }: Section
   )
 }
 
-/** Only what tells the presets apart: the fields that they do not all share. */
+/** Presets with the fields in which they differ. */
 function PresetTable({
   catalogue,
   chosen,
@@ -145,34 +145,34 @@ function PresetTable({
   )
 }
 
-function OwnScenario({
+function CustomScenario({
   scenario,
   index,
   catalogue,
   errors,
   onChange,
 }: {
-  scenario: Own
+  scenario: CustomDraft
   index: number
   catalogue: Catalogue
   errors: FieldErrors
-  onChange: (scenario: Own | null) => void
+  onChange: (scenario: CustomDraft | null) => void
 }) {
-  const at = `own.${index}`
+  const at = `custom.${index}`
   const fields = [...catalogue.fields.scenario.values()].filter(({ name }) => name !== 'name')
   const change = (name: string) => (value: string) => onChange({ ...scenario, [name]: value })
   const error = (name: string) => errors.get(`${at}.${name}`)
-  const usual = scenarioDraft(catalogue.fields.scenario, null, '')
-  // What is left empty has its default, too.
-  const isSet = ({ name }: SchemaField) => !['', usual[name]].includes(scenario[name] ?? '')
-  // Those of the beginning: no field may move while somebody types.
+  const defaults = scenarioDraft(catalogue.fields.scenario, null, '')
+  // Empty fields have their defaults, too.
+  const isSet = ({ name }: SchemaField) => !['', defaults[name]].includes(scenario[name] ?? '')
+  // Determined once: fields must not move during typing.
   const [shown] = useState(() => new Set(fields.filter(isSet).map(({ name }) => name)))
   const isFirst = ({ name }: SchemaField) => COMMON.has(name) || shown.has(name)
   const further = fields.filter((field) => !isFirst(field))
-  const asUsual = !further.some(isSet)
-  // It is not shut again while somebody empties a field in it.
+  const allDefault = !further.some(isSet)
+  // Stays open when a field in it is emptied.
   const opened = useRef(false)
-  opened.current ||= !asUsual || further.some(({ name }) => error(name) !== undefined)
+  opened.current ||= !allDefault || further.some(({ name }) => error(name) !== undefined)
   const input = (field: SchemaField) =>
     field.choices ? (
       <ChoiceField
@@ -194,8 +194,8 @@ function OwnScenario({
       />
     )
   return (
-    <fieldset class="own-scenario" data-own={index}>
-      <legend>Scenario of one’s own</legend>
+    <fieldset class="custom-scenario" data-custom={index}>
+      <legend>Custom scenario</legend>
       <Problems messages={errors.has(at) ? [errors.get(at)!] : []} />
       <div class="fields">
         <div class="field">
@@ -212,7 +212,7 @@ function OwnScenario({
       </div>
       <details open={opened.current}>
         <summary>
-          {further.length} more settings{asUsual && ', at their defaults'}
+          {further.length} more settings{allDefault && ', all at their defaults'}
         </summary>
         <div class="fields">{further.map(input)}</div>
       </details>

@@ -1,4 +1,4 @@
-/** What every section of the form is given. */
+/** Props of all sections of the form. */
 
 import type { FieldErrors } from '../draft/build-spec'
 import type { Catalogue } from '../draft/catalogue'

@@ -1,8 +1,8 @@
-/** Designs that the search begins with: the best of earlier jobs, or those of a cloned one. */
+/** Start designs: the best of earlier jobs, or those of a cloned job. */
 
 import { useId } from 'preact/hooks'
 import { get } from '../../api/client'
-import { foundJobs } from '../../api/found-jobs'
+import { jobSearch } from '../../api/job-search'
 import { useResource } from '../../api/resource'
 import { ChosenList } from '../../components/fields/chosen-list'
 import { Combobox } from '../../components/fields/combobox'
@@ -16,7 +16,7 @@ export function StartSection({ draft, errors, onChange }: SectionProps) {
   const id = useId()
   const { start } = draft
   const problems = errorsUnder(errors, 'start')
-  const wrong = problems.length > 0
+  const invalid = problems.length > 0
   const change = (changes: Partial<StartDraft>) => onChange({ start: { ...start, ...changes } })
   return (
     <section class="card stack-tight" aria-labelledby="part-start">
@@ -26,15 +26,15 @@ export function StartSection({ draft, errors, onChange }: SectionProps) {
       </ChosenList>
       <div class="fields">
         <Combobox
-          label="From the best of jobs"
-          shown=""
-          placeholder={start.jobs.length === 0 ? 'none: the search begins anywhere' : 'another one'}
-          hint="Their best designs are judged first, as part of the budget."
-          wrong={wrong}
-          found={{
-            label: 'Jobs, the newest first',
-            search: foundJobs('tuning', {
-              without: start.jobs,
+          label="Best designs of jobs"
+          chosenLabel=""
+          placeholder={start.jobs.length === 0 ? 'none' : 'add another job'}
+          hint="Their best designs are evaluated first, as part of the budget."
+          invalid={invalid}
+          remote={{
+            label: 'Jobs, newest first',
+            search: jobSearch('tuning', {
+              exclude: start.jobs,
               note: ({ controller }) =>
                 controller === draft.controller ? '' : `tunes ${controller}`,
             }),
@@ -43,12 +43,12 @@ export function StartSection({ draft, errors, onChange }: SectionProps) {
         />
         {start.jobs.length > 0 && (
           <div class="field">
-            <label for={`${id}-count`}>Designs in all</label>
+            <label for={`${id}-count`}>Number of designs</label>
             <input
               id={`${id}-count`}
               inputMode="numeric"
               value={start.count}
-              aria-invalid={wrong}
+              aria-invalid={invalid}
               onInput={(event) => change({ count: event.currentTarget.value })}
             />
           </div>
@@ -57,11 +57,11 @@ export function StartSection({ draft, errors, onChange }: SectionProps) {
       {start.designs.length > 0 && start.jobs.length === 0 && (
         <p class="row">
           <span>
-            It begins with the {formatCount(start.designs.length)} designs that the cloned job began
-            with.
+            The search starts from {formatCount(start.designs.length)} start designs of the cloned
+            job.
           </span>
           <button type="button" class="compact" onClick={() => onChange({ start: NO_START })}>
-            Leave them out
+            Remove them
           </button>
         </p>
       )}
@@ -70,7 +70,7 @@ export function StartSection({ draft, errors, onChange }: SectionProps) {
   )
 }
 
-/** Its name and how good its best is; nothing of a job that is not there, which the estimate tells. */
+/** Name and best fitness of a job; nothing if it is missing, which the estimate reports. */
 function JobWords({ id }: { id: string }) {
   const { data } = useResource(id, (signal) =>
     get('/v1/jobs/{job_id}', { path: { job_id: id }, signal }),

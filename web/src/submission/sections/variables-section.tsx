@@ -1,4 +1,4 @@
-/** The controller, and what becomes of each of its variables and of the gait's. */
+/** Controller, and treatment of its variables and of the gait's. */
 
 import { useState } from 'preact/hooks'
 import type { Variable } from '../../api/types'
@@ -56,12 +56,12 @@ export function VariablesSection({ draft, catalogue, errors, onChange }: Section
             {table('Controller', controller.variables, ['searched', 'fixed'])}
             {controller.conventions.length > 0 && (
               <details open={anySet(controller.conventions, draft.variables)}>
-                <summary>Conventions: what the thesis leaves open, searched or fixed</summary>
+                <summary>Conventions: choices that the thesis leaves open</summary>
                 {table('Convention', controller.conventions, ['default', 'searched', 'fixed'])}
               </details>
             )}
             <details open={anySet([...gait, ...groups], draft.variables)}>
-              <summary>Gait: searched or fixed in place of the scenarios’ own values</summary>
+              <summary>Gait: overrides of the scenarios’ gait parameters</summary>
               {table('Gait', [...gait, ...groups], ['default', 'searched', 'fixed'])}
               <AddGroup
                 variables={gait.filter((variable) => variable.by_leg_group)}
@@ -82,7 +82,7 @@ export function VariablesSection({ draft, catalogue, errors, onChange }: Section
   )
 }
 
-/** A gait parameter for some of the legs: `stride[front]`. */
+/** Adds a gait variable for a group of legs: `stride[front]`. */
 function AddGroup({
   variables,
   onAdd,
@@ -106,11 +106,11 @@ function AddGroup({
         </select>
       </label>
       <label class="row">
-        <span class="label">of the legs</span>
+        <span class="label">for legs</span>
         <input
           class="short"
           value={group}
-          title="front, middle, hind, left, right, a leg’s name, or a group of the robot’s own"
+          title="front, middle, hind, left, right, a leg’s name, or a group defined by the robot"
           onInput={(event) => setGroup(event.currentTarget.value)}
         />
       </label>
@@ -128,14 +128,14 @@ function anySet(
   return variables.some(({ name }) => drafts[name]?.mode !== 'default')
 }
 
-/** The default of a convention is a value; that of the gait depends on the scenario. */
+/** The default of a convention is a value; that of a gait variable depends on the scenario. */
 function modeInWords(mode: VariableMode, { default: value, choices }: Variable): string {
   if (mode !== 'default') return mode
   if (value === undefined || value === null) return 'as in scenario'
   return `default: ${inWords(choices?.[value] ?? String(value))}`
 }
 
-/** words: of a treatment, where it is not called by its own name. */
+/** words: labels of the treatments. */
 export function VariableTable({
   title,
   variables,
@@ -263,13 +263,13 @@ function VariableRow({
       <td>{draft.mode === 'searched' && !categorical && input('high', 'Upper bound')}</td>
       <td class="unit">
         {variable.unit === '1' ? '–' : variable.unit}
-        {variable.kind === 'integer' && ' (whole)'}
+        {variable.kind === 'integer' && ' (integer)'}
       </td>
     </tr>
   )
 }
 
-/** Which of a categorical variable's choices are searched. */
+/** Searched choices of a categorical variable. */
 function Choices({
   variable: { name, choices = [] },
   chosen,
@@ -281,7 +281,7 @@ function Choices({
 }) {
   const toggle = (choice: string) =>
     onChange({
-      // In the variable's order, however they were ticked.
+      // In the variable's order.
       choices: choices.filter((c) => chosen.includes(c) !== (c === choice)),
     })
   return (

@@ -1,10 +1,10 @@
-/** Robust jobs: worlds that differ from the model, and what the walks in them come to. */
+/** Worlds of a robust job, and the aggregation over them. */
 
 import { Segmented } from '../../components/fields/segmented'
 import { formatCount } from '../../format/number'
 import { capitalized, inWords, sentence } from '../../format/words'
 import { errorsUnder } from '../draft/build-spec'
-import { counts, type WorldsDraft, walksEach, worldsFields } from '../draft/worlds'
+import { hasEffect, type WorldsDraft, walksEach, worldsFields } from '../draft/worlds'
 import { ChoiceField, NumberField, Problems } from '../fields/number-field'
 import { describe, type SchemaField } from '../fields/schema-fields'
 import type { SectionProps } from './section'
@@ -13,7 +13,7 @@ export function WorldsSection({ draft, catalogue, errors, onChange }: SectionPro
   const { worlds } = draft
   const change = (changes: Partial<WorldsDraft>) => onChange({ worlds: { ...worlds, ...changes } })
   const fields = worldsFields(catalogue.fields.worlds)
-  const shown = fields.filter((field) => counts(field, worlds))
+  const shown = fields.filter((field) => hasEffect(field, worlds))
   const others = errorsUnder(errors, 'worlds').filter(
     (message) => !worlds.robust || !shown.some(({ name }) => message.startsWith(`${name}: `)),
   )
@@ -23,17 +23,17 @@ export function WorldsSection({ draft, catalogue, errors, onChange }: SectionPro
       <div class="stack">
         <Segmented
           roomy
-          label="Judged in"
+          label="Evaluated in"
           value={worlds.robust ? 'many' : 'one'}
           options={[
-            ['one', 'the model alone'],
+            ['one', 'nominal model'],
             ['many', 'many worlds'],
           ]}
           onChoose={(kind) => change({ robust: kind === 'many' })}
         />
         <p class="muted small">
-          A robust job lets every design walk in worlds that differ from the model in friction,
-          masses, battery, gears, sensors and ground, and judges it by all of them.
+          A robust job simulates every design in worlds with perturbed friction, masses, battery,
+          gears, sensors and ground, and aggregates the results.
         </p>
         {worlds.robust && (
           <div class="fields">
@@ -51,30 +51,31 @@ export function WorldsSection({ draft, catalogue, errors, onChange }: SectionPro
         {worlds.robust && worlds.ranges && (
           <p class="row">
             <span>
-              {formatCount(worlds.ranges.length)} perturbations are drawn, within the ranges of the
-              cloned job.
+              {formatCount(worlds.ranges.length)} perturbations with the ranges of the cloned job.
             </span>
             <button type="button" class="compact" onClick={() => change({ ranges: null })}>
-              Draw all, within the usual ones
+              Use all perturbations with default ranges
             </button>
           </p>
         )}
-        {worlds.robust && <Cost scenarios={draft.presets.length + draft.own.length} {...worlds} />}
+        {worlds.robust && (
+          <Cost scenarios={draft.presets.length + draft.custom.length} {...worlds} />
+        )}
         <Problems messages={others} />
       </div>
     </section>
   )
 }
 
-/** What robustness costs; the estimate has it in full. */
+/** Number of simulations per design. */
 function Cost({ scenarios, ...worlds }: WorldsDraft & { scenarios: number }) {
   const each = walksEach(worlds)
   if (!(each > 0)) return null
   return (
     <p class="small" data-walks-each={each * scenarios}>
-      Every design walks {formatCount(each * scenarios)} times: in {formatCount(scenarios)} scenario
-      {scenarios === 1 ? '' : 's'}, each in {formatCount(each)} world
-      {each === 1 ? '' : 's'}.
+      Every design is simulated {formatCount(each * scenarios)} times: in {formatCount(scenarios)}{' '}
+      scenario{scenarios === 1 ? '' : 's'}, each in {formatCount(each)} world{each === 1 ? '' : 's'}
+      .
     </p>
   )
 }

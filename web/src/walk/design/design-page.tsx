@@ -1,4 +1,4 @@
-/** What the pages of walks and of controllers share: a design that the address names. */
+/** Common parts of the walk and controller pages, whose address identifies a design. */
 
 import type { ComponentChildren } from 'preact'
 import { ErrorNotice } from '../../components/feedback'
@@ -9,7 +9,7 @@ import { jobPath, withQuery } from '../../router/routes'
 import { type DesignSource, queryOf } from './design-source'
 import type { ResolvedDesign } from './resolve-design'
 
-/** A page about what its address names, or about what is wrong with the address. */
+/** Parse the address and show the page, or an error for an invalid address. */
 export function DesignPage<A>({
   title,
   what,
@@ -18,21 +18,21 @@ export function DesignPage<A>({
   children,
 }: {
   title: string
-  /** As in "this address names no walk". */
+  /** Noun for the error message: "Invalid address of a walk." */
   what: string
-  /** Of the page, which without a query shows the published optimum. */
+  /** Path of the page; without a query it shows the published optimum. */
   path: string
   /** Throws AddressError. */
   read: (query: URLSearchParams) => A
   children: (address: A, query: URLSearchParams) => ComponentChildren
 }) {
   const { query } = usePlace()
-  const [address, wrong] = attempt(() => read(query))
+  const [address, error] = attempt(() => read(query))
   if (address !== null) return <>{children(address, query)}</>
   return (
     <>
       <h1>{title}</h1>
-      <ErrorNotice what={`This address names no ${what}.`} error={wrong} />
+      <ErrorNotice what={`Invalid address of a ${what}.`} error={error} />
       <p class="row">
         <a class="button" href={path}>
           Show the published optimum A
@@ -42,22 +42,22 @@ export function DesignPage<A>({
   )
 }
 
-/** Where the page of a design lies, below the job that the design is of, and its heading. */
+/** Heading and breadcrumbs, below the job of the design. */
 export function DesignHeading({
   title,
   path,
   design,
-  beside = [],
+  details = [],
 }: {
   title: string
   path: string
-  /** Null before it is known. */
+  /** Null while loading. */
   design: ResolvedDesign | null
-  /** What is shown of it, for the tab. */
-  beside?: readonly string[]
+  /** Further parts of the document title. */
+  details?: readonly string[]
 }) {
   const progress = useProgress(design?.job)
-  const shown = design ? [[design.label, ...beside].join(', ')] : []
+  const shown = design ? [[design.label, ...details].join(', ')] : []
   return (
     <>
       <Breadcrumbs
@@ -83,14 +83,14 @@ function placeOf(title: string, path: string, design: ResolvedDesign | null) {
   return { crumbs, here: `${title} of design ${particle}` }
 }
 
-/** The ways to the same design's other page, and to its job. */
+/** Links to the design's other page and to its job. */
 export function DesignLinks({
   source,
   path,
   label,
 }: {
   source: DesignSource
-  /** The other page, and what its link says; null if the design has none. */
+  /** Path of the other page; null if it does not apply. */
   path: string | null
   label: string
 }) {
@@ -105,7 +105,7 @@ export function DesignLinks({
       )}
       {'job' in source && (
         <a class="button" href={jobPath(source.job)}>
-          Its job
+          Show job
         </a>
       )}
     </div>

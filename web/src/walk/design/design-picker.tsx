@@ -1,7 +1,7 @@
-/** Choosing a design: published ones, and the best ones of jobs. */
+/** Choice of a design: published ones, and the best ones of jobs. */
 
 import { get } from '../../api/client'
-import { foundJobs } from '../../api/found-jobs'
+import { jobSearch } from '../../api/job-search'
 import { useResource } from '../../api/resource'
 import { type ChoiceGroup, Combobox } from '../../components/fields/combobox'
 import { type DesignSource, sourceOfWord, wordOf } from './design-source'
@@ -16,11 +16,11 @@ export function DesignPicker({
 }: {
   label: string
   chosen: DesignSource | null
-  /** How to call what is chosen. */
+  /** Label of the chosen design. */
   chosenLabel: string
-  /** What the choice of no design is called; without it there must be one. */
+  /** Label of choosing no design; required choice if missing. */
   none?: string
-  /** Why published designs are not offered; without it they are. */
+  /** Why published designs are not offered; they are if missing. */
   note?: string
   onChoose: (source: DesignSource | null) => void
 }) {
@@ -35,17 +35,17 @@ export function DesignPicker({
   if (none !== undefined) groups.push({ label: '', choices: [{ value: '', label: none }] })
   if (note === undefined) groups.push({ label: 'Published designs', choices: published })
   const word = chosen ? wordOf(chosen) : ''
-  const known = published.find(({ value }) => value === word)?.label
+  const publishedLabel = published.find(({ value }) => value === word)?.label
   return (
     <Combobox
       label={label}
-      shown={chosen ? (known ?? chosenLabel) : (none ?? '')}
+      chosenLabel={chosen ? (publishedLabel ?? chosenLabel) : (none ?? '')}
       hint={note}
       groups={groups}
-      found={{ label: 'Best of a job', search: bestOfJobs }}
+      remote={{ label: 'Best of a job', search: bestOfJobs }}
       onChoose={(value) => onChoose(sourceOfWord(value))}
     />
   )
 }
 
-const bestOfJobs = foundJobs('tuning', { value: (job) => wordOf({ kind: 'best', job }) })
+const bestOfJobs = jobSearch('tuning', { value: (job) => wordOf({ kind: 'best', job }) })

@@ -1,8 +1,8 @@
-/** Where a design to look at comes from, as addresses of this page say it. Pure. */
+/** Source of a design, as stored in addresses. */
 
 import type { Design } from '../../format/value'
 
-/** A design of a job (its best one if none is named), a published design, or values as such. */
+/** A design of a job (its best by default), a published design, or given values. */
 export type DesignSource =
   | { readonly kind: 'best'; readonly job: string }
   | {
@@ -18,19 +18,19 @@ export type DesignSource =
       readonly design: Design
     }
 
-/** What is shown where an address names nothing: the thesis's optimum A. */
+/** Default: the thesis's optimum A. */
 export const DEFAULT_SOURCE: DesignSource = {
   kind: 'published',
   controller: 'fuzzy-pi',
   study: 'A',
 }
 
-/** An address that does not make sense; the message says what it should be. */
+/** An invalid address; the message describes the expected form. */
 export class AddressError extends Error {
   override readonly name = 'AddressError'
 }
 
-/** The design of an address's query. Throws AddressError. */
+/** Parse the source from a query. Throws AddressError. */
 export function sourceOf(query: URLSearchParams): DesignSource {
   const job = query.get('job')
   const controller = query.get('controller')
@@ -43,7 +43,7 @@ export function sourceOf(query: URLSearchParams): DesignSource {
   return controller ? { kind: 'published', controller, study: '' } : DEFAULT_SOURCE
 }
 
-/** The query that names a source; null takes a name out. */
+/** Query of a source; null removes a parameter. */
 export function queryOf(source: DesignSource): Record<string, string | null> {
   const none = {
     job: null,
@@ -70,7 +70,7 @@ export function queryOf(source: DesignSource): Record<string, string | null> {
   }
 }
 
-/** One word for a source: `published:A`, `published:p/2011`, `job:ID`, `job:ID/24/7`. */
+/** One-word form: `published:A`, `published:p/2011`, `job:ID`, `job:ID/24/7`. */
 export function wordOf(source: DesignSource): string {
   switch (source.kind) {
     case 'best':
@@ -84,7 +84,7 @@ export function wordOf(source: DesignSource): string {
   }
 }
 
-/** The source that a word names; null for no word. Throws AddressError. */
+/** Inverse of `wordOf`; null for no word. Throws AddressError. */
 export function sourceOfWord(word: string | null): DesignSource | null {
   if (!word) return null
   const at = word.indexOf(':')
@@ -102,14 +102,14 @@ export function sourceOfWord(word: string | null): DesignSource | null {
     const cut = rest.indexOf('/')
     return { kind: 'values', controller: rest.slice(0, cut), design: parsed(rest.slice(cut + 1)) }
   }
-  throw new AddressError(`${word} names no design; write published:A or job:ID`)
+  throw new AddressError(`${word} is not a design; write published:A or job:ID`)
 }
 
 function jobSource(job: string, iteration: string | null, particle: string | null): DesignSource {
   if (!iteration && !particle) return { kind: 'best', job }
   const numbers = [iteration, particle].map((text) => Number(text || Number.NaN))
   if (numbers.some((n) => !Number.isInteger(n) || n < 0)) {
-    throw new AddressError('a design is named by iteration and particle, both from 0')
+    throw new AddressError('a design is given by iteration and particle, both from 0')
   }
   return { kind: 'particle', job, iteration: numbers[0], particle: numbers[1] }
 }

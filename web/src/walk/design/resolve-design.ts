@@ -1,4 +1,4 @@
-/** Designs of jobs and of the literature, asked from the API. */
+/** Loads designs of jobs and published designs. */
 
 import { get } from '../../api/client'
 import { ApiProblem } from '../../api/problem'
@@ -8,7 +8,7 @@ import { placeWord } from '../../format/place'
 import type { Design } from '../../format/value'
 import type { DesignSource } from './design-source'
 
-/** A design with all that a walk of it needs. */
+/** A design with everything needed to simulate it. */
 export interface ResolvedDesign {
   readonly source: DesignSource
   /** For headings and legends. */
@@ -16,15 +16,15 @@ export interface ResolvedDesign {
   readonly robot: JobSpec['robot']
   readonly controller: Controller
   readonly design: Design
-  /** What is different from the model where it walks: values of perturbations. */
+  /** Perturbations of the model, by name. */
   readonly world?: Readonly<Record<string, number>>
-  /** The job that it is of. */
+  /** Job of the design. */
   readonly job?: Job
-  /** Scenarios in which its job judges it; none outside a job. */
+  /** Scenarios of its job; empty without a job. */
   readonly scenarios: readonly Scenario[]
 }
 
-/** The design of a source. like: a controller whose published designs are meant if none is named. */
+/** Load the design of a source. like: controller to prefer if the source names none. */
 export async function resolveDesign(
   source: DesignSource,
   signal: AbortSignal,
@@ -38,7 +38,7 @@ export async function resolveDesign(
   const controller = named(controllers, source.controller)
   return {
     source,
-    label: 'Design of your own',
+    label: 'Custom design',
     robot: 'szabadka2-reconstructed',
     controller,
     design: source.design,
@@ -56,8 +56,8 @@ async function ofJob(
   if (spec.kind !== 'tuning' && spec.kind !== 'certificate') {
     throw new ApiProblem(
       422,
-      'this job fits parameters of the simulation, so its designs drive no controller; its own' +
-        ' page shows them',
+      'this job fits parameters of the simulation; its designs are not controllers. See the' +
+        ' job’s page instead',
     )
   }
   const evaluation = await evaluationOf(source, job, signal)
@@ -66,7 +66,7 @@ async function ofJob(
     source,
     job,
     label: source.kind === 'best' ? `Best of ${name}` : `${name}, design ${placeWord(evaluation)}`,
-    // The evaluations of a certificate are worlds, in which its one design walks.
+    // Evaluations of a certificate are worlds, all with the same design.
     ...(spec.kind === 'certificate'
       ? { design: spec.design, world: worldOf(evaluation) }
       : { design: evaluation.design }),
@@ -76,14 +76,14 @@ async function ofJob(
   }
 }
 
-/** Values of a certificate's perturbations, where our own engine has walked. */
+/** Perturbations of a certificate's world; throws for worlds simulated by another engine. */
 function worldOf(evaluation: Evaluation): Readonly<Record<string, number>> {
   const { engine = 'gaitswarm', ...world } = evaluation.design
   if (engine === 'gaitswarm') return world as Readonly<Record<string, number>>
   throw new ApiProblem(
     422,
-    `this walk was computed by ${engine}, which keeps no record of it; the design before it, the` +
-      ' first of the job, is the same walk by gaitswarm',
+    `this walk was simulated by ${engine}, which does not record it; the first design of the job is` +
+      ' the same walk in gaitswarm',
   )
 }
 
@@ -94,21 +94,18 @@ async function evaluationOf(
 ): Promise<Evaluation> {
   if (source.kind === 'best') {
     if (job.best) return job.best
-    throw new ApiProblem(
-      404,
-      'this job has no design yet that walks in every scenario; wait for it',
-    )
+    throw new ApiProblem(404, 'no design of this job has succeeded in every scenario yet')
   }
   const path = { job_id: source.job, iteration: source.iteration }
   const { items: evaluations } = await get('/v1/jobs/{job_id}/iterations/{iteration}/evaluations', {
     path,
     signal,
   })
-  const found = evaluations.find((evaluation) => evaluation.particle === source.particle)
-  if (found) return found
+  const match = evaluations.find((evaluation) => evaluation.particle === source.particle)
+  if (match) return match
   throw new ApiProblem(
     404,
-    `iteration ${source.iteration} has no design ${source.particle}, but 0 to ${evaluations.length - 1}`,
+    `iteration ${source.iteration} has no design ${source.particle}; valid are 0 to ${evaluations.length - 1}`,
   )
 }
 
@@ -117,9 +114,9 @@ function published(
   controllers: readonly Controller[],
   like?: string,
 ): ResolvedDesign {
-  const wanted = source.controller ?? like
+  const preferred = source.controller ?? like
   const ordered = [...controllers].sort(
-    (a, b) => Number(b.name === wanted) - Number(a.name === wanted),
+    (a, b) => Number(b.name === preferred) - Number(a.name === preferred),
   )
   const searched = source.controller ? [named(controllers, source.controller)] : ordered
   for (const controller of searched) {
@@ -136,19 +133,19 @@ function published(
       scenarios: [],
     }
   }
-  const known = controllers.flatMap((c) =>
+  const available = controllers.flatMap((c) =>
     Object.keys(c.published).map((study) => `${study} of ${c.name}`),
   )
   const of = source.controller ? ` of ${source.controller}` : ''
   throw new ApiProblem(
     404,
-    `there is no published design ${source.study}${of}; known are ${known.join(', ')}`,
+    `there is no published design ${source.study}${of}; available: ${available.join(', ')}`,
   )
 }
 
 function named(controllers: readonly Controller[], name: string): Controller {
-  const found = controllers.find((controller) => controller.name === name)
-  if (found) return found
-  const known = controllers.map((controller) => controller.name).join(', ')
-  throw new ApiProblem(404, `no controller ${name}; known are ${known}`)
+  const match = controllers.find((controller) => controller.name === name)
+  if (match) return match
+  const available = controllers.map((controller) => controller.name).join(', ')
+  throw new ApiProblem(404, `no controller ${name}; available: ${available}`)
 }

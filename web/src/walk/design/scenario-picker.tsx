@@ -1,32 +1,32 @@
-/** Choosing the scenario of a walk: those of its job, and the presets. */
+/** Choice of a scenario: the job's, and the presets. */
 
 import { useId } from 'preact/hooks'
 import type { Scenario, ScenarioPreset } from '../../api/types'
 import { formatExact } from '../../format/number'
 
 export function ScenarioPicker({
-  own,
+  jobScenarios,
   presets,
   chosen,
   onChoose,
 }: {
-  /** Scenarios of the job that the design is of. */
-  own: readonly Scenario[]
+  /** Scenarios of the design's job. */
+  jobScenarios: readonly Scenario[]
   presets: readonly ScenarioPreset[]
-  /** Name of one. */
+  /** Name of the chosen scenario. */
   chosen: string
   onChoose: (name: string) => void
 }) {
   const id = useId()
-  const names = new Set(own.map(({ name }) => name))
+  const names = new Set(jobScenarios.map(({ name }) => name))
   const others = presets.filter(({ name }) => !names.has(name))
   return (
     <div class="field">
       <label for={id}>Scenario</label>
       <select id={id} value={chosen} onChange={(event) => onChoose(event.currentTarget.value)}>
-        {own.length > 0 && (
-          <optgroup label="Of the job">
-            {own.map((scenario) => (
+        {jobScenarios.length > 0 && (
+          <optgroup label="Job">
+            {jobScenarios.map((scenario) => (
               <option key={scenario.name} value={scenario.name}>
                 {described(scenario)}
               </option>
@@ -34,7 +34,7 @@ export function ScenarioPicker({
           </optgroup>
         )}
         {others.length > 0 && (
-          <optgroup label={own.length > 0 ? 'Other presets' : 'Presets'}>
+          <optgroup label={jobScenarios.length > 0 ? 'Other presets' : 'Presets'}>
             {others.map((scenario) => (
               <option key={scenario.name} value={scenario.name}>
                 {described(scenario)}
@@ -47,7 +47,7 @@ export function ScenarioPicker({
   )
 }
 
-/** A scenario's name with what sets it apart. */
+/** Name of a scenario with its distinguishing parameters. */
 function described(scenario: Scenario | ScenarioPreset): string {
   const { name, cycle_time, load, slope, turn, direction, drop, stuck_leg, shove } = scenario
   const parts = [`cycle ${formatExact(cycle_time)} s`]

@@ -1,4 +1,4 @@
-/** Asks how a replay is to be recorded, and tells how far it is. */
+/** Dialog to record a replay as a video. */
 
 import { useEffect, useId, useRef, useState } from 'preact/hooks'
 import { messageOf } from '../../api/problem'
@@ -25,32 +25,32 @@ export function FilmDialog({
   onClose,
 }: {
   playback: Playback
-  /** Throws what goes wrong, or the signal's reason. */
+  /** Rejects with the error, or with the signal's reason. */
   onRecord: (size: FilmSize, type: string, signal: AbortSignal) => Promise<Blob>
   onClose: () => void
 }) {
   const dialog = useRef<HTMLDialogElement>(null)
   const [chosen, setChosen] = useState(1)
   const [recording, setRecording] = useState<AbortController | null>(null)
-  const [wrong, setWrong] = useState<string | null>(null)
+  const [failure, setFailure] = useState<string | null>(null)
   const { speed } = usePlaybackState(playback)
   const type = filmType()
   const id = useId()
   useEffect(() => dialog.current!.showModal(), [])
   useEffect(() => () => recording?.abort(), [recording])
   const record = async () => {
-    const begun = new AbortController()
-    setRecording(begun)
-    setWrong(null)
+    const abort = new AbortController()
+    setRecording(abort)
+    setFailure(null)
     try {
-      const video = await onRecord(SIZES[chosen], type!, begun.signal)
+      const video = await onRecord(SIZES[chosen], type!, abort.signal)
       saveFile(
         video,
         `${fileStem('walk', new URLSearchParams(location.search).get('scenario') ?? '')}.webm`,
       )
       dialog.current?.close()
     } catch (error) {
-      if (!begun.signal.aborted) setWrong(messageOf(error))
+      if (!abort.signal.aborted) setFailure(messageOf(error))
     }
     setRecording(null)
   }
@@ -61,16 +61,15 @@ export function FilmDialog({
       <div class="stack-tight">
         {type === null ? (
           <p class="notice" data-tone="warn" role="alert">
-            This browser cannot record a picture that moves as WebM. Firefox, Chromium and their kin
-            can.
+            This browser cannot record WebM video. Use a current Firefox or Chromium-based browser.
           </p>
         ) : recording ? (
           <Recorded playback={playback} />
         ) : (
           <>
             <p>
-              The walk is played once over, as it is seen now, and recorded meanwhile. It takes{' '}
-              {seconds.toFixed(1)}&nbsp;s, as long as the video will last.
+              The replay is recorded in real time, as currently displayed. Recording takes{' '}
+              {seconds.toFixed(1)}&nbsp;s, the length of the video.
             </p>
             <div class="row">
               <SpeedField playback={playback} speed={speed} />
@@ -91,9 +90,9 @@ export function FilmDialog({
             </div>
           </>
         )}
-        {wrong !== null && (
+        {failure !== null && (
           <p class="notice" data-tone="bad" role="alert">
-            It was not recorded: {wrong}
+            Recording failed: {failure}
           </p>
         )}
       </div>
@@ -119,8 +118,8 @@ function Recorded({ playback }: { playback: Playback }) {
   return (
     <>
       <p>
-        {time.toFixed(1)} of {playback.duration.toFixed(1)}&nbsp;s of the walk are recorded. Leave
-        this tab in view: hidden, it waits.
+        {time.toFixed(1)} of {playback.duration.toFixed(1)}&nbsp;s recorded. Keep this tab visible;
+        recording pauses while it is hidden.
       </p>
       <Progress done={time} planned={playback.duration} label="Recorded [s]" />
     </>

@@ -1,23 +1,23 @@
-/** A replay as a film: played once over while the browser records what the canvas shows. */
+/** Recording of a replay as a video. */
 
 import type { Playback } from '../player/playback'
 
-/** Pictures a second, at most. */
+/** Largest frame rate [1/s]. */
 const PICTURES = 30
 
-/** Enough for thin lines to stay thin. */
+/** Enough for thin lines to remain sharp. */
 const BITS_PER_PIXEL = 0.15
 
-/** How often the first picture is drawn before the walk begins. */
+/** How often the first frame is drawn before playback. */
 const FIRST = 4
 
-/** How long the last picture stays [ms]; the recorder must see it once. */
+/** Duration of the last frame [ms], so that the recorder captures it. */
 const LAST = 100
 
-/** Best first. */
+/** In order of preference. */
 const TYPES = ['video/webm;codecs=vp9', 'video/webm;codecs=vp8', 'video/webm']
 
-/** In which of the types this browser records canvases as WebM; null if in none. */
+/** First supported WebM type; null if there is none. */
 export function filmType(): string | null {
   if (typeof MediaRecorder === 'undefined') return null
   if (!('captureStream' in HTMLCanvasElement.prototype)) return null
@@ -25,12 +25,10 @@ export function filmType(): string | null {
 }
 
 /**
- * Play from the beginning to the end, at the clock's speed, and record what is drawn meanwhile.
+ * Play from beginning to end in real time, and record the canvas. Slow drawing lowers the frame rate,
+ * not the speed. In a hidden tab, playback and recording pause.
  *
- * Real time counts: where pictures are drawn slowly there are fewer of them, and the walk is as fast as it
- * is to be. A hidden tab draws none; clock and recorder stand until it is seen again.
- *
- * Throws the signal's reason, or what the browser says.
+ * Rejects with the signal's reason or the browser's error.
  */
 export async function film(
   canvas: HTMLCanvasElement,
@@ -45,12 +43,12 @@ export async function film(
     videoBitsPerSecond: BITS_PER_PIXEL * PICTURES * canvas.width * canvas.height,
   })
   const parts: Blob[] = []
-  const over = new AbortController()
+  const finished = new AbortController()
   recorder.ondataavailable = ({ data }) => parts.push(data)
   const recorded = new Promise<void>((resolve, reject) => {
     recorder.onstop = () => resolve()
-    recorder.onerror = () => reject(new Error('The browser gave up recording.'))
-    signal.addEventListener('abort', () => reject(signal.reason), { signal: over.signal })
+    recorder.onerror = () => reject(new Error('The browser aborted the recording.'))
+    signal.addEventListener('abort', () => reject(signal.reason), { signal: finished.signal })
   })
   const follow = () => {
     if (document.hidden) {
@@ -61,15 +59,15 @@ export async function film(
       playback.play()
     }
   }
-  const leave = playback.subscribe(() => {
+  const unsubscribe = playback.subscribe(() => {
     if (playback.time < playback.duration || playback.playing) return
     document.removeEventListener('visibilitychange', follow)
     setTimeout(() => recorder.state !== 'inactive' && recorder.stop(), LAST)
   })
-  document.addEventListener('visibilitychange', follow, { signal: over.signal })
+  document.addEventListener('visibilitychange', follow, { signal: finished.signal })
   try {
     recorder.start()
-    // The film begins with the first picture that the recorder gets, which must be of the beginning.
+    // The first frame that the recorder receives must be the beginning.
     for (let k = 0; k < FIRST; k++) {
       playback.seek(0)
       await Promise.race([new Promise(requestAnimationFrame), recorded])
@@ -78,8 +76,8 @@ export async function film(
     await recorded
     return new Blob(parts, { type: 'video/webm' })
   } finally {
-    over.abort()
-    leave()
+    finished.abort()
+    unsubscribe()
     if (recorder.state !== 'inactive') recorder.stop()
     for (const track of stream.getTracks()) track.stop()
   }

@@ -1,11 +1,11 @@
-/** The clock of a replay: which moment is shown, and whether it moves. Knows no browser. */
+/** Clock of a replay, independent of the browser. */
 
-/** Slowest and fastest replay, as a share of real time. */
+/** Playback speeds, as multiples of real time. */
 export const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4] as const
 
 type Listener = () => void
 
-/** Share of a frame by which moments, which come as float32, may be early. */
+/** Tolerance for float32 times, as a share of a frame. */
 const ROUNDING = 1e-3
 
 export class Playback {
@@ -17,16 +17,16 @@ export class Playback {
   constructor(
     /** End of the longest walk [s]. */
     readonly duration: number,
-    /** Recorded frames a second [Hz]. */
+    /** Recorded frames per second [Hz]. */
     readonly frameRate: number,
   ) {}
 
-  /** Moment that is shown [s]. */
+  /** Current time [s]. */
   get time(): number {
     return this.at
   }
 
-  /** Recorded frame that is shown, from 0. */
+  /** Current frame, from 0. */
   get frame(): number {
     return Math.floor(this.at * this.frameRate + ROUNDING)
   }
@@ -43,7 +43,7 @@ export class Playback {
     return this.rate
   }
 
-  /** Start, from the beginning if the end was reached. */
+  /** Start, from the beginning if at the end. */
   play(): void {
     if (this.duration <= 0) return
     if (this.at >= this.duration) this.at = 0
@@ -67,7 +67,7 @@ export class Playback {
     this.changed()
   }
 
-  /** Let real time pass [s]; stops at the end. */
+  /** Advance by real time [s]; stops at the end. */
   advance(seconds: number): void {
     if (!this.moving) return
     this.at = Math.min(this.duration, this.at + seconds * this.rate)
@@ -75,13 +75,13 @@ export class Playback {
     this.changed()
   }
 
-  /** Show a moment [s], the nearest within the walk. */
+  /** Seek to a time [s], clamped to the walk. */
   seek(time: number): void {
     this.at = Math.min(this.duration, Math.max(0, time))
     this.changed()
   }
 
-  /** Stop, and show the frame that lies so many frames further. */
+  /** Stop, and move by a number of frames. */
   step(frames: number): void {
     this.moving = false
     const frame = Math.min(this.lastFrame, Math.max(0, this.frame + frames))
@@ -89,7 +89,7 @@ export class Playback {
     this.changed()
   }
 
-  /** Called after every change; returns what ends it. */
+  /** Subscribe to changes; returns the unsubscribe function. */
   subscribe(listener: Listener): () => void {
     this.listeners.add(listener)
     return () => {

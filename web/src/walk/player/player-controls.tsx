@@ -1,4 +1,4 @@
-/** Play, scrub, speed and view of a replay. */
+/** Playback and view controls of a replay. */
 
 import { useId } from 'preact/hooks'
 import { Segmented } from '../../components/fields/segmented'
@@ -28,14 +28,14 @@ export function PlayerControls({
   onPicture,
 }: {
   playback: Playback
-  /** Whether there are two walks. */
+  /** Whether two walks are compared. */
   comparing: boolean
-  /** Whether there are meshes to be seen. */
+  /** Whether meshes are available. */
   meshed: boolean
   choices: ViewChoices
   onChoose: (choices: ViewChoices) => void
   onLook: (view: ViewName) => void
-  /** Null where there is no picture. */
+  /** Null without a scene. */
   onFilm: (() => void) | null
   onPicture: (() => void) | null
 }) {
@@ -49,17 +49,17 @@ export function PlayerControls({
           value={choices.follow ? 'follow' : 'orbit'}
           options={[
             ['follow', 'Follow'],
-            ['orbit', 'Stand still'],
+            ['orbit', 'Fixed'],
           ]}
           onChoose={(value) => set({ follow: value === 'follow' })}
         />
         {comparing && (
           <Segmented
-            label="Two walks"
+            label="Arrangement"
             value={choices.arrangement}
             options={[
               ['ghost', 'Ghost'],
-              ['beside', 'Side by side'],
+              ['side-by-side', 'Side by side'],
             ]}
             onChoose={(arrangement) => set({ arrangement })}
           />
@@ -112,10 +112,10 @@ function Transport({ playback }: { playback: Playback }) {
       >
         {playing ? 'Pause' : 'Play'}
       </button>
-      <button type="button" onClick={() => playback.step(-1)} aria-label="One frame back">
+      <button type="button" onClick={() => playback.step(-1)} aria-label="Previous frame">
         ‹
       </button>
-      <button type="button" onClick={() => playback.step(1)} aria-label="One frame ahead">
+      <button type="button" onClick={() => playback.step(1)} aria-label="Next frame">
         ›
       </button>
       <input
@@ -124,7 +124,7 @@ function Transport({ playback }: { playback: Playback }) {
         max={playback.lastFrame}
         step={1}
         value={frame}
-        aria-label="Moment of the walk"
+        aria-label="Time in the walk"
         aria-valuetext={`${seconds(time)} s, frame ${frame} of ${playback.lastFrame}`}
         onInput={(event) => {
           playback.seek(Number(event.currentTarget.value) / playback.frameRate)
@@ -138,7 +138,7 @@ function Transport({ playback }: { playback: Playback }) {
   )
 }
 
-/** How fast it plays, as a share of real time. */
+/** Playback speed, as a multiple of real time. */
 export function SpeedField({ playback, speed }: { playback: Playback; speed: number }) {
   const id = useId()
   return (

@@ -1,8 +1,8 @@
-/** What keys do to a replay. Pure but for the clock and the view that they act on. */
+/** Keyboard control of a replay. */
 
 import type { Playback } from './playback'
 
-/** The camera, as keys move it. */
+/** Camera movements. */
 export interface View {
   turn(around: number, up: number): void
   zoom(factor: number): void
@@ -10,11 +10,12 @@ export interface View {
 
 const TURN = Math.PI / 24
 
-/** Elements that have a use of their own for a key. */
-const OWN_SPACE = 'button, a, input, select, textarea, summary'
-const OWN_ARROWS = 'input, select, textarea, [role="tab"], [role="application"][data-own-keys]'
+/** Elements that handle the keys themselves. */
+const SPACE_TARGETS = 'button, a, input, select, textarea, summary'
+const ARROW_TARGETS =
+  'input, select, textarea, [role="tab"], [role="application"][data-handles-keys]'
 
-/** Do what a key says; returns whether it says something. */
+/** Handle a key; returns whether it was handled. */
 export function pressed(
   key: string,
   shift: boolean,
@@ -23,11 +24,11 @@ export function pressed(
   view: View | null,
 ): boolean {
   if (key === ' ') {
-    if (target.closest(OWN_SPACE)) return false
+    if (target.closest(SPACE_TARGETS)) return false
     playback.toggle()
     return true
   }
-  if (target.closest(OWN_ARROWS)) return false
+  if (target.closest(ARROW_TARGETS)) return false
   if (shift && view && turned(key, view)) return true
   switch (key) {
     case 'ArrowLeft':

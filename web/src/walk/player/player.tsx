@@ -1,4 +1,4 @@
-/** The replay: a scene in three dimensions with its controls. */
+/** Replay in three dimensions with its controls. */
 
 import { useEffect, useMemo, useRef, useState } from 'preact/hooks'
 import { messageOf } from '../../api/problem'
@@ -20,7 +20,7 @@ import { pressed } from './player-keys'
 import { LONGEST_STEP, LONGEST_STEP_OF_FILM, ReplayDriver } from './replay-driver'
 import { SceneLegend } from './scene-legend'
 
-/** Of a saved picture, for one of the page. */
+/** Pixels of a saved picture per CSS pixel. */
 const PIXELS = 2
 
 export function Player({
@@ -31,12 +31,12 @@ export function Player({
   camera,
   onCamera,
 }: {
-  /** One walk, or two to be compared. */
+  /** One walk, or two to compare. */
   walks: readonly Recorded[]
   playback: Playback
   choices: ViewChoices
   onChoose: (choices: ViewChoices) => void
-  /** Where it is at first; null for the usual place. */
+  /** Initial camera; null for the default view. */
   camera: CameraPlace | null
   onCamera: (camera: CameraPlace | null) => void
 }) {
@@ -47,13 +47,13 @@ export function Player({
   const [failure, setFailure] = useState<string | null>(null)
   const [drawn, setDrawn] = useState(false)
   const [filming, setFilming] = useState(false)
-  /** Why a picture could not be saved. */
-  const [unsaved, setUnsaved] = useState<string | null>(null)
-  /** Meshes that were loaded, and why there are none of a robot that should have some. */
+  /** Error of saving a picture. */
+  const [pictureError, setPictureError] = useState<string | null>(null)
+  /** Number of loaded meshes, and the error of loading them. */
   const [meshes, setMeshes] = useState(0)
-  const [lost, setLost] = useState<string | null>(null)
-  const [asked, setAsked] = useState(false)
-  /** Choices as they are when something is loaded later. */
+  const [meshError, setMeshError] = useState<string | null>(null)
+  const [meshesLoaded, setMeshesLoaded] = useState(false)
+  /** Current choices, for asynchronous loading. */
   const shown = useRef(choices)
   shown.current = choices
   const placed = useRef({ camera, onCamera })
@@ -74,8 +74,8 @@ export function Player({
     setFailure(null)
     setDrawn(false)
     setMeshes(0)
-    setLost(null)
-    setAsked(false)
+    setMeshError(null)
+    setMeshesLoaded(false)
     import('../scene/walk-scene').then(
       ({ WalkScene }) => {
         if (leave.signal.aborted) return
@@ -92,10 +92,10 @@ export function Player({
             .loadMeshes(() => shown.current.meshes, leave.signal)
             .then((count) => {
               setMeshes(count)
-              setAsked(true)
+              setMeshesLoaded(true)
               replayDriver.request()
             })
-            .catch((error: unknown) => !leave.signal.aborted && setLost(messageOf(error)))
+            .catch((error: unknown) => !leave.signal.aborted && setMeshError(messageOf(error)))
         } catch (error) {
           setFailure(messageOf(error))
         }
@@ -154,7 +154,7 @@ export function Player({
     }
   }
   const picture = async () => {
-    setUnsaved(null)
+    setPictureError(null)
     const shot = scene.current!
     const { clientWidth, clientHeight } = shot.canvas
     const still = shot.picture([PIXELS * clientWidth, PIXELS * clientHeight])
@@ -167,9 +167,11 @@ export function Player({
         {failure !== null && <NoScene reason={failure} />}
       </div>
       <SceneLegend walks={walks} cell={extent.cell} newtons={newtons} choices={choices} />
-      {unsaved !== null && <p class="wrong small">The picture was not saved: {unsaved}</p>}
-      {lost !== null && <p class="muted small">Meshes cannot be loaded: {lost}</p>}
-      {asked && meshes === 0 && walks.some(({ replay }) => hasMeshes(replay.header)) && (
+      {pictureError !== null && (
+        <p class="wrong small">Could not save the picture: {pictureError}</p>
+      )}
+      {meshError !== null && <p class="muted small">Could not load the meshes: {meshError}</p>}
+      {meshesLoaded && meshes === 0 && walks.some(({ replay }) => hasMeshes(replay.header)) && (
         <NoMeshes />
       )}
       <PlayerControls
@@ -180,7 +182,9 @@ export function Player({
         onChoose={onChoose}
         onLook={look}
         onFilm={drawn ? () => setFilming(true) : null}
-        onPicture={drawn ? () => picture().catch((error) => setUnsaved(messageOf(error))) : null}
+        onPicture={
+          drawn ? () => picture().catch((error) => setPictureError(messageOf(error))) : null
+        }
       />
       {filming && (
         <FilmDialog playback={playback} onRecord={record} onClose={() => setFilming(false)} />
@@ -192,8 +196,8 @@ export function Player({
 function NoMeshes() {
   return (
     <p class="muted small">
-      Simple solids: the server has none of the meshes that the robot's URDF names.{' '}
-      <code>gaitswarm serve --robots FOLDER</code> shows those in the robot's folder.
+      Simplified shapes: the server has no meshes for this robot’s URDF. Start it with{' '}
+      <code>gaitswarm serve --robots FOLDER</code> to show those in the robot’s folder.
     </p>
   )
 }
@@ -201,16 +205,16 @@ function NoMeshes() {
 function NoScene({ reason }: { reason: string }) {
   return (
     <div class="notice" data-tone="warn" role="alert">
-      <strong>The walk cannot be drawn in three dimensions here.</strong>
+      <strong>Could not draw the walk in three dimensions.</strong>
       <p>
-        {reason} Switch on hardware acceleration or WebGL in the browser's settings. The clock and
-        the plots below work without it.
+        {reason} Enable hardware acceleration or WebGL in the browser's settings. Playback and the
+        plots below work without it.
       </p>
     </div>
   )
 }
 
-/** Size of the forces that arrows must show [N]. */
+/** Largest force that arrows must represent [N]. */
 function largestForce(replay: Replay): number {
   const legs = replay.header.robot.legs.length
   const sizes = new Float32Array(legs * replay.frames)
@@ -223,15 +227,15 @@ function largestForce(replay: Replay): number {
   return typicalLargest(sizes)
 }
 
-/** Put a scene's canvas into a box and keep it as large as that. */
+/** Append a scene's canvas to a box and follow the size of the box. */
 function shownIn(box: HTMLElement, scene: WalkScene, redraw: () => void): ResizeObserver {
   const { canvas } = scene
   canvas.tabIndex = 0
   canvas.setAttribute('role', 'application')
   canvas.setAttribute(
     'aria-label',
-    'The robot in three dimensions. Space plays, arrow keys step by frame, shift with arrow keys' +
-      ' turns the view, plus and minus zoom. The same numbers are in the charts below.',
+    'The robot in three dimensions. Space plays or pauses, arrow keys step by frame, shift with arrow' +
+      ' keys rotates the view, plus and minus zoom. The charts below show the same data.',
   )
   box.append(canvas)
   const fill = () => {

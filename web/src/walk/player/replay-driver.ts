@@ -1,21 +1,18 @@
-/** Moves a scene by a clock: draws when something changed, and tells the page what is shown. */
+/** Animates a scene by a clock, and publishes the state as data attributes. */
 
 import type { Replay } from '../replay/replay'
 import type { WalkScene } from '../scene/walk-scene'
 import type { Playback } from './playback'
 
-/** Longest time that may pass between two pictures [s]; a tab in the background gets none. */
+/** Longest time step per frame [s], after a pause of a tab in the background. */
 export const LONGEST_STEP = 0.1
-/** While it is recorded, when the clock must keep real time however slowly pictures are drawn [s]. */
+/** During recording, the clock must keep real time however slow the drawing is [s]. */
 export const LONGEST_STEP_OF_FILM = 2
 
-/** Time over which pictures are counted [s]. */
+/** Averaging time of the frame rate [s]. */
 const COUNTED = 1
 
-/**
- * Pictures are asked for only while the clock runs or after a change, so a paused replay costs
- * nothing. Works without a scene too: then the clock alone runs.
- */
+/** Draws only while playing or after a change. Without a scene, just the clock runs. */
 export class ReplayDriver {
   longestStep = LONGEST_STEP
   private scene: WalkScene | null = null
@@ -23,43 +20,43 @@ export class ReplayDriver {
   private before = 0
   private pictures = 0
   private countedFrom = 0
-  private readonly leave: () => void
+  private readonly unsubscribe: () => void
 
   constructor(
     private readonly playback: Playback,
-    /** The walk whose body's place is told. */
+    /** The walk whose body position is published. */
     private readonly replay: Replay,
-    /** Where the moment is told by data- attributes. */
+    /** Element that receives the data attributes. */
     private readonly element: HTMLElement,
   ) {
-    this.leave = playback.subscribe(() => {
-      // Time that passes while it stands, such as of a hidden tab, is not made up for.
+    this.unsubscribe = playback.subscribe(() => {
+      // Time while paused, as in a hidden tab, is not made up for.
       if (!playback.playing) this.before = 0
-      this.tell()
+      this.publish()
       this.request()
     })
-    this.tell()
+    this.publish()
   }
 
-  /** Draw with this scene from now on. */
+  /** Set the scene to draw. */
   attach(scene: WalkScene | null): void {
     this.scene = scene
     this.request()
   }
 
-  /** Draw once more, soon. */
+  /** Schedule a redraw. */
   request(): void {
     this.requested ||= requestAnimationFrame((now) => this.draw(now / 1000))
   }
 
   dispose(): void {
-    this.leave()
+    this.unsubscribe()
     cancelAnimationFrame(this.requested)
     this.scene = null
   }
 
   private draw(now: number): void {
-    // Not cleared before the clock moved, so that its own notice asks for no further picture.
+    // Cleared after advancing, so that the clock's notification does not request another frame.
     if (this.playback.playing) {
       this.playback.advance(this.before === 0 ? 0 : Math.min(this.longestStep, now - this.before))
     }
@@ -72,7 +69,7 @@ export class ReplayDriver {
     if (this.playback.playing) this.request()
   }
 
-  /** Pictures a second, while it plays. */
+  /** Publish the frame rate during playback. */
   private count(now: number): void {
     if (!this.playback.playing || now - this.countedFrom > 2 * COUNTED) {
       this.pictures = 0
@@ -85,7 +82,7 @@ export class ReplayDriver {
     this.countedFrom = now
   }
 
-  private tell(): void {
+  private publish(): void {
     const { playback, replay } = this
     const { dataset } = this.element
     const frame = replay.frameAt(playback.time)
@@ -93,7 +90,7 @@ export class ReplayDriver {
     dataset.time = playback.time.toFixed(4)
     dataset.playing = String(playback.playing)
     ;['x', 'y', 'z'].forEach((axis, k) => {
-      // Adding zero makes the negative zero of rounding a plain one.
+      // Adding zero turns -0 into 0.
       dataset[axis] = String(Number(replay.value('link_pose', frame, k).toFixed(4)) + 0)
     })
   }

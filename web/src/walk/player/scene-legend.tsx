@@ -1,4 +1,4 @@
-/** What is drawn in a scene, in words: walks, forces, grid, slope, load. */
+/** Legend of a scene: walks, forces, grid, slope, load. */
 
 import { formatExact } from '../../format/number'
 import { lengthInWords } from '../replay/extent'
@@ -12,7 +12,7 @@ export function SceneLegend({
   choices,
 }: {
   walks: readonly Recorded[]
-  /** Of the grid [m]. */
+  /** Grid spacing [m]. */
   cell: number
   newtons: number
   choices: ViewChoices
@@ -34,22 +34,22 @@ export function SceneLegend({
       {choices.forces && (
         <span data-force-scale={newtons}>
           <i class="arrow" aria-hidden="true" />
-          force of the ground, {lengthInWords(cell)} for {formatExact(newtons)}&nbsp;N
+          ground reaction force, {lengthInWords(cell)} for {formatExact(newtons)}&nbsp;N
         </span>
       )}
-      <span data-grid={cell}>grid of {lengthInWords(cell)}</span>
+      <span data-grid={cell}>{lengthInWords(cell)} grid</span>
       {ground.slope_deg !== 0 && (
         <span data-slope={ground.slope_deg}>
-          slope of {formatExact(Math.abs(ground.slope_deg))}°,{' '}
+          {formatExact(Math.abs(ground.slope_deg))}° slope,{' '}
           {ground.slope_deg > 0 ? 'rising' : 'falling'} {towards(ground.slope_direction_deg)}
         </span>
       )}
-      {load_kg > 0 && <span data-load={load_kg}>load of {formatExact(load_kg)}&nbsp;kg</span>}
+      {load_kg > 0 && <span data-load={load_kg}>{formatExact(load_kg)}&nbsp;kg load</span>}
     </div>
   )
 }
 
 function towards(degrees: number): string {
-  if (degrees === 0) return 'ahead'
+  if (degrees === 0) return 'forward'
   return `${Math.abs(degrees)}° to the ${degrees > 0 ? 'left' : 'right'}`
 }

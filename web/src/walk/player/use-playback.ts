@@ -1,9 +1,9 @@
-/** A clock as component state. */
+/** Playback as component state. */
 
 import { useEffect, useState } from 'preact/hooks'
 import type { Playback } from './playback'
 
-/** Moment that is shown [s], renewed at most every `milliseconds` while it plays, else at once. */
+/** Current time [s], updated at most every `milliseconds` while playing, otherwise at once. */
 export function usePlaybackTime(playback: Playback, milliseconds: number, active = true): number {
   const [time, setTime] = useState(playback.time)
   useEffect(() => {
@@ -21,7 +21,7 @@ export function usePlaybackTime(playback: Playback, milliseconds: number, active
   return time
 }
 
-/** Whether it plays, and how fast. */
+/** Whether it plays, and at which speed. */
 export function usePlaybackState(playback: Playback): { playing: boolean; speed: number } {
   const [state, setState] = useState({ playing: playback.playing, speed: playback.speed })
   useEffect(() => {

@@ -1,11 +1,11 @@
-/** What a replay shows, as parts of an address. Pure. */
+/** View of a replay as query values. */
 
 import { type Codec, numbersOf } from '../../router/query-value'
 import type { CameraPlace } from '../scene/camera-rig'
 import type { ViewChoices } from './player-controls'
 
-/** What a replay shows where its address says nothing. */
-export const USUAL_VIEW: ViewChoices = {
+/** The default view. */
+export const DEFAULT_VIEW: ViewChoices = {
   arrangement: 'ghost',
   follow: true,
   forces: true,
@@ -13,21 +13,21 @@ export const USUAL_VIEW: ViewChoices = {
   meshes: true,
 }
 
-/** What differs from the usual, by its word. */
+/** Deviations from the default, by word. */
 const WORDS: Readonly<Record<string, Partial<ViewChoices>>> = {
-  beside: { arrangement: 'beside' },
+  'side-by-side': { arrangement: 'side-by-side' },
   still: { follow: false },
   'no-forces': { forces: false },
   'no-trail': { trail: false },
   'no-meshes': { meshes: false },
 }
 
-/** `beside,no-trail` */
+/** `side-by-side,no-trail` */
 export const VIEW: Codec<ViewChoices> = {
   read: (text) => {
     const words = text.split(',')
     if (!words.every((word) => Object.hasOwn(WORDS, word))) return undefined
-    return Object.assign({}, USUAL_VIEW, ...words.map((word) => WORDS[word]))
+    return Object.assign({}, DEFAULT_VIEW, ...words.map((word) => WORDS[word]))
   },
   write: (choices) => {
     const differs = (change: Partial<ViewChoices>) =>
@@ -37,14 +37,14 @@ export const VIEW: Codec<ViewChoices> = {
   },
 }
 
-/** A moment [s]. */
+/** A time [s]. */
 export const MOMENT: Codec<number | null> = {
   read: (text) =>
     text !== '' && Number(text) >= 0 && Number.isFinite(Number(text)) ? Number(text) : undefined,
   write: (moment) => (moment ? String(Number(moment.toFixed(4))) : null),
 }
 
-/** Place of the camera and what it is turned to [m], to the mm: `0.81:-1.2:0.64:0:0:0.02`; null for the usual. */
+/** Camera position and target [m], to the mm: `0.81:-1.2:0.64:0:0:0.02`; null for the default. */
 export const CAMERA: Codec<CameraPlace | null> = {
   read: (text) => {
     const [x, y, z, u, v, w, ...rest] = numbersOf(text)
@@ -52,6 +52,6 @@ export const CAMERA: Codec<CameraPlace | null> = {
     return x === u && y === v && z === w ? undefined : { position: [x, y, z], target: [u, v, w] }
   },
   write: (place) =>
-    // Adding zero makes the negative zero of rounding a plain one.
+    // Adding zero turns -0 into 0.
     place && [...place.position, ...place.target].map((at) => Number(at.toFixed(3)) + 0).join(':'),
 }

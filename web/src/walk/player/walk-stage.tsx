@@ -1,4 +1,4 @@
-/** A small replay that goes on from its beginning, drawn while it is in view. */
+/** A small looping replay, drawn while it is visible. */
 
 import { useEffect, useMemo, useRef, useState } from 'preact/hooks'
 import { messageOf } from '../../api/problem'
@@ -13,7 +13,7 @@ import { ReplayDriver } from './replay-driver'
 import { usePlaybackState } from './use-playback'
 import './walk-stage.css'
 
-/** Recorded frames a second [Hz]. */
+/** Recorded frames per second [Hz]. */
 export const RATE = 50
 const OPTIONS = {
   arrangement: 'ghost',
@@ -30,13 +30,13 @@ export function WalkStage({
   visible,
   onWalked,
 }: {
-  /** Of the walk; of another name it is another one, and asked for. */
+  /** Identity of the walk; another name loads another walk. */
   name: string
   record: (signal: AbortSignal) => Promise<Recorded>
-  /** What is seen, in words. */
+  /** Description for screen readers. */
   label: string
   visible: boolean
-  /** Told of the walk when it is there. */
+  /** Called when the walk has been loaded. */
   onWalked?: (replay: Replay) => void
 }) {
   const walk = useResource(name, record)
@@ -47,21 +47,21 @@ export function WalkStage({
   if (walk.error) {
     return (
       <div class="walk-preview-stage" role="alert">
-        <p class="small">The walk cannot be shown. {messageOf(walk.error)}</p>
+        <p class="small">Could not load the walk. {messageOf(walk.error)}</p>
       </div>
     )
   }
   if (!walk.data) {
     return (
       <div class="walk-preview-stage" role="status">
-        <p class="muted small">The robot walks it now…</p>
+        <p class="muted small">Simulating…</p>
       </div>
     )
   }
   if (walk.data.replay.frames === 0) {
     return (
       <div class="walk-preview-stage">
-        <p class="muted small">There is nothing to show of its walk.</p>
+        <p class="muted small">There is nothing to show.</p>
       </div>
     )
   }
@@ -70,7 +70,7 @@ export function WalkStage({
 
 function Stage({ replay, label, visible }: { replay: Replay; label: string; visible: boolean }) {
   const box = useRef<HTMLDivElement>(null)
-  const [wanted, setWanted] = useState(
+  const [running, setRunning] = useState(
     () => !matchMedia('(prefers-reduced-motion: reduce)').matches,
   )
   const [failure, setFailure] = useState<string | null>(null)
@@ -78,22 +78,22 @@ function Stage({ replay, label, visible }: { replay: Replay; label: string; visi
   const { playing } = usePlaybackState(playback)
   useScene(box, replay, label, playback, setFailure)
   useEffect(() => {
-    // Out of view nothing is drawn; at the end it begins anew.
-    if (wanted && visible && !playing) playback.play()
-    if (!(wanted && visible) && playing) playback.pause()
-  }, [wanted, visible, playing, playback])
+    // Draw only while visible; restart at the end.
+    if (running && visible && !playing) playback.play()
+    if (!(running && visible) && playing) playback.pause()
+  }, [running, visible, playing, playback])
   return (
     <>
       <div class="walk-preview-stage" ref={box} data-stage>
         {failure !== null && (
           <p class="small" role="alert">
-            The walk cannot be drawn in three dimensions here. {failure}
+            Could not draw the walk in three dimensions. {failure}
           </p>
         )}
       </div>
       {failure === null && (
-        <button type="button" class="compact" onClick={() => setWanted(!wanted)}>
-          {wanted ? 'Hold the walk' : 'Let it walk'}
+        <button type="button" class="compact" onClick={() => setRunning(!running)}>
+          {running ? 'Pause' : 'Play'}
         </button>
       )}
     </>
@@ -115,7 +115,7 @@ function useScene(
     const stage = box.current!
     const drive = new ReplayDriver(playback, replay, stage)
     driver.current = drive
-    let left = false
+    let unmounted = false
     const observer = new ResizeObserver(() => {
       if (stage.clientWidth === 0 || stage.clientHeight === 0) return
       scene.current?.resize(stage.clientWidth, stage.clientHeight)
@@ -123,7 +123,7 @@ function useScene(
     })
     import('../scene/walk-scene')
       .then(({ WalkScene }) => {
-        if (left) return
+        if (unmounted) return
         const built = new WalkScene([replay], extentOf([replay]), 1, OPTIONS, () => drive.request())
         scene.current = built
         built.canvas.setAttribute('role', 'img')
@@ -132,9 +132,9 @@ function useScene(
         observer.observe(stage)
         drive.attach(built)
       })
-      .catch((error: unknown) => !left && onFailure(messageOf(error)))
+      .catch((error: unknown) => !unmounted && onFailure(messageOf(error)))
     return () => {
-      left = true
+      unmounted = true
       observer.disconnect()
       drive.dispose()
       scene.current?.dispose()

@@ -1,4 +1,4 @@
-/** Which foot stands when: a bar for every stance, a row for every leg. */
+/** Gait diagram: stance phases of all feet over time. */
 
 import { useMemo, useRef } from 'preact/hooks'
 import { ChartFrame } from '../../charts/chart-frame'
@@ -18,7 +18,7 @@ interface Row {
   readonly walk: number
   readonly label: string
   readonly spans: readonly (readonly [number, number])[]
-  /** Share of the time that the foot stands. */
+  /** Share of the time in stance. */
   readonly share: number
 }
 
@@ -32,12 +32,16 @@ export function GaitChart({ walks, playback }: { walks: readonly Recorded[]; pla
   return (
     <div class="plot" ref={box} data-plot="gait">
       <ChartFrame
-        title="Feet on the ground"
-        note="A bar for every time that a foot stands."
+        title="Gait diagram"
+        note="Bars show stance phases."
         table={() => <GaitTable rows={rows} comparing={walks.length > 1} />}
       >
-        {/* The slider of the replay does the same for keyboards. */}
-        <div class="gait" role="img" aria-label="Which foot stands when; the table has the moments">
+        {/* Keyboard users can seek with the replay's slider. */}
+        <div
+          class="gait"
+          role="img"
+          aria-label="Stance phases of the feet; the table lists the times"
+        >
           {rows.map((row) => (
             <div class="gait-row" key={row.key}>
               <span class="gait-leg">{row.walk === 0 ? row.leg : ''}</span>
@@ -82,7 +86,7 @@ function GaitTable({ rows, comparing }: { rows: readonly Row[]; comparing: boole
     spans.map(([from, to]) => `${formatNumber(from, 3)} to ${quantity(to, 's', 3)}`).join('; ')
   return (
     <Table<Row>
-      caption="When every foot stands"
+      caption="Stance phases"
       rows={rows}
       rowKey={(row) => row.key}
       columns={[
@@ -90,14 +94,14 @@ function GaitTable({ rows, comparing }: { rows: readonly Row[]; comparing: boole
         ...(comparing ? [{ key: 'walk', label: 'Walk', value: (row: Row) => row.label }] : []),
         {
           key: 'share',
-          label: 'Stands for',
+          label: 'Duty factor',
           numeric: true,
           value: (row) => row.share,
           cell: (row) => percent(row.share),
         },
         {
           key: 'spans',
-          label: 'From, to',
+          label: 'Stance phases',
           data: (row) => row.spans.map((span) => span.join(' to ')).join('; '),
           cell: (row) => text(row.spans),
         },
@@ -106,7 +110,7 @@ function GaitTable({ rows, comparing }: { rows: readonly Row[]; comparing: boole
   )
 }
 
-/** Legs in the robot's order, the walks of a leg below each other. */
+/** Legs in the robot's order; walks of the same leg are adjacent. */
 function rowsOf(walks: readonly Recorded[]): Row[] {
   const { legs } = walks[0].replay.header.robot
   return legs.flatMap((leg, k) =>

@@ -1,4 +1,4 @@
-/** One chart over time, whose line moves with the replay and whose clicks move the replay. */
+/** A chart over time, synchronized with the replay. */
 
 import { useMemo, useRef } from 'preact/hooks'
 import { ChartFrame } from '../../charts/chart-frame'
@@ -13,7 +13,7 @@ import type { Recorded } from '../replay/recorded'
 import { moments, seriesOf } from './plot-data'
 import type { PlotSpec } from './plot-specs'
 
-/** Time between two positions of a chart's line while the replay plays [ms]. */
+/** Update interval of the time marker during playback [ms]. */
 const RENEWED = 120
 
 export function PlotCard({
@@ -59,7 +59,7 @@ export function PlotCard({
   )
 }
 
-/** Every curve with its value at the moment that is shown, of both walks if there are two. */
+/** Legend with the current values, of both walks if there are two. */
 function PlotLegend({
   series,
   curves,
@@ -67,7 +67,7 @@ function PlotLegend({
   unit,
 }: {
   series: readonly Series[]
-  /** Curves of one walk. */
+  /** Number of curves per walk. */
   curves: number
   frame: number
   unit: string
@@ -95,7 +95,7 @@ function PlotLegend({
   })
 }
 
-/** Rounding errors of the simulator are zero to the eye. */
+/** Round numerical noise to zero. */
 function rounded(value: number | null): number | null {
   return value !== null && Math.abs(value) < 1e-6 ? 0 : value
 }

@@ -1,20 +1,20 @@
-/** Curves of one walk or two on common moments. Pure. */
+/** Curves of one or two walks at common times. */
 
 import type { Series } from '../../charts/lines/line-chart'
 import type { Recorded } from '../replay/recorded'
 import type { Replay } from '../replay/replay'
 import type { Curve } from './plot-specs'
 
-/** Of the second walk's curves [px]. */
+/** Dash pattern of the second walk [px]. */
 const DASH = [7, 4] as const
 
-/** Moments of the longest walk [s]; all are recorded at the same rate. */
+/** Times of the longest walk [s]; all have the same rate. */
 export function moments(walks: readonly Recorded[]): Float32Array {
   const [longest] = walks.map(({ replay }) => replay).sort((a, b) => b.frames - a.frames)
   return longest.column('time', 0)
 }
 
-/** Curves of every walk, those of the second dashed; null after the end of a walk. */
+/** Curves of all walks, those of the second dashed; null after the end of a walk. */
 export function seriesOf(curves: readonly Curve[], walks: readonly Recorded[]): Series[] {
   const length = Math.max(...walks.map(({ replay }) => replay.frames))
   return walks.flatMap(({ label, replay }, k) =>

@@ -1,14 +1,14 @@
-/** Which curves belong into which chart of a walk. Pure. */
+/** Charts of a walk and their curves. */
 
 import type { Replay } from '../replay/replay'
 
-/** A curve: one number of a channel over time. */
+/** One component of a channel over time. */
 export interface Curve {
   readonly label: string
   readonly channel: string
   readonly index: number
   readonly colour: `--${string}`
-  /** Drawn thin, as what is asked for beside what is reached. */
+  /** Thin line, for desired values. */
   readonly thin?: boolean
 }
 
@@ -30,7 +30,7 @@ const COLOURS = [
   '--series-6',
 ] as const
 
-/** All charts of a walk, those of joints for one leg. Channels that are missing are left out. */
+/** All charts of a walk, joint charts for one leg. Charts of missing channels are omitted. */
 export function plotSpecs(replay: Replay, leg: number): PlotSpec[] {
   const { legs } = replay.header.robot
   const name = words(legs[leg])
@@ -38,7 +38,7 @@ export function plotSpecs(replay: Replay, leg: number): PlotSpec[] {
     {
       key: 'angles',
       title: `Joint angles, ${name}`,
-      note: 'Thin: desired. Thick: reached.',
+      note: 'Thin: desired. Thick: actual.',
       quantity: 'angle',
       unit: 'rad',
       curves: ofJoints(replay, leg).flatMap(({ label, index, colour }) => [
@@ -57,7 +57,7 @@ export function plotSpecs(replay: Replay, leg: number): PlotSpec[] {
     {
       key: 'torques',
       title: `Gear torques, ${name}`,
-      note: 'What each gear puts on its joint.',
+      note: 'Torque of each gear on its joint.',
       quantity: 'torque',
       unit: 'N m',
       curves: ofJoints(replay, leg).map((curve) => ({ ...curve, channel: 'load_torque' })),
@@ -65,23 +65,23 @@ export function plotSpecs(replay: Replay, leg: number): PlotSpec[] {
     {
       key: 'acceleration',
       title: 'Acceleration of the body',
-      note: "In the body's frame: x ahead, y left, z up; without gravity.",
+      note: "In the body's frame: x forward, y left, z up; without gravity.",
       quantity: 'acceleration',
       unit: 'm/s²',
       curves: ofAxes('body_acceleration', 0),
     },
     {
       key: 'leg-force',
-      title: `Force of the ground, ${name}`,
-      note: 'x along the ground ahead, y to the left, z away from it.',
+      title: `Ground reaction force, ${name}`,
+      note: 'x forward along the ground, y left, z normal to the ground.',
       quantity: 'force',
       unit: 'N',
       curves: ofAxes('foot_force', 3 * leg),
     },
     {
       key: 'normal-forces',
-      title: 'Force of the ground, all feet',
-      note: 'Its part away from the ground.',
+      title: 'Ground reaction force, all feet',
+      note: 'Normal component.',
       quantity: 'normal force',
       unit: 'N',
       curves: legs.map((each, k) => ({
@@ -93,7 +93,7 @@ export function plotSpecs(replay: Replay, leg: number): PlotSpec[] {
     },
     {
       key: 'supply',
-      title: 'Voltage of the battery',
+      title: 'Battery voltage',
       note: 'Under the load of all motors.',
       quantity: 'voltage',
       unit: 'V',
@@ -103,17 +103,17 @@ export function plotSpecs(replay: Replay, leg: number): PlotSpec[] {
   return specs.filter(({ curves }) => curves.every(({ channel }) => replay.channel(channel)))
 }
 
-/** A name of the robot's description as words: right_front is right front. */
+/** Readable form of a name: right_front is right front. */
 export function words(name: string): string {
   return name.replaceAll('_', ' ')
 }
 
-/** The leg's joints are those that bear its name. */
+// A leg's joints start with its name.
 function ofJoints(replay: Replay, leg: number): Omit<Curve & { channel: string }, 'thin'>[] {
   const { joints, legs } = replay.header.robot
   const prefix = `${legs[leg]}_`
-  const own = joints.flatMap((joint, index) => (joint.startsWith(prefix) ? [index] : []))
-  const shown = own.length > 0 ? own : joints.map((_, index) => index)
+  const ofLeg = joints.flatMap((joint, index) => (joint.startsWith(prefix) ? [index] : []))
+  const shown = ofLeg.length > 0 ? ofLeg : joints.map((_, index) => index)
   return shown.map((index, k) => ({
     label: words(joints[index].replace(prefix, '')),
     channel: 'joint_angle',

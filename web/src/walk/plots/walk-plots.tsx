@@ -1,4 +1,4 @@
-/** What a walk was over time: charts of one leg, of the body and of all feet. */
+/** Plots of a walk over time: one leg, the body, all feet. */
 
 import { useId, useMemo, useState } from 'preact/hooks'
 import type { Playback } from '../player/playback'
@@ -13,7 +13,7 @@ export function WalkPlots({
   all,
   playback,
 }: {
-  /** Those with frames. */
+  /** Walks with frames. */
   walks: readonly Recorded[]
   all: readonly Recorded[]
   playback: Playback
@@ -28,7 +28,7 @@ export function WalkPlots({
     <section class="stack" aria-label="Charts over time">
       <div class="row spread">
         <p class="muted small">
-          Click a chart to show that moment, drag to zoom, double-click to see all of it again.
+          Click a chart to seek, drag to zoom, double-click to reset the zoom.
           {walks.length > 1 && ` Dashed: ${walks[1].label}.`}
         </p>
         <div class="row">

@@ -1,11 +1,11 @@
-/** When a foot stands on the ground. Pure. */
+/** Stance phases of the feet. */
 
 import type { Replay } from './replay'
 
-/** Force from which on a foot counts as standing [N]. */
+/** Contact force threshold of a stance [N]. */
 export const CONTACT_FORCE = 0.5
 
-/** Spans of time in which a foot stands [s]. */
+/** Stance phases of a foot [s]. */
 export function stances(replay: Replay, leg: number): (readonly [from: number, to: number])[] {
   const spans: (readonly [number, number])[] = []
   let from: number | null = null

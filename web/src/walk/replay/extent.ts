@@ -1,26 +1,26 @@
-/** How large the robots of a scene are, which sets how everything about them is drawn. */
+/** Size of the robots in a scene, which determines the scale of everything else. */
 
 import { multiply, rotate } from './pose'
 import type { Replay, Shape } from './replay'
 
 export interface Extent {
-  /** Longest edge of the box about a robot where it starts [m]. */
+  /** Longest edge of a robot's bounding box at the start [m]. */
   readonly span: number
-  /** Edge of that box to its sides [m]. */
+  /** Lateral edge of that box [m]. */
   readonly width: number
-  /** Its height over the ground [m]. */
+  /** Height of that box above the ground [m]. */
   readonly height: number
-  /** Edge of a cell of the ground's grid, a round number [m]. */
+  /** Grid spacing, a round number [m]. */
   readonly cell: number
 }
 
-/** Of a scene without anything to be seen [m]. */
+/** Span of a scene without anything visible [m]. */
 const UNSEEN = 0.5
 
-/** Edge of a cell, as a share of the span, before it is rounded. */
+/** Grid spacing as a share of the span, before rounding. */
 const CELL = 0.18
 
-/** Of the largest robot in every direction. */
+/** Extent of the largest robot in every direction. */
 export function extentOf(replays: readonly Replay[]): Extent {
   const edges = [0, 0, 0]
   for (const replay of replays) {
@@ -30,7 +30,7 @@ export function extentOf(replays: readonly Replay[]): Extent {
     edges[2] = Math.max(edges[2], high[2])
   }
   const span = Math.max(...edges)
-  // Nothing is drawn, or only a point.
+  // Nothing visible, or just a point.
   if (!(span > 1e-3 && span < 1e3)) {
     return { span: UNSEEN, width: UNSEEN, height: UNSEEN / 2, cell: roundLength(CELL * UNSEEN) }
   }
@@ -45,13 +45,13 @@ export function roundLength(length: number): number {
   return steps.reduce((best, step) => (off(step) < off(best) ? step : best))
 }
 
-/** A length as people read it: 5 cm, 20 cm, 1 m. */
+/** Readable length: 5 cm, 20 cm, 1 m. */
 export function lengthInWords(metres: number): string {
   const centimetres = Math.round(metres * 1e4) / 100
   return centimetres < 100 ? `${centimetres} cm` : `${centimetres / 100} m`
 }
 
-/** Lowest and highest corner of all links and feet in the first frame [m]. */
+/** Bounding box of all links and feet in the first frame [m]. */
 function boxOf(replay: Replay): readonly [number[], number[]] {
   const low = [Infinity, Infinity, Infinity]
   const high = [-Infinity, -Infinity, -Infinity]
@@ -67,7 +67,7 @@ function boxOf(replay: Replay): readonly [number[], number[]] {
     const pose = Array.from({ length: 7 }, (_, i) => replay.value('link_pose', 0, 7 * k + i))
     include(pose, [0, 0, 0])
     for (const shape of link.shapes) {
-      // A load is no part of the robot.
+      // A load is not part of the robot.
       if (shape.role === 'load') continue
       const turn = multiply(pose.slice(3), shape.origin.slice(3))
       const at = rotate(pose.slice(3), shape.origin.slice(0, 3))
@@ -84,7 +84,7 @@ function boxOf(replay: Replay): readonly [number[], number[]] {
   return [low, high]
 }
 
-/** Half the edges of the box about a turned solid, along the world's axes [m]. */
+/** Half the edges of a rotated solid's bounding box [m]. */
 function halfEdges(shape: Shape, turn: readonly number[]): readonly number[] {
   const axes = [
     [1, 0, 0],

@@ -1,14 +1,14 @@
-/** How long a force is drawn. */
+/** Scale of force arrows. */
 
 import type { Extent } from './extent'
 
-/** Length that the largest force should nearly reach, as a share of the robot's span; a leg's. */
+/** Length of the largest arrow, as a share of the robot's span. */
 const LONGEST = 0.47
 
-/** Round numbers of newtons for one cell of the ground's grid. */
+/** Round numbers of newtons per grid cell. */
 const STEPS = [1, 2, 5]
 
-/** Newtons that a cell stands for, so that forces up to `largest` [N] stay in view. */
+/** Newtons per grid cell, so that forces up to `largest` [N] remain visible. */
 export function newtonsPerCell(largest: number, { cell, span }: Extent): number {
   if (!(largest > 0)) return 10
   const needed = (largest * cell) / (LONGEST * span)
@@ -19,7 +19,7 @@ export function newtonsPerCell(largest: number, { cell, span }: Extent): number 
   }
 }
 
-/** The force that all but the rarest hundredth of the values stay under [N]; impacts are short. */
+/** The 99th percentile of the values [N], which ignores short impacts. */
 export function typicalLargest(norms: Float32Array): number {
   if (norms.length === 0) return 0
   const sorted = Float32Array.from(norms).sort()

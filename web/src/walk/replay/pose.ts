@@ -1,11 +1,11 @@
-/** Poses between two recorded frames. A pose is x y z [m] and a unit quaternion x y z w. */
+/** Interpolation of poses. A pose is x y z [m] and a unit quaternion x y z w. */
 
 import type { Replay } from './replay'
 
-/** Numbers of a pose. */
+/** Numbers per pose. */
 export const POSE = 7
 
-/** Poses of all links at a time [s], held at both ends of the walk; written to `out` (7 a link). */
+/** Poses of all links at a time [s], clamped to the walk; written to `out` (7 numbers per link). */
 export function samplePoses(replay: Replay, time: number, out: Float32Array): void {
   const channel = replay.channel('link_pose')
   if (!channel || replay.frames === 0) return
@@ -22,7 +22,7 @@ export function samplePoses(replay: Replay, time: number, out: Float32Array): vo
   }
 }
 
-/** Numbers of a channel at a time [s], straight between frames, held at both ends. */
+/** Values of a channel at a time [s], linear between frames, clamped to the walk. */
 export function sampleChannel(replay: Replay, name: string, time: number, out: Float32Array): void {
   const channel = replay.channel(name)
   if (!channel || replay.frames === 0) return
@@ -36,7 +36,7 @@ export function sampleChannel(replay: Replay, name: string, time: number, out: F
   }
 }
 
-/** Spherical interpolation the short way round, from values[a..] to values[b..]. */
+/** Spherical interpolation along the shorter arc, from values[a..] to values[b..]. */
 export function slerp(
   values: Float32Array,
   a: number,
@@ -50,7 +50,7 @@ export function slerp(
   const sign = cosine < 0 ? -1 : 1
   const angle = Math.acos(Math.min(1, Math.abs(cosine)))
   const sine = Math.sin(angle)
-  // Nearly the same attitude: the sines would be divided by nothing.
+  // Nearly equal attitudes: avoid division by zero.
   const [from, to] =
     sine < 1e-4
       ? [1 - share, share]
@@ -69,7 +69,7 @@ function shareBetween(from: number, to: number, time: number): number {
   return Math.min(1, Math.max(0, (time - from) / (to - from)))
 }
 
-/** A vector turned by a unit quaternion x y z w. */
+/** Rotate a vector by a unit quaternion x y z w. */
 export function rotate(turn: readonly number[], vector: readonly number[]): number[] {
   const [x, y, z, w] = turn
   const [a, b, c] = vector
@@ -77,7 +77,7 @@ export function rotate(turn: readonly number[], vector: readonly number[]): numb
   return [a + w * p + y * r - z * q, b + w * q + z * p - x * r, c + w * r + x * q - y * p]
 }
 
-/** The turn that does `second`, then `first`; unit quaternions x y z w. */
+/** Product of unit quaternions x y z w: `second` first, then `first`. */
 export function multiply(first: readonly number[], second: readonly number[]): number[] {
   const [x, y, z, w] = first
   const [a, b, c, d] = second

@@ -1,11 +1,11 @@
-/** A walk that was asked for: the design, and what was recorded of it. */
+/** Recorded walks. */
 
 import { postBytes } from '../../api/client'
 import type { Scenario } from '../../api/types'
 import type { ResolvedDesign } from '../design/resolve-design'
 import { parseReplay, type Replay } from './replay'
 
-/** As much of a design as a walk needs. */
+/** The parts of a design needed to simulate it. */
 export type WalkingDesign = Pick<ResolvedDesign, 'label' | 'robot' | 'design' | 'world'> & {
   readonly controller: { readonly name: string }
 }
@@ -15,7 +15,7 @@ export interface Recorded {
   readonly replay: Replay
 }
 
-/** Frames a second that can be asked for [Hz]: of the eye, of the charts, of the controller. */
+/** Recording rates [Hz]: for the eye, the charts, the controller. */
 export const RATES = [50, 100, 500] as const
 
 export const DEFAULT_RATE = 100
@@ -24,7 +24,7 @@ export function replaysOf(walks: readonly Recorded[]): Replay[] {
   return walks.map(({ replay }) => replay)
 }
 
-/** Let a design walk through a scenario, a preset's name or one of one's own. */
+/** Simulate a design in a scenario, given by preset name or in full. */
 export async function recordWalk(
   { label, robot, controller, design, world = {} }: WalkingDesign,
   scenario: string | Scenario,

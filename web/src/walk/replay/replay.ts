@@ -1,26 +1,26 @@
-/** A recorded walk as `POST /v1/replays` answers it: a header in JSON, then float32 by frame. */
+/** Replay format of `POST /v1/replays`: a JSON header, then float32 values by frame. */
 
 import type { Scenario } from '../../api/types'
 
-/** Version of the format that is read here. */
+/** Supported version of the format. */
 const REPLAY_VERSION = 1
 
 type Solid = 'capsule' | 'box' | 'sphere' | 'cylinder'
 export type Role = 'body' | 'coxa' | 'femur' | 'tibia' | 'foot' | 'load'
 
-/** One solid, fixed to a link. */
+/** A solid attached to a link. */
 export interface Shape {
   readonly type: Solid
-  /** Box: edges; sphere: radius; cylinder and capsule: radius, length along their own z [m]. */
+  /** Box: edges; sphere: radius; cylinder and capsule: radius, length along z [m]. */
   readonly size: readonly number[]
-  /** Of the centre in the link's frame: x y z [m], quaternion x y z w. */
+  /** Centre in the link's frame: x y z [m], quaternion x y z w. */
   readonly origin: readonly number[]
   readonly role: Role
 }
 
-/** A mesh on a link, as its URDF has it. */
+/** A mesh on a link, from the URDF. */
 export interface LinkMesh {
-  /** Of its file. */
+  /** Name of its file. */
   readonly name: string
   /** In the link's frame: x y z [m], quaternion x y z w. */
   readonly origin: readonly number[]
@@ -36,15 +36,15 @@ interface Link {
   readonly meshes: readonly LinkMesh[]
 }
 
-/** One quantity of a frame. */
+/** A quantity recorded in every frame. */
 export interface Channel {
   readonly name: string
   readonly unit: string
   readonly description: string
   readonly shape: readonly number[]
-  /** Numbers of the frame that come before it. */
+  /** Index of its first number in a frame. */
   readonly offset: number
-  /** Names along its first axis. */
+  /** Names along the first axis. */
   readonly labels: readonly string[]
 }
 
@@ -60,30 +60,30 @@ export interface ReplayHeader {
   readonly scenario: Scenario
   readonly robot: {
     readonly name: string
-    /** SHA-256 of its URDF, by which its meshes are asked for; none of a robot that ships. */
+    /** SHA-256 of its URDF, which identifies its meshes; null for shipped robots. */
     readonly urdf: string | null
     readonly links: readonly Link[]
     readonly joints: readonly string[]
     readonly legs: readonly string[]
   }
   readonly ground: { readonly slope_deg: number; readonly slope_direction_deg: number }
-  /** In the world, whose z axis is normal to the ground [m/s2]. */
+  /** In the world's frame, whose z axis is normal to the ground [m/s2]. */
   readonly gravity: readonly [number, number, number]
   readonly load_kg: number
   readonly channels: readonly Channel[]
 }
 
-/** What the page cannot go without; charts of other channels are left out if they are missing. */
-const NEEDED = ['time', 'link_pose', 'foot_position', 'foot_force'] as const
+/** Required channels; charts of other missing channels are omitted. */
+const REQUIRED = ['time', 'link_pose', 'foot_position', 'foot_force'] as const
 
-/** Something else than a replay of this version came. */
+/** Invalid data, or another version of the format. */
 export class ReplayFormatError extends Error {
   override readonly name = 'ReplayFormatError'
 }
 
-/** A walk: its header, and its frames as one block of numbers. */
+/** A recorded walk. */
 export class Replay {
-  /** Numbers a frame. */
+  /** Numbers per frame. */
   readonly stride: number
   private readonly channels: ReadonlyMap<string, Channel>
 
@@ -108,18 +108,18 @@ export class Replay {
     return this.channels.get(name)
   }
 
-  /** A frame's time since the start [s]. */
+  /** Time of a frame since the start [s]. */
   time(frame: number): number {
     return this.value('time', frame, 0)
   }
 
-  /** The index-th number of a channel, NaN if there is no such channel. */
+  /** One component of a channel; NaN for a missing channel. */
   value(name: string, frame: number, index: number): number {
     const channel = this.channels.get(name)
     return channel ? this.values[frame * this.stride + channel.offset + index] : Number.NaN
   }
 
-  /** The index-th number of a channel in every frame. */
+  /** One component of a channel in all frames. */
   column(name: string, index: number): Float32Array {
     const column = new Float32Array(this.frames)
     for (let frame = 0; frame < this.frames; frame++) column[frame] = this.value(name, frame, index)
@@ -139,30 +139,30 @@ export class Replay {
   }
 }
 
-/** Whether the robot's URDF names meshes, which the server may have. */
+/** Whether the robot's URDF refers to meshes. */
 export function hasMeshes({ robot }: ReplayHeader): boolean {
   return robot.urdf !== null && robot.links.some(({ meshes }) => meshes.length > 0)
 }
 
-/** Numbers that a channel has in a frame. */
+/** Numbers of a channel per frame. */
 function sizeOf(channel: Channel): number {
   return channel.shape.reduce((product, n) => product * n, 1)
 }
 
-/** The walk in an answer. Throws ReplayFormatError that says what is wrong. */
+/** Decode a replay. Throws ReplayFormatError. */
 export function parseReplay(bytes: ArrayBuffer): Replay {
-  if (bytes.byteLength < 4) throw new ReplayFormatError('the replay is empty; ask for it again')
+  if (bytes.byteLength < 4) throw new ReplayFormatError('the replay is empty; try again')
   const length = new DataView(bytes).getUint32(0, true)
   const start = 4 + length
   if (start > bytes.byteLength) {
-    throw new ReplayFormatError('the replay ends in its header; ask for it again')
+    throw new ReplayFormatError('the replay is truncated; try again')
   }
   const header = parseHeader(new TextDecoder().decode(new Uint8Array(bytes, 4, length)))
   const expected = header.frames * widthOf(header.channels) * 4
-  const found = bytes.byteLength - start
-  if (found !== expected) {
+  const actual = bytes.byteLength - start
+  if (actual !== expected) {
     throw new ReplayFormatError(
-      `the replay has ${found} bytes of frames where its header says ${expected}; ask for it again`,
+      `the replay has ${actual} bytes of frames instead of ${expected}; try again`,
     )
   }
   checkChannels(header)
@@ -174,11 +174,11 @@ function parseHeader(text: string): ReplayHeader {
   try {
     header = JSON.parse(text) as ReplayHeader
   } catch {
-    throw new ReplayFormatError('the header of the replay is not JSON; ask for it again')
+    throw new ReplayFormatError('the header of the replay is not JSON; try again')
   }
   if (header.version !== REPLAY_VERSION) {
     throw new ReplayFormatError(
-      `the replay has version ${header.version}, this page reads ${REPLAY_VERSION}; reload the page`,
+      `the replay has version ${header.version}, expected ${REPLAY_VERSION}; reload the page`,
     )
   }
   return header
@@ -186,11 +186,11 @@ function parseHeader(text: string): ReplayHeader {
 
 function checkChannels(header: ReplayHeader): void {
   const sizes = new Map(header.channels.map((channel) => [channel.name, sizeOf(channel)]))
-  for (const name of NEEDED) {
+  for (const name of REQUIRED) {
     if (!sizes.has(name)) throw new ReplayFormatError(`the replay has no channel ${name}`)
   }
   if (sizes.get('link_pose') !== header.robot.links.length * 7) {
-    throw new ReplayFormatError('the replay has not one pose for each link')
+    throw new ReplayFormatError('the replay does not have one pose per link')
   }
 }
 
@@ -198,7 +198,7 @@ function widthOf(channels: readonly Channel[]): number {
   return channels.reduce((end, channel) => Math.max(end, channel.offset + sizeOf(channel)), 0)
 }
 
-/** The numbers from a byte on; copied where their place or the machine's byte order asks for it. */
+/** Little-endian values from an offset; copied if alignment or byte order requires it. */
 function littleEndian(bytes: ArrayBuffer, start: number): Float32Array {
   const native = new Uint8Array(new Uint16Array([1]).buffer)[0] === 1
   if (native) {

@@ -1,9 +1,9 @@
-/** The camera: orbits about the robot by hand, and walks along with it if asked to. */
+/** Orbiting camera that can follow the robot. */
 
 import { PerspectiveCamera, Spherical, Vector3 } from 'three'
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js'
 
-/** Directions to look from, x ahead, y left, z up; lengths are shares of the distance. */
+/** View directions, x forward, y left, z up; relative to the distance. */
 const VIEWS = {
   'three-quarter': [0.5, -0.87, 0.48],
   side: [0, -1, 0.12],
@@ -13,15 +13,14 @@ const VIEWS = {
 
 export type ViewName = keyof typeof VIEWS
 
-/** How near and how far the camera may be, and what it sees at all, in spans of the robot. */
+/** Smallest and largest distance, and clipping planes, in spans of the robot. */
 const NEAREST = 0.47
 const FURTHEST = 11.3
 const SEEN = [0.038, 113] as const
 
 type Point = readonly [x: number, y: number, z: number]
 
-/** Where the camera is and what it is turned to, from the robots' middle while it follows them, else from
- * where the walk begins [m]. */
+/** Camera position and target [m], relative to the robots while following, otherwise to the start. */
 export interface CameraPlace {
   readonly position: Point
   readonly target: Point
@@ -29,10 +28,10 @@ export interface CameraPlace {
 
 export class CameraRig {
   readonly camera = new PerspectiveCamera(32, 1)
-  /** Called when it was placed by hand, by a key or for a view; null: as it is at first. */
+  /** Called when the camera was moved by the user or to a view; null for the default view. */
   onPlaced: (place: CameraPlace | null) => void = () => undefined
   private following = true
-  /** Half the height of what is to be seen [m]. */
+  /** Half the visible height [m]. */
   reach = 1
   private readonly controls: OrbitControls
   private readonly target = new Vector3()
@@ -41,7 +40,7 @@ export class CameraRig {
 
   constructor(
     canvas: HTMLCanvasElement,
-    /** Of the robot [m]. */
+    /** Span of the robot [m]. */
     private readonly span: number,
     onChange: () => void,
   ) {
@@ -54,7 +53,7 @@ export class CameraRig {
     this.controls.maxPolarAngle = 0.56 * Math.PI
     this.controls.addEventListener('change', onChange)
     this.controls.addEventListener('end', () => this.onPlaced(this.place))
-    // The wheel scrolls the page, as long as the scene was not clicked or reached by Tab.
+    // Without focus, the wheel scrolls the page.
     this.controls.enableZoom = false
     canvas.addEventListener('focus', () => {
       this.controls.enableZoom = true
@@ -84,7 +83,7 @@ export class CameraRig {
     this.onPlaced(this.place)
   }
 
-  /** What is being looked at moved there; both stay as far from each other if it is followed. */
+  /** Move the target; the camera moves along while following. */
   moveTarget(target: Vector3): void {
     this.step.subVectors(target, this.target)
     this.target.copy(target)
@@ -94,11 +93,11 @@ export class CameraRig {
     this.controls.update()
   }
 
-  /** Look from a direction, all of the robot in view. */
+  /** Set a view direction, with the whole robot visible. */
   look(from: ViewName): void {
     const narrow = Math.min(1, this.aspect)
-    const wanted = this.reach / (narrow * Math.tan((16 * Math.PI) / 180))
-    const distance = Math.min(FURTHEST * this.span, wanted)
+    const fittingDistance = this.reach / (narrow * Math.tan((16 * Math.PI) / 180))
+    const distance = Math.min(FURTHEST * this.span, fittingDistance)
     const direction = new Vector3(...VIEWS[from]).normalize()
     this.controls.target.copy(this.target)
     this.camera.position.copy(this.target).addScaledVector(direction, distance)
@@ -106,7 +105,7 @@ export class CameraRig {
     this.onPlaced(from === 'three-quarter' && this.following ? null : this.place)
   }
 
-  /** Turn about what is looked at [rad]. */
+  /** Rotate about the target [rad]. */
   turn(around: number, up: number): void {
     const offset = this.camera.position.clone().sub(this.controls.target)
     // Spherical has y up, the scene z.
@@ -119,7 +118,7 @@ export class CameraRig {
     this.onPlaced(this.place)
   }
 
-  /** Come nearer by a factor. */
+  /** Zoom in by a factor. */
   zoom(factor: number): void {
     const offset = this.camera.position.clone().sub(this.controls.target)
     const length = Math.min(

@@ -1,8 +1,8 @@
-/** Giving back what lies in the graphics memory. */
+/** Release of GPU memory. */
 
 import { type Material, type Object3D, Texture } from 'three'
 
-/** Free geometries, materials and textures of an object and all below it. */
+/** Dispose of geometries, materials and textures of an object and its descendants. */
 export function disposeTree(root: Object3D): void {
   root.traverse((object) => {
     const { geometry, material } = object as {

@@ -1,4 +1,4 @@
-/** Where feet touch the ground, and with how much force. */
+/** Marks of foot contacts with force arrows. */
 
 import {
   CircleGeometry,
@@ -15,7 +15,7 @@ import { sampleChannel } from '../replay/pose'
 import type { Replay } from '../replay/replay'
 import type { Palette } from './palette'
 
-/** Radii, and the length of an arrow's head, in spans of the robot. */
+/** Radii, and length of an arrow's head, in spans of the robot. */
 const DISC = 0.046
 const SHAFT = 0.0066
 const HEAD = 0.021
@@ -29,18 +29,18 @@ export class FootMarks {
   private readonly positions: Float32Array
   private readonly forces: Float32Array
   private readonly discMaterial = new MeshBasicMaterial({ transparent: true, opacity: 0.75 })
-  // Through the leg, along which most forces point.
+  // Drawn through the leg, along which most forces point.
   private readonly arrowMaterial = new MeshBasicMaterial({ depthTest: false, transparent: true })
   private readonly force = new Vector3()
   private withForces = true
 
   constructor(
     private readonly replay: Replay,
-    /** Length of an arrow [m/N]. */
+    /** Arrow length per force [m/N]. */
     private readonly scale: number,
-    /** Height of discs over the ground [m]; that of another walk's differs, so that one covers. */
+    /** Height of discs above the ground [m]; differs between walks, to avoid flicker. */
     private readonly height: number,
-    /** Of the robot [m]. */
+    /** Span of the robot [m]. */
     span: number,
   ) {
     const legs = replay.header.robot.legs.length
@@ -55,7 +55,7 @@ export class FootMarks {
     }
   }
 
-  /** Mark the feet as they were at a time [s]. */
+  /** Show the feet at a time [s]. */
   show(time: number): void {
     sampleChannel(this.replay, 'foot_position', time, this.positions)
     sampleChannel(this.replay, 'foot_force', time, this.forces)
@@ -80,7 +80,7 @@ export class FootMarks {
   }
 }
 
-/** An arrow along a vector; its head keeps its size. */
+/** An arrow along a vector with a head of constant size. */
 class Arrow {
   readonly object = new Group()
   private readonly shaft: Mesh

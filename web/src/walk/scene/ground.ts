@@ -1,4 +1,4 @@
-/** The ground: a plane with a grid of round lengths, which fades into the distance. */
+/** Ground plane with a labelled grid that fades into the distance. */
 
 import {
   Group,
@@ -13,18 +13,18 @@ import type { Extent } from '../replay/extent'
 import { lyingText } from './label'
 import type { Palette } from './palette'
 
-/** Edge of the plane, in spans of the robot; it is moved along with it. */
+/** Edge of the plane, which moves with the robot, in spans. */
 const EDGE = 45
 
-/** Cells between thick lines, which have the labels, and how many labels are drawn at most. */
+/** Cells between thick, labelled lines, and the largest number of labels. */
 const LABEL_EVERY = 5
 const MOST_LABELS = 40
 
-/** Height of labels, and how far they lie over the ground so that they are seen, in spans. */
+/** Height of labels, and their elevation above the ground, in spans. */
 const TEXT = 0.095
 const LIFT = 0.004
 
-/** Between which distances the grid fades, in spans. */
+/** Distances between which the grid fades, in spans. */
 const FADES = [1.7, 8.5] as const
 
 const VERTEX = `
@@ -35,7 +35,7 @@ void main() {
   gl_Position = projectionMatrix * viewMatrix * world;
 }`
 
-// Lines are as wide as a pixel wherever they are; fine ones vanish where they would flicker.
+// Lines are one pixel wide at any distance; they fade out where they would flicker.
 const FRAGMENT = `
 uniform vec3 ground;
 uniform vec3 background;
@@ -70,10 +70,10 @@ export class Ground {
   private labels = new Group()
 
   constructor(
-    /** Furthest distance walked [m]. */
+    /** Largest distance walked [m]. */
     private readonly length: number,
-    /** Where the labels stand, across the way [m]. */
-    private readonly beside: number,
+    /** Lateral position of the labels [m]. */
+    private readonly labelOffset: number,
     private readonly extent: Extent,
     shadows: boolean,
   ) {
@@ -111,7 +111,7 @@ export class Ground {
     this.relabel(colours.text)
   }
 
-  /** Keep the plane under the robot; its lines stay where they are. */
+  /** Keep the plane under the robot; its grid stays fixed. */
   moveTo(x: number, y: number): void {
     this.plane.position.set(x, y, 0)
     this.shade.position.set(x, y, 0.5 * LIFT * this.extent.span)
@@ -133,7 +133,7 @@ export class Ground {
     const count = Math.min(MOST_LABELS, Math.ceil(this.length / every) + 1)
     for (let k = 0; k <= count; k++) {
       const label = lyingText(`${(k * every).toFixed(digits)} m`, colour, TEXT * span)
-      label.position.set(k * every, this.beside, LIFT * span)
+      label.position.set(k * every, this.labelOffset, LIFT * span)
       this.labels.add(label)
     }
   }

@@ -1,4 +1,4 @@
-/** Text in a scene. */
+/** Text labels in a scene. */
 
 import {
   CanvasTexture,
@@ -12,7 +12,6 @@ import {
 
 const PIXELS = 64
 
-/** A picture of a line of text. */
 export function textTexture(text: string, colour: string): CanvasTexture {
   const canvas = document.createElement('canvas')
   const context = canvas.getContext('2d')!
@@ -31,14 +30,14 @@ export function textTexture(text: string, colour: string): CanvasTexture {
   return texture
 }
 
-/** Text that lies on the ground, to be read from the side of negative y. height: [m]. */
+/** Text lying on the ground, readable from negative y. height: [m]. */
 export function lyingText(text: string, colour: string, height: number) {
   const map = textTexture(text, colour)
   const material = new MeshBasicMaterial({ map, transparent: true, depthWrite: false })
   return new Mesh(new PlaneGeometry(height * proportion(map), height), material)
 }
 
-/** Text that faces the camera. height: [m]. */
+/** Text facing the camera. height: [m]. */
 export function facingText(text: string, colour: string, height: number): Sprite {
   const map = textTexture(text, colour)
   const sprite = new Sprite(new SpriteMaterial({ map, depthTest: false }))
@@ -46,7 +45,7 @@ export function facingText(text: string, colour: string, height: number): Sprite
   return sprite
 }
 
-/** Width over height of a texture. */
+/** Aspect ratio of a texture. */
 export function proportion(texture: CanvasTexture): number {
   return texture.image.width / texture.image.height
 }

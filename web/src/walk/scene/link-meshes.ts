@@ -1,4 +1,4 @@
-/** Meshes of a robot's links, read by three's own loaders; loaded with the first robot that has any. */
+/** Loads meshes of a robot's links; three's loaders are imported on demand. */
 
 import {
   type BufferGeometry,
@@ -23,30 +23,30 @@ export interface LoadedMesh {
   readonly object: Object3D
 }
 
-/** Where neither URDF nor file says a colour. */
+/** Colour if neither URDF nor file specifies one. */
 const PLAIN = 0xb8bec2
 
 type Format = 'stl' | 'obj' | 'dae'
 
-/** Meshes that the server has of a robot, each as a new object; those that cannot be read are left out. */
+/** Load the meshes that the server has for a robot; invalid ones are skipped. */
 export async function meshesOf(
   { urdf, links }: ReplayHeader['robot'],
   signal: AbortSignal,
 ): Promise<LoadedMesh[]> {
   if (urdf === null) return []
   const { items } = await get('/v1/robots/{digest}/meshes', { path: { digest: urdf }, signal })
-  const known = new Map(items.map((item) => [item.name, item]))
+  const available = new Map(items.map((item) => [item.name, item]))
   const texts = new Map<string, Promise<ArrayBuffer>>()
   const loaded = links.flatMap(({ meshes }, link) =>
     meshes.map(async (mesh): Promise<LoadedMesh | null> => {
-      const { url = null, format = null } = known.get(mesh.name) ?? {}
+      const { url = null, format = null } = available.get(mesh.name) ?? {}
       if (url === null || format === null) return null
       if (!texts.has(url)) texts.set(url, bytesOf(url, signal))
       try {
         return { link, object: placed(parsed(await texts.get(url)!, format), mesh) }
       } catch (error) {
         if (signal.aborted) throw error
-        // The link keeps its simple solids.
+        // The link keeps its simplified shape.
         return null
       }
     }),
@@ -60,7 +60,7 @@ async function bytesOf(url: string, signal: AbortSignal): Promise<ArrayBuffer> {
   return answer.arrayBuffer()
 }
 
-/** What a file shows, without its textures, cameras and lights. Throws where it shows nothing. */
+/** Parse a file, without textures, cameras and lights. Throws if there is no mesh. */
 export function parsed(bytes: ArrayBuffer, format: Format): Object3D {
   const read = readers[format](bytes)
   const root = new Group()
@@ -68,15 +68,15 @@ export function parsed(bytes: ArrayBuffer, format: Format): Object3D {
   read.traverse((object) => {
     if (!(object instanceof Mesh)) return
     const geometry: BufferGeometry = object.geometry.clone().applyMatrix4(object.matrixWorld)
-    // Many an STL has normals of no length.
+    // STL files often have zero normals.
     if (format === 'stl' || !geometry.hasAttribute('normal')) geometry.computeVertexNormals()
-    const [own] = [object.material].flat() as { color?: Color }[]
+    const [original] = [object.material].flat() as { color?: Color }[]
     const material = new MeshStandardMaterial({ roughness: 0.55, metalness: 0.15, color: PLAIN })
-    if (format === 'dae' && own?.color) material.color.copy(own.color)
+    if (format === 'dae' && original?.color) material.color.copy(original.color)
     root.add(new Mesh(geometry, material))
   })
   disposeTree(read)
-  if (root.children.length === 0) throw new Error('there is no mesh in it')
+  if (root.children.length === 0) throw new Error('the file contains no mesh')
   return root
 }
 
@@ -85,14 +85,14 @@ const readers: Readonly<Record<Format, (bytes: ArrayBuffer) => Object3D>> = {
   obj: (bytes) => new OBJLoader(alone()).parse(text(bytes)),
   dae: (bytes) => {
     const scene = new ColladaLoader(alone()).parse(text(bytes), '')?.scene
-    if (!scene) throw new Error('it is no COLLADA file')
-    // In a URDF a file's axes are as they are; the loader has turned z upwards to y.
+    if (!scene) throw new Error('not a COLLADA file')
+    // URDF uses the file's axes as they are; the loader has converted z-up to y-up.
     scene.quaternion.identity()
     return scene
   },
 }
 
-/** Asks the server for nothing more, as textures. */
+/** A manager that loads no further files, such as textures. */
 function alone(): LoadingManager {
   const manager = new LoadingManager()
   manager.setURLModifier(() => 'data:,')
@@ -103,7 +103,7 @@ function text(bytes: ArrayBuffer): string {
   return new TextDecoder().decode(bytes)
 }
 
-/** Where the link has it, as large and in the colour that the URDF says. */
+/** Apply the URDF's origin, scale and colour. */
 function placed(object: Object3D, { origin, scale, colour }: LinkMesh): Object3D {
   const [x, y, z, qx, qy, qz, qw] = origin
   object.position.set(x, y, z)

@@ -1,4 +1,4 @@
-/** Colours of the scene, from the page's own. */
+/** Colours of the scene, derived from the page's. */
 
 import { Color } from 'three'
 import { currentTheme, themeColour } from '../../theme'
@@ -15,7 +15,7 @@ export interface Palette {
   readonly walks: readonly FigurePalette[]
 }
 
-/** Colours of one robot. accent tells whose walk it is, as in the charts. */
+/** Colours of one robot. accent: identifies the walk, as in the charts. */
 export interface FigurePalette {
   readonly accent: Color
   readonly frame: Color
@@ -47,7 +47,7 @@ export function palette(): Palette {
 }
 
 function colour(name: `--${string}`): Color {
-  // three reads rgb(1, 2, 3) only, browsers may write color(srgb ...) or rgb(1 2 3).
+  // three parses only rgb(1, 2, 3), but browsers may write color(srgb ...) or rgb(1 2 3).
   const [r, g, b] = (themeColour(name).match(/[\d.]+/g) ?? ['128', '128', '128']).map(Number)
   return new Color(`rgb(${Math.round(r)}, ${Math.round(g)}, ${Math.round(b)})`)
 }

@@ -1,11 +1,11 @@
-/** The renderer, plainer where the machine draws without a graphics card. */
+/** WebGL renderer with reduced quality on software rendering. */
 
 import { PCFShadowMap, WebGLRenderer } from 'three'
 
-/** Names of drivers that compute pictures on the processor. */
+/** Names of software renderers. */
 const SOFTWARE = /swiftshader|llvmpipe|software|basic render/i
 
-/** Throws where there is no WebGL 2. */
+/** Throws without WebGL 2. */
 export function createRenderer(): WebGLRenderer {
   const plain = isSoftware()
   const renderer = new WebGLRenderer({ antialias: !plain, powerPreference: 'low-power' })
@@ -15,10 +15,10 @@ export function createRenderer(): WebGLRenderer {
   return renderer
 }
 
-/** Asked of a context of its own, which is given back at once. */
+/** Queried from a temporary context. */
 function isSoftware(): boolean {
   const context = document.createElement('canvas').getContext('webgl2')
-  if (!context) throw new Error('This browser gives no WebGL 2.')
+  if (!context) throw new Error('This browser does not support WebGL 2.')
   const info = context.getExtension('WEBGL_debug_renderer_info')
   const name = info ? context.getParameter(info.UNMASKED_RENDERER_WEBGL) : ''
   context.getExtension('WEBGL_lose_context')?.loseContext()

@@ -1,4 +1,4 @@
-/** A robot as it is seen: solids on its links, put where the recording says. */
+/** Robot of a scene: shapes or meshes on its links. */
 
 import {
   BoxGeometry,
@@ -17,7 +17,7 @@ import { POSE, samplePoses } from '../replay/pose'
 import type { Replay, Role, Shape } from '../replay/replay'
 import type { FigurePalette, Palette } from './palette'
 
-/** Parts of one colour. */
+/** Parts with a common colour. */
 type Part = 'frame' | 'accent' | 'limb' | 'joint' | 'load'
 
 const PARTS: Readonly<Record<Role, Part>> = {
@@ -29,7 +29,7 @@ const PARTS: Readonly<Record<Role, Part>> = {
   load: 'load',
 }
 
-/** Opacity of a walk that is shown behind another one. */
+/** Opacity of the ghost walk. */
 const GHOST = 0.38
 
 export class RobotFigure {
@@ -43,7 +43,7 @@ export class RobotFigure {
     load: new MeshStandardMaterial({ roughness: 0.8 }),
   }
   private readonly poses: Float32Array
-  /** By link: its simple solids, but for a load, and the meshes that can be seen in their place. */
+  /** By link: its simplified shapes except loads, and the meshes that replace them. */
   private readonly solids: Object3D[][] = []
   private readonly meshes: Object3D[][] = []
   private ghost = false
@@ -66,7 +66,7 @@ export class RobotFigure {
     }
   }
 
-  /** Put every link where it was at a time [s]. */
+  /** Move the links to a time [s]. */
   show(time: number): void {
     samplePoses(this.replay, time, this.poses)
     this.links.forEach((link, k) => {
@@ -76,17 +76,17 @@ export class RobotFigure {
     })
   }
 
-  /** Where the body is now in the world [m]. */
+  /** Position of the body in the world [m]. */
   get body(): readonly [number, number, number] {
     return [this.poses[0], this.poses[1], this.poses[2]]
   }
 
-  recolour(colours: Palette, own: FigurePalette): void {
-    const each: Record<Part, Color> = { ...own, load: colours.load }
+  recolour(palette: Palette, colours: FigurePalette): void {
+    const each: Record<Part, Color> = { ...colours, load: palette.load }
     for (const part of Object.keys(each) as Part[]) this.materials[part].color.copy(each[part])
   }
 
-  /** Let what is behind shine through, or not. */
+  /** Make the robot transparent or opaque. */
   setGhost(ghost: boolean): void {
     this.ghost = ghost
     for (const material of [...Object.values(this.materials), ...this.meshMaterials()]) {
@@ -97,14 +97,14 @@ export class RobotFigure {
     })
   }
 
-  /** Show a link by a mesh as well; the object is given away. */
+  /** Add a mesh to a link; takes ownership of the object. */
   addMesh(link: number, object: Object3D): void {
     this.links[link].add(object)
     this.meshes[link].push(object)
     for (const material of this.meshMaterials()) makeGhost(material, this.ghost)
   }
 
-  /** Links by their meshes, where they have any, or all by simple solids. */
+  /** Show meshes where available, or simplified shapes. */
   showMeshes(shown: boolean): void {
     this.meshes.forEach((meshes, link) => {
       for (const mesh of meshes) mesh.visible = shown
@@ -113,13 +113,13 @@ export class RobotFigure {
   }
 
   private meshMaterials(): MeshStandardMaterial[] {
-    const found: MeshStandardMaterial[] = []
+    const materials: MeshStandardMaterial[] = []
     for (const mesh of this.meshes.flat()) {
       mesh.traverse((object) => {
-        if (object instanceof Mesh) found.push(object.material)
+        if (object instanceof Mesh) materials.push(object.material)
       })
     }
-    return found
+    return materials
   }
 
   private addShape(link: Group, shape: Shape): void {
@@ -130,12 +130,12 @@ export class RobotFigure {
     link.add(solid)
     if (shape.type === 'box' && shape.role === 'body') this.markFront(solid, shape.size)
     if (shape.type === 'capsule') {
-      // A hub where the joint turns tells one limb from the next.
+      // A hub at the joint separates the limbs visually.
       link.add(this.mesh(new SphereGeometry(shape.size[0] * 1.18, 24, 16), 'joint'))
     }
   }
 
-  /** A stripe over the front edge: which way is ahead. */
+  /** Add a stripe that marks the front. */
   private markFront(body: Mesh, [length, width, height]: readonly number[]): void {
     const stripe = this.mesh(new BoxGeometry(0.16 * length, 0.62 * width, 0.02 * height), 'accent')
     stripe.position.set(0.34 * length, 0, 0.51 * height)
@@ -154,7 +154,7 @@ function makeGhost(material: MeshStandardMaterial, ghost: boolean): void {
   material.transparent = ghost
   material.opacity = ghost ? GHOST : 1
   material.depthWrite = !ghost
-  // Where both robots are at the same place, the first one is seen.
+  // At equal depth, the first robot is visible.
   material.polygonOffset = ghost
   material.polygonOffsetFactor = 2
   material.polygonOffsetUnits = 40

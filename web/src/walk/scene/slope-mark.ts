@@ -1,4 +1,4 @@
-/** How steep the ground is: a level line, a plumb line and the angle between ground and level. */
+/** Mark of the ground's slope: horizontal line, plumb line and angle. */
 
 import {
   BufferGeometry,
@@ -15,19 +15,19 @@ import { proportion, textTexture } from './label'
 
 type Ground = Replay['header']['ground']
 
-/** Of the level line, and of the arc about its end, in spans of the robot. */
+/** Length of the horizontal line, and radius of the arc, in spans of the robot. */
 const LENGTH = 1.13
 const RADIUS = 0.79
 
-/** Of the number of degrees, and how far it is from the arc, in spans. */
+/** Height of the angle's label, and its distance from the arc, in spans. */
 const HEIGHT = 0.104
 const INSIDE = 0.17
 
 export class SlopeMark {
-  /** Stands on the level, so it belongs to the scene, not to the tilted ground. */
+  /** Horizontal, hence part of the scene, not of the tilted ground. */
   readonly object = new Group()
   private readonly material = new LineBasicMaterial({ depthTest: false })
-  /** Where the angle is, from what is looked at [m]. */
+  /** Position of the corner relative to the camera's target [m]. */
   private readonly corner = new Vector3()
   private readonly label = new Sprite(
     new SpriteMaterial({ depthTest: false, transparent: false, alphaTest: 0.4 }),
@@ -35,9 +35,9 @@ export class SlopeMark {
 
   constructor(
     private readonly degrees: number,
-    /** Up the ground, a unit vector of the scene. */
+    /** Uphill unit vector in the scene's frame. */
     uphill: Vector3,
-    /** Of the robot [m]. */
+    /** Span of the robot [m]. */
     private readonly span: number,
   ) {
     const level = uphill.clone().setZ(0).normalize()
@@ -51,16 +51,16 @@ export class SlopeMark {
     this.object.add(this.line([top, new Vector3(), base, top]), this.line(arc))
     this.label.position.copy(direction(angle / 2).multiplyScalar((RADIUS - INSIDE) * span))
     this.object.add(this.label)
-    // The level lies under the ground: over it, but behind robots.
+    // The horizontal line is below the ground: draw it above, but behind robots.
     for (const part of this.object.children) part.renderOrder = -1
   }
 
-  /** Put the angle there, from what is looked at [m]. */
+  /** Set the position of the corner relative to the target [m]. */
   placeAt(corner: Vector3): void {
     this.corner.copy(corner)
   }
 
-  /** Stay beside what is looked at. */
+  /** Follow the target. */
   moveTo(target: Vector3): void {
     this.object.position.addVectors(target, this.corner)
   }
@@ -80,14 +80,13 @@ export class SlopeMark {
   }
 }
 
-/** None on level ground. tilt: from the ground's world to the scene. */
+/** Null on level ground. tilt: rotation from the ground's frame to the scene's. */
 export function slopeMark(ground: Ground, tilt: Quaternion, span: number): SlopeMark | null {
   if (ground.slope_deg === 0) return null
   return new SlopeMark(ground.slope_deg, uphill(ground).applyQuaternion(tilt), span)
 }
 
-/** Where the mark stands clear of the robots, from what is looked at, in the ground's world [m]; foot: the
- * height of the ground's marks over that. */
+/** Position of the mark clear of the robots, relative to the target, in the ground's frame [m]. */
 export function slopeCorner(ground: Ground, room: number, span: number, foot: number): Vector3 {
   const rises = uphill(ground)
   return new Vector3(-rises.y, rises.x, 0)
@@ -96,7 +95,7 @@ export function slopeCorner(ground: Ground, room: number, span: number, foot: nu
     .setZ(foot)
 }
 
-/** Up the ground, in the ground's world. */
+/** Uphill direction in the ground's frame. */
 function uphill({ slope_deg, slope_direction_deg }: Ground): Vector3 {
   const direction = (slope_direction_deg * Math.PI) / 180
   const rises = new Vector3(Math.cos(direction), Math.sin(direction), 0)

@@ -1,4 +1,4 @@
-/** The way that the body came. */
+/** Path of the body. */
 
 import { BufferAttribute, BufferGeometry, type Color, Line, LineBasicMaterial } from 'three'
 import type { Replay } from '../replay/replay'
@@ -14,7 +14,7 @@ export class Trail {
     const geometry = new BufferGeometry()
     geometry.setAttribute('position', new BufferAttribute(points, 3))
     this.object = new Line(geometry, new LineBasicMaterial())
-    // The part that is drawn changes, so its bounds would have to.
+    // The drawn range changes, and so would the bounds.
     this.object.frustumCulled = false
   }
 

@@ -1,4 +1,4 @@
-/** One walk or two in three dimensions: everything that is drawn, and the moment that it shows. */
+/** Scene with one or two walks. */
 
 import {
   DirectionalLight,
@@ -21,37 +21,37 @@ import { RobotFigure } from './robot-figure'
 import { type SlopeMark, slopeCorner, slopeMark } from './slope-mark'
 import { Trail } from './trail'
 
-type Arrangement = 'ghost' | 'beside'
+type Arrangement = 'ghost' | 'side-by-side'
 
 export interface SceneOptions {
   readonly arrangement: Arrangement
   readonly follow: boolean
   readonly forces: boolean
   readonly trail: boolean
-  /** Links by the URDF's meshes, where they were loaded, or by simple solids. */
+  /** Show the URDF's meshes if loaded, instead of simplified shapes. */
   readonly meshes: boolean
 }
 
-/** Distance between two robots side by side, in widths of one. */
-const BESIDE = 1.55
+/** Distance between robots side by side, in widths. */
+const SPACING = 1.55
 
-/** Height over the ground that is looked at, in heights of the robot. */
+/** Height of the target above the ground, in heights of the robot. */
 const MIDDLE = 0.45
 
-/** Half the height that the camera shows of one robot, in spans, and what it shows more of two
- * side by side, in distances between them. */
+/** Half the visible height for one robot, in spans, and its increase for two side by side, in distances
+ * between them. */
 const REACH = 0.58
-const REACH_BESIDE = 0.32
+const REACH_SIDE_BY_SIDE = 0.32
 
-/** Where labels stand, and marks of slopes, from the middle of a robot, in widths. */
+/** Lateral positions of labels and of slope marks, in widths. */
 const LABELS = 0.78
 const SLOPE = 0.7
 
-/** Height of the first walk's marks of feet, and how much lower the second's are, in spans. */
+/** Elevation of the first walk's foot marks, and by how much the second's are lower, in spans. */
 const MARKS = 0.006
 const MARKS_LOWER = 0.002
 
-/** Where the light comes from, and half the edge of what has a shadow, in spans. */
+/** Direction of the light, and half the edge of the shadow area, in spans. */
 const LIGHT = new Vector3(1.3, -2.1, 4.2)
 const SHADED = 1.7
 const DOWN = new Vector3(0, 0, -1)
@@ -69,7 +69,7 @@ interface Lane {
 export class WalkScene {
   private readonly renderer: WebGLRenderer
   private readonly scene = new Scene()
-  /** The ground's world, tilted so that gravity points down. */
+  /** The ground's frame, tilted so that gravity points down. */
   private readonly world = new Group()
   private readonly lanes: readonly Lane[]
   private readonly ground: Ground
@@ -78,12 +78,12 @@ export class WalkScene {
   private readonly sun = new DirectionalLight(0xffffff, 2.4)
   private readonly rig: CameraRig
   private readonly centre = new Vector3()
-  /** Pixels of a picture for one of the page. */
+  /** Device pixels per CSS pixel. */
   private readonly density: number
   private shownSize: Size = [1, 1]
   private filmSize: Size | null = null
 
-  /** newtons: an arrow's for one cell of the grid; onChange: something else is to be drawn. */
+  /** newtons: force of an arrow per grid cell; onChange: requests a redraw. */
   constructor(
     replays: readonly Replay[],
     private readonly extent: Extent,
@@ -104,7 +104,7 @@ export class WalkScene {
     const length = Math.max(...replays.map((r) => r.value('link_pose', r.frames - 1, 0)))
     this.ground = new Ground(
       length,
-      -LABELS * width - (replays.length > 1 ? this.beside / 2 : 0),
+      -LABELS * width - (replays.length > 1 ? this.spacing / 2 : 0),
       extent,
       this.renderer.shadowMap.enabled,
     )
@@ -120,12 +120,12 @@ export class WalkScene {
     this.rig.look('three-quarter')
   }
 
-  /** Distance between two robots side by side [m]. */
-  private get beside(): number {
-    return BESIDE * this.extent.width
+  /** Distance between robots side by side [m]. */
+  private get spacing(): number {
+    return SPACING * this.extent.width
   }
 
-  /** Height over the ground that is looked at [m]. */
+  /** Height of the target above the ground [m]. */
   private get middle(): number {
     return MIDDLE * this.extent.height
   }
@@ -134,12 +134,12 @@ export class WalkScene {
     return this.renderer.domElement
   }
 
-  /** Geometries in the graphics memory, which must not grow while a walk plays. */
+  /** Geometries in GPU memory; must not grow during playback. */
   get geometries(): number {
     return this.renderer.info.memory.geometries
   }
 
-  /** Put everything where it was at a time [s]; a walk that ended stays at its end. */
+  /** Show a time [s]; a finished walk stays at its end. */
   show(time: number): void {
     this.centre.set(0, 0, 0)
     for (const { figure, feet, trail, group } of this.lanes) {
@@ -151,7 +151,7 @@ export class WalkScene {
       this.centre.y += (y + group.position.y) / this.lanes.length
     }
     this.ground.moveTo(this.centre.x, this.centre.y)
-    // Not the body itself: its own rise and fall is to be seen.
+    // Constant, so that the body's vertical movement is visible.
     this.centre.z = this.middle
     this.world.localToWorld(this.centre)
     this.slope?.moveTo(this.centre)
@@ -161,53 +161,53 @@ export class WalkScene {
   }
 
   setOptions(options: SceneOptions): void {
-    const beside = options.arrangement === 'beside' && this.lanes.length > 1
+    const sideBySide = options.arrangement === 'side-by-side' && this.lanes.length > 1
     this.lanes.forEach(({ group, figure, feet, trail }, k) => {
-      group.position.y = beside ? (k - 0.5) * this.beside : 0
-      figure.setGhost(k > 0 && !beside)
+      group.position.y = sideBySide ? (k - 0.5) * this.spacing : 0
+      figure.setGhost(k > 0 && !sideBySide)
       figure.showMeshes(options.meshes)
-      feet.setForces(options.forces && (beside || k === 0))
+      feet.setForces(options.forces && (sideBySide || k === 0))
       trail.object.visible = options.trail
     })
     const { ground } = this.lanes[0].replay.header
-    const room = SLOPE * this.extent.width + (beside ? this.beside / 2 : 0)
+    const room = SLOPE * this.extent.width + (sideBySide ? this.spacing / 2 : 0)
     const foot = MARKS * this.extent.span - this.middle
     const corner = slopeCorner(ground, room, this.extent.span, foot)
     this.slope?.placeAt(corner.applyQuaternion(this.world.quaternion))
     this.slope?.moveTo(this.centre)
     this.rig.follow = options.follow
-    const reach = REACH * this.extent.span + (beside ? REACH_BESIDE * this.beside : 0)
+    const reach = REACH * this.extent.span + (sideBySide ? REACH_SIDE_BY_SIDE * this.spacing : 0)
     if (reach === this.rig.reach) return
     this.rig.reach = reach
     this.rig.look('three-quarter')
   }
 
-  /** Load the meshes of the robots; how many there are now. Throws what a browser says. */
+  /** Load the robots' meshes; returns their number. */
   async loadMeshes(shown: () => boolean, signal: AbortSignal): Promise<number> {
     let count = 0
     for (const { replay, figure } of this.lanes) {
       if (!hasMeshes(replay.header)) continue
       const { meshesOf } = await import('./link-meshes')
-      const found = await meshesOf(replay.header.robot, signal)
+      const loaded = await meshesOf(replay.header.robot, signal)
       signal.throwIfAborted()
-      for (const { link, object } of found) figure.addMesh(link, object)
+      for (const { link, object } of loaded) figure.addMesh(link, object)
       figure.showMeshes(shown())
-      count += found.length
+      count += loaded.length
     }
     return count
   }
 
-  /** Take over the page's colours. */
+  /** Apply the page's colours. */
   recolour(): void {
     const colours = palette()
     this.scene.background = colours.background
     this.ground.recolour(colours)
     this.slope?.recolour(colours.text)
     this.lanes.forEach(({ figure, feet, trail }, k) => {
-      const own = colours.walks[k]
-      figure.recolour(colours, own)
-      feet.recolour(colours, own.accent)
-      trail.recolour(own.accent)
+      const walkColours = colours.walks[k]
+      figure.recolour(colours, walkColours)
+      feet.recolour(colours, walkColours.accent)
+      trail.recolour(walkColours.accent)
     })
   }
 
@@ -215,7 +215,7 @@ export class WalkScene {
     this.rig.look(from)
   }
 
-  /** place: of the camera at first, null for the usual one; onPlaced: is told where it was put later. */
+  /** place: initial camera, null for the default view; onPlaced: called when the user moves it. */
   placeCamera(place: CameraPlace | null, onPlaced: (place: CameraPlace | null) => void): void {
     if (place === null) this.rig.look('three-quarter')
     else this.rig.place = place
@@ -235,24 +235,24 @@ export class WalkScene {
     this.fit()
   }
 
-  /** Draw pictures of this size [px], which the page scales to its own; null: in the page's own. */
+  /** Render at this size [px], scaled to the canvas; null for the canvas's size. */
   film(size: Size | null): void {
     this.filmSize = size
     this.fit()
     this.render()
   }
 
-  /** What is seen now, as a PNG of this size [px]. */
+  /** Current view as a PNG of this size [px]. */
   picture(size: Size): Promise<Blob> {
     this.film(size)
-    // The pixels are taken before the page draws again.
-    const taken = new Promise<Blob>((done, fail) =>
+    // Pixels are captured before the next redraw.
+    const png = new Promise<Blob>((done, fail) =>
       this.canvas.toBlob((blob) =>
-        blob ? done(blob) : fail(new Error('The browser makes no picture of this size.')),
+        blob ? done(blob) : fail(new Error('The browser cannot create a picture of this size.')),
       ),
     )
     this.film(null)
-    return taken
+    return png
   }
 
   render(): void {
@@ -260,7 +260,7 @@ export class WalkScene {
     this.renderer.render(this.scene, this.rig.camera)
   }
 
-  /** Give everything back; the scene cannot be used again. */
+  /** Release all resources; the scene cannot be used afterwards. */
   dispose(): void {
     this.rig.dispose()
     disposeTree(this.scene)

@@ -2,7 +2,7 @@ import { expect, test } from 'vitest'
 import { isolinesOf } from '../../../src/charts/pair/isolines'
 import { CELLS } from '../../../src/charts/pair/pair-model'
 
-/** A cell for each value; null: of designs that all failed. */
+/** One cell per value; null for cells in which all designs failed. */
 function cellsFrom(rows: readonly (readonly (number | null)[])[]) {
   return rows.flatMap((values, row) =>
     values.map((bucket, column) => ({ column, row, designs: 1, bucket })),
@@ -11,7 +11,7 @@ function cellsFrom(rows: readonly (readonly (number | null)[])[]) {
 
 const middle = (at: number) => (at + 0.5) / CELLS
 
-test('an isoline lies where means between the middles of cells come to its level', () => {
+test('an isoline is interpolated between the centres of cells', () => {
   const slope = cellsFrom([
     [0, 4, 8],
     [0, 4, 8],
@@ -24,7 +24,7 @@ test('an isoline lies where means between the middles of cells come to its level
   expect(line.pieces[0].map(([, y]) => y).toSorted()).toEqual([middle(0), middle(1)])
 })
 
-test('nothing is guessed where a cell has no mean, nor from one edge to the other', () => {
+test('there is no isoline next to cells without a mean, nor across the edges of the grid', () => {
   const hole = cellsFrom([
     [0, 4],
     [0, null],
@@ -39,7 +39,7 @@ test('nothing is guessed where a cell has no mean, nor from one edge to the othe
   expect(isolinesOf(ends, [5])).toEqual([])
 })
 
-test('a saddle has two pieces, around the corners that its middle cuts off', () => {
+test('a saddle has two segments, around the corners that its mean separates', () => {
   const saddle = (level: number) =>
     isolinesOf(
       cellsFrom([
@@ -48,7 +48,7 @@ test('a saddle has two pieces, around the corners that its middle cuts off', () 
       ]),
       [level],
     )[0].pieces
-  // Low in the middle: each high corner has a piece of its own; else each low one.
+  // With a low mean, each segment surrounds a high corner; otherwise a low one.
   const nearest = (level: number) =>
     saddle(level).map((piece) => {
       const [x, y] = [0, 1].map((k) => (piece[0][k] + piece[1][k]) / 2)

@@ -19,7 +19,7 @@ const source = (name: string, values: number[]) => ({
   values: Float32Array.from(values),
 })
 
-// Two designs in one corner, one in the other, one that fails.
+// Two designs in one corner, one in the opposite corner, and a failed one.
 const model = buildModel(
   [source('a', [0, 0.1, 10, 5]), source('b', [0, 0.1, 10, 5])],
   Float32Array.from([1, 2, 3, Number.NaN]),
@@ -27,7 +27,7 @@ const model = buildModel(
 const all = selectRows(model, new Map())
 
 describe('two axes', () => {
-  test('are cut into cells with the mean rank of their designs', () => {
+  test('are divided into cells with the mean rank of their designs', () => {
     const cells = cellsOf(model, all, 0, 1)
     expect(cells).toHaveLength(3)
     const at = (cell: number) => cells.find(({ column, row }) => column === cell && row === cell)!
@@ -36,7 +36,7 @@ describe('two axes', () => {
     expect(at(CELLS / 2).bucket).toBeNull()
   })
 
-  test('are marked at round numbers, or with the names of choices', () => {
+  test('have ticks at round numbers, or at the names of choices', () => {
     expect(ticksOf(model.axes[0]).map(({ text }) => text)).toEqual(['0', '2', '4', '6', '8', '10'])
     const laws = { ...model.axes[0], high: 1, choices: ['dead_zone', 'stick'] }
     expect(ticksOf(laws)).toEqual([
@@ -47,7 +47,7 @@ describe('two axes', () => {
     expect(ticksOf(decades).every(({ place }) => place >= 0 && place <= 1)).toBe(true)
   })
 
-  test('tell what is at a place: the nearest design, or the cell', () => {
+  test('describe the nearest design or the cell at a position', () => {
     const at = (place: number, asCells: boolean) =>
       placeInWords(model, all, [0, 1], [place, place], { asCells, reach: 0.05 })
     expect(at(1, false)).toBe('a 10  ·  b 10  ·  fitness 3.0000')
@@ -56,7 +56,7 @@ describe('two axes', () => {
     expect(at(0.5, true)).toContain('all failed')
   })
 
-  test('have a drag select the box between its ends, whatever its direction', () => {
+  test('a drag in any direction selects the box between its ends', () => {
     expect(dragged([0.8, 0.2], [0.5, 0.6])).toEqual([
       [0.5, 0.8],
       [0.2, 0.6],
@@ -67,7 +67,7 @@ describe('two axes', () => {
     ])
   })
 
-  test('have the nearest design chosen, if it is near enough', () => {
+  test('the nearest design within reach is chosen', () => {
     expect(nearestRow(model, all, [0, 1], [0.98, 0.98], 0.1)).toBe(2)
     expect(nearestRow(model, all, [0, 1], [0.75, 0.2], 0.1)).toBeNull()
   })

@@ -10,20 +10,20 @@ import {
 const BOX = { left: 10, top: 20, width: 100, height: 200 }
 
 describe('an axis of a scatter chart', () => {
-  test('shows every value that is finite, with room beside them', () => {
+  test('spans all finite values with a margin', () => {
     const axis = axisOf([[2, Number.NaN], Float32Array.from([4, 3])], false)
     expect([axis.low, axis.high]).toEqual([1.9, 4.1])
     expect(axis.ticks).toContain(3)
   })
 
-  test('is logarithmic where all values are positive, and linear where one is not', () => {
+  test('is logarithmic only if all values are positive', () => {
     const axis = axisOf([[1, 100]], true)
     expect(axis.logarithmic).toBe(true)
     expect(shareOf(axis, 10)).toBeCloseTo(0.5)
     expect(axisOf([[0, 100]], true).logarithmic).toBe(false)
   })
 
-  test('is there for one value, and for none', () => {
+  test('is defined for one value and for none', () => {
     const one = axisOf([[5]], false)
     expect(one.low).toBeLessThan(5)
     expect(one.high).toBeGreaterThan(5)
@@ -31,13 +31,13 @@ describe('an axis of a scatter chart', () => {
   })
 })
 
-test('points lie in the box, greater ones further right and up', () => {
+test('greater values are further right and up', () => {
   const axis = { low: 0, high: 10, logarithmic: false, ticks: [] }
   expect(placeIn(BOX, axis, axis, 0, 0)).toEqual([10, 220])
   expect(placeIn(BOX, axis, axis, 10, 10)).toEqual([110, 20])
 })
 
-test('a click means the nearest point within reach', () => {
+test('a click chooses the nearest point within reach', () => {
   const places = [
     [0, 0],
     [10, 0],
@@ -47,22 +47,22 @@ test('a click means the nearest point within reach', () => {
   expect(nearest([[Number.NaN, 0]], [0, 0], 24)).toBeNull()
 })
 
-describe('names of points', () => {
+describe('labels of points', () => {
   const named = (x: number, y: number) => ({ at: [x, y] as const, width: 30 })
 
-  test('stand beside their point, on the other side where the box ends', () => {
+  test('are next to their point, on the other side at the edge of the box', () => {
     const [inner, edge] = placeNames([named(20, 100), named(100, 100)], BOX, 10, 5)
     expect(inner).toEqual([25, 100])
     expect(edge).toEqual([65, 100])
   })
 
-  test('keep clear of each other', () => {
+  test('do not overlap', () => {
     const [first, second] = placeNames([named(50, 100), named(50, 100)], BOX, 10, 5)
     expect(first).toEqual([55, 100])
     expect(second).toEqual([15, 100])
   })
 
-  test('are left out where there is no room', () => {
+  test('are omitted if there is no space', () => {
     const crowd = Array.from({ length: 30 }, () => named(50, 100))
     expect(placeNames(crowd, BOX, 10, 5)).toContain(null)
   })

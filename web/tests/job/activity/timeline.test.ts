@@ -15,7 +15,7 @@ const task = (worker: string, begun: number, seconds: number, more: object = {})
   ...more,
 })
 
-test('tasks of a machine that overlap lie below each other, others in one line', () => {
+test('overlapping tasks of a machine go to separate lanes, others share one', () => {
   const activity = {
     tasks: [task('b', 0, 2), task('a', 1, 1), task('b', 1, 2), task('b', 2, 1)],
     iterations: [
@@ -29,11 +29,11 @@ test('tasks of a machine that overlap lie below each other, others in one line',
     ['b', [2, 1]],
   ])
   expect(seconds).toBe(3)
-  expect(iterations).toEqual([{ iteration: 1, begun: 1.5 }])
-  expect(workers[0].lanes[0][0]).toMatchObject({ begun: 1, ended: 2, computed: 0.5 })
+  expect(iterations).toEqual([{ iteration: 1, start: 1.5 }])
+  expect(workers[0].lanes[0][0]).toMatchObject({ start: 1, end: 2, computed: 0.5 })
 })
 
-test('only the last tasks are shown, and none is no error', () => {
+test('only the last tasks are shown, and there may be none', () => {
   const many = { tasks: [task('a', 0, 1), task('a', 5, 1)], iterations: [] } as unknown as Activity
   expect(timelineOf(many, 1).seconds).toBe(1)
   const none = { tasks: [], iterations: [] } as unknown as Activity

@@ -22,14 +22,14 @@ const designs: Particles = {
   ],
 }
 
-test('a selection means the same designs wherever its address is read', () => {
+test('a selection in the address means the same designs in every tab', () => {
   const rows = (words: string | null) => {
-    const found = selectedRows(designs, words)
-    return found && [...found].sort()
+    const selected = selectedRows(designs, words)
+    return selected && [...selected].sort()
   }
   expect(rows('P:4:10')).toEqual([1, 2])
   expect(rows('P:4:10,energy:15:25')).toEqual([1])
-  // Without a stretch that can be read nothing stands out.
+  // Invalid ranges select nothing.
   expect(rows('none:1:2')).toBeNull()
   expect(rows(null)).toBeNull()
 })

@@ -2,7 +2,7 @@ import { beforeEach, describe, expect, test } from 'vitest'
 import type { Iteration } from '../../../src/api/types'
 import { EventStream, type Followed, type Source } from '../../../src/job/live/event-stream'
 
-/** A stream whose events the test sends. */
+/** A stream whose events are sent by the test. */
 class FakeSource implements Source {
   closed = false
   private listeners = new Map<string, (event: MessageEvent<string>) => void>()
@@ -22,7 +22,7 @@ class FakeSource implements Source {
   }
 }
 
-/** A clock that the test moves. */
+/** A clock advanced by the test. */
 class FakeClock {
   now = 1000
   private due: { at: number; call: () => void }[] = []
@@ -50,17 +50,17 @@ class FakeClock {
 
 let clock: FakeClock
 let sources: FakeSource[]
-let told: Followed | null
+let latest: Followed | null
 let stream: EventStream
 
 const source = () => sources.at(-1)!
 const iteration = (index: number) => ({ index, best: 1 }) as Iteration
-const indices = () => told?.iterations.map(({ index }) => index)
+const indices = () => latest?.iterations.map(({ index }) => index)
 
 beforeEach(() => {
   clock = new FakeClock()
   sources = []
-  told = null
+  latest = null
   stream = new EventStream(
     {
       open: (after) => {
@@ -71,7 +71,7 @@ beforeEach(() => {
       later: clock.later,
     },
     (followed) => {
-      told = followed
+      latest = followed
     },
   )
 })
@@ -81,16 +81,16 @@ const receive = (...numbers: number[]) => {
   clock.pass(50)
 }
 
-describe('a whole stream', () => {
-  test('begins at the start and appends iterations in order', () => {
+describe('an intact stream', () => {
+  test('starts at the beginning and appends iterations in order', () => {
     source().send('open')
     receive(0, 1, 2)
     expect(sources[0].after).toBeNull()
     expect(indices()).toEqual([0, 1, 2])
-    expect(told).toMatchObject({ connection: 'open', staleSince: null })
+    expect(latest).toMatchObject({ connection: 'open', staleSince: null })
   })
 
-  test('tells events that come together once', () => {
+  test('reports simultaneous events once', () => {
     let times = 0
     const counting = new EventStream(
       { open: () => new FakeSource(null), now: () => 0, later: clock.later },
@@ -98,8 +98,8 @@ describe('a whole stream', () => {
         times += 1
       },
     )
-    const own = (counting as unknown as { source: FakeSource }).source
-    for (let index = 0; index < 100; index++) own.send('iteration', iteration(index))
+    const countingSource = (counting as unknown as { source: FakeSource }).source
+    for (let index = 0; index < 100; index++) countingSource.send('iteration', iteration(index))
     clock.pass(1000)
     expect(times).toBe(1)
   })
@@ -112,11 +112,15 @@ describe('a whole stream', () => {
     clock.pass(60_000)
     expect(sources).toHaveLength(1)
     expect(source().closed).toBe(true)
-    expect(told).toMatchObject({ connection: 'ended', state: 'failed', error: 'the disk is full' })
+    expect(latest).toMatchObject({
+      connection: 'ended',
+      state: 'failed',
+      error: 'the disk is full',
+    })
   })
 })
 
-test('iterations that are known already are not asked for again', () => {
+test('iterations already loaded are not requested again', () => {
   let after: number | null = null
   const seeded = new EventStream({
     open: (last) => {
@@ -130,7 +134,7 @@ test('iterations that are known already are not asked for again', () => {
   expect(seeded.last).toBe(1)
 })
 
-describe('a repeat', () => {
+describe('a duplicate', () => {
   test('is dropped', () => {
     source().send('open')
     receive(0, 1, 1, 0, 2)
@@ -139,7 +143,7 @@ describe('a repeat', () => {
 })
 
 describe('a gap', () => {
-  test('is never shown: the stream is opened again after the last iteration', () => {
+  test('is never shown: the stream is reopened after the last iteration', () => {
     source().send('open')
     receive(0, 1, 4)
     expect(indices()).toEqual([0, 1])
@@ -151,22 +155,22 @@ describe('a gap', () => {
 })
 
 describe('a broken stream', () => {
-  test('is stale since it broke, and goes on after the last iteration', () => {
+  test('is stale from the break on, and continues after the last iteration', () => {
     source().send('open')
     receive(0, 1)
     const broke = clock.now
     source().send('error')
     clock.pass(60)
-    expect(told).toMatchObject({ connection: 'stale', staleSince: broke })
+    expect(latest).toMatchObject({ connection: 'stale', staleSince: broke })
     clock.pass(1000)
     expect(source().after).toBe(1)
     source().send('open')
     receive(2)
     expect(indices()).toEqual([0, 1, 2])
-    expect(told).toMatchObject({ connection: 'open', staleSince: null })
+    expect(latest).toMatchObject({ connection: 'open', staleSince: null })
   })
 
-  test('stays stale since the first break while it cannot be opened', () => {
+  test('stays stale since the first break until it is reopened', () => {
     source().send('open')
     receive(0)
     const broke = clock.now
@@ -175,10 +179,10 @@ describe('a broken stream', () => {
       clock.pass(10_000)
     }
     expect(sources).toHaveLength(6)
-    expect(told?.staleSince).toBe(broke)
+    expect(latest?.staleSince).toBe(broke)
   })
 
-  test('waits longer each time, and not at all when the network is back', () => {
+  test('backs off exponentially, but reconnects at once when the network is back', () => {
     source().send('open')
     source().send('error')
     clock.pass(499)
@@ -192,7 +196,7 @@ describe('a broken stream', () => {
     expect(sources).toHaveLength(3)
   })
 
-  test('no longer listens to what it had opened before', () => {
+  test('ignores events of a previous connection', () => {
     const first = source()
     first.send('open')
     receive(0)
@@ -204,7 +208,7 @@ describe('a broken stream', () => {
   })
 })
 
-test('a closed stream opens nothing any more', () => {
+test('a closed stream does not reconnect', () => {
   source().send('error')
   stream.close()
   clock.pass(60_000)

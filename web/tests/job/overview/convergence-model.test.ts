@@ -13,7 +13,7 @@ const column = (name: string, values: readonly number[]) => ({
 })
 
 describe('the range of the convergence chart', () => {
-  test('fits best, median and reference, whatever else there is', () => {
+  test('fits best, median and reference only', () => {
     const [low, high] = fittedRange(
       [
         [20, 15, 10],
@@ -26,7 +26,7 @@ describe('the range of the convergence chart', () => {
     expect(fittedRange([[20], [40]], [90], false)![1]).toBeGreaterThan(90)
   })
 
-  test('has positive ends where it is logarithmic, and is none without a number', () => {
+  test('has positive ends if logarithmic, and is null without a number', () => {
     const [low, high] = fittedRange([[0, 10], [1000]], [], true)!
     expect([low > 7, low < 10, high > 1000]).toEqual([true, true, true])
     expect(fittedRange([[null], []], [17], true)).toBeNull()
@@ -34,14 +34,14 @@ describe('the range of the convergence chart', () => {
   })
 })
 
-describe('what lies above it', () => {
+describe('values above the range', () => {
   const particles: Particles = {
     rows: 4,
     total: 400,
     columns: [column('iteration', [0, 0, 1, 2]), column('fitness', [5, 99, Number.NaN, 7])],
   }
 
-  test('are designs that walked, of which some may be left out', () => {
+  test('include only successful designs, possibly thinned', () => {
     const dots = dotsOf(particles)!
     expect([...dots.iterations]).toEqual([0, 0, 2])
     expect([...dots.fitness]).toEqual([5, 99, 7])
@@ -49,7 +49,7 @@ describe('what lies above it', () => {
     expect(dotsOf({ ...particles, columns: [] })).toBeNull()
   })
 
-  test('is marked once an iteration, by the spread and by single designs', () => {
+  test('are marked once per iteration, for bands and single designs', () => {
     const dots = dotsOf(particles)
     expect([...iterationsAbove([1, 50], [0, 1, 2], null, dots)]).toEqual([0])
     expect([...iterationsAbove([1, 50], [0, 1, 2], [10, 60, null], null)]).toEqual([1])

@@ -2,13 +2,13 @@ import { expect, test } from 'vitest'
 import type { Variable } from '../../../src/api/types'
 import { gainOf } from '../../../src/job/gain'
 import { endInWords, noticeState } from '../../../src/job/header/end-notice-model'
-import { placed } from '../../../src/job/overview/winner-model'
+import { winnerVariables } from '../../../src/job/overview/winner-model'
 
 const variable = (name: string, low: number | null, high: number | null) =>
   ({ name, unit: 'V', low, high, kind: 'continuous' }) as unknown as Variable
 
-test('each variable of the winner has its place in its bounds', () => {
-  const rows = placed({ P: 2, I: 0.5, D: 10, law: 'fuzzy', stride: 0.06 }, [
+test('each variable of the winner has a position between its bounds', () => {
+  const rows = winnerVariables({ P: 2, I: 0.5, D: 10, law: 'fuzzy', stride: 0.06 }, [
     variable('P', 2, 4),
     variable('I', 0, 2),
     variable('D', 0, 10),
@@ -21,11 +21,14 @@ test('each variable of the winner has its place in its bounds', () => {
     ['law', null, null, false],
     ['stride', null, null, true],
   ])
-  // A published design may lie beyond the bounds that a job searches.
-  expect(placed({ P: 7 }, [variable('P', 2, 4)])[0]).toMatchObject({ share: 1, at: 'high' })
+  // A published design may be outside the search bounds.
+  expect(winnerVariables({ P: 7 }, [variable('P', 2, 4)])[0]).toMatchObject({
+    share: 1,
+    at: 'high',
+  })
 })
 
-test('a gain is over a published design that walks, of a best that there is', () => {
+test('a gain requires a successful reference and a best design', () => {
   const published = { name: 'A', kind: 'published', fitness: 20 } as const
   expect(gainOf(published, 15, null).share).toBe(0.25)
   expect(gainOf(published, null, null).share).toBeNull()
@@ -36,14 +39,14 @@ test('a gain is over a published design that walks, of a best that there is', ()
   })
 })
 
-test('a gain says over what it is: a published design, or the start of an own robot', () => {
+test('a gain names its reference: a published design, or the start design', () => {
   const published = { name: 'A', kind: 'published', fitness: 20 } as const
   const start = { name: 'start design', kind: 'start', fitness: 20 } as const
   expect(gainOf(published, 15, null).reference?.label).toBe('published A')
   expect(gainOf(start, 15, null).reference?.label).toBe('start design')
 })
 
-test('a notice says how the job ended, and whether there can be one', () => {
+test('a notification states how the job ended, if the browser allows it', () => {
   const job = { id: 'k2', name: '', state: 'succeeded', iterations: 25, error: null } as const
   expect(endInWords({ ...job, best_fitness: 12.5 })).toEqual({
     title: 'k2: succeeded',

@@ -34,7 +34,7 @@ const voltage: FittedParameter = {
   explanation: 'all runs agree on a small part of the range',
 }
 const mass: FittedParameter = { ...voltage, name: 'body_mass', trust: 'unknown', explanation: 'no' }
-const found: Identifiability = {
+const identifiability: Identifiability = {
   jobs: ['a', 'b'],
   fitness: [0.03, 0.031],
   thresholds: [1, 0.1, 0.01],
@@ -42,16 +42,16 @@ const found: Identifiability = {
   parameters: [voltage, mass],
 }
 
-test('a width is a share of the range that was searched', () => {
-  expect(widthAt(found, voltage, 0.1)).toBeCloseTo(0.25)
-  expect(widthAt(found, voltage, 0.01)).toBeCloseTo(0.05)
+test('a width is a share of the search range', () => {
+  expect(widthAt(identifiability, voltage, 0.1)).toBeCloseTo(0.25)
+  expect(widthAt(identifiability, voltage, 0.01)).toBeCloseTo(0.05)
 })
 
-test('a threshold that was not asked for has no width', () => {
-  expect(widthAt(found, voltage, 0.05)).toBeNull()
+test('an unknown threshold has no width', () => {
+  expect(widthAt(identifiability, voltage, 0.05)).toBeNull()
 })
 
-test('between choices there are no widths', () => {
+test('categorical parameters have no widths', () => {
   const choices = ['karnopp', 'stick'].map((name) => ({
     name,
     fitness: 1,
@@ -60,11 +60,11 @@ test('between choices there are no widths', () => {
   }))
   const law: FittedParameter = { ...voltage, name: 'contact_law', low: 0, high: 1, choices }
   expect([voltage, law].map(isCategorical)).toEqual([false, true])
-  expect(widthAt(found, law, 0.1)).toBeNull()
+  expect(widthAt(identifiability, law, 0.1)).toBeNull()
 })
 
-test('verdicts are counted from the best to the worst, with their meaning', () => {
-  expect(verdicts(found)).toEqual([
+test('verdicts are counted from best to worst, with explanations', () => {
+  expect(verdicts(identifiability)).toEqual([
     { trust: 'trusted', count: 1, explanation: 'all runs agree on a small part of the range' },
     { trust: 'rough', count: 0, explanation: null },
     { trust: 'unknown', count: 1, explanation: 'no' },
@@ -76,20 +76,20 @@ test('a parameter of a single run has no rank, so that it comes last', () => {
   expect(rankOf({ ...voltage, trust: null })).toBeNull()
 })
 
-test('thresholds lie evenly by their logarithm, the least at the left', () => {
-  expect(placeOf(0.01, found.thresholds)).toBe(0)
-  expect(placeOf(0.1, found.thresholds)).toBeCloseTo(0.5)
-  expect(placeOf(1, found.thresholds)).toBeCloseTo(1)
+test('thresholds are spaced logarithmically, the smallest at the left', () => {
+  expect(placeOf(0.01, identifiability.thresholds)).toBe(0)
+  expect(placeOf(0.1, identifiability.thresholds)).toBeCloseTo(0.5)
+  expect(placeOf(1, identifiability.thresholds)).toBeCloseTo(1)
 })
 
-test('an outline goes along the upper ends and back along the lower ones', () => {
+test('an outline follows the upper ends and returns along the lower ones', () => {
   expect(shareOf(10, voltage)).toBe(0.5)
-  expect(outline(found, voltage, 100, 40)).toBe(
+  expect(outline(identifiability, voltage, 100, 40)).toBe(
     'M100.0 0.0L50.0 10.0L0.0 10.0L0.0 12.0L50.0 20.0L100.0 40.0Z',
   )
 })
 
-test('an address names each further run once, and never the job itself', () => {
+test('an address names each further run once, without the job itself', () => {
   const query = new URLSearchParams('also=b,,c, b,a')
   expect(runsOf(query, 'a')).toEqual(['b', 'c'])
   expect(runsOf(new URLSearchParams(), 'a')).toEqual([])
@@ -97,7 +97,7 @@ test('an address names each further run once, and never the job itself', () => {
   expect(wordOfRuns([])).toBeNull()
 })
 
-test('more runs than the API compares are left out', () => {
+test('runs beyond the limit of the API are ignored', () => {
   const ids = Array.from({ length: 40 }, (_, k) => `job${k}`)
   expect(runsOf(new URLSearchParams({ also: ids.join() }), 'a')).toHaveLength(31)
 })
@@ -107,7 +107,7 @@ function summary(change: Partial<JobSummary>): JobSummary {
   return { id: 'x', kind: 'identification', scenarios, best_fitness: 0.03, ...change } as JobSummary
 }
 
-test('only fits of the same recordings with a design are offered as further runs', () => {
+test('only fits of the same recordings with a result are offered as further runs', () => {
   const jobs = [
     summary({ id: 'a' }),
     summary({ id: 'b', scenarios: ['r2', 'r1'] }),
@@ -128,13 +128,13 @@ function job(id: string, seed: number): Job {
   return { id, spec: { seed } } as Job
 }
 
-test('runs are called by their seeds where these tell them apart, else by their ids', () => {
+test('runs are labelled by their seeds if distinct, otherwise by their ids', () => {
   expect(labelsOf(['a', 'b'], [job('b', 2), job('a', 1)])).toEqual(['seed 1', 'seed 2'])
   expect(labelsOf(['a', 'b'], [job('a', 1), job('b', 1)])).toEqual(['a', 'b'])
   expect(labelsOf(['a', 'b'], [job('a', 1)])).toEqual(['a', 'b'])
 })
 
-test('seeds that occur twice are told', () => {
+test('repeated seeds are reported', () => {
   expect(repeatedSeeds([job('a', 1), job('b', 2), job('c', 1)])).toEqual([1])
   expect(repeatedSeeds([job('a', 1), job('b', 2)])).toEqual([])
 })

@@ -17,7 +17,7 @@ function target(use: string, difference: number | null): TargetResult {
   }
 }
 
-test('a target is met within one tolerance to either side', () => {
+test('a target is met within one tolerance on either side', () => {
   expect([-1.1, -1, 0, 1, 1.1].map(isWithin)).toEqual([false, true, true, true, false])
   expect(isWithin(null)).toBe(false)
 })
@@ -27,7 +27,7 @@ test('only fitted targets are counted', () => {
   expect(withinCount({ targets })).toEqual({ within: 1, fitted: 3 })
 })
 
-test('an address may leave a target or a walk out, and nothing else', () => {
+test('an address can leave out a target or a walk', () => {
   const words = ['leave_out=target', 'leave_out=walk', 'leave_out=all', '']
   expect(words.map((text) => leaveOutOf(new URLSearchParams(text)))).toEqual([
     'target',

@@ -27,7 +27,7 @@ const FRONT = {
   ],
 } as unknown as Front
 
-test('a design is named in the address, and anything else is none', () => {
+test('a design in the address is parsed; anything else is null', () => {
   expect(placeOf(placeWord({ iteration: 24, particle: 7 }))).toEqual({ iteration: 24, particle: 7 })
   expect(placeWord({ iteration: 24, particle: 7 })).toBe('24.7')
   expect(placeOf('24/7'), 'as in older addresses').toEqual({ iteration: 24, particle: 7 })
@@ -36,11 +36,11 @@ test('a design is named in the address, and anything else is none', () => {
 })
 
 describe('axes', () => {
-  test('are those that were asked for', () => {
+  test('are those requested', () => {
     expect(axesOf(FRONT, 'energy', 'torque')).toEqual(['energy', 'torque'])
   })
 
-  test('are speed and acceleration otherwise, and never the same twice', () => {
+  test('default to speed and acceleration, and always differ', () => {
     expect(axesOf(FRONT, null, null)).toEqual(['reciprocal_speed', 'acceleration'])
     expect(axesOf(FRONT, 'acceleration', 'acceleration')).toEqual([
       'acceleration',
@@ -58,22 +58,22 @@ describe('a published design', () => {
   const of = (...walks: readonly unknown[]) =>
     publishedDesign(FRONT, { label: 'published A', scenarios: { ...walks } as never })
 
-  test('is the geometric mean over its walks, as those of the front are', () => {
-    const found = of(walk(2), walk(8))!
-    expect(found.objectives.energy).toBeCloseTo(4)
-    expect(publishedMarks([found], 'energy', 'torque')[0]).toMatchObject({
+  test('is the geometric mean over its simulations, like those of the front', () => {
+    const design = of(walk(2), walk(8))!
+    expect(design.objectives.energy).toBeCloseTo(4)
+    expect(publishedMarks([design], 'energy', 'torque')[0]).toMatchObject({
       name: 'published A',
       y: 1,
     })
   })
 
-  test('that fails has no place among them', () => {
+  test('is omitted if a simulation failed', () => {
     expect(of(walk(2), walk(8, 'fell'))).toBeNull()
   })
 })
 
-describe('what is drawn', () => {
-  test('is the front by two objectives, in its order', () => {
+describe('the chart', () => {
+  test('shows the front by two objectives, in its order', () => {
     const { x, y } = frontCloud(FRONT, 'energy', 'reciprocal_speed')
     expect([x, y]).toEqual([
       [5, 4],
@@ -81,16 +81,16 @@ describe('what is drawn', () => {
     ])
   })
 
-  test('has one mark for all preferences under which a design wins, on the front or not', () => {
+  test('has one mark per winner with all its preferences, on the front or not', () => {
     const marks = marksOf(FRONT, 'energy', 'reciprocal_speed')
     expect(marks.map(({ name, x, y }) => [name, x, y])).toEqual([
-      ['own, A', 5, 1],
+      ['job, A', 5, 1],
       ['B', 9, 9],
       ['knee 1', 4, 2],
     ])
   })
 
-  test('is all designs behind it, if their objectives are known', () => {
+  test('shows all designs behind the front if their objectives are loaded', () => {
     const column = (name: string, values: number[]) => ({ name, values: Float32Array.from(values) })
     const particles = {
       columns: [column('objective:energy', [5]), column('objective:torque', [1])],

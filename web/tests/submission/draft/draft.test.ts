@@ -4,10 +4,10 @@ import { errorsByField, specOf, withKinds } from '../../../src/submission/draft/
 import { ofLegGroups } from '../../../src/submission/draft/catalogue'
 import { type Draft, draftOf } from '../../../src/submission/draft/draft'
 import { CATALOGUE } from '../catalogue-example'
-import { EMPTY, withOwnScenario } from './drafts'
+import { EMPTY, withCustomScenario } from './drafts'
 
 describe('a draft', () => {
-  test('begins with the defaults that the API documents', () => {
+  test('starts with the defaults documented by the API', () => {
     expect(specOf(EMPTY)).toEqual({
       name: '',
       robot: 'hexapod',
@@ -26,7 +26,7 @@ describe('a draft', () => {
     })
   })
 
-  test('starts from the best of jobs that are named, or else from those of a cloned job', () => {
+  test('starts from the best of the named jobs, otherwise from the designs of a cloned job', () => {
     const started = (changes: Partial<Draft['start']>) =>
       specOf({ ...EMPTY, start: { ...EMPTY.start, ...changes } }).start
     expect(specOf(EMPTY)).not.toHaveProperty('start')
@@ -39,7 +39,7 @@ describe('a draft', () => {
     expect(specOf(named).start).toEqual({ jobs: ['k2q7'], count: 9 })
   })
 
-  test('sends fixed and gait variables as they were set', () => {
+  test('sends fixed and gait variables as set', () => {
     const { P, stride, ...rest } = EMPTY.variables
     const spec = specOf({
       ...EMPTY,
@@ -53,7 +53,7 @@ describe('a draft', () => {
     expect(spec.variables).toContainEqual({ name: 'stride', low: 0.12, high: 0.2 })
   })
 
-  test('keeps variables of leg groups, and offers them for those variables alone', () => {
+  test('keeps variables of leg groups, and offers them for eligible variables only', () => {
     const stride = { name: 'stride[front]', low: 0.1, high: 0.15 }
     const cloned = draftOf(
       {
@@ -70,13 +70,13 @@ describe('a draft', () => {
     expect(ofLegGroups(gait, names).map(({ name }) => name)).toEqual(['stride[left_rear]'])
   })
 
-  test('sends objects of a scenario of one’s own as they are written', () => {
-    const [own] = withOwnScenario.own
-    const written = { ...own, by_group: '{"stride[front]": 0.05}', phases: '{"a": ' }
-    const [, sent] = specOf({ ...withOwnScenario, own: [written] }).scenarios ?? []
+  test('sends objects of a custom scenario as written', () => {
+    const [custom] = withCustomScenario.custom
+    const written = { ...custom, by_group: '{"stride[front]": 0.05}', phases: '{"a": ' }
+    const [, sent] = specOf({ ...withCustomScenario, custom: [written] }).scenarios ?? []
     expect(sent).toMatchObject({ by_group: { 'stride[front]': 0.05 }, phases: '{"a": ' })
-    const again = draftOf({ scenarios: [sent] } as unknown as JobSpec, CATALOGUE)
-    expect(again.own[0].by_group).toBe('{"stride[front]":0.05}')
+    const reread = draftOf({ scenarios: [sent] } as unknown as JobSpec, CATALOGUE)
+    expect(reread.custom[0].by_group).toBe('{"stride[front]":0.05}')
   })
 
   test('sends a categorical variable by the names of its choices', () => {
@@ -98,7 +98,7 @@ describe('a draft', () => {
     expect(specOf(fixed).fixed).toEqual({ window: 'flat' })
   })
 
-  test('leaves conventions at their default unless they are set', () => {
+  test('keeps conventions at their default unless set', () => {
     const { integral_span: span, ...rest } = EMPTY.variables
     expect(specOf(EMPTY).fixed).toEqual({})
     const fixed = {
@@ -109,7 +109,7 @@ describe('a draft', () => {
     expect(draftOf(specOf(fixed), CATALOGUE).variables.integral_span.mode).toBe('fixed')
   })
 
-  test('leaves what is no number for the API to refuse', () => {
+  test('passes invalid numbers on for the API to reject', () => {
     expect(specOf({ ...EMPTY, iterations: 'many' }).iterations).toBe('many')
     expect(specOf({ ...EMPTY, seed: '' }).seed).toBe('')
   })
@@ -119,7 +119,7 @@ describe('a draft', () => {
     expect(spec.variables).toContainEqual({ name: 'FOMF', low: 1, high: 3, kind: 'integer' })
   })
 
-  test('sends a variant of the robot with numbers', () => {
+  test('sends a robot variant with numbers', () => {
     const robot = { ...EMPTY.robot, kind: 'variant' as const, backlash: ['2.5', '1', '1'] }
     expect(specOf({ ...EMPTY, robot }).robot).toEqual({
       name: 'hexapod',
@@ -129,7 +129,7 @@ describe('a draft', () => {
     })
   })
 
-  test('names the robot that was chosen, and what a variant of it changes', () => {
+  test('sends the chosen robot, and the changes of a variant', () => {
     const robot = { ...EMPTY.robot, name: 'hexapod-identified' }
     expect(specOf({ ...EMPTY, robot }).robot).toBe('hexapod-identified')
     const stick = { ...robot, kind: 'variant' as const, contact_law: 'stick' }
@@ -139,7 +139,7 @@ describe('a draft', () => {
     })
   })
 
-  test('offers the choices of a field that may be null', () => {
+  test('offers the choices of a nullable field', () => {
     expect(CATALOGUE.fields.variant.get('contact_law')?.choices).toEqual(['linear_zone', 'stick'])
   })
 })
@@ -165,32 +165,32 @@ describe('a clone', () => {
   } as unknown as JobSpec
   const draft = draftOf(resolved, CATALOGUE)
 
-  test('knows presets by their values and keeps the others as they are', () => {
+  test('recognizes presets by their values and keeps the others', () => {
     expect(draft.presets).toEqual(['fast'])
-    expect(draft.own).toEqual([{ name: 'mine', radius: '0.2', load: '1' }])
+    expect(draft.custom).toEqual([{ name: 'mine', radius: '0.2', load: '1' }])
     expect(draft.preference.kind).toBe('C')
   })
 
-  test('asks for the same job again', () => {
-    const again = specOf(draft)
-    expect(again).toEqual({
+  test('yields the same job', () => {
+    const reread = specOf(draft)
+    expect(reread).toEqual({
       ...resolved,
       scenarios: ['fast', resolved.scenarios![1]],
       preference: 'C',
     })
   })
 
-  test('keeps the robot that was named', () => {
+  test('keeps the robot', () => {
     for (const robot of [
       'hexapod-identified',
       { name: 'hexapod-identified', contact_law: null, planned_soles: 'own', backlash: [1, 0, 0] },
     ]) {
-      const again = specOf(draftOf({ ...resolved, robot } as unknown as JobSpec, CATALOGUE))
-      expect(again.robot).toEqual(robot)
+      const reread = specOf(draftOf({ ...resolved, robot } as unknown as JobSpec, CATALOGUE))
+      expect(reread.robot).toEqual(robot)
     }
   })
 
-  test('has the choices that were searched, and the name of one that was fixed by its index', () => {
+  test('has the searched choices, and a fixed choice by name', () => {
     const window = {
       name: 'window',
       kind: 'categorical',
@@ -204,15 +204,17 @@ describe('a clone', () => {
     expect(fixed.variables.window).toMatchObject({ mode: 'fixed', value: 'hamming' })
   })
 
-  test('of a preference of one’s own stays so', () => {
-    const own = { bias: [1, 1, 1, 1, 1], exponent: [1, 1, 1, 1, 0] } as JobSpec['preference']
-    expect(specOf(draftOf({ ...resolved, preference: own }, CATALOGUE)).preference).toEqual(own)
+  test('keeps a custom preference', () => {
+    const custom = { bias: [1, 1, 1, 1, 1], exponent: [1, 1, 1, 1, 0] } as JobSpec['preference']
+    expect(specOf(draftOf({ ...resolved, preference: custom }, CATALOGUE)).preference).toEqual(
+      custom,
+    )
   })
 })
 
-describe('a problem', () => {
-  const found = (field: string) => [
-    ...errorsByField([{ field, message: 'is wrong' }], withOwnScenario).keys(),
+describe('an API error', () => {
+  const fieldsOf = (field: string) => [
+    ...errorsByField([{ field, message: 'is wrong' }], withCustomScenario).keys(),
   ]
 
   test.each([
@@ -220,11 +222,11 @@ describe('a problem', () => {
     ['optimizer.particles', 'optimizer.particles'],
     ['variables.1.low', 'variables.FOMF.low'],
     ['fixed.P', 'variables.P.value'],
-    ['scenarios.1.radius', 'own.0.radius'],
+    ['scenarios.1.radius', 'custom.0.radius'],
     ['scenarios.0', 'scenarios'],
     ['', ''],
   ])('of %s is shown at %s', (field, shown) => {
-    expect(found(field)).toEqual([shown])
+    expect(fieldsOf(field)).toEqual([shown])
   })
 
   test('does not hide another one of the same field', () => {

@@ -3,8 +3,8 @@ import { CATALOGUE } from '../catalogue-example'
 
 export const EMPTY = emptyDraft(CATALOGUE)
 
-export const withOwnScenario: Draft = {
+export const withCustomScenario: Draft = {
   ...EMPTY,
   presets: ['fast'],
-  own: [scenarioDraft(CATALOGUE.fields.scenario, CATALOGUE.scenarios[1], 'mine')],
+  custom: [scenarioDraft(CATALOGUE.fields.scenario, CATALOGUE.scenarios[1], 'mine')],
 }

@@ -11,7 +11,7 @@ describe('the optimizer', () => {
   const { optimizers } = CATALOGUE
   const [pso, thesis, simplex] = optimizers
 
-  test('is the default method at first, with its settings', () => {
+  test('is the default method with its settings', () => {
     expect(EMPTY.optimizer).toEqual({ name: 'pso', particles: '25', inertia_end: '0.7' })
     expect(specOf(EMPTY).optimizer).toEqual(pso.settings)
   })
@@ -23,18 +23,18 @@ describe('the optimizer', () => {
     expect(withPreset(large, simplex)).not.toHaveProperty('inertia_end')
   })
 
-  test('offers what the schema of the method has, but its name', () => {
+  test("offers the settings of the method's schema, except its name", () => {
     const fields = new Map(settingsOf(simplex).map((field) => [field.name, field]))
     expect([...fields.keys()]).toEqual(['particles', 'restarts', 'steps', 'order'])
     expect(fields.get('restarts')).toMatchObject({
       type: 'boolean',
-      description: 'Whether it starts anew.',
+      description: 'Whether it restarts.',
     })
     expect(fields.get('order')?.choices).toEqual(['1', '2'])
     expect(boundsInWords(fields.get('particles')!)).toBe('1 to 10\u202f000')
   })
 
-  test('becomes numbers, truth values and lists again, and nothing where it is left empty', () => {
+  test('becomes numbers, booleans and lists; empty settings are omitted', () => {
     const { optimizer } = draftOf({ ...specOf(EMPTY), optimizer: 'simplex' } as never, CATALOGUE)
     expect(specOf({ ...EMPTY, optimizer }).optimizer).toEqual({
       name: 'simplex',
@@ -50,7 +50,7 @@ describe('the optimizer', () => {
     })
   })
 
-  test('of a job to be cloned may be a name, or settings without their defaults', () => {
+  test('of a cloned job may be a name, or settings without their defaults', () => {
     const named = draftOf({ ...specOf(EMPTY), optimizer: 'pso-thesis' }, CATALOGUE)
     expect(named.optimizer.inertia_end).toBe('0.9')
     expect(optimizerDraft(optimizers, { name: 'simplex', particles: 3 }, 'pso')).toMatchObject({
@@ -68,7 +68,7 @@ describe('the neighbourhood of a design', () => {
   const near = (design: Record<string, number>) =>
     around(EMPTY, design, new Set(['FOMF'])).variables
 
-  test('is a part of the range around it', () => {
+  test('is a part of the range around the design', () => {
     expect(near({ P: 0.5 }).P).toMatchObject({ low: '0.35', high: '0.65' })
   })
 
@@ -76,13 +76,13 @@ describe('the neighbourhood of a design', () => {
     expect(near({ P: 1 }).P).toMatchObject({ low: '0.7', high: '1' })
   })
 
-  test('leaves a categorical variable its choices', () => {
+  test('keeps the choices of a categorical variable', () => {
     const window = { ...EMPTY.variables.window, mode: 'searched' as const }
     const draft = { ...EMPTY, variables: { ...EMPTY.variables, window } }
     expect(around(draft, { window: 'hamming' }, new Set()).variables.window).toEqual(window)
   })
 
-  test('of an integer variable has whole bounds that differ', () => {
+  test('of an integer variable has distinct integer bounds', () => {
     expect(near({ FOMF: 2 }).FOMF).toMatchObject({ low: '1', high: '3' })
   })
 })

@@ -3,7 +3,7 @@ import type { JobSpec } from '../../../src/api/types'
 import { specOf } from '../../../src/submission/draft/build-spec'
 import { caseDraft, caseFields } from '../../../src/submission/draft/case'
 import { type Draft, draftOf } from '../../../src/submission/draft/draft'
-import { counts, walksEach, worldsFields } from '../../../src/submission/draft/worlds'
+import { hasEffect, walksEach, worldsFields } from '../../../src/submission/draft/worlds'
 import { boundsInWords, fieldsOf } from '../../../src/submission/fields/schema-fields'
 import { ofKind, withRobotJob } from '../../../src/submission/robot/job'
 import { CATALOGUE, DOCUMENT } from '../catalogue-example'
@@ -16,31 +16,31 @@ describe('worlds', () => {
     worlds: { ...EMPTY.worlds, robust: true, values: { ...EMPTY.worlds.values, ...values } },
   })
 
-  test('are left out unless the job is to be robust', () => {
+  test('are omitted unless the job is robust', () => {
     expect(specOf(EMPTY)).not.toHaveProperty('worlds')
     expect(walksEach(EMPTY.worlds)).toBe(1)
     expect(specOf(robust()).worlds).toEqual({ count: 8, seed: 1, aggregate: 'cvar', level: 0.75 })
   })
 
-  test('are what the schema lets be set, in its order', () => {
+  test('have the fields of the schema, in its order', () => {
     const names = worldsFields(fields.worlds).map(({ name }) => name)
     expect(names).toEqual(['count', 'seed', 'aggregate', 'level'])
   })
 
-  test('multiply the walks of a design', () => {
+  test('multiply the simulations of a design', () => {
     expect(walksEach(robust({ count: '12' }).worlds)).toBe(12)
     expect(walksEach(robust({ count: 'many' }).worlds)).toBeNaN()
     expect(specOf(robust({ count: 'many' })).worlds).toMatchObject({ count: 'many' })
     expect(specOf(robust({ count: '' })).worlds).toMatchObject({ count: '' })
   })
 
-  test('have a level for a quantile and a value at risk only', () => {
+  test('have a level for quantile and cvar only', () => {
     const level = fields.worlds.get('level')!
-    const asked = (aggregate: string) => counts(level, robust({ aggregate }).worlds)
-    expect(['mean', 'quantile', 'worst', 'cvar'].filter(asked)).toEqual(['quantile', 'cvar'])
+    const hasLevel = (aggregate: string) => hasEffect(level, robust({ aggregate }).worlds)
+    expect(['mean', 'quantile', 'worst', 'cvar'].filter(hasLevel)).toEqual(['quantile', 'cvar'])
   })
 
-  test('of a cloned job are asked for again, with their ranges', () => {
+  test('of a cloned job are sent with their ranges', () => {
     const worlds = {
       count: 3,
       seed: 5,
@@ -55,11 +55,11 @@ describe('worlds', () => {
   })
 })
 
-describe("a robot's own folder", () => {
+describe('settings of a robot folder', () => {
   const files: Draft = { ...EMPTY, name: 'mine', ...ofKind(EMPTY, 'files', EMPTY) }
   const slow = { name: 'slow', cycle_time: 2 }
 
-  test('brings its scenarios and variables in place of those of the robot that ships', () => {
+  test('replace scenarios and variables of the shipped robot', () => {
     expect(specOf(files).scenarios).toEqual([])
     const job = JSON.stringify({
       controller: 'pi',
@@ -74,21 +74,21 @@ describe("a robot's own folder", () => {
     expect(spec.iterations).toBe(25)
   })
 
-  test('is left behind for a robot that ships', () => {
+  test('are discarded when a shipped robot is chosen', () => {
     const back = { ...files, ...ofKind(files, 'shipped', EMPTY) }
     expect(specOf(back)).toEqual(specOf({ ...EMPTY, name: 'mine' }))
   })
 
   test.each([
-    ['{', /no JSON/],
+    ['{', /not valid JSON/],
     ['[]', /one JSON object/],
     ['{"controller": "none"}', /controller none/],
-  ])('is refused where it is %s', (text, message) => {
+  ])('rejects %s', (text, message) => {
     expect(() => withRobotJob(files, CATALOGUE, text)).toThrow(message)
   })
 })
 
-test("a plug-in's case is chosen with its settings, and known again in a spec", () => {
+test('a plug-in case is chosen with its settings, and recognized in a spec', () => {
   const [damped] = CATALOGUE.cases
   expect(caseFields(damped).map(({ name }) => name)).toEqual(['share'])
   const spec = specOf({ ...EMPTY, case: { ...caseDraft(damped), share: '0.3' } })
@@ -102,18 +102,18 @@ test("a plug-in's case is chosen with its settings, and known again in a spec", 
 describe('fields of the schema', () => {
   const scenario = fieldsOf(DOCUMENT, 'Scenario')
 
-  test('carry their unit, bounds and default', () => {
+  test('have a unit, bounds and a default', () => {
     expect(scenario.get('radius')).toMatchObject({ unit: 'm', low: 0, high: 1, required: true })
     expect(scenario.get('load')).toMatchObject({ unit: '1', default: 0, required: false })
   })
 
-  test('say their bounds in words', () => {
+  test('describe their bounds', () => {
     expect(boundsInWords(scenario.get('radius')!)).toBe('above 0, at most 1')
     expect(boundsInWords(scenario.get('load')!)).toBe('0 to 50')
     expect(boundsInWords(fieldsOf(DOCUMENT, 'JobSpec').get('seed')!)).toBe('at least 0')
   })
 
-  test('of a schema that is not there are an error', () => {
+  test('of a missing schema are an error', () => {
     expect(() => fieldsOf(DOCUMENT, 'Nothing')).toThrow('no schema Nothing')
   })
 })

@@ -6,7 +6,7 @@ import { CATALOGUE } from '../catalogue-example'
 const empty = emptyDraft(CATALOGUE)
 
 describe('other bounds', () => {
-  test('replace those of searched variables alone', () => {
+  test('replace those of searched variables only', () => {
     const fixed = { ...empty.variables.FOMF, mode: 'fixed' as const }
     const draft = { ...empty, variables: { ...empty.variables, FOMF: fixed } }
     const wider = widened(draft, 'P:-1:2.5,FOMF:0:9,unknown:0:1')
@@ -15,9 +15,9 @@ describe('other bounds', () => {
     expect(wider.variables.unknown).toBeUndefined()
   })
 
-  test('that cannot be read change nothing', () => {
-    for (const asked of ['', 'P', 'P:1', 'P:a:b', 'P::2', 'P:1:2:3']) {
-      expect(widened(empty, asked)).toEqual(empty)
+  test('are ignored if invalid', () => {
+    for (const bounds of ['', 'P', 'P:1', 'P:a:b', 'P::2', 'P:1:2:3']) {
+      expect(widened(empty, bounds)).toEqual(empty)
     }
   })
 })

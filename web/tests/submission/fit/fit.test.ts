@@ -3,24 +3,24 @@ import type { OptimizerPreset, RecordingView, Variable } from '../../../src/api/
 import { EMPTY_FIT, errorsByPart } from '../../../src/submission/fit/fit'
 import { identificationSpec } from '../../../src/submission/fit/identification'
 import { parameterDrafts, parameterErrors } from '../../../src/submission/fit/parameters'
-import { choiceOf, idsIn } from '../../../src/submission/fit/recordings/found-recordings'
 import {
   emptyWalk,
   measuredRequest,
   walkErrors,
 } from '../../../src/submission/fit/recordings/measured-walk'
+import { choiceOf, idsIn } from '../../../src/submission/fit/recordings/recording-search'
 import { calibrationSpec, nextKey, withRecordings } from '../../../src/submission/fit/targets'
 import { CATALOGUE } from '../catalogue-example'
 
-test('a kept recording is offered by what it is of, and refused if it cannot be read', () => {
-  const kept = { id: '0f343b0931126a20', created_at: '2026-03-01T10:00:00Z', size: 206113 }
+test('a stored recording is offered with a description, and refused if unreadable', () => {
+  const stored = { id: '0f343b0931126a20', created_at: '2026-03-01T10:00:00Z', size: 206113 }
   const walk = { scenario: 'slope', controller: 'pi', joints: 18, rate: 500, seconds: 3 }
-  const choice = choiceOf({ ...kept, ...walk, rows: 1500, synthetic: true })
-  expect([choice.value, choice.label]).toEqual([kept.id, '3.00 s of slope with pi'])
+  const choice = choiceOf({ ...stored, ...walk, rows: 1500, synthetic: true })
+  expect([choice.value, choice.label]).toEqual([stored.id, '3.00 s of slope with pi'])
   expect(choice.note).toContain('0f343b093112 · 2026-03-01')
-  expect(choice.note).toContain('18 joints · 500 rows a second · 206 kB · synthetic')
+  expect(choice.note).toContain('18 joints · 500 rows per second · 206 kB · synthetic')
   const nothing = { scenario: null, controller: null, joints: null, rows: null, seconds: null }
-  const broken = choiceOf({ ...kept, ...nothing, rate: 500, synthetic: false })
+  const broken = choiceOf({ ...stored, ...nothing, rate: 500, synthetic: false })
   expect(broken.refused).toContain('cannot be read')
 })
 
@@ -41,17 +41,17 @@ const METHODS = [
 const parameter = (name: string, low: number, high: number) =>
   ({ name, low, high, unit: '1', kind: 'continuous', description: '' }) as unknown as Variable
 
-const KNOWN = [
+const FITTABLE = [
   parameter('body_mass', 2, 6),
   parameter('battery_voltage', 8, 13),
   { ...parameter('contact_law', 0, 0), kind: 'categorical', choices: ['stick', 'dead_zone'] },
 ] as readonly Variable[]
 
-const ALL = { known: KNOWN, usual: null, said: {} }
+const ALL = { fittable: FITTABLE, fittedByDefault: null, edited: {} }
 const drafts = parameterDrafts(ALL)
 
-test('what the API has against a parameter stands at it, however many are fitted', () => {
-  const parameters = { known: KNOWN, usual: ['battery_voltage'], said: {} }
+test('an API error is assigned to its parameter, however many are fitted', () => {
+  const parameters = { fittable: FITTABLE, fittedByDefault: ['battery_voltage'], edited: {} }
   const errors = [
     { field: 'variables.0.low', message: 'must be a number' },
     { field: 'variables', message: 'too few' },
@@ -62,13 +62,13 @@ test('what the API has against a parameter stands at it, however many are fitted
 })
 
 describe('an identification', () => {
-  test('has parameters as they were picked: by name, with bounds, with choices', () => {
-    const said = {
+  test('has parameters by name, with bounds, or with choices', () => {
+    const edited = {
       battery_voltage: { ...drafts.battery_voltage, mode: 'searched', low: '9' } as const,
       contact_law: { ...drafts.contact_law, mode: 'searched', choices: ['stick'] } as const,
     }
-    const draft = { ...EMPTY_FIT, name: 'fit', said }
-    const parameters = { known: KNOWN, usual: ['body_mass'], said }
+    const draft = { ...EMPTY_FIT, name: 'fit', edited: edited }
+    const parameters = { fittable: FITTABLE, fittedByDefault: ['body_mass'], edited: edited }
     expect(
       identificationSpec(draft, parameters, '1,3', 'szabadka2', ['aa', 'bb'], METHODS),
     ).toEqual({
@@ -88,7 +88,7 @@ describe('an identification', () => {
     })
   })
 
-  test('sends what is no number as typed, and no particles to a method without', () => {
+  test('sends invalid numbers as typed, and no particles to a method without', () => {
     const draft = { ...EMPTY_FIT, method: 'one-at-a-time', iterations: 'ten' }
     const spec = identificationSpec(draft, ALL, 'foot', 'szabadka2', [], METHODS)
     expect(spec.optimizer).toEqual({ name: 'one-at-a-time' })
@@ -96,7 +96,7 @@ describe('an identification', () => {
     expect(spec.variables).toEqual(['body_mass', 'battery_voltage', 'contact_law'])
   })
 
-  test('has the messages of the API by part, with the entry', () => {
+  test('has the errors of the API by part, with the entry', () => {
     const errors = [
       { field: 'recordings.1', message: 'unknown' },
       { field: 'recordings', message: 'too few' },
@@ -120,7 +120,7 @@ describe('a calibration', () => {
       peak_current: 0.9,
     }) as unknown as RecordingView
 
-  test('has walk and currents of each recording, and none of a recording that is left out', () => {
+  test('has a walk and currents per recording, and no targets of deselected recordings', () => {
     const [a, b] = [recording('aa'), recording('bb')]
     const targets = withRecordings([], [], [a, b])
     const { walks, targets: sent } = calibrationSpec(
@@ -140,10 +140,10 @@ describe('a calibration', () => {
     ])
   })
 
-  test('keeps what was changed and removed when another recording comes', () => {
+  test('keeps edited and removed targets when another recording is added', () => {
     const [a, b] = [recording('aa'), recording('bb')]
-    const kept = withRecordings([], [], [a]).slice(0, 1)
-    const targets = withRecordings(kept, ['aa'], [a, b])
+    const remaining = withRecordings([], [], [a]).slice(0, 1)
+    const targets = withRecordings(remaining, ['aa'], [a, b])
     expect(targets.map(({ recording }) => recording)).toEqual(['aa', 'bb', 'bb'])
     expect(new Set(targets.map(({ key }) => key)).size).toBe(3)
     expect(nextKey(targets)).toBe(3)
@@ -153,7 +153,7 @@ describe('a calibration', () => {
 describe('a measured walk', () => {
   const draft = { ...emptyWalk(CATALOGUE), design: '{"P": 0.4}' }
 
-  test('names its preset, unless other cycles were walked', () => {
+  test('names its preset, unless the cycles differ', () => {
     const { name } = CATALOGUE.scenarios[0]
     const request = measuredRequest(draft, 'szabadka2', 'time [s]', CATALOGUE)
     expect(request).toMatchObject({ robot: 'szabadka2', scenario: name, design: { P: 0.4 } })
@@ -161,11 +161,11 @@ describe('a measured walk', () => {
     expect(walked.scenario).toMatchObject({ name, cycles: 5 })
   })
 
-  test('sends a design that is no JSON as typed, for the API to refuse', () => {
+  test('sends an invalid design as typed, for the API to reject', () => {
     expect(measuredRequest({ ...draft, design: '{' }, 'szabadka2', '', CATALOGUE).design).toBe('{')
   })
 
-  test('has the messages of the API at its fields, and those of none aside', () => {
+  test('assigns API errors to its fields', () => {
     const errors = [
       { field: 'log', message: 'line 3: not a number' },
       { field: 'scenario.cycles', message: 'must be a number' },

@@ -17,26 +17,26 @@ const SOURCES: DesignSource[] = [
 ]
 
 describe.each(SOURCES)('$kind', (source) => {
-  test('is in the query what it was', () => {
+  test('is restored from its query', () => {
     const entries = Object.entries(queryOf(source)).filter(([, value]) => value !== null)
     expect(sourceOf(new URLSearchParams(entries as [string, string][]))).toEqual(source)
   })
 
-  test('is as a word what it was', () => {
+  test('is restored from its word', () => {
     expect(sourceOfWord(wordOf(source))).toEqual(source)
   })
 })
 
-test('an address that names nothing shows the published optimum', () => {
+test('an empty address shows the published optimum', () => {
   expect(sourceOf(new URLSearchParams('scenario=slope-fast'))).toEqual(DEFAULT_SOURCE)
 })
 
-test('a published design may be named without its controller', () => {
+test('a published design can be named without its controller', () => {
   const source = { kind: 'published', controller: null, study: 'A' }
   expect(sourceOfWord('published:A')).toEqual(source)
 })
 
-test('no word names no design', () => {
+test('an empty word names no design', () => {
   expect([sourceOfWord(null), sourceOfWord('')]).toEqual([null, null])
 })
 

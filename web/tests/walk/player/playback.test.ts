@@ -1,7 +1,7 @@
 import { expect, test, vi } from 'vitest'
 import { Playback } from '../../../src/walk/player/playback'
 
-test('real time passes as fast as the chosen speed', () => {
+test('time advances at the chosen speed', () => {
   const playback = new Playback(4.5, 50)
   playback.advance(1)
   expect(playback.time).toBe(0)
@@ -13,7 +13,7 @@ test('real time passes as fast as the chosen speed', () => {
   expect(playback.time).toBeCloseTo(1.1)
 })
 
-test('stops at the end, and plays from the beginning then', () => {
+test('stops at the end, and restarts from the beginning', () => {
   const playback = new Playback(1, 50)
   playback.play()
   playback.advance(9)
@@ -22,7 +22,7 @@ test('stops at the end, and plays from the beginning then', () => {
   expect([playback.time, playback.playing]).toEqual([0, true])
 })
 
-test('steps frame by frame, and not past the ends', () => {
+test('steps frame by frame, within the walk', () => {
   const playback = new Playback(0.1, 50)
   playback.step(-1)
   expect(playback.frame).toBe(0)
@@ -32,14 +32,14 @@ test('steps frame by frame, and not past the ends', () => {
   expect([playback.frame, playback.time]).toEqual([5, 0.1])
 })
 
-test('stepping while it plays pauses it', () => {
+test('stepping during playback pauses', () => {
   const playback = new Playback(1, 50)
   playback.play()
   playback.step(1)
   expect(playback.playing).toBe(false)
 })
 
-test('speeds stay between a tenth and four times real time', () => {
+test('the speed is limited to between a tenth and four times real time', () => {
   const playback = new Playback(1, 50)
   playback.setSpeed(0)
   expect(playback.speed).toBe(0.1)
@@ -47,7 +47,7 @@ test('speeds stay between a tenth and four times real time', () => {
   expect(playback.speed).toBe(4)
 })
 
-test('tells listeners of every change until they leave', () => {
+test('notifies listeners of every change until they unsubscribe', () => {
   const playback = new Playback(1, 50)
   const listener = vi.fn()
   const leave = playback.subscribe(listener)
@@ -63,7 +63,7 @@ test('a walk without frames cannot be played', () => {
   expect(playback.playing).toBe(false)
 })
 
-test('the last frame is reached though its moment is a float32', () => {
+test('the last frame is reached although its time is a float32', () => {
   const playback = new Playback(Math.fround(4.49), 100)
   playback.seek(playback.lastFrame / playback.frameRate)
   expect([playback.frame, playback.lastFrame]).toEqual([449, 449])

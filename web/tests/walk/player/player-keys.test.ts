@@ -2,7 +2,7 @@ import { describe, expect, test } from 'vitest'
 import { Playback } from '../../../src/walk/player/playback'
 import { pressed } from '../../../src/walk/player/player-keys'
 
-/** An element that is one of some kinds, for `closest`. */
+/** A stub element for `closest`. */
 function element(kind: string): Element {
   const is = (selector: string) => selector.split(',').some((each) => each.trim() === kind)
   return { closest: (selector: string) => (is(selector) ? {} : null) } as unknown as Element
@@ -20,13 +20,13 @@ test('space plays and pauses', () => {
   expect(clock.playing).toBe(true)
 })
 
-test('space on a button is the button’s', () => {
+test('space on a button is left to the button', () => {
   const clock = playback()
   expect(pressed(' ', false, element('button'), clock, null)).toBe(false)
   expect(clock.playing).toBe(false)
 })
 
-test('arrows go by frames, home and end to the ends', () => {
+test('arrows step by frames, home and end seek to the ends', () => {
   const clock = playback()
   for (const key of ['ArrowRight', 'ArrowRight', 'ArrowLeft']) {
     pressed(key, false, ELSEWHERE, clock, null)
@@ -38,14 +38,14 @@ test('arrows go by frames, home and end to the ends', () => {
   expect(clock.time).toBe(0)
 })
 
-test('arrows in a choice are the choice’s', () => {
+test('arrows in a select are left to the select', () => {
   const clock = playback()
   expect(pressed('ArrowRight', false, element('select'), clock, null)).toBe(false)
   expect(clock.frame).toBe(0)
 })
 
 describe('with shift', () => {
-  test('arrows turn the view, and leave the clock alone', () => {
+  test('arrows rotate the view and do not affect the clock', () => {
     const clock = playback()
     const turns: [number, number][] = []
     const view = { turn: (a: number, b: number) => turns.push([a, b]), zoom: () => {} }

@@ -1,16 +1,21 @@
 import { expect, test } from 'vitest'
-import { CAMERA, MOMENT, USUAL_VIEW, VIEW } from '../../../src/walk/player/view-words'
+import { CAMERA, DEFAULT_VIEW, MOMENT, VIEW } from '../../../src/walk/player/view-words'
 
-test('a view is written by what differs from the usual', () => {
-  expect(VIEW.write(USUAL_VIEW)).toBeNull()
-  const view = { ...USUAL_VIEW, arrangement: 'beside', follow: false, trail: false } as const
-  expect(VIEW.write(view)).toBe('beside,still,no-trail')
-  expect(VIEW.read('beside,still,no-trail')).toEqual(view)
+test('a view is written by its deviations from the default', () => {
+  expect(VIEW.write(DEFAULT_VIEW)).toBeNull()
+  const view = {
+    ...DEFAULT_VIEW,
+    arrangement: 'side-by-side',
+    follow: false,
+    trail: false,
+  } as const
+  expect(VIEW.write(view)).toBe('side-by-side,still,no-trail')
+  expect(VIEW.read('side-by-side,still,no-trail')).toEqual(view)
   expect(VIEW.read('besides')).toBeUndefined()
   expect(VIEW.read('toString')).toBeUndefined()
 })
 
-test('a moment is a time from the beginning', () => {
+test('a moment is a non-negative time', () => {
   expect(MOMENT.read(MOMENT.write(1 / 3)!)).toBe(0.3333)
   for (const wrong of ['', '-1', 'soon', 'Infinity']) expect(MOMENT.read(wrong)).toBeUndefined()
 })

@@ -10,12 +10,12 @@ const walk = (count: number, label: string) => ({
   replay: parseReplay(encoded(header(count), frames(count))),
 })
 
-test('charts of channels that were not recorded are left out', () => {
+test('charts of channels that were not recorded are omitted', () => {
   const keys = plotSpecs(walk(3, 'A').replay, 0).map(({ key }) => key)
   expect(keys).toEqual(['leg-force', 'normal-forces'])
 })
 
-test('the second walk has dashed curves, and no values after its end', () => {
+test('the second walk has dashed curves, without values after its end', () => {
   const walks = [walk(4, 'A'), walk(2, 'B')]
   const [spec] = plotSpecs(walks[0].replay, 0).filter(({ key }) => key === 'normal-forces')
   const [first, second] = seriesOf(spec.curves, walks)
@@ -25,11 +25,11 @@ test('the second walk has dashed curves, and no values after its end', () => {
   expect(second.dash).toBeDefined()
 })
 
-test('moments are those of the longer walk, whichever it is', () => {
+test('moments are those of the longer walk', () => {
   expect(moments([walk(2, 'A'), walk(5, 'B')])).toHaveLength(5)
 })
 
-test('a foot stands from its first force to its last', () => {
+test('a stance lasts from the first force to the last', () => {
   const [[from, to], ...others] = stances(walk(5, 'A').replay, 0)
   expect([from, to].map((moment) => Number(moment.toFixed(3)))).toEqual([0.1, 0.4])
   expect(others).toEqual([])

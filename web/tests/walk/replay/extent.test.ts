@@ -4,7 +4,7 @@ import { newtonsPerCell } from '../../../src/walk/replay/force-scale'
 import { parseReplay, type Shape } from '../../../src/walk/replay/replay'
 import { encoded, frames, header } from './replay-bytes'
 
-/** A box of these edges [m] on the body's link, 0.15 m over the ground. */
+/** A box with these edges [m] on the body's link, 0.15 m above the ground. */
 function walker(size: readonly number[], turn: readonly number[] = [0, 0, 0, 1]) {
   const shape: Shape = { type: 'box', size, origin: [0, 0, 0, ...turn], role: 'body' }
   const load: Shape = { type: 'sphere', size: [9], origin: [0, 0, 0, 0, 0, 0, 1], role: 'load' }
@@ -15,10 +15,10 @@ function walker(size: readonly number[], turn: readonly number[] = [0, 0, 0, 1])
   return parseReplay(encoded(header(2, { robot }), frames(2)))
 }
 
-test('the largest robot of a scene sets its lengths, whatever it carries', () => {
+test('the largest robot of a scene determines the scale, without its load', () => {
   const small = extentOf([walker([0.4, 0.3, 0.1])])
   expect(small.span).toBeCloseTo(0.4)
-  // The foot of this walker is at y = 0.2 m.
+  // The foot of this robot is at y = 0.2 m.
   expect(small.width).toBeCloseTo(0.35)
   expect(small.height).toBeCloseTo(0.2)
   expect(small.cell).toBe(0.1)
@@ -27,19 +27,19 @@ test('the largest robot of a scene sets its lengths, whatever it carries', () =>
   expect(both.cell).toBe(1)
 })
 
-test('solids are as large as they are turned', () => {
+test('the rotation of solids is taken into account', () => {
   const quarter = [0, 0, Math.SQRT1_2, Math.SQRT1_2]
   const turned = extentOf([walker([0.4, 1, 0.1], quarter)])
   expect(turned.span).toBeCloseTo(1)
   expect(turned.width).toBeCloseTo(0.4)
 })
 
-test('a walk without a frame has lengths too', () => {
+test('a walk without frames has a scale too', () => {
   const none = parseReplay(encoded(header(0), frames(0)))
   expect(extentOf([none]).span).toBeGreaterThan(0)
 })
 
-test('forces are as long beside a large robot as beside a small one', () => {
+test('force arrows scale with the robot', () => {
   const share = (size: number[]) => {
     const extent = extentOf([walker(size)])
     return extent.cell / newtonsPerCell(50, extent) / extent.span

@@ -13,7 +13,7 @@ test.each([
   expect(newtonsPerCell(largest, HEXAPOD)).toBeCloseTo(expected)
 })
 
-test('a rare impact does not set the scale', () => {
+test('a rare impact does not determine the scale', () => {
   const norms = new Float32Array(1000).fill(20)
   norms[500] = 900
   expect(typicalLargest(norms)).toBe(20)

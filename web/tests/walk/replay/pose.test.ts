@@ -5,7 +5,7 @@ import { encoded, frames, header } from './replay-bytes'
 
 const replay = parseReplay(encoded(header(11), frames(11)))
 
-test('between two frames, a link moves straight and turns evenly', () => {
+test('between two frames, a link moves linearly and rotates uniformly', () => {
   const pose = new Float32Array(7)
   samplePoses(replay, 0.25, pose)
   const half = (Math.PI / 4) * 0.25
@@ -15,7 +15,7 @@ test('between two frames, a link moves straight and turns evenly', () => {
   expect(pose[6]).toBeCloseTo(Math.cos(half))
 })
 
-test('before the start and after the end, the pose is held', () => {
+test('poses are clamped before the start and after the end', () => {
   const pose = new Float32Array(7)
   samplePoses(replay, -1, pose)
   expect(pose[0]).toBe(0)
@@ -29,7 +29,7 @@ test('forces are interpolated', () => {
   expect(force[2]).toBeCloseTo(35)
 })
 
-test('a quaternion and its negative are the same attitude, so nothing turns between them', () => {
+test('a quaternion and its negative are the same attitude', () => {
   const values = new Float32Array([0, 0, 0.6, 0.8, 0, 0, -0.6, -0.8])
   const out = new Float32Array(4)
   slerp(values, 0, 4, 0.5, out, 0)

@@ -1,4 +1,4 @@
-/** Replays made by hand: a box with one leg that slides along x. */
+/** Example replays: a box with one leg that slides along x. */
 
 import type { Channel, ReplayHeader } from '../../../src/walk/replay/replay'
 
@@ -11,7 +11,7 @@ export const CHANNELS: Channel[] = [
 
 const STRIDE = 14
 
-/** Frames of 10 Hz; the body is at x = time and turns about z by a quarter turn a second. */
+/** Frames at 10 Hz; the body is at x = time and rotates about z by a quarter turn per second. */
 export function frames(count: number): Float32Array {
   const values = new Float32Array(count * STRIDE)
   for (let frame = 0; frame < count; frame++) {
@@ -49,7 +49,7 @@ export function header(count: number, changes: Partial<ReplayHeader> = {}): Repl
   }
 }
 
-/** As the server writes it; padding: whether the header is filled up to whole words. */
+/** Encode like the server. padding: whether the header is padded to whole words. */
 export function encoded(head: object, values: Float32Array, padding = true): ArrayBuffer {
   let text = new TextEncoder().encode(JSON.stringify(head))
   if (padding) {

@@ -5,7 +5,7 @@ import { CHANNELS, encoded, frames, header } from './replay-bytes'
 describe('a replay', () => {
   const replay = parseReplay(encoded(header(5), frames(5)))
 
-  test('has the numbers of every frame', () => {
+  test('has the values of every frame', () => {
     expect(replay.frames).toBe(5)
     expect(replay.end).toBeCloseTo(0.4)
     expect(replay.value('link_pose', 3, 0)).toBeCloseTo(0.3)
@@ -13,7 +13,7 @@ describe('a replay', () => {
     expect(Array.from(replay.column('foot_force', 2))).toEqual([0, 10, 20, 30, 40])
   })
 
-  test('has no value of a channel that was not sent', () => {
+  test('has no values of a missing channel', () => {
     expect(replay.channel('current')).toBeUndefined()
     expect(replay.value('current', 0, 0)).toBeNaN()
   })
@@ -30,19 +30,19 @@ describe('a replay', () => {
     expect(replay.frameAt(time)).toBe(frame)
   })
 
-  test('is read where frames do not start at a whole word', () => {
+  test('is decoded at any alignment', () => {
     const odd = encoded(header(2, { explanation: 'odd' }), frames(2), false)
     const other = encoded(header(2, { explanation: 'odd!' }), frames(2), false)
     for (const bytes of [odd, other]) expect(parseReplay(bytes).value('foot_force', 1, 2)).toBe(10)
   })
 
-  test('may have no frames at all', () => {
+  test('may have no frames', () => {
     const none = parseReplay(encoded(header(0), frames(0)))
     expect(none.end).toBe(0)
   })
 })
 
-describe('what is not a replay is refused with the way out', () => {
+describe('invalid data is refused with advice', () => {
   test.each([
     ['nothing', new ArrayBuffer(0), /empty/],
     [
@@ -51,8 +51,8 @@ describe('what is not a replay is refused with the way out', () => {
       /version 2.*reload the page/,
     ],
     ['too few frames', encoded(header(3), frames(2)), /112 bytes of frames.*168/],
-    ['too many frames', encoded(header(1), frames(2)), /ask for it again/],
-    ['a header that is cut', encoded(header(1), frames(1)).slice(0, 40), /ends in its header/],
+    ['too many frames', encoded(header(1), frames(2)), /try again/],
+    ['a truncated header', encoded(header(1), frames(1)).slice(0, 40), /truncated/],
     ['no poses', encoded(header(1, { channels: [CHANNELS[0]] }), new Float32Array(1)), /link_pose/],
     ['text', new TextEncoder().encode('\x04\0\0\0oops').buffer as ArrayBuffer, /not JSON/],
   ])('%s', (_, bytes, message) => {
@@ -63,6 +63,6 @@ describe('what is not a replay is refused with the way out', () => {
   test('poses of fewer links than the robot has', () => {
     const one = header(1)
     const two = { ...one.robot, links: [...one.robot.links, ...one.robot.links] }
-    expect(() => parseReplay(encoded({ ...one, robot: two }, frames(1)))).toThrow(/each link/)
+    expect(() => parseReplay(encoded({ ...one, robot: two }, frames(1)))).toThrow(/pose per link/)
   })
 })

@@ -24,7 +24,7 @@ test('an OBJ is read without its materials, and gets normals', () => {
   expect(mesh.geometry.hasAttribute('normal')).toBe(true)
 })
 
-test('an STL is read, whose normals may be missing', () => {
+test('an STL is read, with or without normals', () => {
   const stl = `solid s
 facet normal 0 0 0
 outer loop

@@ -1,4 +1,4 @@
-/** The recordings that a robot is fitted to: those that were read here, and others that are kept. */
+/** The selected recordings: uploaded here, or stored on the server. */
 
 import type { Resource } from '../../../api/resource'
 import type { RecordingView } from '../../../api/types'
@@ -6,7 +6,7 @@ import { ErrorNotice, Loading } from '../../../components/feedback'
 import { ChosenList } from '../../../components/fields/chosen-list'
 import { Combobox } from '../../../components/fields/combobox'
 import { formatNumber } from '../../../format/number'
-import { foundRecordings, idsIn, shortId } from './found-recordings'
+import { idsIn, recordingSearch, shortId } from './recording-search'
 
 export function ChosenCard({
   ids,
@@ -19,14 +19,14 @@ export function ChosenCard({
 }) {
   return (
     <section class="card stack" aria-labelledby="part-recordings">
-      <h2 id="part-recordings">Recordings to fit to</h2>
+      <h2 id="part-recordings">Recordings to fit</h2>
       {ids.length === 0 && (
-        <p class="muted">None yet: read a measured walk above, or choose one that is kept.</p>
+        <p class="muted">None yet: upload a log above, or select a stored recording.</p>
       )}
       {recordings.loading && <Loading what="the recordings" />}
       {recordings.error && (
         <ErrorNotice
-          what="A recording cannot be looked at."
+          what="Could not load a recording."
           error={recordings.error}
           retry={recordings.reload}
         />
@@ -36,11 +36,11 @@ export function ChosenCard({
       </ChosenList>
       <div class="fields">
         <Combobox
-          label="Recordings that are kept"
-          shown=""
+          label="Stored recordings"
+          chosenLabel=""
           placeholder="scenario, controller or id"
-          found={{ label: 'Recordings, the newest first', search: foundRecordings(ids) }}
-          hint="Ids of several can be pasted at once."
+          remote={{ label: 'Recordings, newest first', search: recordingSearch(ids) }}
+          hint="You can paste several ids at once."
           onChoose={(id) => onChange([...ids, id])}
           onPaste={(text) => {
             const pasted = idsIn(text).filter((id) => !ids.includes(id))

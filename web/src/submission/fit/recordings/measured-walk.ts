@@ -1,20 +1,20 @@
-/** The walk that a measured log is of, as it was typed, and the request that it becomes. */
+/** Upload of a measured log: form state, request and errors. */
 
 import type { FieldError } from '../../../api/problem'
 import type { MeasuredWalkRequest, RobotSource } from '../../../api/types'
 import type { Catalogue } from '../../draft/catalogue'
 
-/** Everything as it was typed. */
+/** Form state; numbers as text. */
 export interface WalkDraft {
   readonly scenario: string
-  /** Empty for those of the preset. */
+  /** Empty for the preset's value. */
   readonly cycles: string
   readonly controller: string
   /** JSON. */
   readonly design: string
 }
 
-/** Where a problem is shown. */
+/** Form fields that can have errors. */
 export type WalkField = 'log' | 'robot' | keyof WalkDraft
 
 export function emptyWalk({ scenarios, controllers }: Catalogue): WalkDraft {
@@ -28,12 +28,12 @@ export function emptyWalk({ scenarios, controllers }: Catalogue): WalkDraft {
   }
 }
 
-/** A design of the literature as JSON; empty braces if there is none of that name. */
+/** A published design as JSON; an empty object if there is none. */
 export function publishedDesign({ published }: Catalogue['controllers'][number], study: string) {
   return JSON.stringify(published[study] ?? {}, null, 1)
 }
 
-/** What is no JSON object is sent as typed, and so is a number of cycles: the API refuses it. */
+/** Build the request; invalid JSON and numbers are sent as text, for the API to reject. */
 export function measuredRequest(
   draft: WalkDraft,
   robot: RobotSource,
@@ -49,29 +49,33 @@ export function measuredRequest(
   } as MeasuredWalkRequest
 }
 
-/** The API's messages by the field of the form; the empty name has those of no field. */
+/** API errors by form field; others have an empty key. */
 export function walkErrors(errors: readonly FieldError[]): Partial<Record<WalkField | '', string>> {
-  const found: Partial<Record<WalkField | '', string>> = {}
+  const byField: Partial<Record<WalkField | '', string>> = {}
   for (const { field, message } of errors) {
     const [first, ...rest] = field.split('.')
-    const name = FIELDS.find((known) => known === first) ?? ''
+    const name = FIELDS.find((entry) => entry === first) ?? ''
     const shown = rest.at(-1) === 'cycles' ? 'cycles' : name
     const inside = shown === name && rest.length > 0 ? `${rest.join('.')}: ` : ''
-    found[shown] = `${found[shown] === undefined ? '' : `${found[shown]}; `}${inside}${message}`
+    byField[shown] =
+      `${byField[shown] === undefined ? '' : `${byField[shown]}; `}${inside}${message}`
   }
-  return found
+  return byField
 }
 
 const FIELDS: readonly WalkField[] = ['log', 'robot', 'scenario', 'controller', 'design']
 
-/** The preset's name, or all of it with other cycles. */
+/** Name of the preset, or all its fields with the given cycles. */
 function scenarioOf({ scenario, cycles }: WalkDraft, { scenarios, fields }: Catalogue): unknown {
   const preset = scenarios.find(({ name }) => name === scenario)
   const text = cycles.trim()
   if (text === '' || !preset) return scenario
-  const own = [...fields.scenario.keys()].map((name) => [name, preset[name as keyof typeof preset]])
+  const presetValues = [...fields.scenario.keys()].map((name) => [
+    name,
+    preset[name as keyof typeof preset],
+  ])
   const number = Number(text)
-  return { ...Object.fromEntries(own), cycles: Number.isNaN(number) ? text : number }
+  return { ...Object.fromEntries(presetValues), cycles: Number.isNaN(number) ? text : number }
 }
 
 function json(text: string): unknown {

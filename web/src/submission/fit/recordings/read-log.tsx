@@ -1,30 +1,28 @@
-/** What was read of a measured log: how long it is, what it holds, and where the walk begins. */
+/** Summary of an uploaded log. */
 
 import type { MeasuredWalk } from '../../../api/types'
 import { Table } from '../../../components/table/table'
 import { formatCount, formatNumber } from '../../../format/number'
 
-/** Correlation of desired angles under which it is told that another walk may have been named. */
+/** Correlation of desired angles below which the log probably shows another walk. */
 const SAME_WALK = 0.95
 
 export function ReadLog({ read }: { read: MeasuredWalk }) {
   const { recording } = read
   return (
-    <section class="stack-tight" aria-label="What was read" data-recording={recording.id}>
+    <section class="stack-tight" aria-label="Log summary" data-recording={recording.id}>
       <p role="status">
-        {recording.synthetic ? 'A synthetic log, computed and not measured: ' : 'Read: '}
-        {formatNumber(read.seconds, 4)} s in {formatCount(read.rows)} rows. The walk begins{' '}
-        {formatNumber(Math.abs(read.offset), 3)} s {read.offset < 0 ? 'before' : 'into'} the log;{' '}
-        {formatCount(read.cycles)} whole {read.cycles === 1 ? 'cycle' : 'cycles'} of{' '}
-        {formatNumber(read.cycle_time, 3)} s, {formatNumber(recording.seconds, 4)} s in all, are
-        compared. Mean current {formatNumber(recording.mean_current, 3)} A.
+        {recording.synthetic ? 'Synthetic log, simulated rather than measured: ' : 'Log: '}
+        {formatNumber(read.seconds, 4)} s in {formatCount(read.rows)} rows. The walk starts{' '}
+        {formatNumber(Math.abs(read.offset), 3)} s {read.offset < 0 ? 'before' : 'into'} the log.{' '}
+        {formatCount(read.cycles)} complete {read.cycles === 1 ? 'cycle' : 'cycles'} of{' '}
+        {formatNumber(read.cycle_time, 3)} s are compared, {formatNumber(recording.seconds, 4)} s in
+        total. Mean current: {formatNumber(recording.mean_current, 3)} A.
       </p>
       <p class={read.correlation < SAME_WALK ? 'wrong' : undefined}>
-        Its desired angles and the simulated ones have a correlation of{' '}
+        Correlation of its desired angles with the simulated ones:{' '}
         {formatNumber(read.correlation, 4)}
-        {read.correlation < SAME_WALK &&
-          ': much less than 1, so scenario, cycles or design may be those of another walk'}
-        .
+        {read.correlation < SAME_WALK && '. This is low: check scenario, cycles and design'}.
       </p>
       <Table
         caption="Signals of the log"
@@ -32,7 +30,7 @@ export function ReadLog({ read }: { read: MeasuredWalk }) {
         rowKey={({ name }) => name}
         columns={[
           { key: 'name', label: 'Signal', header: true, value: (s) => s.name },
-          { key: 'meaning', label: 'What it is', minor: true, value: (s) => s.description },
+          { key: 'meaning', label: 'Description', minor: true, value: (s) => s.description },
           { key: 'unit', label: 'Unit', value: (s) => s.unit },
           {
             key: 'channels',

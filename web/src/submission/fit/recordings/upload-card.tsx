@@ -1,4 +1,4 @@
-/** A measured log from a file, with the walk that it is of: read by the API, and what was read. */
+/** Form to upload a measured log with a description of its walk. */
 
 import { useId, useState } from 'preact/hooks'
 import { post } from '../../../api/client'
@@ -34,8 +34,8 @@ export function UploadCard({
   const id = useId()
   const change = (changes: Partial<WalkDraft>) => setDraft((old) => ({ ...old, ...changes }))
   const controller = catalogue.controllers.find(({ name }) => name === draft.controller)
-  const told = problem instanceof ApiProblem ? problem.errors : []
-  const errors = walkErrors(told)
+  const fieldErrors = problem instanceof ApiProblem ? problem.errors : []
+  const errors = walkErrors(fieldErrors)
   const send = async () => {
     if (!file) {
       setProblem(new ApiProblem(422, 'no log', [{ field: 'log', message: 'choose a file first' }]))
@@ -79,11 +79,11 @@ export function UploadCard({
             onChange={(event) => setFile(event.currentTarget.files?.[0] ?? null)}
           />
           <span id={`${id}-log-hint`} class={errors.log === undefined ? 'hint' : 'wrong'}>
-            {errors.log ?? 'CSV, 500 rows a second, units in the headings'}
+            {errors.log ?? 'CSV with 500 rows per second and units in the column headings'}
           </span>
         </div>
         <ChoiceField
-          label="Scenario that it walked through"
+          label="Scenario"
           choices={catalogue.scenarios.map(({ name }) => name)}
           value={draft.scenario}
           error={errors.scenario}
@@ -92,31 +92,31 @@ export function UploadCard({
         <TextField
           label="Cycles"
           value={draft.cycles}
-          hint="that were walked; empty: as in the scenario"
+          hint="number of cycles walked; empty: as in the scenario"
           error={errors.cycles}
           onChange={(cycles) => change({ cycles })}
         />
         <ChoiceField
-          label="Controller that drove it"
+          label="Controller"
           choices={catalogue.controllers.map(({ name }) => name)}
           value={draft.controller}
           error={errors.controller}
           onChange={(name) => {
-            const chosen = catalogue.controllers.find((known) => known.name === name)
+            const chosen = catalogue.controllers.find((entry) => entry.name === name)
             const study = Object.keys(chosen?.published ?? {})[0] ?? ''
             change({ controller: name, design: chosen ? publishedDesign(chosen, study) : '{}' })
           }}
         />
         {controller && Object.keys(controller.published).length > 0 && (
           <ChoiceField
-            label="Published design to begin with"
+            label="Published design to start from"
             choices={Object.keys(controller.published)}
             value={studyOf(controller, draft.design)}
             onChange={(study) => change({ design: publishedDesign(controller, study) })}
           />
         )}
         <div class="field wide">
-          <label for={`${id}-design`}>Design that it walked with, as JSON</label>
+          <label for={`${id}-design`}>Design as JSON</label>
           <textarea
             id={`${id}-design`}
             rows={4}
@@ -127,27 +127,25 @@ export function UploadCard({
             onInput={(event) => change({ design: event.currentTarget.value })}
           />
           <span id={`${id}-design-hint`} class={errors.design === undefined ? 'hint' : 'wrong'}>
-            {errors.design ?? 'the controller’s variables, and any gait variable such as stride'}
+            {errors.design ?? 'the controller’s variables, and gait variables such as stride'}
           </span>
         </div>
       </div>
       <div class="row">
         <button type="submit" disabled={reading}>
-          {reading ? 'Reading…' : 'Read the log'}
+          {reading ? 'Uploading…' : 'Upload the log'}
         </button>
       </div>
-      {problem !== null && (told.length === 0 || errors[''] !== undefined) && (
-        <ErrorNotice what="The log was not read." error={problem} />
+      {problem !== null && (fieldErrors.length === 0 || errors[''] !== undefined) && (
+        <ErrorNotice what="Could not process the log." error={problem} />
       )}
       {read && <ReadLog read={read} />}
     </form>
   )
 }
 
-/** Whose design the text is; empty for one of one's own. */
+/** Study of a published design; empty for a custom one. */
 function studyOf(controller: Catalogue['controllers'][number], design: string): string {
-  const found = Object.keys(controller.published).find(
-    (study) => publishedDesign(controller, study) === design,
-  )
-  return found ?? ''
+  const studies = Object.keys(controller.published)
+  return studies.find((study) => publishedDesign(controller, study) === design) ?? ''
 }

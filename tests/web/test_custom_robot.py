@@ -1,4 +1,4 @@
-"""A robot of one's own: its meshes, and what is Szabadka-II's and so not shown with it."""
+"""Custom robots: meshes, URDF import, and hidden features of Szabadka-II."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ MESHES = {"body.stl": tetrahedron(0.1), "plate.obj": OBJ, "sheet.dae": DAE}
 
 
 def green(image: NDArray[np.uint8]) -> int:
-    """Pixels in the colour of the meshes' material, lit or in the shade."""
+    """Number of pixels in the colour of the meshes' material."""
     r, g, b = (image[..., k].astype(int) for k in range(3))
     return int(((g > 2 * r) & (g > 2 * b) & (g > 40)).sum())
 
 
-def test_meshes_of_a_robot_of_ones_own_are_drawn_and_can_be_switched_off(
+def test_meshes_of_a_custom_robot_are_drawn_and_can_be_hidden(
     server: ServerProcess, robots: Path, visit: Callable[..., Visit]
 ) -> None:
     urdf = with_mesh((QUADRUPED / "robot.urdf").read_text(encoding="utf-8"), *MESHES)
@@ -70,14 +70,14 @@ def test_meshes_of_a_robot_of_ones_own_are_drawn_and_can_be_switched_off(
     expect(player).to_have_attribute("data-meshes", "0")
     expect(page.get_by_text("gaitswarm serve --robots FOLDER")).to_be_visible()
 
-    expect(page.get_by_text("This robot has no published design.")).to_be_visible()
+    expect(page.get_by_text("There is no published design for this robot.")).to_be_visible()
     expect(page.get_by_label("Scenario").locator("option")).to_have_count(1)
     page.goto(f"{server.url}/jobs/{job_id}/scenarios")
-    expect(page.get_by_text("This robot has no published design.")).to_be_visible()
+    expect(page.get_by_text("There is no published design for this robot.")).to_be_visible()
     expect(page.get_by_label("Compare with")).to_have_value("nothing")
 
 
-def test_a_urdf_is_seen_walking_and_becomes_a_job(
+def test_a_urdf_is_simulated_and_submitted(
     server: ServerProcess, tmp_path: Path, visit: Callable[..., Visit]
 ) -> None:
     def file(name: str, text: str) -> Path:
@@ -85,38 +85,38 @@ def test_a_urdf_is_seen_walking_and_becomes_a_job(
         return tmp_path / name
 
     page = visit(server.url, allowed="422").go("/jobs/new")
-    page.get_by_role("link", name="a robot of your own").click()
+    page.get_by_role("link", name="a custom robot").click()
     urdf = page.get_by_label("URDF", exact=True)
     urdf.set_input_files(file("broken.urdf", dog().replace("-2.7", "-120")))
-    refused = page.get_by_role("alert").filter(has_text="No robot can be made of broken.urdf.")
-    expect(refused).to_contain_text(re.compile("urdf: .*line .*are degrees"))
+    error = page.get_by_role("alert").filter(has_text="Could not create a robot from broken.urdf.")
+    expect(error).to_contain_text(re.compile("urdf: .*line .*are degrees"))
 
     urdf.set_input_files(file("dog.urdf", dog(foot="cylinder")))
-    found = page.get_by_role("region", name="What was found")
-    expect(found).to_contain_text("dog: 4 legs, 12 joints, 11.60 kg")
-    expect(found.get_by_role("row").filter(has_text="FL_calf_joint")).to_contain_text("0.480")
-    expect(refused).to_have_count(0)
+    results = page.get_by_role("region", name="Check results")
+    expect(results).to_contain_text("dog: 4 legs, 12 joints, 11.60 kg")
+    expect(results.get_by_role("row").filter(has_text="FL_calf_joint")).to_contain_text("0.480")
+    expect(error).to_have_count(0)
     start = page.get_by_role("region", name="Start design")
-    start.get_by_label("Walk to look at").select_option("fast")
-    start.get_by_role("button", name="Let it walk").click()
+    start.get_by_label("Scenario to simulate").select_option("fast")
+    start.get_by_role("button", name="Simulate").click()
     expect(start.locator("[data-ended='ok']")).to_be_visible()
-    expect(start.get_by_role("img", name="The start design walking")).to_be_visible()
+    expect(start.get_by_role("img", name="Replay of the preview design")).to_be_visible()
 
     toml = page.get_by_label("Text of robot.toml")
     proposed = toml.input_value()
     toml.fill(proposed.replace("load_height", "load_hight"))
-    expect(found).to_have_count(0)
+    expect(results).to_have_count(0)
     page.get_by_role("button", name="Check the robot again").click()
     missing = page.get_by_role("alert").filter(has_text="load_height: is missing")
     expect(missing.first).to_be_visible()
     toml.fill(proposed.replace("load_height = 0.05", "load_height = 0.07"))
     page.get_by_role("button", name="Check the robot again").click()
-    expect(found).to_be_visible()
+    expect(results).to_be_visible()
 
-    slow = page.locator("[data-own='0']")
+    slow = page.locator("[data-custom='0']")
     drop = slow.get_by_label(re.compile("^drop"))
     expect(drop).to_be_hidden()
-    slow.get_by_text(re.compile("more settings, at their defaults")).click()
+    slow.get_by_text(re.compile("more settings, all at their defaults")).click()
     drop.fill("0.01")
     drop.fill("")
     expect(drop).to_be_visible()

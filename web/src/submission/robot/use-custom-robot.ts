@@ -1,4 +1,4 @@
-/** A robot of one's own in the making: proposed from its URDF, then looked at. */
+/** State of a custom robot: chosen files, proposal and check. */
 
 import { useEffect, useRef, useState } from 'preact/hooks'
 import { post } from '../../api/client'
@@ -10,39 +10,39 @@ import { withJob, withRobotJob } from './job'
 
 export type ActuatorChoice = NonNullable<RobotDraftRequest['actuator']>
 
-/** Files as they were chosen. */
-interface Chosen {
+/** A file's name and content. */
+interface TextFile {
   readonly name: string
   readonly text: string
 }
 
-export interface OwnRobot {
-  readonly urdf: Chosen | null
-  /** One's own; null where it is proposed. */
-  readonly toml: Chosen | null
-  /** One's own; null where its fields are proposed. */
-  readonly job: Chosen | null
+export interface CustomRobot {
+  readonly urdf: TextFile | null
+  /** Uploaded robot.toml; null if generated. */
+  readonly toml: TextFile | null
+  /** Uploaded job.json; null if its fields are generated. */
+  readonly job: TextFile | null
   readonly actuator: ActuatorChoice
-  /** What the API does now. */
+  /** Request in progress. */
   readonly busy: 'proposing' | 'checking' | null
   readonly problem: { readonly what: string; readonly error: unknown } | null
-  /** Of the robot.toml that was proposed. */
+  /** Guessed values in the generated robot.toml. */
   readonly guesses: readonly string[]
-  /** What was seen, and of which robot. */
-  readonly seen: { readonly robot: RobotDraft; readonly check: RobotCheck } | null
+  /** Check result, and the robot that was checked. */
+  readonly checked: { readonly robot: RobotDraft; readonly check: RobotCheck } | null
   readonly chooseUrdf: (file: File) => void
   readonly chooseToml: (file: File) => void
   readonly chooseJob: (file: File) => void
   readonly chooseActuator: (actuator: ActuatorChoice) => void
-  /** A robot.toml from the URDF, in place of the one that is there. */
+  /** Generate robot.toml from the URDF, replacing the current one. */
   readonly propose: () => void
   readonly check: () => void
 }
 
 interface State
   extends Pick<
-    OwnRobot,
-    'urdf' | 'toml' | 'job' | 'actuator' | 'busy' | 'problem' | 'guesses' | 'seen'
+    CustomRobot,
+    'urdf' | 'toml' | 'job' | 'actuator' | 'busy' | 'problem' | 'guesses' | 'checked'
   > {}
 
 const NOTHING: State = {
@@ -53,16 +53,16 @@ const NOTHING: State = {
   busy: null,
   problem: null,
   guesses: [],
-  seen: null,
+  checked: null,
 }
 
-export function useOwnRobot(
+export function useCustomRobot(
   draft: Draft,
   catalogue: Catalogue,
   onChange: (changes: Partial<Draft>) => void,
-): OwnRobot {
+): CustomRobot {
   const [state, setState] = useState(NOTHING)
-  // Answers come later: what was typed meanwhile beside the robot must stay.
+  // Responses are asynchronous; edits made meanwhile must be kept.
   const now = useRef({ draft, state })
   now.current = { draft, state }
   const set = (changes: Partial<State>) => {
@@ -75,18 +75,18 @@ export function useOwnRobot(
   }
   const files = (changes: Partial<RobotDraft>) =>
     change({ robot: { ...now.current.draft.robot, ...changes } })
-  const asked = useRef(new AbortController())
-  useEffect(() => () => asked.current.abort(), [])
+  const abortController = useRef(new AbortController())
+  useEffect(() => () => abortController.current.abort(), [])
 
-  /** Do what asks the API, in place of what was asked before. */
-  const ask = async (
+  /** Run a request, aborting the previous one. */
+  const request = async (
     busy: State['busy'],
     what: string,
     work: (signal: AbortSignal) => Promise<void>,
   ): Promise<boolean> => {
-    asked.current.abort()
-    asked.current = new AbortController()
-    const { signal } = asked.current
+    abortController.current.abort()
+    abortController.current = new AbortController()
+    const { signal } = abortController.current
     set({ busy, problem: null })
     try {
       await work(signal)
@@ -100,36 +100,40 @@ export function useOwnRobot(
   }
 
   const check = () =>
-    ask('checking', 'This robot cannot be used as it is.', async (signal) => {
+    request('checking', 'This robot cannot be used as it is.', async (signal) => {
       const { robot } = now.current.draft
       const body = { toml: robot.toml, urdf: robot.urdf }
-      const found = await post('/v1/robots/checks', { body, signal })
-      if (!signal.aborted) set({ seen: { robot, check: found } })
+      const checkResult = await post('/v1/robots/checks', { body, signal })
+      if (!signal.aborted) set({ checked: { robot, check: checkResult } })
     })
 
   const propose = async () => {
     const { urdf, actuator } = now.current.state
     if (!urdf) return
-    set({ toml: null, guesses: [], seen: null })
+    set({ toml: null, guesses: [], checked: null })
     const body = { name: robotName(urdf.name), urdf: urdf.text, actuator }
-    const made = await ask('proposing', `No robot can be made of ${urdf.name}.`, async (signal) => {
-      const answer = await post('/v1/robots/drafts', { body, signal })
-      if (signal.aborted) return
-      const { draft: last, state: chosen } = now.current
-      const next = chosen.job ? last : withJob(last, catalogue, answer.job)
-      const robot = { ...next.robot, toml: answer.toml, urdf: answer.urdf }
-      change({ ...next, robot })
-      set({ guesses: answer.guesses })
-    })
-    if (made) await check()
+    const succeeded = await request(
+      'proposing',
+      `Could not create a robot from ${urdf.name}.`,
+      async (signal) => {
+        const answer = await post('/v1/robots/drafts', { body, signal })
+        if (signal.aborted) return
+        const { draft: last, state: chosen } = now.current
+        const next = chosen.job ? last : withJob(last, catalogue, answer.job)
+        const robot = { ...next.robot, toml: answer.toml, urdf: answer.urdf }
+        change({ ...next, robot })
+        set({ guesses: answer.guesses })
+      },
+    )
+    if (succeeded) await check()
   }
 
-  /** Read a file, and go on with its text. */
-  const read = async (file: File, use: (chosen: Chosen) => unknown) => {
+  /** Read a file and process its content. */
+  const read = async (file: File, use: (chosen: TextFile) => unknown) => {
     try {
       await use({ name: file.name, text: await textOf(file) })
     } catch (error) {
-      set({ problem: { what: `${file.name} was not taken.`, error } })
+      set({ problem: { what: `Could not use ${file.name}.`, error } })
     }
   }
 
@@ -137,16 +141,16 @@ export function useOwnRobot(
     ...state,
     chooseUrdf: (file) =>
       read(file, (urdf) => {
-        const own = now.current.state.toml
-        set({ urdf, seen: null })
-        // Whatever comes of it: the robot is no longer the one before.
-        files({ urdf: urdf.text, toml: own?.text ?? '' })
-        return own ? check() : propose()
+        const uploadedToml = now.current.state.toml
+        set({ urdf, checked: null })
+        // The previous robot no longer applies, whatever the outcome.
+        files({ urdf: urdf.text, toml: uploadedToml?.text ?? '' })
+        return uploadedToml ? check() : propose()
       }),
     chooseToml: (file) =>
       read(file, (toml) => {
         const { urdf } = now.current.state
-        set({ toml, guesses: [], seen: null, problem: null })
+        set({ toml, guesses: [], checked: null, problem: null })
         files({ toml: toml.text, ...(urdf && { urdf: urdf.text }) })
         return now.current.draft.robot.urdf === '' ? undefined : check()
       }),

@@ -1,47 +1,47 @@
-/** Recorded walks to choose from, as the server finds them: by scenario, controller or id. */
+/** Server-side search for recordings by scenario, controller or id. */
 
 import { get } from '../../../api/client'
 import type { RecordingEntry } from '../../../api/types'
-import type { Choice, Search } from '../../../components/fields/found-choices'
+import type { Choice, Search } from '../../../components/fields/choice-search'
 import { formatNumber } from '../../../format/number'
 import { formatMoment } from '../../../format/time'
 
-/** Recordings of one page of the picker. */
+/** Recordings per page. */
 const PAGE = 20
 
-/** Of a recording, in full. */
+/** A full recording id. */
 const ID = /^[0-9a-f]{32}$/
 
-/** As much of an id as is shown. */
+/** Shortened id for display. */
 export function shortId(id: string): string {
   return id.slice(0, 12)
 }
 
-/** The ids that a text consists of, each once; none if there is anything else in it. */
+/** Distinct ids in a text; none if it contains anything else. */
 export function idsIn(text: string): string[] {
   const words = text.split(/[\s,;"'[\]]+/).filter((word) => word !== '')
   return words.every((word) => ID.test(word)) ? [...new Set(words)] : []
 }
 
-/** without: ids of recordings that are not offered. */
-export function foundRecordings(without: readonly string[]): Search {
+/** exclude: ids of recordings that are not offered. */
+export function recordingSearch(exclude: readonly string[]): Search {
   return async (search, after, signal) => {
     const page = await get('/v1/recordings', { query: { search, after, limit: PAGE }, signal })
-    const items = page.items.filter(({ id }) => !without.includes(id)).map(choiceOf)
+    const items = page.items.filter(({ id }) => !exclude.includes(id)).map(choiceOf)
     return { items, next: page.next ?? null }
   }
 }
 
 export function choiceOf(recording: RecordingEntry): Choice {
   const { id, seconds, scenario, controller, joints, rate, size } = recording
-  const kept = `${shortId(id)} · ${formatMoment(recording.created_at)}`
+  const details = `${shortId(id)} · ${formatMoment(recording.created_at)}`
   if (scenario === null || seconds === null) {
-    return { value: id, label: shortId(id), refused: `${kept} · cannot be read` }
+    return { value: id, label: shortId(id), refused: `${details} · cannot be read` }
   }
   const parts = [
-    kept,
+    details,
     `${joints} joints`,
-    `${formatNumber(rate, 3)} rows a second`,
+    `${formatNumber(rate, 3)} rows per second`,
     `${formatNumber(size / 1000, 3)} kB`,
     recording.synthetic ? 'synthetic' : '',
   ]

@@ -11,16 +11,16 @@ describe('a file of a robot', () => {
   })
 
   test.each([
-    ['is no text', new Uint8Array([0x73, 0xff, 0xfe]), /a\.stl is not UTF-8 text; choose another/],
+    ['is not text', new Uint8Array([0x73, 0xff, 0xfe]), /a\.stl is not UTF-8 text; choose another/],
     ['is large', new Uint8Array(4_000_001), /a\.stl has 4\.0 MB.*Choose the URDF itself/],
-  ])('is refused where it %s', async (_, bytes, said) => {
-    await expect(textOf(new File([bytes], 'a.stl'))).rejects.toThrow(said)
+  ])('is refused if it %s', async (_, bytes, message) => {
+    await expect(textOf(new File([bytes], 'a.stl'))).rejects.toThrow(message)
   })
 
-  test('that is gone is refused with what to do', async () => {
-    const gone = new File(['x'], 'a.urdf')
-    gone.arrayBuffer = () => Promise.reject(new DOMException('gone', 'NotFoundError'))
-    await expect(textOf(gone)).rejects.toThrow('choose it again')
+  test('that is missing is refused with advice', async () => {
+    const missing = new File(['x'], 'a.urdf')
+    missing.arrayBuffer = () => Promise.reject(new DOMException('gone', 'NotFoundError'))
+    await expect(textOf(missing)).rejects.toThrow('choose it again')
   })
 
   test.each([
@@ -32,8 +32,8 @@ describe('a file of a robot', () => {
   ])('%s names a robot %s', (file, name) => expect(robotName(file)).toBe(name))
 })
 
-test('a start design is the middle of what is searched, with what is fixed', () => {
-  const known = [
+test('a preview design is the middle of the search space, with fixed values', () => {
+  const variables = [
     { name: 'P', low: 0, high: 1, kind: 'continuous' },
     { name: 'N', low: 0, high: 5, kind: 'integer' },
     { name: 'feed_forward', low: 0, high: 1, kind: 'continuous' },
@@ -47,7 +47,7 @@ test('a start design is the middle of what is searched, with what is fixed', () 
     ],
     fixed: { stride: 0.1 },
   } as unknown as JobSpec
-  expect(startDesign(spec, known)).toEqual({
+  expect(startDesign(spec, variables)).toEqual({
     P: 0.25,
     N: 3,
     gait: 'trot',

@@ -1,4 +1,4 @@
-/** What may be fitted of a robot: of one that ships from the catalogue, of one's own as it is checked. */
+/** Parameters of a robot that can be fitted: from the catalogue, or from the check of a custom robot. */
 
 import { post } from '../../api/client'
 import { useResource } from '../../api/resource'
@@ -6,12 +6,15 @@ import type { RobotPreset } from '../../api/types'
 import type { Catalogue } from '../draft/catalogue'
 import type { RobotDraft } from '../draft/draft'
 
-export type KnownParameters = Pick<RobotPreset, 'parameters' | 'conventions'>
+export type FittableParameters = Pick<RobotPreset, 'parameters' | 'conventions'>
 
-export function useKnownParameters(robot: RobotDraft, { robots }: Catalogue): KnownParameters {
-  const own = robot.kind === 'files' && robot.toml !== '' && robot.urdf !== ''
+export function useFittableParameters(
+  robot: RobotDraft,
+  { robots }: Catalogue,
+): FittableParameters {
+  const isCustom = robot.kind === 'files' && robot.toml !== '' && robot.urdf !== ''
   const { toml, urdf } = robot
-  const checked = useResource(own ? `${toml} ${urdf}` : null, (signal) =>
+  const checked = useResource(isCustom ? `${toml} ${urdf}` : null, (signal) =>
     post('/v1/robots/checks', { body: { toml, urdf }, signal }),
   )
   const shipped = robots.find(({ name }) => name === robot.name) ?? robots[0]

@@ -1,4 +1,4 @@
-/** A robot of one's own: its URDF is enough; what was guessed is shown, and can be changed. */
+/** Custom robot from a URDF; guessed settings are shown and can be edited. */
 
 import { useId } from 'preact/hooks'
 import { NOT_PUBLISHED } from '../../api/robots'
@@ -12,21 +12,22 @@ import { FileField } from './file-field'
 import { Findings } from './findings'
 import { startDesign } from './start-design'
 import { StartWalk } from './start-walk'
-import { type ActuatorChoice, useOwnRobot } from './use-own-robot'
+import { type ActuatorChoice, useCustomRobot } from './use-custom-robot'
 
 const ACTUATORS = ['auto', 'dc', 'torque'] as const satisfies readonly ActuatorChoice[]
 
 const BUSY = {
-  proposing: 'Looking for legs, a stance and actuators…',
-  checking: 'Letting it stand for a second…',
+  proposing: 'Detecting legs, stance and actuators…',
+  checking: 'Simulating one second of standing…',
 }
 
-export function OwnRobot({ draft, catalogue, onChange }: SectionProps) {
-  const own = useOwnRobot(draft, catalogue, onChange)
+export function CustomRobotForm({ draft, catalogue, onChange }: SectionProps) {
+  const state = useCustomRobot(draft, catalogue, onChange)
   const { robot } = draft
-  const { seen } = own
+  const { checked } = state
   const manual = useManual()
-  const current = seen !== null && seen.robot.toml === robot.toml && seen.robot.urdf === robot.urdf
+  const current =
+    checked !== null && checked.robot.toml === robot.toml && checked.robot.urdf === robot.urdf
   const spec = specOf(draft)
   const controller = catalogue.controllers.find(({ name }) => name === draft.controller)
   return (
@@ -35,40 +36,40 @@ export function OwnRobot({ draft, catalogue, onChange }: SectionProps) {
         <FileField
           label="URDF"
           accept=".urdf,.xml"
-          hint={own.urdf?.name ?? (robot.urdf === '' ? 'all that is needed' : 'the job’s own')}
+          hint={state.urdf?.name ?? (robot.urdf === '' ? 'required' : 'from the job')}
           missing={robot.urdf === ''}
-          onFile={own.chooseUrdf}
+          onFile={state.chooseUrdf}
         />
         <ChoiceField
           label="Actuators"
           choices={ACTUATORS}
-          value={own.actuator}
-          hint="that are proposed: auto decides by the URDF’s torques and rates"
-          onChange={(actuator) => own.chooseActuator(actuator as ActuatorChoice)}
+          value={state.actuator}
+          hint="of the proposal: auto decides by the URDF’s torques and rates"
+          onChange={(actuator) => state.chooseActuator(actuator as ActuatorChoice)}
         />
         <FileField
           label="robot.toml"
           accept=".toml"
-          hint={own.toml?.name ?? 'optional; proposed from the URDF if there is none'}
-          onFile={own.chooseToml}
+          hint={state.toml?.name ?? 'optional; generated from the URDF by default'}
+          onFile={state.chooseToml}
         />
         <FileField
           label="job.json"
           accept=".json"
-          hint={own.job?.name ?? 'optional; its scenarios, controller and variables'}
-          onFile={own.chooseJob}
+          hint={state.job?.name ?? 'optional; scenarios, controller and variables'}
+          onFile={state.chooseJob}
         />
       </div>
       <p class="muted small">
-        Legs of three joints that turn, 2 to 32 of them. Meshes are not needed. Nothing is kept
+        2 to 32 legs with three revolute joints each. Meshes are not needed. Nothing is stored
         before the job is submitted. {NOT_PUBLISHED}
       </p>
-      {own.problem && (
+      {state.problem && (
         <>
-          <ErrorNotice {...own.problem} />
+          <ErrorNotice {...state.problem} />
           <p class="small">
-            Choose another URDF, bring a robot.toml of your own, or change the one below and check
-            again. {manual && <a href="/manual/docs/robots.html">What a robot needs</a>}
+            Choose another URDF, provide a robot.toml, or edit the one below and check again.{' '}
+            {manual && <a href="/manual/docs/robots.html">Requirements for robots</a>}
           </p>
         </>
       )}
@@ -76,23 +77,23 @@ export function OwnRobot({ draft, catalogue, onChange }: SectionProps) {
       <div class="row">
         <button
           type="button"
-          disabled={own.busy !== null || robot.toml === '' || robot.urdf === ''}
-          onClick={own.check}
+          disabled={state.busy !== null || robot.toml === '' || robot.urdf === ''}
+          onClick={state.check}
         >
-          {seen ? 'Check the robot again' : 'Check the robot'}
+          {checked ? 'Check the robot again' : 'Check the robot'}
         </button>
-        {own.urdf && (
-          <button type="button" disabled={own.busy !== null} onClick={own.propose}>
-            Propose robot.toml anew
+        {state.urdf && (
+          <button type="button" disabled={state.busy !== null} onClick={state.propose}>
+            Regenerate robot.toml
           </button>
         )}
         <span class="muted" role="status">
-          {own.busy ? BUSY[own.busy] : seen && !current && 'It was changed since it was checked.'}
+          {state.busy ? BUSY[state.busy] : checked && !current && 'Modified since the last check.'}
         </span>
       </div>
-      {current && seen && (
+      {current && checked && (
         <>
-          <Findings check={seen.check} guesses={own.guesses} />
+          <Findings check={checked.check} guesses={state.guesses} />
           <StartWalk
             robot={spec.robot}
             controller={draft.controller}
@@ -110,7 +111,7 @@ function Toml({ text, onText }: { text: string; onText: (text: string) => void }
   if (text === '') return null
   return (
     <details open>
-      <summary>robot.toml: all that a URDF does not say, with a comment on every guess</summary>
+      <summary>robot.toml: settings missing in the URDF, with comments on guessed values</summary>
       <div class="field">
         <label class="visually-hidden" for={id}>
           Text of robot.toml

@@ -10,7 +10,7 @@ import { ALL_JOBS, Breadcrumbs, type Crumb } from '../router/breadcrumbs'
 import { usePlace } from '../router/navigation'
 import { idsOf } from '../router/query-value'
 import { jobPath } from '../router/routes'
-import { around } from './draft/around-design'
+import { around, widened } from './draft/bounds'
 import { caseOf } from './draft/case'
 import { type Catalogue, loadCatalogue, variablesOf } from './draft/catalogue'
 import { type Draft, draftOf, emptyDraft, preferenceOf, withScenarios } from './draft/draft'
@@ -19,7 +19,6 @@ import { JobForm } from './form'
 import { JsonForm } from './json-form'
 import { ofKind } from './robot/job'
 import './submission.css'
-import { widened } from './draft/widen'
 
 interface Start {
   readonly catalogue: Catalogue

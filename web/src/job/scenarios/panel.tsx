@@ -12,7 +12,7 @@ import { caseWords, fitnessUnit } from '../fitness'
 import { utilityOf } from '../preference'
 import { type Reference, ReferencePicker, useReference } from '../reference'
 import { ScenarioFamiliesCard } from './families-card'
-import { ObjectiveNotes } from './objective-notes'
+import './notes.css'
 import { caseLabel, type RecordingSummary, RecordingsCard, useRecordings } from './recordings'
 import { UtilityBars } from './utility-bars'
 
@@ -260,5 +260,22 @@ function Compared({
         {share !== null && <span data-tone={tone}>{change(share, '%', 2)}</span>}
       </span>
     </span>
+  )
+}
+
+/** Descriptions of the objectives. */
+function ObjectiveNotes({ job }: { job: Job }) {
+  return (
+    <details class="small notes-fold">
+      <summary>Descriptions of the objectives</summary>
+      <dl class="notes">
+        {job.objectives.map(({ name, description }) => (
+          <div key={name}>
+            <dt>{inWords(name)}</dt>
+            <dd class="muted">{description}</dd>
+          </div>
+        ))}
+      </dl>
+    </details>
   )
 }

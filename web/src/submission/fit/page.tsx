@@ -1,9 +1,9 @@
 /** New identification or calibration: measured log, recordings and form. */
 
 import { useMemo, useRef, useState } from 'preact/hooks'
-import { get } from '../../api/client'
+import { get, post } from '../../api/client'
 import { useResource } from '../../api/resource'
-import type { RobotSource } from '../../api/types'
+import type { RobotPreset, RobotSource } from '../../api/types'
 import { ErrorNotice, Loading } from '../../components/feedback'
 import { ALL_JOBS, Breadcrumbs } from '../../router/breadcrumbs'
 import { setQuery } from '../../router/navigation'
@@ -11,10 +11,9 @@ import { idsOf } from '../../router/query-value'
 import { withQuery } from '../../router/routes'
 import { type FieldErrors, robotOf } from '../draft/build-spec'
 import { type Catalogue, loadCatalogue } from '../draft/catalogue'
-import { emptyDraft } from '../draft/draft'
+import { emptyDraft, type RobotDraft } from '../draft/draft'
 import { RobotSection } from '../robot/section'
 import { CalibrationForm } from './calibration'
-import { type FittableParameters, useFittableParameters } from './fittable-parameters'
 import { IdentificationForm } from './identification'
 import { ChosenCard } from './recordings/chosen-card'
 import { UploadCard } from './recordings/upload-card'
@@ -34,6 +33,9 @@ const WORDS = {
   identification: 'an identification from measured walks',
   calibration: 'a calibration to measured walks',
 }
+
+/** Parameters of a robot that can be fitted. */
+type FittableParameters = Pick<RobotPreset, 'parameters' | 'conventions'>
 
 /** Props of the forms. */
 export interface FitProps {
@@ -152,4 +154,16 @@ function useLast<T>(data: T | null): T | null {
 /** Selection in the address at this moment, which may have changed since the request. */
 function chosenNow(): string[] {
   return idsOf(new URLSearchParams(location.search).get('recordings'))
+}
+
+/** Parameters from the catalogue, or from the check of a custom robot. */
+function useFittableParameters(robot: RobotDraft, { robots }: Catalogue): FittableParameters {
+  const isCustom = robot.kind === 'files' && robot.toml !== '' && robot.urdf !== ''
+  const { toml, urdf } = robot
+  const checked = useResource(isCustom ? `${toml} ${urdf}` : null, (signal) =>
+    post('/v1/robots/checks', { body: { toml, urdf }, signal }),
+  )
+  const shipped = robots.find(({ name }) => name === robot.name) ?? robots[0]
+  if (robot.kind !== 'files') return shipped
+  return { parameters: checked.data?.parameters ?? [], conventions: shipped.conventions }
 }

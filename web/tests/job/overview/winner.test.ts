@@ -1,7 +1,7 @@
 import { expect, test } from 'vitest'
 import type { Variable } from '../../../src/api/types'
 import { gainOf } from '../../../src/job/gain'
-import { endInWords, noticeState } from '../../../src/job/header/end-notice-model'
+import { endInWords, noticeState } from '../../../src/job/header/end-notice'
 import { winnerVariables } from '../../../src/job/overview/winner-model'
 
 const variable = (name: string, low: number | null, high: number | null) =>

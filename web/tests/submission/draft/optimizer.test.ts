@@ -1,5 +1,5 @@
 import { describe, expect, test } from 'vitest'
-import { around } from '../../../src/submission/draft/around-design'
+import { around } from '../../../src/submission/draft/bounds'
 import { specOf } from '../../../src/submission/draft/build-spec'
 import { draftOf } from '../../../src/submission/draft/draft'
 import { optimizerDraft, settingsOf, withPreset } from '../../../src/submission/draft/optimizer'

@@ -1,6 +1,11 @@
 import { expect, test } from 'vitest'
-import { extentOf, lengthInWords, roundLength } from '../../../src/walk/replay/extent'
-import { newtonsPerCell } from '../../../src/walk/replay/force-scale'
+import {
+  extentOf,
+  lengthInWords,
+  newtonsPerCell,
+  roundLength,
+  typicalLargest,
+} from '../../../src/walk/replay/extent'
 import { parseReplay, type Shape } from '../../../src/walk/replay/replay'
 import { encoded, frames, header } from './replay-bytes'
 
@@ -55,4 +60,22 @@ test.each([
 ])('%d m is rounded to %d m', (length, expected, words) => {
   expect(roundLength(length)).toBeCloseTo(expected, 9)
   expect(lengthInWords(roundLength(length))).toBe(words)
+})
+
+const HEXAPOD = { span: 0.53, width: 0.5, height: 0.2, cell: 0.1 }
+
+test.each([
+  [0, 10],
+  [20, 10],
+  [48, 20],
+  [60, 50],
+  [0.02, 0.01],
+])('forces up to %d N are drawn with a cell for %d N', (largest, expected) => {
+  expect(newtonsPerCell(largest, HEXAPOD)).toBeCloseTo(expected)
+})
+
+test('a rare impact does not determine the scale', () => {
+  const norms = new Float32Array(1000).fill(20)
+  norms[500] = 900
+  expect(typicalLargest(norms)).toBe(20)
 })

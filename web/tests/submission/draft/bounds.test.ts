@@ -1,6 +1,6 @@
 import { describe, expect, test } from 'vitest'
+import { widened } from '../../../src/submission/draft/bounds'
 import { emptyDraft } from '../../../src/submission/draft/draft'
-import { widened } from '../../../src/submission/draft/widen'
 import { CATALOGUE } from '../catalogue-example'
 
 const empty = emptyDraft(CATALOGUE)

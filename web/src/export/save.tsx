@@ -1,10 +1,13 @@
 /** Saves a chart's numbers or picture as files. Loaded on demand. */
 
-import type { ComponentChildren } from 'preact'
+import { type ComponentChildren, render } from 'preact'
+import type { Cell } from '../components/table/rows'
+import type { Column } from '../components/table/table'
+import { type CollectedTable, TableSink } from '../components/table/table-sink'
+import { withUnit } from '../format/number'
 import { pageName } from '../title'
 import { csvOf, type DataTable, fileStem } from './csv'
 import { pictureOf, pngOf } from './picture'
-import { tablesOf } from './tables'
 
 export type Kind = 'csv' | 'svg' | 'png'
 
@@ -44,4 +47,34 @@ export function saveFile(content: Blob, name: string): void {
   link.click()
   // Allow time for the download to start.
   setTimeout(() => URL.revokeObjectURL(address), 10_000)
+}
+
+/** The tables of a chart as data: all rows, in full precision. */
+function tablesOf(content: ComponentChildren): readonly DataTable[] {
+  const collected: CollectedTable[] = []
+  const place = document.createElement('div')
+  render(
+    <TableSink.Provider value={(table) => collected.push(table)}>{content}</TableSink.Provider>,
+    place,
+  )
+  render(null, place)
+  return collected.map(dataOf)
+}
+
+function dataOf({ caption, columns, rows }: CollectedTable): DataTable {
+  return {
+    name: caption,
+    header: columns.map(({ label, unit = '1' }) => withUnit(label, unit)),
+    rows: rows.map((row) => columns.map((column) => cellOf(column, row))),
+  }
+}
+
+function cellOf(column: Column<unknown>, row: unknown): Cell {
+  if (column.data) return column.data(row)
+  if (column.value) return column.value(row)
+  const place = document.createElement('div')
+  render(column.cell?.(row) ?? null, place)
+  const text = place.textContent
+  render(null, place)
+  return text
 }

@@ -111,7 +111,7 @@ def kernel(precision: Precision, wanted: Target | None, walkers: int) -> Callabl
     robot = load_robot(ROBOT)
     coding, timestep = control_steps(robot)
     plan = plan_walk(robot, SCENARIO, timestep)
-    compiled = load_kernel(robot, precision, wanted=wanted)
+    compiled = load_kernel(robot, precision, compile_for=wanted)
     assert plan is not None
     assert compiled is not None
     law = CONTROLLERS["fuzzy-pi"].compile(CONTROLLERS["fuzzy-pi"].published["A"])

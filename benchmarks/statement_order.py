@@ -56,7 +56,7 @@ def kernel(robot: Robot, precision: Precision, aim: Target, *, in_order: bool) -
     else:
         with patch.object(emit_c, "ordered", iter):
             source = kernel_source(robot, precision)
-    library = load_library("order-check", source.encode(), lambda: source, wanted=aim)
+    library = load_library("order-check", source.encode(), lambda: source, compile_for=aim)
     if library is None:
         raise SystemExit("no C compiler found: there is nothing to compare")
     return NativeKernel(robot, library)

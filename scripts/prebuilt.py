@@ -58,7 +58,7 @@ def build(robots: Sequence[str], targets: Sequence[str], directory: Path) -> lis
     for name, identity, source in sources(robots):
         for target in targets:
             library = build_library(
-                name, identity, source, wanted=TARGETS[target], directory=directory
+                name, identity, source, compile_for=TARGETS[target], directory=directory
             )
             if library is None:
                 raise SystemExit(f"{target}: there is no compiler for {TARGETS[target]}")

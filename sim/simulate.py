@@ -33,8 +33,8 @@ from gaitswarm.sim.kernel.walk import (
     Kernel,
     Precision,
     Walking,
+    WalkRequest,
     WalkSetup,
-    WantedWalk,
     walk_together,
 )
 from gaitswarm.sim.near_names import instead_of
@@ -183,7 +183,7 @@ def _simulating(
         plan = plans[key]
         if plan is not None:
             setups[index] = plan(law)
-    results = yield [WantedWalk(kernel, coding, setup, log) for setup in setups.values()]
+    results = yield [WalkRequest(kernel, coding, setup, log) for setup in setups.values()]
     logs: list[WalkLog | None] = [None] * len(designs)
     for (index, setup), result in zip(setups.items(), results, strict=True):
         statuses[index], objectives[index] = judge(setup, result, coding.substeps, timestep)

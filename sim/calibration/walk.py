@@ -16,7 +16,7 @@ from gaitswarm.sim.controllers import CONTROLLERS, ControllerName, control_law
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.gait.trajectory import desired_angles
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
-from gaitswarm.sim.kernel.walk import Precision, Walking, WalkSetup, WantedWalk, walk_together
+from gaitswarm.sim.kernel.walk import Precision, Walking, WalkRequest, WalkSetup, walk_together
 from gaitswarm.sim.outcome import MEASUREMENTS, N_OBJECTIVES, OBJECTIVES, Objective, Outcome, Status
 from gaitswarm.sim.robot import Robot, RobotSource, load_robot
 from gaitswarm.sim.robot.identifiable import (
@@ -87,10 +87,7 @@ def _planner(source: RobotSource, planned_soles: float | None) -> Robot:
 
 Floats = NDArray[np.float64]
 
-RESULTS: Final = (
-    *OBJECTIVES,
-    *(Objective(m.name, m.unit, m.description) for m in MEASUREMENTS),
-)
+RESULTS: Final = (*OBJECTIVES, *(Objective(m.name, m.unit, m.description) for m in MEASUREMENTS))
 """All that a walk tells, f1 to f6 first: columns of what these walks come to."""
 
 
@@ -140,7 +137,7 @@ class CalibrationWalk:
         objectives = np.full((len(designs), len(RESULTS)), np.nan)
         statuses = np.full(len(designs), Status.UNREACHABLE, dtype=np.uint8)
         timesteps: dict[int, float] = {}
-        wanted: list[WantedWalk] = []
+        wanted: list[WalkRequest] = []
         of_robot = {variable.name for variable in robot_variables(self.robots)}
         for index, row in enumerate(designs.tolist()):
             values = dict(zip(self.variables, row, strict=True))
@@ -152,7 +149,7 @@ class CalibrationWalk:
             if setup is not None:
                 timesteps[index] = timestep
                 kernel = kernel_of(robot, precision=self.precision)
-                wanted.append(WantedWalk(kernel, coding, setup))
+                wanted.append(WalkRequest(kernel, coding, setup))
         results = yield wanted
         for (index, timestep), walk, result in zip(timesteps.items(), wanted, results, strict=True):
             substeps = walk.coding.substeps

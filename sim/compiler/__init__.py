@@ -1,1 +1,1 @@
-"""C code: compiled at first use, cached, loaded with ctypes."""
+"""Compilation of C code at run time: compiled on first use, cached, loaded with ctypes."""

@@ -1,8 +1,8 @@
-"""Compiled libraries on disk: found only if intact, put in place whole, swept when of no use.
+"""Cache of compiled libraries on disk: found only if intact, stored atomically, swept when unused.
 
-Beside every library lies its SHA-256 in the format of `sha256sum`. A file that was truncated or
-changed does not match it and counts as none, so it is built again rather than loaded: to load it
-could kill the process, or give wrong numbers without a word.
+Every library has its SHA-256 in a file next to it, in the format of `sha256sum`. A truncated or
+modified library does not match and is rebuilt: loading it could kill the process or give wrong
+numbers silently.
 """
 
 from __future__ import annotations
@@ -22,27 +22,27 @@ from typing import Final
 from gaitswarm.sim.errors import KernelBuildError
 
 KEPT_UNUSED_DAYS: Final = 90
-"""A library that was not loaded for so long is removed when another one is built."""
+"""Libraries not loaded for this long are removed when another one is built."""
 
 SIZE_VARIABLE: Final = "GAITSWARM_KERNEL_CACHE_BYTES"
-"""Environment variable: libraries may take so much together; beyond it, those that were loaded
-longest ago are removed when another one is built."""
+"""Environment variable: limit of the libraries' total size; beyond it, the least recently loaded
+ones are removed when another one is built."""
 
 DEFAULT_SIZE: Final = 1 << 30
 
 _DAY: Final = 86400.0
 
-_NOTED_AFTER: Final = 60.0
-"""Seconds after which a use is noted again: order of use need not be finer."""
+_USE_RESOLUTION: Final = 60.0
+"""Resolution of the recorded time of use [s]."""
 
 _in_use: Final[set[Path]] = set()
-"""Libraries that this process has found or built, and so may have loaded: it never removes them."""
+"""Libraries that this process has found or built and may have loaded: it never removes them."""
 
 _OWN_FILE: Final = re.compile(r"(?P<stem>.+-[0-9a-f]{24})(-.+\.(so|sha256|tmp)|\.lock)")
 
 
 def find(pattern: str, directory: Path | None = None) -> tuple[Path | None, tuple[Path, ...]]:
-    """Look for a library in the usual directory, then in this user's private one."""
+    """Look in the usual directory, then in the private one; also return damaged libraries."""
     damaged: list[Path] = []
     for place in _directories() if directory is None else (directory,):
         try:
@@ -59,7 +59,7 @@ def find(pattern: str, directory: Path | None = None) -> tuple[Path | None, tupl
 
 
 def is_intact(library: Path) -> bool:
-    """Whether a file can be read and matches the checksum beside it."""
+    """Whether a file can be read and matches its checksum."""
     try:
         recorded = _checksum_of(library).read_text(encoding="ascii", errors="replace").split()
         return recorded[:1] == [hashlib.sha256(library.read_bytes()).hexdigest()]
@@ -70,11 +70,10 @@ def is_intact(library: Path) -> bool:
 def build(
     stem: str, file: str, make: Callable[[Path], None], directory: Path | None = None
 ) -> Path:
-    """Put a library into the cache, unless another process has done so meanwhile.
+    """Store a library in the cache, unless another process has done so meanwhile.
 
-    Processes that want the same library wait for the one that builds it. Whatever happens, and
-    even if the power fails, a file under the library's name is whole or does not match its
-    checksum.
+    Processes that need the same library wait for the one that builds it. At any time, even after a
+    power failure, a file under the library's name is complete or does not match its checksum.
     """
     size = _size_limit()
     place = directory or _writable_directory()
@@ -91,8 +90,7 @@ def build(
                     _put(built, library)
     except OSError as error:
         raise KernelBuildError(
-            f"{library} cannot be stored: {error}; set XDG_CACHE_HOME to a directory for compiled"
-            " kernels"
+            f"{library} cannot be stored: {error}; set XDG_CACHE_HOME to a writable directory"
         ) from error
     _in_use.add(library)
     if directory is None:
@@ -106,7 +104,7 @@ def _put(built: Path, library: Path) -> None:
     checksum.write_text(f"{digest}  {library.name}\n", encoding="ascii")
     for written in (built, checksum):
         _flush(written)
-    # A crash between the two leaves a pair that does not match, which counts as none.
+    # A crash between the two leaves a pair that does not match.
     checksum.replace(_checksum_of(library))
     built.replace(library)
     with contextlib.suppress(OSError):  # not every file system can flush a directory
@@ -126,18 +124,18 @@ def _checksum_of(library: Path) -> Path:
 
 
 def _mark_used(library: Path) -> None:
-    """So that `_sweep` keeps it; a time of modification is kept by every file system."""
-    with contextlib.suppress(OSError):  # shipped in an image, perhaps, where nothing is swept
-        if library.stat().st_mtime < time.time() - _NOTED_AFTER:
+    """Update the modification time, which `_sweep` reads."""
+    with contextlib.suppress(OSError):  # read-only, e.g. in an image
+        if library.stat().st_mtime < time.time() - _USE_RESOLUTION:
             os.utime(library)
 
 
 def _directories() -> Iterator[Path]:
-    """Where libraries may be. Lazy: the private directory is judged only if it is needed."""
+    """Directories of libraries. Lazy: the private directory is checked only if needed."""
     usual = _usual_directory()
     if usual is not None:
         yield usual
-    # Windows tells nobody whose a directory is.
+    # Windows does not report the owner of a directory.
     if hasattr(os, "getuid") and _is_private(private := _private_directory()):
         yield private
 
@@ -154,18 +152,17 @@ def _usual_directory() -> Path | None:
 
 
 def _private_directory() -> Path:
-    """This user's own among the temporary files."""
     return Path(tempfile.gettempdir()) / f"gaitswarm-{os.getuid()}"
 
 
 def _is_private(directory: Path) -> bool:
-    """Whether nobody else can have put anything in it: what is loaded from it is run."""
+    """Whether no other user can have put files into it: libraries loaded from it are executed."""
     try:
-        found = directory.lstat()
-    except OSError:  # nothing there yet
+        status = directory.lstat()
+    except OSError:  # does not exist yet
         return True
-    mine = found.st_uid == os.getuid() and not found.st_mode & 0o022
-    return mine and stat.S_ISDIR(found.st_mode)
+    mine = status.st_uid == os.getuid() and not status.st_mode & 0o022
+    return mine and stat.S_ISDIR(status.st_mode)
 
 
 def _writable_directory() -> Path:
@@ -178,20 +175,20 @@ def _writable_directory() -> Path:
         except OSError as error:
             refused = error
     private = _private_directory()
-    reason = "can be written" if _is_private(private) else "is a directory of this user's alone"
+    reason = "writable" if _is_private(private) else "private to this user"
     raise KernelBuildError(
-        f"neither {_usual_directory()} can be written nor {private} {reason}; set XDG_CACHE_HOME to"
-        " a directory for compiled kernels"
+        f"{_usual_directory()} is not writable and {private} is not {reason}; set XDG_CACHE_HOME to"
+        " a writable directory"
     ) from refused
 
 
 @contextlib.contextmanager
 def _locked(path: Path, *, wait: bool = True) -> Iterator[bool]:
-    """Hold a lock that dies with its process; yields whether it is held. Leaves no file behind."""
+    """Hold a lock that is released if its process dies; yield whether it is held."""
     while True:
         with path.open("w") as file:
             held = _lock(file.fileno(), wait=wait)
-            # Whoever held it before has removed it, and another may have made it anew.
+            # The previous holder has removed the file, and another process may have recreated it.
             if held and not _is_at(file.fileno(), path):
                 continue
             try:
@@ -203,7 +200,7 @@ def _locked(path: Path, *, wait: bool = True) -> Iterator[bool]:
 
 
 def _lock(descriptor: int, *, wait: bool) -> bool:
-    """False if another holds it, or where there are no locks; the rename alone is safe, too."""
+    """Return False without a lock; the atomic rename is safe too."""
     try:
         import fcntl  # noqa: PLC0415  not on every system
 
@@ -228,24 +225,24 @@ def _size_limit() -> int:
 
 
 def _sweep(directory: Path, size: int) -> None:
-    """Remove what dead processes left behind, and libraries that were not used for long.
+    """Remove leftovers of dead processes, and libraries that have not been used for long.
 
-    What other processes have loaded stays in their memory, whatever becomes of the file; who has
-    only found it builds it again.
+    Loaded libraries stay in memory when their file is removed; a process that has only found one
+    rebuilds it.
     """
     oldest = time.time() - KEPT_UNUSED_DAYS * _DAY
     with contextlib.suppress(OSError):
         for path in sorted(directory.iterdir()):
-            own = _OWN_FILE.fullmatch(path.name)
-            if own and _is_leftover(path, oldest):
-                _remove_unlocked(path, own["stem"])
-        kept = [
-            (path.stat().st_mtime, path.stat().st_size, path, own["stem"])
+            match = _OWN_FILE.fullmatch(path.name)
+            if match and _is_leftover(path, oldest):
+                _remove_unlocked(path, match["stem"])
+        libraries = [
+            (path.stat().st_mtime, path.stat().st_size, path, match["stem"])
             for path in directory.glob("*.so")
-            if (own := _OWN_FILE.fullmatch(path.name))
+            if (match := _OWN_FILE.fullmatch(path.name))
         ]
-        taken = sum(bytes_ for _, bytes_, _, _ in kept)
-        for _, bytes_, path, stem in sorted(kept):
+        taken = sum(bytes_ for _, bytes_, _, _ in libraries)
+        for _, bytes_, path, stem in sorted(libraries):
             if taken <= size:
                 break
             if path not in _in_use:
@@ -254,11 +251,8 @@ def _sweep(directory: Path, size: int) -> None:
 
 
 def _remove_unlocked(path: Path, stem: str) -> None:
-    """Remove a file that nobody is building: whoever builds a library holds its lock."""
-    with (
-        contextlib.suppress(OSError),
-        _locked(path.with_name(f"{stem}.lock"), wait=False) as held,
-    ):
+    """Remove a file unless a process that builds its library holds the lock."""
+    with contextlib.suppress(OSError), _locked(path.with_name(f"{stem}.lock"), wait=False) as held:
         if held:
             _remove(path)
 

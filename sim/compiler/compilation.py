@@ -1,7 +1,7 @@
-"""C source -> shared library, compiled once and kept in the user's cache directory.
+"""Compilation of C source to shared libraries, cached in the user's cache directory.
 
-A library is named by a hash of all that went into it, so a stale one is never loaded; see
-`sim.compiler.cache` on damaged ones. One that was built beforehand and installed with the package
+A library is named by a hash of everything that went into it, so a stale one is never loaded; for
+damaged ones see `sim.compiler.cache`. A library built beforehand and installed with the package
 saves the compilation, or the compiler.
 """
 
@@ -34,24 +34,22 @@ X86: Final = "x86_64"
 ARM: Final = "aarch64"
 
 _SPELLINGS: Final[Mapping[str, str]] = {"amd64": X86, "x64": X86, "arm64": ARM}
-"""What systems call these two; Windows says AMD64, macOS arm64."""
+"""Names of these architectures on other systems: AMD64 on Windows, arm64 on macOS."""
 
 
 def host_architecture() -> str:
-    """The architecture of this machine."""
     machine = platform.machine().lower()
     return _SPELLINGS.get(machine, machine)
 
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """What code is compiled for.
+    """Target of a compilation.
 
     Attributes:
-        lanes: Doubles in a vector register.
-        level: Micro-architecture level of the x86-64 ABI as GCC names it, or empty for the
-            architecture's plain one.
-        architecture: As `host_architecture` spells it; empty for this machine's.
+        lanes: doubles in a vector register.
+        level: micro-architecture level of the x86-64 ABI as GCC names it; empty for the baseline.
+        architecture: spelled as by `host_architecture`; empty for this machine's.
     """
 
     lanes: int
@@ -59,12 +57,12 @@ class Target:
     architecture: str = ""
 
     def resolved(self) -> Target:
-        """This target, with the architecture named."""
+        """Return this target with the architecture filled in."""
         return Target(self.lanes, self.level, self.architecture or host_architecture())
 
 
-# Named levels rather than -march=native: one binary for all machines of a level. A machine has a
-# level if its CPU has the flags of this one and of all below it.
+# Named levels instead of -march=native: one binary for all machines of a level. A machine has a
+# level if its CPU has the flags of this one and of all lower ones.
 _V2: Final = frozenset({"cx16", "popcnt", "pni", "sse4_1", "sse4_2", "ssse3"})
 _V3: Final = _V2 | {"avx2", "bmi1", "bmi2", "f16c", "fma", "movbe"}
 _V4: Final = _V3 | {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"}
@@ -74,15 +72,15 @@ X86_TARGETS: Final[Mapping[Target, frozenset[str]]] = {
     Target(4, "x86-64-v3", X86): _V3,
     Target(2, "x86-64-v2", X86): _V2,
 }
-"""Levels from the widest on, each with the CPU flags that it needs, as Linux names them."""
+"""Levels, the widest first, with their CPU flags as Linux names them."""
 
 ARM_TARGET: Final = Target(2, "", ARM)
-"""NEON, which every aarch64 has."""
+"""NEON, available on every aarch64."""
 
 
 @lru_cache(maxsize=1)
 def target() -> Target:
-    """The widest target that this machine runs."""
+    """Return the widest target that this machine runs."""
     if host_architecture() == X86:
         flags = cpu_flags()
         for candidate, needed in X86_TARGETS.items():
@@ -92,7 +90,7 @@ def target() -> Target:
 
 
 def cpu_flags() -> frozenset[str]:
-    """What this machine's x86-64 CPU can do, as far as the system says so."""
+    """Return the flags of this machine's x86-64 CPU, as far as the system reports them."""
     try:
         if platform.system() == "Darwin":
             return _flags_of_macos(subprocess.check_output(_SYSCTL, text=True, timeout=10.0))
@@ -108,14 +106,14 @@ _SYSCTL: Final = (
 
 
 def _flags_of_macos(text: str) -> frozenset[str]:
-    """`SSE4.1` is Linux's `sse4_1`, and only one flag has another name."""
+    """Convert to Linux's names: `SSE4.1` is `sse4_1`, and `sse3` is `pni`."""
     flags = frozenset(text.lower().replace(".", "_").split())
     return flags | {"pni"} if "sse3" in flags else flags
 
 
 # No contraction into fused multiply-adds and no fast-math: a lane's bits must not depend on
-# compiler or machine. Integers wrap: a lane that has diverged computes on. Zig's compiler adds what
-# a debugger needs, ten times the code, unless it is told not to.
+# compiler or machine. Integers wrap: a diverged lane computes on. Without -g0, Zig's compiler adds
+# debug information of ten times the code's size.
 FLAGS: Final = (
     "-std=gnu11",
     "-O2",
@@ -128,18 +126,17 @@ FLAGS: Final = (
     "-Wall",
     "-Wextra",
 )
-"""For every compiler and target."""
 
 SCHEDULING: Final = ("-fschedule-insns", "-fsched-pressure")
-"""For GCC, which orders a limb's instructions a tenth slower without them. Clang has its own."""
+"""For GCC: without them, its instruction order for a limb is a tenth slower. Clang has its own."""
 
 _PROBE_LIMIT: Final = 30.0
-"""Seconds that a compiler may take to say its version."""
+"""Time limit of `--version` [s]."""
 
 COMPILER_MEMORY: Final = 8 << 30
-"""Data that a process of a compiler may have [B]; a kernel takes one a fortieth of that."""
+"""Limit of a compiler process's data [B]; a kernel needs a fortieth of it."""
 
-# Limits are set in the process that becomes the compiler, and are those of all that it starts.
+# The limits are set in the process that becomes the compiler, and are inherited by its children.
 _LIMITED: Final = """
 import os, sys
 try:
@@ -159,13 +156,13 @@ _ADVICE: Final[Mapping[str, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class Compiler:
-    """A C compiler: its command, and the first line it says of its version."""
+    """A C compiler: its command, and the first line of its version."""
 
     command: tuple[str, ...]
     version: str
 
     def flags(self, aim: Target) -> tuple[str, ...]:
-        """Flags for a target, whose level zig spells in its own way."""
+        """Return the flags for a target; Zig spells levels in its own way."""
         flags = FLAGS if self._is_clang else (*FLAGS, *SCHEDULING)
         if not aim.level:
             return flags
@@ -179,9 +176,9 @@ class Compiler:
 
 
 def find_compiler(architecture: str = "") -> Compiler | None:
-    """Look for a C compiler, once a process."""
-    wanted = architecture or host_architecture()
-    return _find(wanted, wanted == host_architecture())
+    """Find a C compiler, once per process."""
+    architecture = architecture or host_architecture()
+    return _find(architecture, architecture == host_architecture())
 
 
 @lru_cache(maxsize=4)
@@ -196,7 +193,7 @@ def _find(architecture: str, native: bool) -> Compiler | None:
 
 
 def without_compiler() -> str:
-    """What is missing where nothing can be compiled."""
+    """Explain that no compiler was found, with the remedy."""
     system = platform.system()
     advice = _ADVICE.get(system, "install gcc or clang, or `pip install gaitswarm[compiler]`")
     return f"no C compiler found: {advice}"
@@ -205,9 +202,9 @@ def without_compiler() -> str:
 def run_compiler(
     compiler: Compiler, arguments: Sequence[str], scratch: Path, purpose: str, time_limit: float
 ) -> None:
-    """Run a compiler to its end."""
+    """Run a compiler within its limits."""
     command = shlex.join(compiler.command)
-    # What the compiler keeps for itself goes with the directory, even if it is killed.
+    # Temporary files of the compiler go with the directory, even if it is killed.
     environment = {**os.environ, "TMPDIR": str(scratch)}
     limits = [str(COMPILER_MEMORY), str(math.ceil(time_limit))]
     limited = [sys.executable, "-I", "-S", "-c", _LIMITED, *limits]
@@ -215,7 +212,7 @@ def run_compiler(
         done = _run([*limited, *compiler.command, *arguments], time_limit, environment)
     except subprocess.TimeoutExpired as error:
         raise KernelBuildError(
-            f"{command} did not {purpose} within {time_limit:g} s, and was ended"
+            f"{command} did not {purpose} within {time_limit:g} s and was terminated"
         ) from error
     except OSError as error:
         raise KernelBuildError(f"{command} cannot be run: {error}") from error
@@ -256,7 +253,7 @@ def _version(command: Sequence[str]) -> str:
 def _run(
     command: Sequence[str], time_limit: float, environment: Mapping[str, str] | None = None
 ) -> subprocess.CompletedProcess[str]:
-    """`subprocess.run`, but when time is up, all that the command started ends with it."""
+    """`subprocess.run` that also kills the command's children on timeout."""
     with subprocess.Popen(
         command,
         env=environment,
@@ -277,17 +274,17 @@ def _run(
 
 
 TIME_LIMIT: Final = 300.0
-"""Seconds that a compiler may take; a kernel takes one some five."""
+"""Time limit of a compilation [s]; a kernel takes about five."""
 
 _ATTEMPTS: Final = 3
-"""To load a library that other processes remove."""
+"""Attempts to load a library that other processes remove."""
 
 PREBUILT: Final = Path(__file__).with_name("prebuilt")
-"""Where `python -m scripts.prebuilt` puts libraries, for a wheel to bring them."""
+"""Libraries built by `python -m scripts.prebuilt`, which a wheel contains."""
 
 
 def vector_header() -> str:
-    """The vector type that kernels are written in."""
+    """C source of the vector type that kernels use."""
     folder = resources.files("gaitswarm.sim.compiler")
     vectors = (folder / "vec.h").read_text(encoding="utf-8")
     for name in ("instructions.h", "fma.h"):
@@ -301,29 +298,34 @@ def load_library(
     identity: bytes,
     source: Callable[[], str],
     *,
-    wanted: Target | None = None,
+    compile_for: Target | None = None,
     extra_flags: Sequence[str] = (),
     time_limit: float = TIME_LIMIT,
 ) -> ctypes.CDLL | None:
-    """Load a library from the cache, or compile it now."""
+    """Load a library from the cache, or compile it."""
     for _ in range(_ATTEMPTS):
         library = build_library(
-            name, identity, source, wanted=wanted, extra_flags=extra_flags, time_limit=time_limit
+            name,
+            identity,
+            source,
+            compile_for=compile_for,
+            extra_flags=extra_flags,
+            time_limit=time_limit,
         )
         if library is None:
             return None
         try:
             return ctypes.CDLL(str(library))
         except OSError as error:
-            # Between finding and loading it, another process may have removed it.
+            # Another process may have removed it between finding and loading.
             if library.exists():
                 raise KernelBuildError(
-                    f"{library} cannot be loaded: {error}; set XDG_CACHE_HOME to a directory whose"
-                    " files may be executed"
+                    f"{library} cannot be loaded: {error}; set XDG_CACHE_HOME to a directory"
+                    " that allows executable files"
                 ) from error
     raise KernelBuildError(
-        f"{name} was removed {_ATTEMPTS} times before it could be loaded; set {cache.SIZE_VARIABLE}"
-        " to more bytes"
+        f"{name} was removed {_ATTEMPTS} times before it could be loaded; increase"
+        f" {cache.SIZE_VARIABLE}"
     )
 
 
@@ -332,16 +334,16 @@ def build_library(
     identity: bytes,
     source: Callable[[], str],
     *,
-    wanted: Target | None = None,
+    compile_for: Target | None = None,
     extra_flags: Sequence[str] = (),
     time_limit: float = TIME_LIMIT,
     directory: Path | None = None,
 ) -> Path | None:
     """Find a library in the cache or among the prebuilt ones, or compile it; without loading it.
 
-    Who sets $CC wants that compiler's: then no prebuilt one is taken.
+    If $CC is set, no prebuilt library is used.
     """
-    aim = (wanted or target()).resolved()
+    aim = (compile_for or target()).resolved()
     hashed = hashlib.sha256(
         repr((FLAGS, SCHEDULING, *extra_flags, aim, platform.system())).encode()
     )
@@ -352,7 +354,7 @@ def build_library(
     file = f"{stem}-{'*' if compiler is None else _signature(compiler)}.so"
     library, damaged = cache.find(file, directory)
     if library is None and directory is None and not os.environ.get("CC"):
-        # Whatever the robot is called that it was built for.
+        # Whichever robot it was built for.
         library, damaged_here = cache.find(f"*-{digest}-*.so", PREBUILT)
         damaged += damaged_here
     if library is not None:
@@ -360,8 +362,8 @@ def build_library(
     if compiler is None:
         if damaged:
             raise KernelBuildError(
-                f"{damaged[0]} is damaged: it does not match the checksum beside it, and cannot be"
-                f" built again: {without_compiler()}, or bring back both files from where they came"
+                f"{damaged[0]} is damaged (checksum mismatch) and cannot be rebuilt:"
+                f" {without_compiler()}, or restore both files"
             )
         return None
     arguments = [*compiler.flags(aim), *extra_flags]
@@ -369,7 +371,7 @@ def build_library(
     def make(built: Path) -> None:
         code = built.with_name("kernel.c")
         code.write_text(f"#define DOUBLES {aim.lanes}\n{source()}", encoding="utf-8")
-        # The mathematical library for its fma, where the processor has none.
+        # libm for its fma, on processors without one.
         arguments.extend([str(code), "-o", str(built), "-lm"])
         run_compiler(compiler, arguments, built.parent, f"compile {stem}", time_limit)
 
@@ -381,5 +383,5 @@ def _signature(compiler: Compiler) -> str:
 
 
 def _safe(name: str) -> str:
-    """A part of a file name, whatever a robot is called."""
+    """Make a part of a file name of any robot name."""
     return re.sub(r"[^A-Za-z0-9_-]+", "_", name)[:80]

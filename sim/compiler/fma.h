@@ -1,7 +1,7 @@
-/* a b + c, a b - c and c - a b, rounded once: the bits of the instructions that AVX2, AVX-512 and
-   NEON have. Processors without one (x86-64-v2) compute them from sums and products, exactly but
-   with some fifty operations in place of one. */
-/* Not in line: a step has thousands of them, and would take minutes to compile. */
+/* a b + c, a b - c and c - a b, rounded once: the bits of the instructions of AVX2, AVX-512 and
+   NEON. Processors without them (x86-64-v2) compute them exactly from sums and products, with some
+   fifty operations instead of one. */
+/* Not inlined: a step has thousands of them and would take minutes to compile. */
 #define CALLED static __attribute__((noinline, unused))
 
 #ifdef FMA_PD
@@ -16,14 +16,14 @@ OPERATION dvec upper_half(dvec a)
   return scaled - (scaled - a);
 }
 
-/* What rounding took from sum = a + b (Knuth). */
+/* Rounding error of sum = a + b (Knuth). */
 OPERATION dvec lost_of_sum(dvec a, dvec b, dvec sum)
 {
   const dvec back = sum - a;
   return (a - (sum - back)) + (b - back);
 }
 
-/* a + b rounded to odd: to the neighbour of odd last bit, unless it is exact. */
+/* a + b rounded to odd: to the neighbour with an odd last bit, unless exact. */
 OPERATION dvec sum_to_odd(dvec a, dvec b)
 {
   const dvec sum = a + b, lost = lost_of_sum(a, b, sum), zero = DSPLAT(0.0);
@@ -37,8 +37,8 @@ OPERATION divec is_below(dvec a, double limit)
   return (dvec)((divec)a & INT64_MAX) < DSPLAT(limit);
 }
 
-/* Boldo and Melquiond, "Emulation of a FMA and correctly rounded sums", 2008. Where parts of it
-   overflow or underflow, the fma of libm serves, which the standard says is exact, too. */
+/* Boldo and Melquiond, "Emulation of a FMA and correctly rounded sums", 2008. Where it overflows or
+   underflows, libm's fma is used, which the standard requires to be exact too. */
 CALLED dvec dvec_fma(dvec a, dvec b, dvec c)
 {
   const dvec product = a * b, zero = DSPLAT(0.0);
@@ -46,7 +46,7 @@ CALLED dvec dvec_fma(dvec a, dvec b, dvec c)
   const dvec rest = ((a1 * b1 - product) + a1 * b2 + a2 * b1) + a2 * b2;
   const dvec low = c + rest, low_lost = lost_of_sum(c, rest, low);
   const dvec high = product + low, high_lost = lost_of_sum(product, low, high);
-  /* An exact product: one sum, and the sign of a zero as it should be. */
+  /* Exact product: one sum, which also has the right sign of zero. */
   dvec r = dvec_select(rest == zero, product + c, high + sum_to_odd(low_lost, high_lost));
   const divec tiny = is_below(product, 0x1p-960) & (a != zero) & (b != zero);
   const divec fit = is_below(a, 0x1p990) & is_below(b, 0x1p990) & is_below(product, 0x1p1000) &
@@ -68,8 +68,8 @@ OPERATION vec vec_fma(vec a, vec b, vec c) { return FMA_PS(a, b, c); }
 OPERATION vec vec_fms(vec a, vec b, vec c) { return FMS_PS(a, b, c); }
 OPERATION vec vec_fnma(vec a, vec b, vec c) { return FNMA_PS(a, b, c); }
 #else
-/* A product of floats is exact in doubles, and a sum that is rounded to odd there can be rounded
-   again without harm: doubles have more than twice the bits. */
+/* A product of floats is exact in doubles, and a sum rounded to odd there can be rounded again
+   without error: doubles have more than twice the bits. */
 CALLED vec vec_fma(vec a, vec b, vec c)
 {
   vec r;

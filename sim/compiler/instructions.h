@@ -1,18 +1,18 @@
-/* What this machine's instructions do to a whole register of doubles (PD) or floats (PS), where C has
-   no operator that is sure to become them. None is defined where a register is not as wide as a
-   vector, or has no such instruction.
+/* This machine's instructions on a whole register of doubles (PD) or floats (PS) for which C has no
+   operator that reliably becomes them. None is defined if a register is not as wide as a vector, or
+   has no such instruction.
 
-   GCC has names of its own for them. They spare its header of all instructions, which takes half as
-   long to read as a kernel takes to compile. */
+   GCC has its own names for them, which avoid its header of all instructions: reading that takes
+   half as long as compiling a kernel. */
 #if defined(__has_builtin) && !defined(__clang__)
 #if __has_builtin(__builtin_ia32_vfmsubpd256)
 #define NAMED_256
 #endif
 #if __has_builtin(__builtin_ia32_vfmsubpd512_mask)
 #define NAMED_512
-/* The rounding that is set: to nearest. */
+/* The current rounding mode: to nearest. */
 #define AS_SET 4
-/* A mask that leaves no lane out. GCC takes some as unsigned char, and others signed. */
+/* A mask of all lanes. GCC takes some as unsigned char, others as signed. */
 #define ALL -1
 #define ALL_UNSIGNED ((unsigned char)0xff)
 #endif

@@ -1,6 +1,6 @@
-/* Walkers in lock-step: a vector of reals, one lane a walker. Reals are doubles, or floats where
-   SINGLE is defined, of which twice as many fill a register; DOUBLES is how many doubles do.
-   Every operation is IEEE-exact or built from such, so a lane's bits do not depend on compiler,
+/* Walks in lock-step: a vector of reals, one lane per walk. Reals are doubles, or floats if SINGLE
+   is defined, of which twice as many fit a register; DOUBLES is the number of doubles. Every
+   operation is IEEE-exact or built from such operations, so a lane's bits do not depend on compiler,
    machine or neighbours. No libm: its last bits differ between systems. */
 #include <stdint.h>
 #include <string.h>
@@ -18,7 +18,7 @@ typedef int64_t integer;
 typedef real vec __attribute__((vector_size(sizeof(real) * LANES)));
 typedef integer ivec __attribute__((vector_size(sizeof(real) * LANES)));
 
-/* Doubles whatever a real is: HALVES of these for all lanes. */
+/* Doubles, whatever a real is: HALVES of these for all lanes. */
 #define HALVES (LANES / DOUBLES)
 typedef double dvec __attribute__((vector_size(8 * DOUBLES)));
 typedef int64_t divec __attribute__((vector_size(8 * DOUBLES)));
@@ -31,7 +31,7 @@ typedef dvec wide[HALVES];
 /* Not every source uses all of them. */
 #define OPERATION static inline __attribute__((unused))
 
-/* Less zero is x itself, and so no operation; plus zero is none of -0. */
+/* x - 0 is x itself and costs no operation; x + 0 is not for -0. */
 #define SPLAT(x) ((real)(x) - (vec){0})
 #define ISPLAT(x) ((integer)(x) - (ivec){0})
 #define DSPLAT(x) ((double)(x) - (dvec){0})
@@ -49,7 +49,7 @@ OPERATION dvec dvec_select(divec mask, dvec a, dvec b)
 
 #include "instructions.h"
 
-/* Of a NaN and a number, the second operand: what the instruction does, spelt out elsewhere. */
+/* For a NaN and a number, the second operand, as the instruction does. */
 #ifdef MAX_PD
 OPERATION dvec dvec_max(dvec a, dvec b) { return MAX_PD(a, b); }
 OPERATION dvec dvec_min(dvec a, dvec b) { return MIN_PD(a, b); }
@@ -89,8 +89,8 @@ OPERATION vec vec_sqrt(vec a)
 #endif
 }
 
-/* Adding 1.5 * 2^52 rounds a double to the nearest integer, halves to the even one, and leaves it
-   in the low bits; 1.5 * 2^23 does so with a float. */
+/* Adding 1.5 * 2^52 rounds a double to the nearest integer, halves to even, and leaves it in the low
+   bits; 1.5 * 2^23 does the same for a float. */
 #define DOUBLE_ROUNDER 6755399441055744.0
 #ifdef SINGLE
 #define ROUNDER 12582912.0
@@ -98,7 +98,7 @@ OPERATION vec vec_sqrt(vec a)
 #define ROUNDER DOUBLE_ROUNDER
 #endif
 
-/* Both below 2^51 in size. */
+/* Below 2^51 in size; dvec_floor as well. */
 OPERATION dvec dvec_round(dvec a) { return (a + DSPLAT(DOUBLE_ROUNDER)) - DSPLAT(DOUBLE_ROUNDER); }
 
 OPERATION dvec dvec_floor(dvec a)
@@ -107,7 +107,7 @@ OPERATION dvec dvec_floor(dvec a)
   return nearest - (dvec)((nearest > a) & (divec)DSPLAT(1.0));
 }
 
-/* A whole number as an integer, and back; it is below 2^51 in size. */
+/* A whole number below 2^51 in size as an integer, and back. */
 OPERATION divec dvec_whole(dvec a)
 {
   return (divec)(a + DSPLAT(DOUBLE_ROUNDER)) - (divec)DSPLAT(DOUBLE_ROUNDER);
@@ -118,8 +118,8 @@ OPERATION dvec dvec_of(divec a)
   return (dvec)(a + (divec)DSPLAT(DOUBLE_ROUNDER)) - DSPLAT(DOUBLE_ROUNDER);
 }
 
-/* Half h of a vector of reals as doubles, and back. GCC widens eight floats in two halves unless it is
-   told the instruction. */
+/* Half h of a vector of reals as doubles, and back. GCC widens eight floats in two halves without
+   the explicit instruction. */
 OPERATION dvec vec_widened(const vec *x, int h)
 {
   hvec half;
@@ -137,11 +137,11 @@ OPERATION void vec_narrow(vec *x, int h, dvec value)
   memcpy((char *)x + (size_t)h * sizeof half, &half, sizeof half);
 }
 
-/* sin and cos: reduction to [-pi/4, pi/4] with pi/2 in two parts (in floats three; Cody and Waite),
-   of which products are rounded with their sums only. Then polynomials: in doubles those of Sun's
-   fdlibm to x^13 and x^14, within 2^-58; in floats Taylor's to x^9 and x^10, whose remainder is below
-   half an ulp. Joint angles are a few radians; beyond 1e5 rad (in floats 1e4 rad) accuracy is lost,
-   and such a walk has long diverged. */
+/* sin and cos: reduction to [-pi/4, pi/4] with pi/2 in two parts (for floats three; Cody and Waite),
+   whose products are rounded only with their sums. Then polynomials: for doubles those of Sun's
+   fdlibm to x^13 and x^14, within 2^-58; for floats Taylor's to x^9 and x^10, whose remainder is
+   below half an ulp. Joint angles are a few radians; beyond 1e5 rad (floats 1e4 rad) accuracy is
+   lost, and such a walk has long diverged. */
 OPERATION void vec_sincos(vec x, vec *sine, vec *cosine)
 {
   const vec rounded = vec_fma(x, SPLAT(0x1.45f306dc9c883p-1), SPLAT(ROUNDER));

@@ -124,25 +124,13 @@ class FuzzyPi:
             description="Gain of the integrator.",
         ),
         Variable(
-            name="FI1R",
-            low=1500,
-            high=6000,
-            unit="counts",
-            description="Range of the angle error.",
+            name="FI1R", low=1500, high=6000, unit="counts", description="Range of the angle error."
         ),
         Variable(
-            name="FI2R",
-            low=6000,
-            high=24000,
-            unit="counts",
-            description="Range of the current.",
+            name="FI2R", low=6000, high=24000, unit="counts", description="Range of the current."
         ),
         Variable(
-            name="FOR",
-            low=500,
-            high=2000,
-            unit="PWM counts",
-            description="Range of the output.",
+            name="FOR", low=500, high=2000, unit="PWM counts", description="Range of the output."
         ),
         Variable(
             name="FOMF",
@@ -154,10 +142,7 @@ class FuzzyPi:
         ),
         Variable(name="FW1", low=0.1, high=1.0, description="Weight of rule 1: zero -> null."),
         Variable(
-            name="FW23",
-            low=0.1,
-            high=1.0,
-            description="Weight of rules 2, 3: follow the error.",
+            name="FW23", low=0.1, high=1.0, description="Weight of rules 2, 3: follow the error."
         ),
         Variable(
             name="FW4",

@@ -163,19 +163,9 @@ class FuzzyPi3:
     )
     variables: Final = (
         Variable(
-            name="A_ERR",
-            low=500,
-            high=10000,
-            unit="counts",
-            description="Range of the angle error",
+            name="A_ERR", low=500, high=10000, unit="counts", description="Range of the angle error"
         ),
-        Variable(
-            name="I_MA",
-            low=1.0,
-            high=6.0,
-            unit="A",
-            description="Range of the current.",
-        ),
+        Variable(name="I_MA", low=1.0, high=6.0, unit="A", description="Range of the current."),
         Variable(
             name="V_ERR",
             low=1000,
@@ -184,11 +174,7 @@ class FuzzyPi3:
             description="Range of the velocity error.",
         ),
         Variable(
-            name="FzzP",
-            low=200,
-            high=5000,
-            unit="PWM counts",
-            description="Range of the voltage.",
+            name="FzzP", low=200, high=5000, unit="PWM counts", description="Range of the voltage."
         ),
         Variable(
             name="FzzI",
@@ -211,35 +197,16 @@ class FuzzyPi3:
             kind="integer",
             description="Membership functions of the integrated voltage: 1 triangle, 2 Gauss.",
         ),
+        Variable(name="W1", low=0.0, high=1.0, description="Weight of rule 1: error zero -> null."),
         Variable(
-            name="W1",
-            low=0.0,
-            high=1.0,
-            description="Weight of rule 1: error zero -> null.",
+            name="W2", low=0.0, high=1.0, description="Weight of rule 2: velocity zero -> null."
         ),
         Variable(
-            name="W2",
-            low=0.0,
-            high=1.0,
-            description="Weight of rule 2: velocity zero -> null.",
+            name="W34", low=0.0, high=1.0, description="Weight of rules 3, 4: follow the error."
         ),
+        Variable(name="W56", low=0.0, high=1.0, description="Weight of rules 5, 6: current large."),
         Variable(
-            name="W34",
-            low=0.0,
-            high=1.0,
-            description="Weight of rules 3, 4: follow the error.",
-        ),
-        Variable(
-            name="W56",
-            low=0.0,
-            high=1.0,
-            description="Weight of rules 5, 6: current large.",
-        ),
-        Variable(
-            name="W78",
-            low=0.0,
-            high=1.0,
-            description="Weight of rules 7, 8: follow the velocity.",
+            name="W78", low=0.0, high=1.0, description="Weight of rules 7, 8: follow the velocity."
         ),
     )
     conventions: Final = _CONVENTIONS

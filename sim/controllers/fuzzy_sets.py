@@ -17,11 +17,7 @@ from gaitswarm.sim.controllers.mamdani import FuzzySet
 from gaitswarm.sim.variables import Variable
 
 SIGNED: Final[Mapping[str, FuzzySet]] = MappingProxyType(
-    {
-        "negative": FuzzySet(-1.0, 1.0),
-        "zero": FuzzySet(0.0, 1.0),
-        "positive": FuzzySet(1.0, 1.0),
-    }
+    {"negative": FuzzySet(-1.0, 1.0), "zero": FuzzySet(0.0, 1.0), "positive": FuzzySet(1.0, 1.0)}
 )
 """Of an error, angle or velocity."""
 

@@ -19,25 +19,13 @@ from gaitswarm.sim.controllers.fixed_point import (
 from gaitswarm.sim.variables import Variable
 
 _P: Final = Variable(
-    name="P",
-    low=0.05,
-    high=1.0,
-    unit="PWM counts/count",
-    description="Proportional gain.",
+    name="P", low=0.05, high=1.0, unit="PWM counts/count", description="Proportional gain."
 )
 _I: Final = Variable(
-    name="I",
-    low=0.0,
-    high=1.0,
-    unit="PWM counts/(count s)",
-    description="Integral gain.",
+    name="I", low=0.0, high=1.0, unit="PWM counts/(count s)", description="Integral gain."
 )
 _D: Final = Variable(
-    name="D",
-    low=0.0,
-    high=0.02,
-    unit="PWM counts s/count",
-    description="Derivative gain.",
+    name="D", low=0.0, high=0.02, unit="PWM counts s/count", description="Derivative gain."
 )
 
 

@@ -172,10 +172,7 @@ def reference_table(
 
 
 def compiled_table(
-    system: Mamdani,
-    grid: Mapping[str, NDArray[np.float64]],
-    *,
-    library: ctypes.CDLL | None = None,
+    system: Mamdani, grid: Mapping[str, NDArray[np.float64]], *, library: ctypes.CDLL | None = None
 ) -> tuple[NDArray[np.int8], float] | None:
     """An inference in 8 bits, with the bits of `quantisation.reference_table`.
 

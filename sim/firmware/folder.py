@@ -77,10 +77,7 @@ class ControlLog:
 
 
 def control_logs(
-    robot: Robot,
-    scenarios: Sequence[Scenario],
-    law: ControlLaw,
-    gait: Mapping[str, float],
+    robot: Robot, scenarios: Sequence[Scenario], law: ControlLaw, gait: Mapping[str, float]
 ) -> tuple[ControlLog, ...]:
     """Let a control law walk, and keep what it read and gave."""
     kernel = kernel_of(robot)

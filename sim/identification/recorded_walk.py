@@ -8,14 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    FiniteFloat,
-    ValidationError,
-    model_validator,
-)
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
 
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName, names_of
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
@@ -137,10 +130,7 @@ Recordings = Mapping[str, RecordedWalk]
 
 
 def record(
-    pair: Synchronised,
-    scenario: Scenario,
-    controller: str,
-    design: Mapping[str, float],
+    pair: Synchronised, scenario: Scenario, controller: str, design: Mapping[str, float]
 ) -> RecordedWalk:
     """The measured currents of two synchronised logs, on the simulated one's time axis."""
     try:

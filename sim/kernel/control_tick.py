@@ -22,11 +22,11 @@ Ints = NDArray[np.int64]
 
 @dataclass(slots=True)
 class Past:
-    """What the controllers remember from tick to tick: (J,) each.
+    """State of the controllers between ticks, (J,) each.
 
     Attributes:
-        integral: of the integrators [counts, with `INTEGRAL_BITS` fraction bits].
-        error: of the tick before [counts]; none before the first.
+        integral: integrators [counts, with `INTEGRAL_BITS` fraction bits].
+        error: of the previous tick [counts]; None before the first.
     """
 
     integral: Ints
@@ -34,20 +34,19 @@ class Past:
 
     @classmethod
     def of(cls, n_joints: int) -> Past:
-        """Before the first tick."""
         return cls(np.zeros(n_joints, dtype=np.int64))
 
 
 def low_pass(sensed: Floats, current: Floats, smoothing: float) -> Floats:
-    """The current sensors' analog filter over one physics step.
+    """Advance the current sensors' analog filter by one physics step.
 
     Args:
-        sensed: Behind the filter, (J,) [A].
+        sensed: Filter output before the step, (J,) [A].
         current: Absolute, (J,) [A].
-        smoothing: Share of its distance from `current` that it goes [1]; 1 for no filter.
+        smoothing: Share of the distance to `current` covered in the step [1]; 1 for no filter.
 
     Returns:
-        Behind the filter after the step, (J,) [A].
+        Filter output after the step, (J,) [A].
     """
     return current.copy() if smoothing >= 1.0 else sensed + smoothing * (current - sensed)
 
@@ -55,10 +54,10 @@ def low_pass(sensed: Floats, current: Floats, smoothing: float) -> Floats:
 def coded(
     angles: Floats, current: Floats, desired: NDArray[np.int32], coding: Coding
 ) -> tuple[Ints, Ints]:
-    """What the controllers read.
+    """Encode the sensor readings.
 
     Args:
-        angles: That the encoders see, (J,) [rad].
+        angles: Seen by the encoders, (J,) [rad].
         current: Absolute, behind the filter, (J,) [A].
         desired: Coded angles, (J,) [counts].
 
@@ -70,7 +69,7 @@ def coded(
 
 
 def control(law: ControlLaw, coding: Coding, error: Ints, load: Ints, past: Past) -> Ints:
-    """One tick of all joints' controllers (thesis 5.3).
+    """Run one tick of all joints' controllers (thesis 5.3).
 
     Args:
         error: Of the angles, (J,) [counts].
@@ -95,11 +94,7 @@ def control(law: ControlLaw, coding: Coding, error: Ints, load: Ints, past: Past
 
 
 def status_of(q: Floats, v: Floats, internal_state: Floats, setup: WalkSetup) -> Status:
-    """Whether a walk goes on, as it is asked at the end of every control tick.
-
-    Args:
-        internal_state: (I,).
-    """
+    """Return the status at the end of a control tick; OK means that the walk continues."""
     if not all(np.isfinite(array).all() for array in (q, v, internal_state)):
         return Status.DIVERGED
     upright = 1.0 - 2.0 * (q[3] * q[3] + q[4] * q[4])
@@ -109,25 +104,25 @@ def status_of(q: Floats, v: Floats, internal_state: Floats, setup: WalkSetup) ->
 
 
 def padded_states(rows: Sequence[Floats], ticks: int) -> Floats:
-    """States of a walk, as `WalkResult` has them."""
+    """Pad the logged states to all ticks, as in `WalkResult`."""
     states = np.full((ticks, len(rows[0])), np.nan)
     states[: len(rows)] = rows
     return states
 
 
-_NONE: Final = JointPd()
+_NO_PD: Final = JointPd()
 
 
 class InnerLoop:
-    """What a robot's actuators are given from inner tick to inner tick.
+    """Commands to a robot's actuators from inner tick to inner tick.
 
-    A DC motor is given the voltage of the control tick.
+    DC motors keep the voltage of the control tick.
     """
 
     def __init__(self, robot: Robot, setup: WalkSetup, coding: Coding) -> None:
         self._limit = robot.actuators().torque_limit if robot.is_torque_controlled else None
         self._setup, self._coding = setup, coding
-        self._pd = setup.control_law.joint_pd or _NONE
+        self._pd = setup.control_law.joint_pd or _NO_PD
         self._target: Floats = np.zeros(robot.n_joints)
         self._speed: Floats = self._target
         self._commanded: Floats = self._target
@@ -143,7 +138,7 @@ class InnerLoop:
             return
         desired, carrying = self._setup.desired, self._setup.feed_forward
         later = min(tick + 1, len(desired) - 1)
-        # The last target has no next one: the speed before it goes on.
+        # The last target has no successor: the speed before it continues.
         further = desired[later].astype(np.int64) - desired[max(later - 1, 0)]
         self._target = desired[tick] / self._coding.angle_counts
         self._speed = further / self._coding.angle_counts * float(CONTROL_RATE)
@@ -152,11 +147,11 @@ class InnerLoop:
             self._commanded = self._commanded + share
 
     def command(self, angles: Floats, rates: Floats) -> Floats:
-        """What actuators are given, until the next inner tick.
+        """Return the command until the next inner tick.
 
         Args:
-            angles: That their encoders see, (J,) [rad].
-            rates: Likewise, (J,) [rad/s].
+            angles: Seen by the encoders, (J,) [rad].
+            rates: Seen by the encoders, (J,) [rad/s].
 
         Returns:
             Motor voltage per supply voltage, or torque per torque limit, (J,) [1].
@@ -166,6 +161,6 @@ class InnerLoop:
         torque = self._pd.stiffness * (self._target - angles)
         torque = torque + self._pd.damping * (self._speed - rates)
         share = self._commanded + torque * (1.0 / self._limit)
-        # Of a NaN the lower bound, as in torque.c.
+        # A NaN becomes the lower bound, as in torque.c.
         command: Floats = np.fmin(np.fmax(share, -1.0), 1.0)
         return command

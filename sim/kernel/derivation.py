@@ -1,4 +1,4 @@
-"""Derivation of a kernel's C source, in a process with limits for robots that do not ship."""
+"""Derivation of a kernel's C source; in a process with limits for robots that do not ship."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ if TYPE_CHECKING:
     from gaitswarm.sim.kernel.walk import Precision
 
 SECONDS: Final = 120.0
-"""That a derivation may take; it takes one or two, and a second more to start."""
+"""Time limit of a derivation, which takes one or two seconds after a second of start-up."""
 
 CPU_SECONDS: Final = 60
 
 MEMORY: Final = 4 << 30
-"""Address space of a process that derives [B]; it takes a tenth of that."""
+"""Address space of the process [B]; a derivation needs a tenth of it."""
 
-# Not kept: CasADi's symbols would take memory, and robots with a new kernel are rare.
+# Not kept: CasADi's symbols hold memory, and robots with a new kernel are rare.
 PROCESSES: Final = LimitedProcesses(
     "gaitswarm.sim.kernel.derivation",
     count=2,
@@ -34,7 +34,7 @@ PROCESSES: Final = LimitedProcesses(
 
 
 def derived_source(robot: Robot, precision: Precision = "double") -> str:
-    """As `kernel_source`; in a process of its own, unless the robot ships."""
+    """Derive a kernel's C source."""
     if robot.ships:
         return kernel_source(robot, precision)
     request = {
@@ -46,7 +46,7 @@ def derived_source(robot: Robot, precision: Precision = "double") -> str:
         return str(PROCESSES.ask(request)["source"])
     except ProcessEnded as error:
         raise KernelBuildError(
-            f"there is no kernel for {robot.description.name!r}: deriving it {error}"
+            f"no kernel for {robot.description.name!r}: its derivation {error}"
         ) from error
 
 

@@ -1,4 +1,4 @@
-"""The order in which walks enter the lanes of a kernel that refills them."""
+"""Order in which walks enter the lanes of a kernel."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from dataclasses import dataclass
 from typing import Final
 
 _GOOD_ENOUGH: Final = 1.005
-"""Of the time that lanes would take which all end at once; what is nearer is not worth a search."""
+"""Ratio to the time of perfectly even lanes below which the search stops."""
 
 _EXCHANGES_PER_LANE: Final = 4
-"""The search's length at most."""
+"""Limit of the search's length."""
 
 
 @dataclass(frozen=True, slots=True)
 class LanePlan:
-    """Walks on lanes, each of which begins its next walk when one ends.
+    """Assignment of walks to lanes; a lane starts its next walk when one ends.
 
     Attributes:
-        order: indices of the walks, in the order in which they begin.
-        end: when the last lane is done, in the durations' unit.
-        use: share of the lanes' time until then that is walked [1].
+        order: indices of the walks in the order of their start.
+        end: time at which the last lane finishes, in the unit of the durations.
+        use: share of the lanes' time until then that is spent on walks [1].
     """
 
     order: tuple[int, ...]
@@ -31,10 +31,10 @@ class LanePlan:
 
 
 def plan_lanes(durations: Sequence[float], lanes: int) -> LanePlan:
-    """Spread walks over lanes so that all lanes end at nearly the same time.
+    """Distribute walks over lanes so that all lanes finish at nearly the same time.
 
-    Longest first onto the lane that is free first (Graham's LPT rule); then walks of the lane that
-    ends last are moved or exchanged, as long as that lets it end earlier.
+    Longest processing time first (Graham's LPT rule); then walks of the lane that finishes last are
+    moved or exchanged while that shortens it.
     """
     if not durations:
         return LanePlan((), 0.0, 1.0)
@@ -51,10 +51,9 @@ def plan_lanes(durations: Sequence[float], lanes: int) -> LanePlan:
 
 
 def _end(durations: Sequence[float], order: Sequence[int], lanes: int) -> float:
-    """When the last lane is done if each free lane begins the next walk of the order.
+    """Return when the last lane finishes if each free lane takes the next walk of the order.
 
-    It may be earlier than where the walks were spread: a lane that has no more walks there takes
-    the next one here.
+    It may be earlier than planned: a lane without planned walks takes the next one here.
     """
     free = [0.0] * lanes
     for index in order:
@@ -64,7 +63,7 @@ def _end(durations: Sequence[float], order: Sequence[int], lanes: int) -> float:
 
 @dataclass(slots=True)
 class _Lane:
-    """walks: (duration, index), the shortest first."""
+    """A lane; walks are (duration, index), the shortest first."""
 
     end: float
     walks: list[tuple[float, int]]
@@ -78,7 +77,7 @@ class _Lane:
         self.end -= walk[0]
 
     def begins(self) -> list[tuple[float, int]]:
-        """(time, index) of every walk; the longest is first."""
+        """Return (start time, index) of every walk, the longest first."""
         time, begun = 0.0, []
         for duration, index in reversed(self.walks):
             begun.append((time, index))
@@ -87,7 +86,7 @@ class _Lane:
 
 
 def _longest_first(durations: Sequence[float], lanes: int) -> list[_Lane]:
-    """The lane that ends last first."""
+    """Apply the LPT rule; the lane that finishes last comes first."""
     filled = [_Lane(0.0, []) for _ in range(lanes)]
     free = [(0.0, k) for k in range(lanes)]
     for index in sorted(range(len(durations)), key=lambda k: -durations[k]):
@@ -98,10 +97,7 @@ def _longest_first(durations: Sequence[float], lanes: int) -> list[_Lane]:
 
 
 def _relieve(filled: list[_Lane]) -> bool:
-    """Let the first lane, which ends last, end earlier without another then ending as late.
-
-    Returns whether a walk was moved, or exchanged for a shorter one.
-    """
+    """Shorten the first lane, which finishes last, by one move or exchange; return success."""
     last = filled[0]
     best: tuple[float, _Lane, tuple[float, int], tuple[float, int] | None] | None = None
     for lane in filled[1:]:
@@ -124,7 +120,7 @@ def _relieve(filled: list[_Lane]) -> bool:
 
 
 def _near(lane: _Lane, duration: float) -> list[tuple[float, int] | None]:
-    """The lane's walks just below and above a duration; None is no walk."""
+    """Return the lane's walks just below and above a duration; None stands for no walk."""
     at = bisect_left(lane.walks, (duration, -1))
     below = lane.walks[at - 1] if at else None
     return [below, lane.walks[at]] if at < len(lane.walks) else [below]

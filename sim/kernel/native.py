@@ -1,4 +1,4 @@
-"""The compiled kernel: emitted physics and the hand-written driver, loaded with ctypes."""
+"""The compiled kernel, loaded with ctypes: generated physics and the hand-written driver."""
 
 from __future__ import annotations
 
@@ -38,20 +38,17 @@ from gaitswarm.sim.robot import Robot
 Floats = NDArray[np.float64]
 
 
+def _fields(kind: Any, *names: str) -> list[tuple[str, Any]]:
+    return [(name, kind) for name in names]
+
+
 class CodingStructure(ctypes.Structure):
-    """Sensors, PWM and rates of all walks of a call, with the robot's constants."""
+    """Sensors, PWM and rates of all walks of a call, and the robot's constants."""
 
     _fields_ = [
-        ("angle_counts", ctypes.c_double),
-        ("current_counts", ctypes.c_double),
-        ("duty_per_count", ctypes.c_double),
-        ("angle_step", ctypes.c_int64),
-        ("current_step", ctypes.c_int64),
-        ("pwm_step", ctypes.c_int64),
-        ("pwm_counts", ctypes.c_int64),
-        ("substeps", ctypes.c_int64),
-        ("refinement", ctypes.c_int64),
-        ("inner_ticks", ctypes.c_int64),
+        *_fields(ctypes.c_double, "angle_counts", "current_counts", "duty_per_count"),
+        *_fields(ctypes.c_int64, "angle_step", "current_step", "pwm_step", "pwm_counts"),
+        *_fields(ctypes.c_int64, "substeps", "refinement", "inner_ticks"),
         ("robot", ctypes.c_void_p),
     ]
 
@@ -59,26 +56,16 @@ class CodingStructure(ctypes.Structure):
 class _Table(ctypes.Structure):
     _fields_ = [
         ("values", ctypes.c_void_p),
-        ("n_error", ctypes.c_int64),
-        ("n_current", ctypes.c_int64),
-        ("n_velocity", ctypes.c_int64),
-        ("error_gain", ctypes.c_int64),
-        ("current_gain", ctypes.c_int64),
-        ("velocity_gain", ctypes.c_int64),
-        ("output_gain", ctypes.c_int64),
+        *_fields(ctypes.c_int64, "n_error", "n_current", "n_velocity"),
+        *_fields(ctypes.c_int64, "error_gain", "current_gain", "velocity_gain", "output_gain"),
     ]
 
 
 class _Law(ctypes.Structure):
     _fields_ = [
-        ("proportional_gain", ctypes.c_int64),
-        ("integral_gain", ctypes.c_int64),
-        ("derivative_gain", ctypes.c_int64),
-        ("direct", _Table),
-        ("integrated", _Table),
-        ("stiffness", ctypes.c_double),
-        ("damping", ctypes.c_double),
-        ("feed_forward", ctypes.c_double),
+        *_fields(ctypes.c_int64, "proportional_gain", "integral_gain", "derivative_gain"),
+        *_fields(_Table, "direct", "integrated"),
+        *_fields(ctypes.c_double, "stiffness", "damping", "feed_forward"),
     ]
 
 
@@ -93,38 +80,57 @@ class SensorErrorsStructure(ctypes.Structure):
 
 
 class Walker(ctypes.Structure):
-    """A walk as the kernel reads it, with where its results go and what they are."""
+    """A walk: input arrays, addresses of its results, and scalar results."""
 
     _fields_ = [
-        ("q0", ctypes.c_void_p),
-        ("internal_state", ctypes.c_void_p),
-        ("parameters", ctypes.c_void_p),
-        ("desired", ctypes.c_void_p),
-        ("disturbance", ctypes.c_void_p),
-        ("feed_forward", ctypes.c_void_p),
+        *_fields(ctypes.c_void_p, "q0", "internal_state", "parameters", "desired"),
+        *_fields(ctypes.c_void_p, "disturbance", "feed_forward"),
         ("sensors", SensorErrorsStructure),
         ("shove", 2 * ctypes.c_int64),
         ("law", _Law),
         ("ticks", ctypes.c_int64),
-        ("fall_height", ctypes.c_double),
-        ("fall_cosine", ctypes.c_double),
+        *_fields(ctypes.c_double, "fall_height", "fall_cosine"),
         ("smoothing", 2 * ctypes.c_double),
-        ("sums", ctypes.c_void_p),
-        ("end", ctypes.c_void_p),
-        ("log", ctypes.c_void_p),
+        *_fields(ctypes.c_void_p, "sums", "end", "log"),
         ("peak_current", ctypes.c_double),
         ("status", ctypes.c_int64),
     ]
 
 
-STRUCTURES: Final = {"coding": CodingStructure, "table": _Table, "walker": Walker}
-"""By their names in the library's functions that tell their sizes."""
+class _Call(ctypes.Structure):
+    _fields_ = [
+        ("walkers", ctypes.c_void_p),
+        *_fields(ctypes.c_int64, "n", "begun", "left", "number"),
+        ("following", ctypes.c_void_p),
+    ]
+
+
+class _Pool(ctypes.Structure):
+    _fields_ = [*_fields(ctypes.c_int64, "busy", "calls"), ("first", ctypes.c_void_p)]
+
+
+class LaneCounts(ctypes.Structure):
+    """`gaitswarm.sim.kernel.walk.LaneUse` of the lanes of one thread."""
+
+    _fields_ = _fields(ctypes.c_int64, "walked", "computed", "timed", "control")
+
+
+STRUCTURES: Final = {
+    "coding": CodingStructure,
+    "table": _Table,
+    "walker": Walker,
+    "call": _Call,
+    "pool": _Pool,
+    "lane_use": LaneCounts,
+}
+"""By their names in the library's `size_of_` functions."""
 
 
 class Addresses:
-    """Addresses of arrays, which stay where they are as long as this object lives.
+    """Addresses of contiguous arrays, which stay valid while this object lives.
 
-    Walks share most of them: those of a scenario all but the law, those of a design the law.
+    Walks share most arrays: those of a scenario all but the control law, those of a design the
+    control law.
     """
 
     def __init__(self) -> None:
@@ -132,22 +138,19 @@ class Addresses:
         self._laws: dict[int, tuple[_Law, ControlLaw]] = {}
 
     def of(self, array: NDArray[Any], dtype: Any) -> int:
-        """Where an array's numbers are."""
-        known = self._arrays.get(id(array))
-        if known is None:
+        cached = self._arrays.get(id(array))
+        if cached is None:
             contiguous = np.ascontiguousarray(array, dtype=dtype)
-            known = int(contiguous.ctypes.data), contiguous, array
-            self._arrays[id(array)] = known
-        return known[0]
+            cached = int(contiguous.ctypes.data), contiguous, array
+            self._arrays[id(array)] = cached
+        return cached[0]
 
     def if_any(self, array: Floats | None) -> int | None:
-        """As `of`, for doubles."""
         return None if array is None else self.of(array, np.float64)
 
     def law(self, law: ControlLaw) -> _Law:
-        """A control law as the kernel reads it."""
-        known = self._laws.get(id(law))
-        if known is None:
+        cached = self._laws.get(id(law))
+        if cached is None:
             packed = _Law(
                 law.proportional_gain,
                 law.integral_gain,
@@ -156,8 +159,8 @@ class Addresses:
                 self._table(law.integrated),
                 *dataclasses.astuple(law.joint_pd or JointPd()),
             )
-            known = self._laws[id(law)] = packed, law
-        return known[0]
+            cached = self._laws[id(law)] = packed, law
+        return cached[0]
 
     def _table(self, table: Response | None) -> _Table:
         if table is None:
@@ -176,61 +179,32 @@ class Addresses:
         )
 
 
-class _Call(ctypes.Structure):
-    _fields_ = [
-        ("walkers", ctypes.c_void_p),
-        ("n", ctypes.c_int64),
-        ("begun", ctypes.c_int64),
-        ("left", ctypes.c_int64),
-        ("number", ctypes.c_int64),
-        ("following", ctypes.c_void_p),
-    ]
-
-
-class _Pool(ctypes.Structure):
-    _fields_ = [
-        ("busy", ctypes.c_int64),
-        ("calls", ctypes.c_int64),
-        ("first", ctypes.c_void_p),
-    ]
-
-
-class LaneCounts(ctypes.Structure):
-    """As `gaitswarm.sim.kernel.walk.LaneUse`, of the lanes of one thread."""
-
-    _fields_ = [(name, ctypes.c_int64) for name in ("walked", "computed", "timed", "control")]
-
-
-SHARED_STRUCTURES: Final = {"call": _Call, "pool": _Pool, "lane_use": LaneCounts}
-"""By their names in the library's functions that tell their sizes."""
-
-
 class Pool:
-    """Calls of one kernel and coding.
+    """Concurrent calls of one kernel and coding.
 
-    A thread first begins all walks of its own call. Lanes that become free then are filled with
-    walks of the other calls, so that all threads end at nearly the same time.
+    A thread first starts all walks of its own call. Lanes that then become free take walks of other
+    calls, so that all threads finish at nearly the same time.
     """
 
     def __init__(self, library: ctypes.CDLL) -> None:
         self._library = library
         self._shared = _Pool()
         self._walked = threading.Condition()
-        self._kept: list[tuple[_Call, object]] = []
+        self._pending: list[tuple[_Call, object]] = []
 
     def walk(
         self, walkers: ctypes.Array[Any], coding: ctypes.Structure, memory: object
     ) -> tuple[LaneCounts, float]:
-        """Compute walks, and perhaps some of other calls.
+        """Compute the walks, and possibly some of other calls.
 
         Returns:
-            How the lanes of this thread were used; and how long it then waited for walks that other
-            threads had taken over [s].
+            Use of this thread's lanes, and how long it then waited for walks that other threads had
+            taken over [s].
         """
         call = _Call(walkers=ctypes.addressof(walkers), n=len(walkers), left=len(walkers))
         use = LaneCounts()
         with self._walked:
-            self._kept.append((call, (walkers, memory)))
+            self._pending.append((call, (walkers, memory)))
         self._library.gaitswarm_walk(
             ctypes.byref(self._shared), ctypes.byref(call), ctypes.byref(coding), ctypes.byref(use)
         )
@@ -238,7 +212,7 @@ class Pool:
         with self._walked:
             self._walked.notify_all()
             self._walked.wait_for(lambda: not self._left(call))
-            self._kept = [kept for kept in self._kept if self._left(kept[0])]
+            self._pending = [pending for pending in self._pending if self._left(pending[0])]
         return use, time.perf_counter() - walked
 
     def _left(self, call: _Call) -> int:
@@ -249,7 +223,7 @@ _CODED: Final = tuple(field.name for field in dataclasses.fields(Coding))
 
 
 class NativeKernel:
-    """A robot's physics and control, compiled. Its loop runs outside the interpreter's lock."""
+    """A robot's compiled physics and control. Its loop releases the interpreter's lock."""
 
     backend: Final = "native"
 
@@ -268,9 +242,8 @@ class NativeKernel:
         self._pools: dict[Coding, Pool] = {}
 
     def _check(self, robot: str) -> None:
-        """What is passed across the border must mean the same on both sides."""
-        structures = STRUCTURES | SHARED_STRUCTURES
-        sizes = {f"size_of_{name}": ctypes.sizeof(kind) for name, kind in structures.items()}
+        """Check that structures and array sizes agree with the library's."""
+        sizes = {f"size_of_{name}": ctypes.sizeof(kind) for name, kind in STRUCTURES.items()}
         sizes |= {
             "joints": self._joints,
             "parameters": self.layout.size,
@@ -279,24 +252,23 @@ class NativeKernel:
             "log_width": self._log_width,
         }
         for name, size in sizes.items():
-            found = int(getattr(self._library, f"gaitswarm_{name}")())
-            if found != size:
+            compiled = int(getattr(self._library, f"gaitswarm_{name}")())
+            if compiled != size:
                 raise KernelBuildError(
-                    f"the library loaded for {robot} is not this program's kernel of it: its"
-                    f" {name} is {found}, not {size}; remove kernel-* from the directory of"
-                    " compiled kernels, and it will be built again"
+                    f"the library loaded for {robot} does not match this program: its {name} is"
+                    f" {compiled}, not {size}; remove kernel-* from the kernel cache directory"
                 )
 
     @property
     def code_size(self) -> int | None:
-        """Machine code of the library [B]; None where libraries are not in the ELF format."""
+        """Machine code of the library [B]; None if it is not an ELF file."""
         return text_size(Path(self._library._name).read_bytes())  # noqa: SLF001 - documented
 
     def walk(self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool) -> WalkResults:
-        """All walks, `lanes` at a time: where one ends, the next one of `plan_lanes` begins.
+        """Compute all walks, `lanes` at a time, in the order of `plan_lanes`.
 
-        Concurrent calls without logs share their walks: what a thread's lanes have room for at the
-        end, it takes over from another call, and waits for what others have taken over from it.
+        Concurrent calls without logs share their walks: a thread with free lanes takes over walks
+        of another call, and waits for those that others have taken over from it.
         """
         for law in {id(s.control_law): s.control_law for s in setups}.values():
             check_gains(law, torque=self._torque)
@@ -334,7 +306,7 @@ class NativeKernel:
             walker.log = None if record is None else record.ctypes.data
         coded = (getattr(coding, name) for name in _CODED)
         packed = CodingStructure(*coded, self._constants.ctypes.data)
-        # Somebody waits for a log, as a rule: it is not held up by other walks.
+        # A log is usually waited for: do not delay it by other walks.
         pool = Pool(self._library) if log else self._pools.setdefault(coding, Pool(self._library))
         use, waited = pool.walk(walkers, packed, (addresses, sums, end, logs))
         ended = sorted(zip(order, walkers, strict=True), key=lambda pair: pair[0])
@@ -348,18 +320,14 @@ class NativeKernel:
         )
 
 
+# Cached: tasks of successive iterations have walks of the same lengths.
 @lru_cache(maxsize=64)
 def _order(ticks: tuple[int, ...], lanes: int) -> tuple[int, ...]:
-    """Planned once: the tasks of one iteration have walks as long as those of the next."""
     return plan_lanes(ticks, lanes).order
 
 
 def text_size(library: bytes) -> int | None:
-    """Size of the section `.text` of a 64-bit little-endian ELF file.
-
-    Returns:
-        [B]; None for another format.
-    """
+    """Size of the section `.text` of a 64-bit little-endian ELF file [B]; None for others."""
     if library[:6] != b"\x7fELF\x02\x01":
         return None
     (table,) = struct.unpack_from("<Q", library, 0x28)
@@ -373,17 +341,17 @@ def text_size(library: bytes) -> int | None:
 
 _libraries: Final[dict[bytes, ctypes.CDLL | None]] = {}
 _kernels: Final[dict[tuple[bytes, bytes], NativeKernel]] = {}
-"""By library and constants, those used last at the end."""
-_KEPT: Final = 64
+"""By library and constants, the most recently used last."""
+_MAX_KERNELS: Final = 64
 _loading: Final[dict[bytes, threading.Lock]] = {}
 _registering: Final = threading.Lock()
 
 
 def native_kernel(robot: Robot, precision: Precision = "double") -> NativeKernel | None:
-    """The robot's kernel, compiled at first use and loaded once a process.
+    """Return the robot's kernel, compiled on first use and loaded once per process.
 
-    Robots that differ in run-time parameters only share one. While one kernel is compiled, others
-    can be loaded.
+    Robots that differ only in run-time parameters share a library. Other kernels can be loaded
+    while one is compiled.
     """
     identity = kernel_identity(robot, precision)
     with _registering:
@@ -397,9 +365,9 @@ def native_kernel(robot: Robot, precision: Precision = "double") -> NativeKernel
     key = identity, robot_constants(robot).tobytes()
     with _registering:
         kernel = _kernels.pop(key, None) or NativeKernel(robot, library)
-        # Kernels are small, but a calibration may have one for every design.
+        # Kernels are small, but a calibration may use one for every design.
         _kernels[key] = kernel
-        if len(_kernels) > _KEPT:
+        if len(_kernels) > _MAX_KERNELS:
             del _kernels[next(iter(_kernels))]
     return kernel
 
@@ -408,21 +376,21 @@ def load_kernel(
     robot: Robot,
     precision: Precision = "double",
     *,
-    wanted: Target | None = None,
+    compile_for: Target | None = None,
     extra_flags: Sequence[str] = (),
 ) -> NativeKernel | None:
-    """A kernel that `native_kernel` does not keep, to compare ways of compiling."""
-    library = _load(robot, precision, wanted, extra_flags)
+    """Load a kernel without caching it in this process, to compare ways of compiling."""
+    library = _load(robot, precision, compile_for, extra_flags)
     return None if library is None else NativeKernel(robot, library)
 
 
 def _load(
-    robot: Robot, precision: Precision, wanted: Target | None, extra_flags: Sequence[str]
+    robot: Robot, precision: Precision, compile_for: Target | None, extra_flags: Sequence[str]
 ) -> ctypes.CDLL | None:
     return load_library(
         "kernel" if precision == "double" else "kernel-single",
         kernel_identity(robot, precision),
         lambda: derived_source(robot, precision),
-        wanted=wanted,
+        compile_for=compile_for,
         extra_flags=extra_flags,
     )

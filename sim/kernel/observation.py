@@ -1,4 +1,4 @@
-"""The 500 Hz log of a walk: what the kernel kept of it, and all that follows from that."""
+"""The 500 Hz log of a walk, derived from the states that the kernel logged."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from gaitswarm.sim.robot import Robot
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WalkLog:
-    """What happened at every control tick (500 Hz) of one walk; T ticks, J joints, L legs.
+    """Time series of one walk at every control tick (500 Hz); T ticks, J joints, L legs.
 
     Attributes:
         time: (T,) [s].
@@ -25,12 +25,12 @@ class WalkLog:
         base_orientation: (T, 4) quaternion x y z w.
         base_velocity: in the body's frame, (T, 6) linear [m/s] and angular [rad/s].
         joint_angle: of the links, (T, J) [rad].
-        motor_angle: what the encoders see, with backlash not the link's, (T, J) [rad].
+        motor_angle: seen by the encoders; with backlash not the link's, (T, J) [rad].
         joint_velocity: (T, J) [rad/s].
         desired_angle: (T, J) [rad].
         current: of the motors, (T, J) [A].
         voltage: of the motors, (T, J) [V].
-        load_torque: that the gearheads pass to the links, (T, J) [N m].
+        load_torque: passed by the gearheads to the links, (T, J) [N m].
         foot_force: in the world, (T, L, 3) [N].
         supply: voltage of the battery, (T,) [V].
     """
@@ -50,7 +50,7 @@ class WalkLog:
     supply: NDArray[np.float64]
 
     def until_end(self) -> WalkLog:
-        """The ticks that were walked: all but those after an early end."""
+        """Return the log without the ticks after an early end."""
         columns = {column.name: getattr(self, column.name) for column in fields(self)}
         walked = np.all(
             [np.isfinite(c.reshape(len(c), -1)).all(axis=1) for c in columns.values()], axis=0
@@ -64,13 +64,13 @@ class WalkLog:
         dv/dt + omega x v of the logged twist, dv/dt by central differences over 4 ms.
         """
         linear, angular = self.base_velocity[:, :3], self.base_velocity[:, 3:]
-        # One tick alone is the first, at rest.
+        # A single tick is the first one, at rest.
         rate = np.gradient(linear, self.time, axis=0) if len(linear) > 1 else np.zeros_like(linear)
         return np.asarray(rate + np.cross(angular, linear))
 
 
 class States(NamedTuple):
-    """What a kernel keeps of a walk at every tick, after its control; T ticks, J joints."""
+    """States logged by a kernel at every tick, after its control; T ticks, J joints."""
 
     base_position: NDArray[np.float64]
     """(T, 3) [m]."""
@@ -85,34 +85,29 @@ class States(NamedTuple):
     internal_state: NDArray[np.float64]
     """(T, I)."""
     sensed_current: NDArray[np.float64]
-    """Absolute, before the current sensors' converters and their errors, (T, J) [A]."""
+    """Absolute, before the converters of the current sensors and their errors, (T, J) [A]."""
     duty: NDArray[np.float64]
     """(T, J) [1]."""
 
 
 def split_states(robot: Robot, states: NDArray[np.float64]) -> States:
-    """Name what a kernel kept."""
     n = robot.n_joints
     widths = [3, 4, n, 6, n, internal_state_size(robot), n]
     return States(*np.split(states, np.cumsum(widths), axis=1))
 
 
 def encoder_angles(robot: Robot, states: States) -> NDArray[np.float64]:
-    """What the encoders see: the motors, which backlash parts from the links.
-
-    Returns:
-        (T, J) [rad].
-    """
+    """Return the angles that the encoders see, (T, J) [rad]: those of the motors."""
     if robot.has_backlash:
         return states.internal_state[:, : robot.n_joints]
     return states.joint_angle
 
 
 def walk_log(robot: Robot, setup: WalkSetup, states: NDArray[np.float64]) -> WalkLog:
-    """Currents, torques, forces and supply of every tick, from its state and duty."""
+    """Compute currents, torques, forces and supply of every tick from its state and duty."""
     feet, ticks = len(robot.legs), len(states)
-    kept = split_states(robot, states)
-    position, orientation, angle, twist, rate, internal_state, _, duty = kept
+    parts = split_states(robot, states)
+    position, orientation, angle, twist, rate, internal_state, _, duty = parts
     walked = int(np.isfinite(states).all(axis=1).sum())
     joints = robot.n_joints
     seen = [np.full((ticks, size), np.nan) for size in (joints, joints, joints, 3 * feet, 1)]
@@ -124,8 +119,8 @@ def walk_log(robot: Robot, setup: WalkSetup, states: NDArray[np.float64]) -> Wal
         parameters = np.tile(setup.parameters, (walked, 1))
         pushes = Layout(robot).slices["push"]
         parameters[:begin, pushes] = parameters[end:, pushes] = 0.0
-        parts = _observing(robot, walked)(*(part[:walked].T for part in inputs), parameters.T)
-        for target, part in zip(seen, parts, strict=False):
+        observed = _observing(robot, walked)(*(part[:walked].T for part in inputs), parameters.T)
+        for target, part in zip(seen, observed, strict=False):
             target[:walked] = np.array(part).T
     current, voltage, load, force, supply = seen
     return WalkLog(
@@ -134,7 +129,7 @@ def walk_log(robot: Robot, setup: WalkSetup, states: NDArray[np.float64]) -> Wal
         base_orientation=orientation,
         base_velocity=twist,
         joint_angle=angle,
-        motor_angle=encoder_angles(robot, kept),
+        motor_angle=encoder_angles(robot, parts),
         joint_velocity=rate,
         desired_angle=setup.desired / robot.description.sensors.angle_counts,
         current=current,
@@ -147,8 +142,7 @@ def walk_log(robot: Robot, setup: WalkSetup, states: NDArray[np.float64]) -> Wal
 
 @lru_cache(maxsize=16)
 def _observing(robot: Robot, instants: int) -> Any:
-    """What is observed at so many instants; many walks are as long as others."""
-    # Logs are rare: they alone need CasADi in a process that has a compiled kernel.
+    # Imported here: with a compiled kernel, only logs need CasADi.
     from gaitswarm.sim.kernel.dynamics.physics_step import physics_model  # noqa: PLC0415
 
     return physics_model(robot).observe.map(instants)
@@ -157,11 +151,11 @@ def _observing(robot: Robot, instants: int) -> Any:
 def sensed_currents(
     robot: Robot, current: NDArray[np.float64], voltage: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """What reaches the converters of the current sensors: absolute currents behind the low-pass.
+    """Return the inputs of the current sensors' converters: absolute currents behind the low-pass.
 
-    The low-pass of `sensors.current_filter` (thesis 2.3.6.3) begins at zero. Between two control
-    ticks the current is taken as a straight line: the duty, and all but exactly the voltage, is
-    constant there, so the line ends where the next tick's jump of the voltage begins.
+    The low-pass of `sensors.current_filter` (thesis 2.3.6.3) starts at zero. Between two control
+    ticks the current is taken as linear: the duty, and almost exactly the voltage, is constant
+    there, so the line ends where the voltage jumps at the next tick.
 
     Args:
         current: Of the motors at every control tick, (T, J) [A].
@@ -175,7 +169,7 @@ def sensed_currents(
     if smoothing >= 1.0:
         return begins
     if robot.is_torque_controlled:
-        # Torques follow a PD from inner tick to inner tick, with no great jump at a control tick.
+        # Torques follow a PD between inner ticks, without a large jump at a control tick.
         ends = begins[1:]
     else:
         ends = np.abs(current[1:] - np.diff(voltage, axis=0) / robot.actuators().resistance)

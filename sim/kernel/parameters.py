@@ -24,24 +24,24 @@ JAM_STIFFNESS: Final = 2000.0
 """Of the obstacle that holds a jammed joint [N m/rad]: a stalled coxa moves it by 0.3 degrees."""
 
 JAM_DAMPING: Final = 10.0
-"""Of the same [N m s/rad]: about half of what damps a coxa's rotor on it critically."""
+"""[N m s/rad]: about half of the critical damping of a coxa's rotor on the obstacle."""
 
 STATIC_FRICTION_RATE: Final = 0.02
-"""Rate of a joint from which on its gearhead's static friction is full [rad/s]."""
+"""Joint rate from which a gearhead's static friction is full [rad/s]."""
 
 SHOVE_DURATION: Final = 0.1
-"""For which a shove's force is constant [s]."""
+"""Duration of a shove's constant force [s]."""
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
 class ContactData:
-    """What a law of contact needs of the kernel's inputs.
+    """Kernel inputs of a contact law.
 
     Attributes:
-        parameters: that it reads by foot, fields of `gaitswarm.sim.robot.description.Contact`.
-        internal_state_size: numbers that it carries by foot from step to step.
+        parameters: read for each foot, fields of `gaitswarm.sim.robot.description.Contact`.
+        internal_state_size: numbers carried for each foot from step to step.
     """
 
     parameters: tuple[str, ...]
@@ -58,15 +58,14 @@ CONTACT_LAWS: Final[Mapping[ContactLaw, ContactData]] = MappingProxyType(
         "dead_zone": ContactData((*_NORMAL, "slip_velocity", "stick_velocity")),
     }
 )
-"""By name; their formulas are in `gaitswarm.sim.kernel.dynamics.contact`."""
+"""By name; the formulas are in `gaitswarm.sim.kernel.dynamics.contact`."""
 
 
 def internal_state_size(robot: Robot) -> int:
-    """Length of the internal state: what a walk carries beside q and v.
+    """Return the length of a walk's internal state, which it carries besides q and v.
 
-    Args:
-        robot: With backlash, angles [rad] and rates [rad/s] of its motors come first; then what
-            the law of contact carries, foot by foot.
+    With backlash, angles [rad] and rates [rad/s] of the motors come first; then the state of the
+    contact law, foot by foot.
     """
     motors = 2 * robot.n_joints if robot.has_backlash else 0
     law = CONTACT_LAWS[robot.description.contact_law]
@@ -83,19 +82,18 @@ _OF_THE_BODY: Final = (
 
 
 class Layout:
-    """Where each parameter lies in the kernel's flat parameter vector.
+    """Position of each parameter in the kernel's flat parameter vector.
 
-    field (length): timestep (1), gravity (3), base_mass (1), base_moment (3), base_inertia (6:
-    xx yy zz xy xz yz about the body frame's origin), viscous (J), supply_voltage (1),
-    supply_resistance (1), jam_stiffness, jam_damping and jam_angle of the obstacle at every
-    joint (J each), push (3: force on the body's origin along the world's axes, during a shove),
-    backlash (J, if the robot has any) and displaced (1, likewise: whether disturbances are angles),
+    field (length): timestep (1), gravity (3), base_mass (1), base_moment (3), base_inertia (6: xx
+    yy zz xy xz yz about the body frame's origin), viscous (J), supply_voltage (1),
+    supply_resistance (1), jam_stiffness, jam_damping and jam_angle of the obstacle at every joint
+    (J each), push (3: force on the body's origin along the world's axes, during a shove), backlash
+    (J, with backlash) and displaced (1, with backlash: whether disturbances are angles),
     static_friction (J, if the robot has any), and by foot (L each) the parameters of the contact
     law.
 
     Attributes:
-        slices: by field.
-        by_limb: fields that each limb has numbers of its own in, and how many.
+        by_limb: fields with values for each limb, and the number of these.
         size: P, length of the vector.
     """
 
@@ -133,19 +131,11 @@ class Layout:
         self.size = start
 
     def fields(self, packed: Floats) -> dict[str, Floats]:
-        """Name the parts of a vector.
-
-        Args:
-            packed: (size,).
-        """
+        """Split a vector (P,) by field."""
         return {name: packed[where] for name, where in self.slices.items()}
 
     def pack(self, **values: float | Floats) -> Floats:
-        """The vector.
-
-        Returns:
-            (size,).
-        """
+        """Return the vector (P,)."""
         if values.keys() != self.slices.keys():
             raise KeyError(sorted(values.keys() ^ self.slices.keys()))
         packed = np.empty(self.size)
@@ -155,29 +145,22 @@ class Layout:
 
 
 def _towards(direction: float) -> Floats:
-    """Unit vector along the ground, counted from x to y [deg]."""
+    """Unit vector along the ground; the direction [deg] is counted from x to y."""
     towards = math.radians(direction)
     return np.array([math.cos(towards), math.sin(towards), 0.0])
 
 
 def gravity_on(slope: float, direction: float = 0.0) -> Floats:
-    """Gravity in a world whose z axis is normal to the ground.
+    """Return gravity (3,) [m/s2] in a world whose z axis is normal to the ground.
 
     Args:
-        slope: By which the ground rises [deg].
-        direction: Towards which it does, counted from x to y [deg].
-
-    Returns:
-        (3,) [m/s2].
+        slope: Inclination of the ground [deg].
+        direction: Uphill direction, counted from x to y [deg].
     """
     angle, towards = math.radians(slope), math.radians(direction)
     along = -GRAVITY * math.sin(angle)
     return np.array(
-        [
-            along * math.cos(towards),
-            along * math.sin(towards),
-            -GRAVITY * math.cos(angle),
-        ]
+        [along * math.cos(towards), along * math.sin(towards), -GRAVITY * math.cos(angle)]
     )
 
 
@@ -189,15 +172,16 @@ def pack_parameters(
     start: Floats | None = None,
     displaced: bool = False,
 ) -> Floats:
-    """The kernel's parameters for one robot in one scenario.
+    """Return the kernel's parameters for one robot in one scenario.
 
     A load is a point mass at `load_height` over the body's centre.
 
     Args:
         timestep: Of the physics [s].
-        start: Angles at which the walk begins, where a jammed leg is held, (J,) [rad]; zero if
-            left out.
-        displaced: Whether disturbances are angles between gearheads and links [rad], not torques.
+        start: Joint angles at the start, at which a jammed leg is held, (J,) [rad]; zero by
+            default.
+        displaced: Whether disturbances are angles between gearheads and links [rad] instead of
+            torques.
     """
     if displaced and not robot.has_backlash:
         raise SimulationInputError(

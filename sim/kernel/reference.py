@@ -1,8 +1,8 @@
-"""The readable driver: the same walk over CasADi's interpreter.
+"""The Python driver: the same walk over CasADi's interpreter.
 
-The oracle of driver.c (of tick.c and control.c: control_tick.py, of sensors.c: sensors.py), and the
-fallback where there is no C compiler. Function by function their twin; the physics agrees to
-rounding, the integer arithmetic exactly.
+It is the oracle of driver.c (control_tick.py of tick.c and control.c, sensors.py of sensors.c) and
+the fallback where there is no C compiler. The physics agrees to rounding, the integer arithmetic
+exactly.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class ReferenceKernel:
         self.internal_state_size = model.kick.numel_in(2)
 
     def walk(self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool) -> WalkResults:
-        """All walks, one after the other."""
+        """Compute the walks one after the other."""
         for setup in setups:
             check_gains(setup.control_law, torque=self._robot.is_torque_controlled)
             setup.check(
@@ -65,7 +65,7 @@ class ReferenceKernel:
         return WalkResults(tuple(result for result, _ in walks), LaneUse(rounds, rounds))
 
     def _walk(self, setup: WalkSetup, coding: Coding, *, log: bool) -> tuple[WalkResult, int]:
-        """What became of the walk, and how many rounds of physics steps it took."""
+        """Return the result of a walk and its number of rounds of physics steps."""
         step = Stepper(self._model, setup)
         past, sensors = Past.of(setup.desired.shape[1]), Sensors(setup.sensors)
         sensed = np.zeros(setup.desired.shape[1])
@@ -113,7 +113,7 @@ class ReferenceKernel:
 
 
 class Stepper:
-    """CasADi's kick and drift on fixed buffers: several times cheaper than calling the functions"""
+    """CasADi's kick and drift on fixed buffers: several times faster than calling the functions."""
 
     def __init__(self, model: PhysicsModel, setup: WalkSetup) -> None:
         n_joints = setup.desired.shape[1]
@@ -144,37 +144,33 @@ class Stepper:
 
     @property
     def timestep(self) -> float:
-        """Length of the steps that follow [s]."""
+        """Length of the following steps [s]."""
         return float(self.parameters[self._at][0])
 
     def motors(self, *, loose: bool) -> tuple[Floats, Floats]:
-        """Angles and rates that the encoders see.
-
-        Returns:
-            Views, (J,) [rad] and (J,) [rad/s].
-        """
+        """Return views of the angles (J,) [rad] and rates (J,) [rad/s] that the encoders see."""
         n = len(self.duty)
         if loose:
             return self.internal_state[:n], self.internal_state[n : 2 * n]
         return self.q[7:], self.v[6:]
 
     def push(self, tick: int) -> None:
-        """Let the shove's force act, or not."""
+        """Apply the shove's force during its ticks."""
         begin, end = self._shove_ticks
         self.parameters[self._push_at] = self._push * (begin <= tick < end)
 
     def refine(self, refinement: int) -> None:
-        """Set the length of the steps that follow."""
+        """Set the length of the following steps."""
         self.parameters[self._at] = self._timestep / refinement
 
     def kick(self) -> None:
-        """Velocities of the next step, in place; what is measured is of its middle."""
+        """Advance the velocities by a step in place; measurements are those of its middle."""
         self._kick[1]()
         for array, after in self._kicked:
             array[:] = after
 
     def drift(self, steps: float) -> None:
-        """Positions at these velocities, in place."""
+        """Advance the positions at these velocities in place."""
         self._time[:] = steps * self.parameters[self._at]
         self._drift[1]()
         for array, after in self._drifted:
@@ -182,7 +178,7 @@ class Stepper:
 
 
 def _buffered(function: Any, inputs: Sequence[Floats], outputs: Sequence[Floats]) -> Any:
-    """A CasADi function bound to arrays: its buffer, which must be kept, and what evaluates it."""
+    """Bind a CasADi function to arrays; return its buffer, to be kept alive, and its evaluator."""
     buffer, evaluate = function.buffer()
     for k, array in enumerate(inputs):
         buffer.set_arg(k, array.data)
@@ -193,5 +189,4 @@ def _buffered(function: Any, inputs: Sequence[Floats], outputs: Sequence[Floats]
 
 @lru_cache(maxsize=8)
 def reference_kernel(robot: Robot) -> ReferenceKernel:
-    """The robot's interpreter kernel."""
     return ReferenceKernel(robot, physics_model(robot))

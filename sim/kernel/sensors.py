@@ -1,6 +1,6 @@
-"""What sensors get wrong before their readings are coded: white noise, and delays.
+"""Sensor errors before coding: white noise and delays.
 
-The readable twin of sensors.c, number by number.
+The Python twin of sensors.c, number by number.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ LARGEST_DELAY: Final = 15
 """Of a sensor [control ticks]."""
 
 _BYTES: Final = 8
-"""Whose sum is a reading's noise (Irwin and Hall's distribution): exact, and normal but for its
-tails, which end at 4.9 deviations."""
+"""Number of bytes whose sum is a reading's noise (Irwin-Hall distribution): exact, and normal
+except for the tails, which end at 4.9 standard deviations."""
 
 _MEAN: Final = _BYTES * 255 // 2
 
@@ -38,14 +38,14 @@ _WEYL: Final = 0x9E3779B9, 0xBB67AE85
 
 @dataclass(frozen=True, slots=True)
 class SensorErrors:
-    """Of all joints' encoders and current sensors in one walk.
+    """Errors of all joints' encoders and current sensors in one walk.
 
     Attributes:
-        angle_noise: standard deviation of an angle [rad].
+        angle_noise: standard deviation [rad].
         current_noise: standard deviation of an absolute current [A].
-        angle_delay: how late the controller learns an angle [control ticks].
-        current_delay: how late the controller learns a current [control ticks].
-        seed: of the noise, which depends on it, on tick and joint alone.
+        angle_delay: [control ticks].
+        current_delay: [control ticks].
+        seed: of the noise, which depends on seed, tick and joint only.
     """
 
     angle_noise: float = 0.0
@@ -57,14 +57,14 @@ class SensorErrors:
     def __post_init__(self) -> None:
         for name in ("angle_noise", "current_noise"):
             if not 0.0 <= getattr(self, name) < math.inf:
-                raise SimulationInputError(f"{name}: {getattr(self, name):g} is less than 0")
+                raise SimulationInputError(f"{name}: {getattr(self, name):g} must be at least 0")
         for name in ("angle_delay", "current_delay"):
             if not 0 <= getattr(self, name) <= LARGEST_DELAY:
                 raise SimulationInputError(
-                    f"{name}: {getattr(self, name)} is not 0 to {LARGEST_DELAY} control ticks"
+                    f"{name}: {getattr(self, name)} must be 0 to {LARGEST_DELAY} control ticks"
                 )
         if not 0 <= self.seed < 2**64:
-            raise SimulationInputError(f"seed: {self.seed} is not 0 to 2^64 - 1")
+            raise SimulationInputError(f"seed: {self.seed} must be 0 to 2^64 - 1")
 
     @property
     def scales(self) -> tuple[float, float]:
@@ -78,7 +78,6 @@ class SensorErrors:
 
 
 NO_ERRORS: Final = SensorErrors()
-"""Of sensors that tell the controller what is."""
 
 
 def philox(counter: Words, key: tuple[Words, Words]) -> Words:
@@ -100,13 +99,13 @@ def philox(counter: Words, key: tuple[Words, Words]) -> Words:
 
 
 def byte_sums(seeds: Words, tick: int, joints: int, stream: int = 0) -> Integers:
-    """Whole numbers that are nearly normal, two for every joint.
+    """Return nearly normal integers, two for every joint.
 
     Args:
         seeds: (n,), of 64 bits.
 
     Returns:
-        (n, J, 2) sums of eight bytes, less their mean; the standard deviation is `DEVIATION`.
+        (n, J, 2) sums of eight bytes minus their mean; the standard deviation is `DEVIATION`.
     """
     counter = np.zeros((len(seeds), joints, 4), dtype=np.uint64)
     counter[..., 0], counter[..., 1], counter[..., 2] = tick, np.arange(joints), stream
@@ -121,30 +120,29 @@ class Sensors:
 
     def __init__(self, errors: SensorErrors) -> None:
         self._errors = errors
-        self._kept = [deque[Floats](maxlen=delay + 1) for delay in errors.delays]
+        self._delayed = [deque[Floats](maxlen=delay + 1) for delay in errors.delays]
         self._tick = 0
 
     def read(self, angle: Floats, current: Floats) -> tuple[Floats, Floats]:
-        """What the controller learns in the next tick.
+        """Return the readings of the next tick.
 
         Args:
             angle: Of all encoders, (J,) [rad].
             current: Absolute, (J,) [A].
 
         Returns:
-            Angles and currents, (J,) each. Where a reading of before the walk is asked for, the
-            first one.
+            Angles and currents, (J,) each. Readings from before the walk equal the first one.
         """
         noise = self._noise(len(angle))
         self._tick += 1
         seen = []
-        for exact, further, kept in zip((angle, current), noise, self._kept, strict=True):
-            kept.append(exact + further)
-            seen.append(kept[0])
+        for exact, error, delayed in zip((angle, current), noise, self._delayed, strict=True):
+            delayed.append(exact + error)
+            seen.append(delayed[0])
         return seen[0], seen[1]
 
     def _noise(self, joints: int) -> tuple[Floats | float, Floats | float]:
-        """Of angles and currents, (J,) each; without any no random number is drawn."""
+        """Noise of angles and currents, (J,) each; no random number is drawn without noise."""
         of_angle, of_current = self._errors.scales
         if not (of_angle or of_current):
             return 0.0, 0.0

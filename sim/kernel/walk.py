@@ -1,11 +1,12 @@
-"""Walks as input and output of kernels, and the interface of a kernel."""
+"""Inputs and results of simulated walks, and the interface of the kernels that compute them."""
 
 from __future__ import annotations
 
 import math
+import operator
 import time
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 from itertools import islice
 from typing import Any, Final, Literal, Protocol, TypeVar, overload
 
@@ -22,9 +23,10 @@ from gaitswarm.sim.robot.description import EnergyConvention
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+T = TypeVar("T")
 
 Precision = Literal["single", "double"]
-"""Of the compiled physics. Positions, sums and control are computed in double precision in both."""
+"""Of the compiled physics. Positions, sums and control are in double precision in both."""
 
 INTEGRANDS: Final = (
     "torque",
@@ -36,10 +38,10 @@ INTEGRANDS: Final = (
     "absolute_current",
     "heat",
 )
-"""Rates that a driver accumulates, at the middle of every step: squared gear torque sum [N2 m2],
-squared accelerations [m2/s4], [rad2/s4], electrical power [W], speed along the heading [m/s]; over
-the motors, the sums of the absolute electrical power [W], of the absolute current [A], and of the
-heat R I^2 [W]."""
+"""Rates that a driver sums up at the middle of every step: squared gear torque sum [N2 m2], squared
+accelerations [m2/s4], [rad2/s4], electrical power [W], speed along the heading [m/s]; over the
+motors, the sums of the absolute electrical power [W], of the absolute current [A], and of the heat
+R I^2 [W]."""
 
 CODE_LIMIT = 65535
 """Largest coded error or current; the robot's integers have 16 bits."""
@@ -50,21 +52,21 @@ LARGEST_PWM = LARGEST_OUTPUT
 
 @dataclass(frozen=True, slots=True)
 class Coding:
-    """Integers of sensors and PWM for a batch, and physics steps a control tick.
+    """Resolutions of sensors and PWM, and physics steps per control tick.
 
     Attributes:
-        angle_counts: code of one radian [counts/rad].
-        current_counts: code of one ampere [counts/A].
+        angle_counts: [counts/rad].
+        current_counts: [counts/A].
         duty_per_count: motor voltage per supply voltage, or torque per torque limit, of one count
             of a controller's output [1].
         angle_step: encoder resolution [counts].
         current_step: resolution of the current's converter [counts].
         pwm_step: resolution of the PWM [counts].
         pwm_counts: full scale of the PWM [counts].
-        substeps: physics steps a control tick.
-        refinement: how many times as many of a control tick in which a foot may come down: what
-            happens then is faster than a step.
-        inner_ticks: of the actuators' joint PD in a control tick, by which `substeps` is divided.
+        substeps: physics steps per control tick.
+        refinement: factor by which steps are shorter in control ticks in which a foot may touch
+            down.
+        inner_ticks: ticks of the actuators' joint PD per control tick; divides `substeps`.
     """
 
     angle_counts: float
@@ -89,18 +91,18 @@ class Coding:
             "inner_ticks",
         ):
             if getattr(self, name) < 1:
-                raise SimulationInputError(f"{name}: {getattr(self, name)} is less than 1")
+                raise SimulationInputError(f"{name}: {getattr(self, name)} must be at least 1")
         if self.pwm_counts > LARGEST_PWM:
-            raise SimulationInputError(f"pwm_counts: {self.pwm_counts} is over {LARGEST_PWM}")
+            raise SimulationInputError(
+                f"pwm_counts: {self.pwm_counts} must be at most {LARGEST_PWM}"
+            )
         if self.substeps % self.inner_ticks:
             raise SimulationInputError(
-                f"inner_ticks: {self.substeps} physics steps cannot be divided by them,"
-                f" {self.inner_ticks}"
+                f"inner_ticks: {self.inner_ticks} does not divide {self.substeps} physics steps"
             )
 
     @classmethod
     def of(cls, robot: Robot, substeps: int, refinement: int = 1) -> Coding:
-        """Resolutions of a robot's sensors and bridges."""
         d = robot.description
         counts, step, per_count = d.output
         return cls(
@@ -117,90 +119,67 @@ class Coding:
         )
 
     def angle_codes(self, angles: Floats) -> Ints:
-        """What encoders say.
-
-        Args:
-            angles: Of the motors [rad].
-
-        Returns:
-            As many codes [counts].
-        """
+        """Encode motor angles [rad] as [counts]."""
         return coarsen(
             _rounded(angles * self.angle_counts, -4 * CODE_LIMIT, 4 * CODE_LIMIT), self.angle_step
         )
 
     def current_codes(self, currents: Floats) -> Ints:
-        """What the converters of the current sensors say.
-
-        Args:
-            currents: Absolute, behind the sensors' low-pass [A].
-
-        Returns:
-            As many codes [counts].
-        """
+        """Encode absolute currents [A], behind the sensors' low-pass, as [counts]."""
         return coarsen(_rounded(currents * self.current_counts, 0, CODE_LIMIT), self.current_step)
 
     def pwm_codes(self, duty: Floats) -> Ints:
-        """What the controller gave, of what the motors got.
-
-        Args:
-            duty: Motor voltage per supply voltage, or torque per torque limit [1].
-
-        Returns:
-            As many PWM counts [counts].
-        """
+        """Convert motor voltages per supply voltage, or torques per torque limit, to [counts]."""
         return np.rint(duty / self.duty_per_count).astype(np.int64)
 
 
 def coarsen(code: Ints, step: int) -> Ints:
-    """Nearest multiple of a resolution, halves up."""
+    """Round to the nearest multiple of a resolution, halves up."""
     coarse: Ints = (code + step // 2) // step * step
     return coarse
 
 
 def _rounded(value: Floats, low: int, high: int) -> Ints:
-    """Of a NaN, 0."""
+    """Round and clip; a NaN becomes 0."""
     whole = np.rint(value)
     whole[np.isnan(whole)] = 0.0
     return np.minimum(np.maximum(whole, low), high).astype(np.int64)
 
 
 def current_smoothing(time_constant: float, timestep: float) -> float:
-    """How fast the analog low-pass of the current follows.
+    """Return the coefficient of the analog low-pass of the current for a physics step.
+
+    It is the share of its distance from the absolute current that the low-pass covers [1].
 
     Args:
         time_constant: Of the low-pass [s]; 0 for none.
         timestep: Of the physics [s].
-
-    Returns:
-        Share of its distance from the absolute current that it goes in a physics step [1].
     """
     return -math.expm1(-timestep / time_constant) if time_constant > 0.0 else 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WalkSetup:
-    """One walk to be computed.
+    """Input of one walk.
 
     Attributes:
         start: initial q, at rest, (7+J,).
-        internal_state: initial, (I,), as `parameters.internal_state_size` says.
-        parameters: (P,), as `parameters.Layout` says.
+        internal_state: initial, (I,), see `parameters.internal_state_size`.
+        parameters: (P,), see `parameters.Layout`.
         desired: coded angles, (T, J) int32.
         control_law: of every joint.
-        fall_height: of the body; below it the robot has fallen [m].
-        fall_cosine: of the tilt; below it the robot has fallen.
-        disturbance: torques on the links, (T, J) [N m], or, as the parameter `displaced` says,
-            angles between gearheads and links [rad]; or None.
-        energy: what of a motor's electrical power counts as spent.
+        fall_height: height of the body below which the robot has fallen [m].
+        fall_cosine: cosine of the tilt below which the robot has fallen.
+        disturbance: torques on the links, (T, J) [N m], or, with the parameter `displaced`, angles
+            between gearheads and links [rad]; or None.
+        energy: which part of a motor's electrical power counts as spent.
         direction: of travel along the heading, 1 forward and -1 backward.
         drop: height of the start above the stance at which the soles carry the weight [m].
-        current_smoothing: share of its distance from the absolute current that the analog
-            low-pass of the current goes in a physics step; 1 for no low-pass [1].
-        sensors: what they get wrong.
-        shove_ticks: control ticks from which on, and up to which, the parameter `push` acts.
+        current_smoothing: see the function of this name; 1 for no low-pass [1].
+        shove_ticks: first control tick of the shove by the parameter `push`, and the tick after its
+            last.
         feed_forward: torques with which the joints carry the robot, of which torque-controlled
-            actuators are given the control law's share, (T, J) [N m]; or None.
+            actuators receive the control law's share, (T, J) [N m]; or None.
     """
 
     start: Floats
@@ -220,11 +199,7 @@ class WalkSetup:
     feed_forward: Floats | None = None
 
     def smoothing(self, refinement: int) -> float:
-        """The analog low-pass over a shorter step.
-
-        Returns:
-            `current_smoothing` of such a step [1].
-        """
+        """Return `current_smoothing` for steps that are shorter by a factor [1]."""
         if refinement == 1 or self.current_smoothing >= 1.0:
             return self.current_smoothing
         return -math.expm1(math.log1p(-self.current_smoothing) / refinement)
@@ -235,38 +210,36 @@ class WalkSetup:
         return len(self.desired)
 
     def check(self, *, joints: int, internal_state: int, parameters: int) -> None:
-        """Refuse arrays that a kernel of these sizes would read beyond their ends."""
+        """Check the shapes of arrays that a kernel of these sizes reads."""
         ticks = max(self.ticks, 1)
-        wanted: dict[str, tuple[NDArray[Any], tuple[int, ...]]] = {
+        expected: dict[str, tuple[NDArray[Any], tuple[int, ...]]] = {
             "start": (self.start, (7 + joints,)),
             "internal_state": (self.internal_state, (internal_state,)),
             "parameters": (self.parameters, (parameters,)),
             "desired": (self.desired, (ticks, joints)),
         }
         for name in ("disturbance", "feed_forward"):
-            further = getattr(self, name)
-            if further is not None:
-                wanted[name] = (further, (ticks, joints))
-        for name, (array, shape) in wanted.items():
+            optional = getattr(self, name)
+            if optional is not None:
+                expected[name] = (optional, (ticks, joints))
+        for name, (array, shape) in expected.items():
             if array.shape != shape:
                 raise SimulationInputError(
-                    f"{name}: an array of shape {array.shape}; this kernel and walk need {shape}"
+                    f"{name}: array of shape {array.shape}; this kernel and walk require {shape}"
                 )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WalkResult:
-    """What became of a walk.
+    """Result of one walk.
 
     Attributes:
-        status: how it ended.
-        sums: `INTEGRANDS` summed over physics steps, shorter ones by their share,
-            (8,).
+        sums: `INTEGRANDS` summed over physics steps, shorter steps by their share, (8,).
         end: final q, (7+J,).
         peak_current: largest |I| of any motor at any physics step [A].
         states: q, v, internal state, absolute current before the converters [A] and duty at every
-            control tick after its control, (T, 7+J + 6+J + I + J + J), NaN after an early end;
-            None if not asked for. `observation.walk_log` tells the rest.
+            control tick after its control, (T, 7+J + 6+J + I + J + J), NaN after an early end; None
+            without a log. See `observation.walk_log`.
     """
 
     status: Status
@@ -278,13 +251,13 @@ class WalkResult:
 
 @dataclass(frozen=True, slots=True)
 class LaneUse:
-    """How well a kernel's lanes were used.
+    """Utilization of a kernel's lanes.
 
     Attributes:
-        walked: rounds of physics steps, summed over lanes, that belonged to a walk.
-        computed: rounds of physics steps, summed over lanes, in all.
-        timed: what some of the rounds took, control ticks and all [ns].
-        control: what the control ticks took of that [ns].
+        walked: rounds of physics steps that belonged to a walk, summed over lanes.
+        computed: all rounds of physics steps, summed over lanes.
+        timed: time of a sample of the rounds, control ticks included [ns].
+        control: time of the control ticks in that sample [ns].
     """
 
     walked: int = 0
@@ -294,36 +267,26 @@ class LaneUse:
 
     @property
     def share(self) -> float:
-        """Of the lanes' time that was walked [1]; 1 where nothing was computed."""
+        """Share of the lanes' time spent on walks [1]; 1 if nothing was computed."""
         return self.walked / self.computed if self.computed else 1.0
 
     @property
     def control_share(self) -> float:
-        """Of the kernel's time that control ticks took [1]; 0 where nothing was timed."""
+        """Share of the kernel's time spent in control ticks [1]; 0 if nothing was timed."""
         return self.control / self.timed if self.timed else 0.0
 
     def __add__(self, other: LaneUse) -> LaneUse:
-        return LaneUse(
-            self.walked + other.walked,
-            self.computed + other.computed,
-            self.timed + other.timed,
-            self.control + other.control,
-        )
+        return LaneUse(*map(operator.add, astuple(self), astuple(other)))
 
     def __sub__(self, other: LaneUse) -> LaneUse:
-        return LaneUse(
-            self.walked - other.walked,
-            self.computed - other.computed,
-            self.timed - other.timed,
-            self.control - other.control,
-        )
+        return LaneUse(*map(operator.sub, astuple(self), astuple(other)))
 
 
 class WalkResults(Sequence[WalkResult]):
-    """What became of all walks of one call, in their order.
+    """Results of all walks of one call, in order.
 
     Args:
-        waited: How long the thread waited for walks that others had taken over [s].
+        waited: Time that the thread waited for walks taken over by other threads [s].
     """
 
     def __init__(
@@ -345,7 +308,7 @@ class WalkResults(Sequence[WalkResult]):
 
 
 class Kernel(Protocol):
-    """Computes walks. Thread-safe; a walk's result does not depend on its neighbours."""
+    """Computes walks. Thread-safe; a walk's result does not depend on the other walks of a call."""
 
     @property
     def backend(self) -> str:
@@ -353,7 +316,7 @@ class Kernel(Protocol):
 
     @property
     def lanes(self) -> int:
-        """Walks that are stepped together."""
+        """Number of walks that are stepped together."""
 
     def walk(self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool) -> WalkResults:
         """Compute walks.
@@ -364,7 +327,7 @@ class Kernel(Protocol):
             log: Whether to keep states.
 
         Returns:
-            Results, in order, and how the lanes were used.
+            Results in order, and the use of the lanes.
 
         Raises:
             SimulationInputError: A setup has arrays of other sizes.
@@ -375,14 +338,13 @@ NO_JOINT_PD: Final = (
     "a joint PD commands torques, and this robot has DC motors; choose another controller, or give"
     ' robot.toml actuators of kind = "torque"'
 )
-"""Why such a robot does not walk."""
 
 _LARGEST_TERM = 2**51
-"""Of a control law's sums; the compiled kernel adds up three of them, exactly, in 53 bits."""
+"""Of a control law's sums; the compiled kernel adds three of them exactly in 53 bits."""
 
 
 def check_gains(law: ControlLaw, *, torque: bool) -> None:
-    """Refuse gains with which the compiled kernel's arithmetic is not exact, or leaves a table."""
+    """Check that the law suits the actuators and is computed exactly by the compiled kernel."""
     if law.joint_pd is not None and not torque:
         raise SimulationInputError(NO_JOINT_PD)
     largest = {
@@ -403,18 +365,12 @@ def check_gains(law: ControlLaw, *, torque: bool) -> None:
             raise SimulationInputError(f"{name}: too large for the controllers' integers")
 
 
-T = TypeVar("T")
-
-
 @dataclass(frozen=True, slots=True, eq=False)
-class WantedWalk:
-    """One walk, and what computes it.
+class WalkRequest:
+    """One walk and the kernel that computes it.
 
     Attributes:
-        kernel: of the robot that walks.
-        coding: sensors, PWM and rates of the walk.
-        setup: the walk.
-        log: whether its states are to be kept.
+        log: whether to keep its states.
     """
 
     kernel: Kernel
@@ -423,20 +379,18 @@ class WantedWalk:
     log: bool = False
 
 
-Walking = Generator[Sequence[WantedWalk], Sequence[WalkResult], T]
-"""What has walks computed on its way to a result: it yields the walks that it wants, is sent what
-became of them, in their order, as often as it likes, and returns the result."""
+Walking = Generator[Sequence[WalkRequest], Sequence[WalkResult], T]
+"""A computation that needs walks: a generator that yields requests, receives their results in
+order, and returns its own result. It may yield any number of times."""
 
 
 @dataclass(slots=True)
 class KernelTime:
-    """What calls of kernels took, of those who ask for it.
+    """Accumulated time of kernel calls.
 
     Attributes:
-        seconds: wall time in the calls but for `waited`, added to [s].
-        waited: time in the calls that went by until other threads had ended walks that they had
-            taken over, added to [s].
-        lane_use: of all of them.
+        seconds: wall time in the calls, without `waited` [s].
+        waited: time in the calls spent waiting for walks that other threads had taken over [s].
     """
 
     seconds: float = 0.0
@@ -447,7 +401,7 @@ class KernelTime:
 def walk_together(
     walkings: Sequence[Walking[T]], kernel_time: KernelTime | None = None
 ) -> tuple[T, ...]:
-    """Run several computations side by side; walks of one kernel and coding share one call.
+    """Run several computations concurrently; walks of one kernel and coding share one call.
 
     walkings                        calls
     a yields x1, x2; b yields y1    kernel.walk(x1, x2, y1)
@@ -457,25 +411,25 @@ def walk_together(
     results: dict[int, T] = {}
     answers: dict[int, Sequence[WalkResult] | None] = dict.fromkeys(range(len(walkings)))
     while answers:
-        wanted: dict[int, Sequence[WantedWalk]] = {}
+        requests: dict[int, Sequence[WalkRequest]] = {}
         for index, answer in answers.items():
             walking = walkings[index]
             try:
-                wanted[index] = next(walking) if answer is None else walking.send(answer)
+                requests[index] = next(walking) if answer is None else walking.send(answer)
             except StopIteration as ended:
                 results[index] = ended.value
-        walks = [walk for own in wanted.values() for walk in own]
+        walks = [walk for batch in requests.values() for walk in batch]
         computed = iter(_computed(walks, kernel_time or KernelTime()))
-        answers = {index: list(islice(computed, len(own))) for index, own in wanted.items()}
+        answers = {index: list(islice(computed, len(batch))) for index, batch in requests.items()}
     return tuple(results[index] for index in range(len(walkings)))
 
 
-def _computed(walks: Sequence[WantedWalk], kernel_time: KernelTime) -> list[WalkResult]:
-    """What became of the walks, in order."""
+def _computed(walks: Sequence[WalkRequest], kernel_time: KernelTime) -> list[WalkResult]:
+    """Compute the walks with one call per kernel, coding and log; return the results in order."""
     calls: dict[tuple[Kernel, Coding, bool], list[int]] = {}
     for index, walk in enumerate(walks):
         calls.setdefault((walk.kernel, walk.coding, walk.log), []).append(index)
-    found: dict[int, WalkResult] = {}
+    result_of: dict[int, WalkResult] = {}
     for (kernel, coding, log), indices in calls.items():
         setups = [walks[index].setup for index in indices]
         begun = time.perf_counter()
@@ -483,5 +437,5 @@ def _computed(walks: Sequence[WantedWalk], kernel_time: KernelTime) -> list[Walk
         kernel_time.seconds += time.perf_counter() - begun - results.waited
         kernel_time.waited += results.waited
         kernel_time.lane_use += results.lane_use
-        found.update(zip(indices, results, strict=True))
-    return [found[index] for index in range(len(walks))]
+        result_of.update(zip(indices, results, strict=True))
+    return [result_of[index] for index in range(len(walks))]

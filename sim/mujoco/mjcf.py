@@ -161,10 +161,7 @@ def _plane_height(contacts: Sequence[Contact], soles: Soles) -> float:
 
 
 def _add_leg(
-    base: ET.Element,
-    robot: Robot,
-    number: int,
-    drawn: Mapping[str, Sequence[Shape]],
+    base: ET.Element, robot: Robot, number: int, drawn: Mapping[str, Sequence[Shape]]
 ) -> ET.Element:
     """The leg's last body."""
     urdf, leg = robot.urdf, robot.description.legs[number]

@@ -22,7 +22,7 @@ from gaitswarm.sim.kernel.walk import (
     Precision,
     Walking,
     WalkSetup,
-    WantedWalk,
+    WalkRequest,
     walk_together,
 )
 from gaitswarm.sim.mujoco.engines import ENGINES, check_installed
@@ -275,7 +275,7 @@ class PerturbedWalk:
         measured = np.full((len(designs), N_MEASUREMENTS), np.nan)
         logs: list[WalkLog | None] = [None] * len(designs)
         setups = self._setups(robot, designs, timestep)
-        results = yield [WantedWalk(kernel, coding, setup, log) for setup in setups.values()]
+        results = yield [WalkRequest(kernel, coding, setup, log) for setup in setups.values()]
         for (index, setup), result in zip(setups.items(), results, strict=True):
             statuses[index], objectives[index] = judge(setup, result, coding.substeps, timestep)
             measured[index] = measure(setup, result, coding.substeps)
@@ -424,7 +424,7 @@ class WorldWalk:
         measured = np.full((len(worlds), N_MEASUREMENTS), np.nan)
         logs: list[WalkLog | None] = [None] * len(worlds)
         setups = self._setups(worlds, timestep)
-        results = yield [WantedWalk(kernel, coding, setup, log) for setup in setups]
+        results = yield [WalkRequest(kernel, coding, setup, log) for setup in setups]
         for index, (setup, result) in enumerate(zip(setups, results, strict=True)):
             statuses[index], objectives[index] = judge(setup, result, coding.substeps, timestep)
             measured[index] = measure(setup, result, coding.substeps)

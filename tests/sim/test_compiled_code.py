@@ -90,7 +90,7 @@ def test_kernels_of_every_level_compile_without_a_warning(wanted: Target) -> Non
     }
     for name, text in sources.items():
         library = build_library(
-            name, text.encode(), partial(str, text), wanted=wanted, extra_flags=STRICT
+            name, text.encode(), partial(str, text), compile_for=wanted, extra_flags=STRICT
         )
         assert library is not None
 

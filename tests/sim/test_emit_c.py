@@ -41,7 +41,7 @@ def compiled(
         f"      out[(at + k) * {outputs} + i] = y[i][k]; }} }}\n"
     )
     aim = wanted if wanted.lanes <= target().lanes else target()
-    library = load_library("emitted-check", source.encode(), lambda: source, wanted=aim)
+    library = load_library("emitted-check", source.encode(), lambda: source, compile_for=aim)
     assert library is not None
 
     def call(numbers: Floats) -> Floats:

@@ -145,7 +145,7 @@ def test_the_compiled_table_of_a_published_design_has_the_same_bits(shape: Shape
 def test_narrower_vectors_give_the_same_table(wanted: Target) -> None:
     source = inference_source()
     narrow = wanted if wanted.lanes <= target().lanes else target()
-    library = load_library("inference", source.encode(), lambda: source, wanted=narrow)
+    library = load_library("inference", source.encode(), lambda: source, compile_for=narrow)
     system = inference_system(0.187, 0.961, 0.789, 0.927, Shape.GAUSS)
     grid = {"error": ERROR.grid(), "current": CURRENT.grid()}
     usual, other = compiled_table(system, grid), compiled_table(system, grid, library=library)

@@ -346,7 +346,7 @@ def test_a_walk_has_the_same_bits_at_every_vector_width(narrower: Target, robot:
         narrower = target()
     wide = native_kernel(robot)
     assert wide is not None
-    narrow = load_kernel(robot, wanted=narrower)
+    narrow = load_kernel(robot, compile_for=narrower)
     assert narrow is not None
     assert narrow.lanes == narrower.lanes
     setups = [_setup(robot, wide, s.model_copy(update={"cycles": 1.0})) for s in SCENARIOS]

@@ -106,7 +106,7 @@ def test_objectives_are_those_of_double_precision_unless_the_last_bit_of_a_float
 def test_floats_have_the_same_bits_at_every_vector_width(narrower: Target, robot: Robot) -> None:
     if target().lanes < narrower.lanes:
         narrower = target()
-    narrow = load_kernel(robot, "single", wanted=narrower)
+    narrow = load_kernel(robot, "single", compile_for=narrower)
     assert narrow is not None
     assert narrow.lanes == 2 * narrower.lanes
     setups, (coding, _) = short_walks(robot), control_steps(robot)
@@ -174,7 +174,7 @@ def test_fused_multiply_add_is_rounded_once_whatever_the_machine_has(
         "  out[2] = vec_fnma(x, y, z)[LANES - 1]; }"
     )
     aim = wanted if wanted.lanes <= target().lanes else target()
-    library = load_library("fused-check", source.encode(), lambda: source, wanted=aim)
+    library = load_library("fused-check", source.encode(), lambda: source, compile_for=aim)
     assert library is not None
     real = np.float32 if precision == "single" else np.float64
     epsilon = float(np.finfo(real).eps)

@@ -118,7 +118,7 @@ def test_a_walk_has_the_same_bits_at_every_vector_width(narrower: Target) -> Non
     if host_architecture() != X86 or target().lanes < narrower.lanes:
         narrower = target()
     robot = made()
-    wide, narrow = native_kernel(robot), load_kernel(robot, wanted=narrower)
+    wide, narrow = native_kernel(robot), load_kernel(robot, compile_for=narrower)
     assert wide is not None
     assert narrow is not None
     setups = [setup_of(robot, law_of(controller)) for controller in DRIVES]

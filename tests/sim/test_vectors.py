@@ -91,7 +91,7 @@ def call(aim: Target, name: str, *inputs: Reals, results: int) -> Reals:
     """What one of `FUNCTIONS` gives, (n, results), compiled for a target."""
     kind = inputs[0].dtype
     text = source("single" if kind == np.float32 else "double")
-    library = load_library("vectors", text.encode(), lambda: text, wanted=aim)
+    library = load_library("vectors", text.encode(), lambda: text, compile_for=aim)
     assert library is not None
     output = np.empty((len(inputs[0]), results), dtype=kind)
     pointers = [ctypes.c_void_p(array.ctypes.data) for array in (*inputs, output)]

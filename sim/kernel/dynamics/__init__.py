@@ -1,1 +1,1 @@
-"""A physics step as symbols: rigid bodies, motors and contact, derived from Pinocchio's model."""
+"""Symbolic physics step: rigid bodies, motors and contact, derived from Pinocchio's model."""

@@ -1,4 +1,4 @@
-"""The robot's body in a physics step, as symbols: before its limbs are known, and after."""
+"""The robot's body in a physics step, as symbols: before and after its limbs."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Scalars = tuple[Scalar, ...]
 
 
 def body_state(q: Sequence[Scalar], v: Sequence[Scalar], gravity: Sequence[Scalar]) -> LinkState:
-    """Where the body is and how it moves.
+    """State of the body.
 
     Args:
         gravity: In the world [m/s2].
@@ -55,13 +55,10 @@ def body_of(p: Mapping[str, Sequence[Scalar]]) -> RigidBody:
 
 
 def pushed(state: LinkState, push: Sequence[Scalar]) -> Vector:
-    """What a force on the body adds to the force that the bias takes.
+    """Contribution of a push to the force of the bias, in the body's frame [N].
 
     Args:
         push: At the body's origin, along the world's axes [N].
-
-    Returns:
-        In the body's frame [N].
     """
     force = add(
         add(scale(push[0], state.ahead), scale(push[1], cross(state.up, state.ahead))),
@@ -71,7 +68,7 @@ def pushed(state: LinkState, push: Sequence[Scalar]) -> Vector:
 
 
 def solved(state: LinkState, inertia: Inertia, force: Force) -> tuple[Motion, Motion]:
-    """The body's acceleration under all limbs."""
+    """Acceleration of the body with all limbs: relative to free fall, and in its own axes."""
     falling = free_acceleration(inertia, force)
     v, w = state.velocity.linear, state.velocity.angular
     return falling, Motion(
@@ -82,19 +79,11 @@ def solved(state: LinkState, inertia: Inertia, force: Force) -> tuple[Motion, Mo
 def body_integrands(
     state: LinkState, acceleration: Motion, timestep: Scalar
 ) -> tuple[Scalar, Scalar, Scalar]:
-    """What the driver accumulates of the body, at the step's middle.
-
-    Args:
-        timestep: [s].
-
-    Returns:
-        Squared acceleration [m2/s4] and angular acceleration [rad2/s4], speed along the heading
-        [m/s].
-    """
+    """Squared acceleration [m2/s4], [rad2/s4] and forward speed [m/s] at mid-step."""
     half = 0.5 * timestep
     v = add(state.velocity.linear, scale(half, acceleration.linear))
     w = add(state.velocity.angular, scale(half, acceleration.angular))
-    # The body's twist is in its own frame, so the material acceleration adds omega x v.
+    # The twist is in the body's own frame, so the material acceleration adds omega x v.
     linear = add(acceleration.linear, cross(w, v))
     ahead_x, ahead_y = state.ahead[0], cross(state.up, state.ahead)[0]
     world_x, world_y = dot(state.ahead, v), dot(cross(state.up, state.ahead), v)
@@ -105,11 +94,7 @@ def body_integrands(
 
 
 def drifted(q: Sequence[Scalar], v: Sequence[Scalar], time: Scalar) -> list[Scalar]:
-    """Positions after some time at constant velocities.
-
-    Args:
-        time: [s].
-    """
+    """Positions after some time [s] at constant velocities."""
     turn = scale(time, _triple(v[3:6]))
     along = scale(time, _triple(v[0:3]))
     bent = add(along, scale(0.5, cross(turn, along)))
@@ -119,10 +104,10 @@ def drifted(q: Sequence[Scalar], v: Sequence[Scalar], time: Scalar) -> list[Scal
 
 
 def _turned(quaternion: Sequence[Scalar], turn: Vector) -> list[Scalar]:
-    """Quaternion times the exponential of a small turn vector [rad], renormalised.
+    """Quaternion times the exponential of a small rotation vector [rad], renormalised.
 
-    Series in the squared angle (4e-3 rad at 10 rad/s) exact to rounding; one Newton step
-    towards unit length instead of a square root.
+    Series in the squared angle (4e-3 rad at 10 rad/s), exact to rounding; one Newton step towards
+    unit length instead of a square root.
     """
     x, y, z, w = quaternion
     half = scale(0.5, turn)

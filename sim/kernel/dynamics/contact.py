@@ -1,6 +1,6 @@
-"""Ground contact of a point foot and its laws of friction, as symbols (thesis 2.2.6).
+"""Ground contact of a point foot and its friction laws, as symbols (thesis 2.2.6).
 
-What a law reads and carries from step to step, as data: `sim.kernel.parameters.CONTACT_LAWS`.
+Inputs and internal state of the laws, as data: `sim.kernel.parameters.CONTACT_LAWS`.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from gaitswarm.sim.kernel.dynamics.spatial import (
 from gaitswarm.sim.robot.description import ContactLaw
 
 InternalState = tuple[Scalar, ...]
-"""What a law carries of one foot from step to step; for most laws nothing."""
+"""State that a law carries for one foot from step to step; empty for most laws."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,7 @@ class Foot:
         rising: part of the velocity along `up` [m/s].
         normal: force of the ground's spring [N].
         touching: 1 on the ground, 0 in the air.
-        damping: of the normal force, while it is not held at zero [N s/m].
+        damping: of the normal force, while it is not clamped at zero [N s/m].
         penetration: of the sole into the ground, negative in the air [m].
         mobility: upper bound of the foot's acceleration under a force [1/kg].
     """
@@ -63,18 +63,14 @@ class Foot:
     mobility: Scalar
 
     def lands_within(self, time: float) -> Scalar:
-        """Whether the foot may come down.
-
-        Args:
-            time: [s].
-        """
+        """Whether the foot may touch down within a time [s]."""
         return (1.0 - self.touching) * (self.penetration > self.rising * time)
 
     def sliding(self, drag: Scalar, timestep: Scalar) -> Scalar:
-        """How sure it is that a sliding foot still slides after a step.
+        """Confidence that a sliding foot still slides after a step [1].
 
-        A friction that does not depend on the speed must not be taken as constant over a step in
-        which it may bring the foot to rest: the step would turn the foot round.
+        Friction that does not depend on the speed must not be taken as constant over a step that
+        may stop the foot: the step would reverse its motion.
 
         Args:
             drag: The whole friction per speed [N s/m].
@@ -83,14 +79,11 @@ class Foot:
         return ca.fmax(1.0 - drag * (timestep * self.mobility), 0.0)
 
     def resisting(self, sideways: Scalar, further: Scalar = 0.0) -> Matrix:
-        """How a force at the foot falls as the foot moves faster.
+        """-dF/dv in the link's frame, with the damping along `up`, symmetric [N s/m].
 
         Args:
             sideways: Along the ground, in every direction [N s/m].
-            further: What is added along the slip, over the slip's square [N s3/m3].
-
-        Returns:
-            -dF/dv in the link's frame, with the damping along `up`, symmetric [N s/m].
+            further: Added along the slip, over the slip's square [N s3/m3].
         """
         resistance = outer(scale(self.damping - sideways, self.up), self.up)
         even = ((sideways, 0.0, 0.0), (0.0, sideways, 0.0), (0.0, 0.0, sideways))
@@ -103,7 +96,7 @@ class Foot:
 
 @dataclass(frozen=True, slots=True)
 class Reaction:
-    """The ground's answer to a foot, in the link's frame.
+    """Reaction of the ground on a foot, in the link's frame.
 
     Attributes:
         force: on the foot [N].
@@ -117,8 +110,8 @@ class Reaction:
 
 
 Friction = Callable[[Foot, Mapping[str, Scalar], InternalState, Scalar], Reaction]
-"""A law of friction: (foot, ground, internal state, timestep) -> reaction. Its resistance leaves
-out how friction follows the normal force, which is not symmetric."""
+"""A friction law: (foot, ground, internal state, timestep) -> reaction. Its resistance omits how
+friction follows the normal force, which is not symmetric."""
 
 
 def foot_on_ground(
@@ -126,11 +119,11 @@ def foot_on_ground(
 ) -> Foot:
     """F_z = k p - c dz/dt while the sole touches (eq. 2.13), never pulling.
 
-    The sole's spring hangs below the tibia's end along the ground's normal.
+    The sole's spring extends from the tibia's end along the ground's normal.
 
     Args:
         at: The tibia's end in its frame [m].
-        mobility: Upper bound of the tibia's end's acceleration under a force [1/kg].
+        mobility: Upper bound of the acceleration of the tibia's end under a force [1/kg].
     """
     velocity = add(link.velocity.linear, cross(link.velocity.angular, at))
     penetration = ground["sole"] - (link.height + dot(link.up, at))
@@ -155,14 +148,10 @@ def foot_on_ground(
 def linear_zone(
     foot: Foot, ground: Mapping[str, Scalar], internal_state: InternalState, timestep: Scalar
 ) -> Reaction:
-    """F_t = -mu F_z v / max(|v|, v_lin) (table 2.6).
-
-    Args:
-        timestep: Of the physics [s].
-    """
+    """F_t = -mu F_z v / max(|v|, v_lin) (table 2.6)."""
     del internal_state
     zone = ground["slip_velocity"]
-    # |v_t|^2 can be rounded below zero at rest; the linear zone's bound covers that.
+    # |v_t|^2 can be rounded below zero at rest; the bound of the linear zone covers that.
     squared = dot(foot.velocity, foot.velocity) - foot.rising * foot.rising
     pace = 1.0 / ca.sqrt(ca.fmax(squared, zone * zone))
     limit = ground["friction"] * foot.normal
@@ -190,25 +179,24 @@ def karnopp(
 def stick(
     foot: Foot, ground: Mapping[str, Scalar], internal_state: InternalState, timestep: Scalar
 ) -> Reaction:
-    """Spring and damper along the ground from where the foot came down, saturated at mu F_z.
+    """Spring and damper along the ground from the touchdown point, saturated at mu F_z.
 
     Args:
         internal_state: The spring's elongation along the world's x and y [m].
-        timestep: Of the physics [s].
     """
     k, c = ground["stick_stiffness"], ground["stick_damping"]
-    stretched, wanted = [], []
+    stretched, pull = [], []
     for axis, elongation in zip((foot.ahead, foot.left), internal_state, strict=True):
         speed = dot(axis, foot.velocity)
         longer = (elongation + timestep * speed) * foot.touching
         stretched.append(longer)
-        wanted.append(-(k * longer + c * speed))
+        pull.append(-(k * longer + c * speed))
     limit = ground["friction"] * foot.normal
-    squared = wanted[0] * wanted[0] + wanted[1] * wanted[1]
-    # A foot in the air wants nothing and may have nothing: the bound keeps 0 / 0 away.
+    squared = pull[0] * pull[0] + pull[1] * pull[1]
+    # The bound avoids 0 / 0 for a foot in the air.
     share = limit / ca.sqrt(ca.fmax(ca.fmax(squared, limit * limit), 1e-18))
     force = scale(foot.normal, foot.up)
-    for axis, component in zip((foot.ahead, foot.left), wanted, strict=True):
+    for axis, component in zip((foot.ahead, foot.left), pull, strict=True):
         force = add(force, scale(share * component, axis))
     after = tuple(share * longer for longer in stretched)
     return Reaction(force, foot.resisting(share * c * foot.touching), after)
@@ -217,11 +205,7 @@ def stick(
 def dead_zone(
     foot: Foot, ground: Mapping[str, Scalar], internal_state: InternalState, timestep: Scalar
 ) -> Reaction:
-    """F_t = -mu F_z min(1, (|v| - v_d) / (v_lin - v_d)) v / |v|, none below v_d (table 2.6).
-
-    Args:
-        timestep: Of the physics [s].
-    """
+    """F_t = -mu F_z min(1, (|v| - v_d) / (v_lin - v_d)) v / |v|, none below v_d (table 2.6)."""
     del internal_state
     threshold = ground["stick_velocity"]
     # Identified speeds may cross: the friction then jumps at v_d.
@@ -242,4 +226,3 @@ def dead_zone(
 FRICTION: Final[Mapping[ContactLaw, Friction]] = MappingProxyType(
     {"linear_zone": linear_zone, "karnopp": karnopp, "stick": stick, "dead_zone": dead_zone}
 )
-"""By name."""

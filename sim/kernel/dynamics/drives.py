@@ -1,4 +1,8 @@
-"""What drives a joint in a physics step, as symbols: a DC motor, or an actuator of given torque."""
+"""Drives of the joints in a physics step, as symbols: DC motors or torque-controlled actuators.
+
+With backlash (thesis: gearlash) the motor side (rotor, gearhead, encoder) is a second inertia that
+touches the link at either end of the play through a stiff, damped shaft.
+"""
 
 from __future__ import annotations
 
@@ -16,17 +20,14 @@ from gaitswarm.sim.robot.limbs import LimbJoint, is_torque_controlled
 def shaft_torque(
     ahead: Scalar, rate: Scalar, play: Scalar, stiffness: float, damping: float
 ) -> Scalar:
-    """Torque of a stiff, damped shaft on the link; it pushes, but never pulls into the play.
+    """Torque of a stiff, damped shaft on the link [N m]; it pushes, but never pulls into the play.
 
     Args:
-        ahead: Motor side's angle less the link's [rad].
+        ahead: Motor side's angle minus the link's [rad].
         rate: Derivative of `ahead` [rad/s].
         play: End to end [rad].
         stiffness: Of the closed play [N m/rad].
         damping: Of the closed play [N m s/rad].
-
-    Returns:
-        Torque on the link [N m].
     """
     half = 0.5 * play
     drag = damping * rate
@@ -36,28 +37,19 @@ def shaft_torque(
 
 
 def static_friction(rate: Scalar, friction: Scalar) -> Scalar:
-    """Torque against the motion, whatever its speed; linear in a narrow zone, so it never drives.
+    """Torque against the motion, independent of its speed [N m].
+
+    It is linear in a narrow zone, so it never drives.
 
     Args:
         rate: Of the gearhead's output, at the joint [rad/s].
         friction: From `STATIC_FRICTION_RATE` on [N m].
-
-    Returns:
-        Torque [N m].
     """
     return -friction * ca.fmin(ca.fmax(rate * (1.0 / STATIC_FRICTION_RATE), -1.0), 1.0)
 
 
 def static_friction_slope(rate: Scalar, friction: Scalar) -> Scalar:
-    """How `static_friction` grows with the rate, where it does.
-
-    Args:
-        rate: Of the gearhead's output, at the joint [rad/s].
-        friction: From `STATIC_FRICTION_RATE` on [N m].
-
-    Returns:
-        -d torque / d rate [N m s/rad].
-    """
+    """-d torque / d rate of `static_friction` [N m s/rad]."""
     return friction * (ca.fabs(rate) < STATIC_FRICTION_RATE) * (1.0 / STATIC_FRICTION_RATE)
 
 
@@ -83,8 +75,8 @@ class TorqueDrive(Drive):
     """The drive of a torque-controlled actuator.
 
     Attributes:
-        drop: by which its torque falls as its rate grows, where speed limits it; else 0
-            [N m s/rad].
+        drop: by which its torque falls as its rate grows, where the speed limits it; else 0 [N m
+            s/rad].
     """
 
     drop: Scalar
@@ -92,11 +84,11 @@ class TorqueDrive(Drive):
 
 @dataclass(frozen=True, slots=True)
 class Friction:
-    """Of a joint and its gears.
+    """Friction of a joint and its gears.
 
     Attributes:
         viscous: [N m s/rad].
-        static: against the motion, whatever its speed; None for none [N m].
+        static: [N m]; None for none.
     """
 
     viscous: Scalar
@@ -104,7 +96,6 @@ class Friction:
 
 
 def friction_of(joint: int, p: Mapping[str, Sequence[Scalar]]) -> Friction:
-    """Friction among the run-time parameters."""
     static = p["static_friction"]
     return Friction(p["viscous"][joint], static[joint] if static else None)
 
@@ -131,13 +122,13 @@ def drive_of(
 def _torque_drive(
     joint: LimbJoint, duty: Scalar, rate: Scalar, supply: Scalar, friction: Friction
 ) -> TorqueDrive:
-    """The torque that is commanded, within what the speed leaves of it along the motion."""
+    """The commanded torque within the limits that the speed sets along the motion."""
     stall = joint.stall_torque + joint.stall_torque_per_volt * supply
     most = stall - joint.torque_drop * rate
     least = -stall - joint.torque_drop * rate
-    wanted = duty * joint.torque_limit
-    torque = ca.fmin(ca.fmax(wanted, ca.fmin(least, 0.0)), ca.fmax(most, 0.0))
-    limited = (most < wanted) * (most > 0.0) + (wanted < least) * (least < 0.0)
+    commanded = duty * joint.torque_limit
+    torque = ca.fmin(ca.fmax(commanded, ca.fmin(least, 0.0)), ca.fmax(most, 0.0))
+    limited = (most < commanded) * (most > 0.0) + (commanded < least) * (least < 0.0)
     drop = joint.torque_drop * limited
     current = joint.inverse_torque * torque
     voltage = joint.resistance * current + joint.torque * rate
@@ -147,7 +138,7 @@ def _torque_drive(
 def _with_friction(
     torque: Scalar, damping: Scalar, rate: Scalar, friction: Friction
 ) -> tuple[Scalar, Scalar]:
-    """Torque behind a joint's friction, and its damping with the friction's."""
+    """Torque behind a joint's friction, and its damping including that of the friction."""
     torque = torque - friction.viscous * rate
     damping = damping + friction.viscous
     if friction.static is not None:
@@ -157,16 +148,13 @@ def _with_friction(
 
 
 def at_middle(joint: LimbJoint, drive: Drive, faster: Scalar) -> tuple[Scalar, Scalar]:
-    """Voltage and current of a motor later in a step.
+    """Voltage [V] and current [A] of a motor later in a step.
 
     Args:
-        faster: By which the motor's rate at the joint has grown since [rad/s].
-
-    Returns:
-        Voltage [V] and current [A].
+        faster: Increase of the motor's rate at the joint since [rad/s].
     """
     if isinstance(drive, TorqueDrive):
-        # Of I = tau / k and U = R I + k omega.
+        # From I = tau / k and U = R I + k omega.
         less = (joint.inverse_torque * drive.drop) * faster
         voltage = drive.voltage + joint.torque * faster - joint.resistance * less
         return voltage, drive.current - less
@@ -182,28 +170,25 @@ def battery_voltage(
     *,
     torque: bool,
 ) -> Scalar:
-    """Voltage of the battery under the load of all motors.
+    """Voltage of the battery under the load of all motors [V].
 
-    The power of torque-controlled actuators, P = sum(R / k^2 tau^2 + tau omega) of the torques that
-    are commanded, does not depend on the voltage: U (V - U) / R_i = P, of whose solutions the
-    higher one is taken. A battery that cannot give P gives all it can, at half its own voltage.
+    The power of torque-controlled actuators, P = sum(R / k^2 tau^2 + tau omega) of the commanded
+    torques, does not depend on the voltage; of the solutions of U (V - U) / R_i = P the higher one
+    is taken. A battery that cannot deliver P delivers its maximum, at half its own voltage.
 
     Args:
-        constants: As `gaitswarm.sim.robot.limbs.electrical_constants` has them, (2 J,).
+        constants: See `gaitswarm.sim.robot.limbs.electrical_constants`, (2 J,).
         duty: Motor voltage per supply voltage, or commanded torque per torque limit, (J,) [1].
         rates: Of the motors at the joints, (J,) [rad/s].
         source: Open-circuit voltage of the battery [V].
         internal: Resistance of the battery [ohm].
-
-    Returns:
-        Under load [V].
     """
     n = len(duty)
     if not torque:
         return supply_voltage(duty, rates, constants[n:], constants[:n], source, internal)
     power = 0.0
     for share, rate, loss, limit in zip(duty, rates, constants[:n], constants[n:], strict=True):
-        wanted = share * limit
-        power = power + wanted * (loss * wanted + rate)
+        commanded = share * limit
+        power = power + commanded * (loss * commanded + rate)
     half = 0.5 * source
     return half + ca.sqrt(ca.fmax(half * half - internal * power, 0.0))

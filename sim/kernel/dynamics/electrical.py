@@ -1,4 +1,4 @@
-"""The battery that all motors share, as symbols or numbers (thesis 2.2.5)."""
+"""The battery shared by all motors, in symbols or numbers (thesis 2.2.5)."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ def supply_voltage(
     source: Scalar,
     internal: Scalar,
 ) -> Scalar:
-    """Voltage of one battery of finite resistance under quasi-static motor currents.
+    """Voltage of one battery of finite resistance under quasi-static motor currents [V].
 
-    The bridges conserve power, so the battery's current is sum(duty_j I_j); with
-    I_j = (duty_j U_S - k_j omega_j) / R_j, U_S = V - R_i sum(duty_j I_j) is linear in U_S (thesis
-    2.2.5). The electrical pole (L/R = 44 us) is faster than a physics step, hence quasi-static.
+    The bridges conserve power, so the battery's current is sum(duty_j I_j); with I_j = (duty_j U_S
+    - k_j omega_j) / R_j, U_S = V - R_i sum(duty_j I_j) is linear in U_S (thesis 2.2.5). The
+    electrical pole (L/R = 44 us) is faster than a physics step, hence quasi-static.
 
     Args:
         duty: Motor voltage per supply voltage, (J,) [1].
@@ -28,9 +28,6 @@ def supply_voltage(
         conductance: Of the motors, (J,) [1/ohm].
         source: Open-circuit voltage of the battery [V].
         internal: Resistance of the battery [ohm].
-
-    Returns:
-        Under load [V].
     """
     back, load = 0.0, 0.0
     for share, rate, k, g in zip(duty, rates, torque, conductance, strict=True):

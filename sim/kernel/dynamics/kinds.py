@@ -1,4 +1,4 @@
-"""Kinds of limbs: what the compiled code of a limb depends on, and what is its data."""
+"""Kinds of limbs: what the compiled code of a limb depends on, as opposed to its data."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from gaitswarm.sim.robot.limbs import Limb, LimbJoint, electrical_constants, lim
 
 @lru_cache(maxsize=64)
 def robot_constants(robot: Robot) -> NDArray[np.float64]:
-    """What a kernel reads of its robot beside the run-time parameters."""
+    """Constants that a kernel reads besides the run-time parameters."""
     limbs = limbs_of(robot)
     joints = [joint for limb in limbs for joint in limb.joints]
     kinds = limb_kinds(limbs)
@@ -37,26 +37,24 @@ class LimbKind:
     """Limbs that share a function: same axes, and the same constants are 0 or 1.
 
     Attributes:
-        axes: of the joints.
-        trivial: constant by constant, 0 or 1 where all have it, None elsewhere.
+        trivial: by constant, 0 or 1 where all limbs have it, else None.
     """
 
     axes: tuple[tuple[float, ...], ...]
     trivial: tuple[float | None, ...]
 
     def numbers_of(self, limb: Limb) -> list[float]:
-        """What a limb of this kind differs in from another one."""
-        return [x for x, known in zip(_constants(limb), self.trivial, strict=True) if known is None]
+        """Constants in which limbs of this kind differ."""
+        return [x for x, fixed in zip(_constants(limb), self.trivial, strict=True) if fixed is None]
 
     def symbolic(self, limb: Limb, symbols: Sequence[Scalar]) -> Limb:
-        """A limb of this kind, as symbols."""
         left = iter(symbols)
-        values = iter([next(left) if known is None else known for known in self.trivial])
+        values = iter([next(left) if fixed is None else fixed for fixed in self.trivial])
         return _with_constants(limb, values)
 
 
 def limb_kinds(limbs: Sequence[Limb]) -> list[LimbKind]:
-    """The kind of every limb: as few kinds as there are sets of axes."""
+    """The kind of every limb: one kind per set of axes."""
     alike: dict[tuple[tuple[float, ...], ...], list[list[float]]] = {}
     for limb in limbs:
         alike.setdefault(_axes(limb), []).append(_constants(limb))
@@ -75,7 +73,7 @@ def _axes(limb: Limb) -> tuple[tuple[float, ...], ...]:
 
 
 def _constants(limb: Limb) -> list[float]:
-    """All leaves but the axes; the joints' signs first."""
+    """All leaves but the axes, the joints' signs first."""
     rest = [
         leaf for joint in limb.joints for name in _DATA for leaf in leaves(getattr(joint, name))
     ]
@@ -83,7 +81,7 @@ def _constants(limb: Limb) -> list[float]:
 
 
 def _with_constants(limb: Limb, values: Iterator[Scalar]) -> Limb:
-    """A limb with others in the order of `_constants`."""
+    """Replace the constants, in the order of `_constants`."""
     signs = [next(values) for _ in limb.joints]
     joints = []
     for joint, sign in zip(limb.joints, signs, strict=True):

@@ -1,4 +1,4 @@
-"""One limb in a physics step, as symbols: what it passes to the body, and what comes back.
+"""One limb in a physics step, as symbols.
 
 A step is the kick of a leapfrog: it changes velocities at fixed positions. Forces that depend on
 velocity are taken at the step's middle by one linearly implicit equation, whose matrix is the
@@ -47,17 +47,18 @@ from gaitswarm.sim.robot.limbs import Limb, LimbJoint
 Scalars = tuple[Scalar, ...]
 
 LANDING_HORIZON: Final = 1.25 * CONTROL_PERIOD
-"""How far a landing is seen [s]: at the last step of a control tick, to the end of the next one."""
+"""Look-ahead for touchdowns [s]: from the last step of a control tick to the end of the next one.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class Environment:
-    """What is the same for all limbs in a step.
+    """State common to all limbs in a step.
 
     Attributes:
         timestep: [s].
         supply: voltage of the battery under load [V].
-        displaced: whether disturbances are angles, 1 or 0; for backlash only.
+        displaced: 1 if disturbances are angles, else 0; with backlash only.
     """
 
     timestep: Scalar
@@ -76,7 +77,7 @@ class LimbState:
         disturbance: torque on the link [N m], or angle [rad].
         motor_angles: with backlash [rad].
         motor_rates: with backlash [rad/s].
-        carried: what the law of contact carries of the foot.
+        carried: internal state of the foot's contact law.
     """
 
     angles: Scalars
@@ -90,17 +91,15 @@ class LimbState:
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """What a limb keeps between the body's two halves of a step.
+    """Values of a limb that are kept between `before` and `after`.
 
     Attributes:
-        sines: of the joints' turning about their axes.
-        cosines: likewise.
-        passed: by `articulated_body.inward`.
-        drives: by joint.
+        sines: of the rotations about the joints' axes.
+        cosines: of the same.
         armature: of the rotors, with half a step's damping [kg m2].
-        landing: 1 if the foot may come down within `LANDING_HORIZON`, else 0.
-        torques: that the gearheads pass to the links, before the step; without backlash with what
-            turns the rotors themselves [N m].
+        landing: 1 if the foot may touch down within `LANDING_HORIZON`, else 0.
+        torques: passed by the gearheads to the links, before the step; without backlash including
+            the torque that accelerates the rotors [N m].
         spins: accelerations of rotors behind backlash [rad/s2].
     """
 
@@ -116,15 +115,14 @@ class Held:
 
 @dataclass(frozen=True, slots=True)
 class Before:
-    """What a limb comes to before the body's acceleration is known.
+    """Results for a limb before the body's acceleration is known.
 
     Attributes:
         inertia: articulated, in the body's frame.
-        force: that the bias takes, in the body's frame.
-        held: for `after`.
+        force: of the bias, in the body's frame.
         motor_rates: after the step, with backlash.
         carried: after the step.
-        foot_force: before the step: along the world's x, y, z [N].
+        foot_force: before the step, along the world's x, y, z [N].
     """
 
     inertia: Inertia
@@ -137,16 +135,16 @@ class Before:
 
 @dataclass(frozen=True, slots=True)
 class After:
-    """What a limb comes to.
+    """Results for a limb after the body's acceleration is known.
 
     Attributes:
         accelerations: of the joints [rad/s2].
         rates: of the joints after the step [rad/s].
         currents: of the motors, at the step's middle [A].
-        loads: torques that the gearheads pass to the links, at the step's middle [N m].
+        loads: torques passed by the gearheads to the links, at the step's middle [N m].
         tallies: sums over the limb's motors at the step's middle: |load| [N m], electrical power
             [W], its absolute value [W], |current| [A], heat [W]; then the largest |current| [A],
-            and 1 if the foot may come down within `LANDING_HORIZON`, else 0.
+            and 1 if the foot may touch down within `LANDING_HORIZON`, else 0.
     """
 
     accelerations: Scalars
@@ -164,7 +162,7 @@ def before(
     environment: Environment,
     p: Mapping[str, Scalars],
 ) -> Before:
-    """From the body's state to what the body feels of the limb."""
+    """Compute the inertia and force that the limb passes to the body, from the body's state."""
     half = 0.5 * environment.timestep
     sines, cosines = _turns(limb, state.angles)
     links = _links(limb, sines, cosines, state.rates)
@@ -182,7 +180,7 @@ def before(
         spins = ()
         torques = [d.torque + more for d, more in zip(drives, state.disturbance, strict=True)]
         armature = [j.armature + half * d.damping for j, d in zip(limb.joints, drives, strict=True)]
-    passed_on, rotors = tuple(torques), tuple(armature)
+    gear_torques, rotors = tuple(torques), tuple(armature)
     for k, (angle, rate) in enumerate(zip(state.angles, state.rates, strict=True)):
         obstacle = p["jam_stiffness"][k] * (angle - p["jam_angle"][k]) + p["jam_damping"][k] * rate
         torques[k] = torques[k] - obstacle
@@ -214,7 +212,7 @@ def before(
             drives,
             rotors,
             foot.lands_within(LANDING_HORIZON),
-            passed_on,
+            gear_torques,
             spins,
         ),
         tuple(rate + dt * spin for rate, spin in zip(state.motor_rates, spins, strict=True)),
@@ -227,14 +225,8 @@ def before(
     )
 
 
-def after(
-    limb: Limb,
-    held: Held,
-    carrier: Motion,
-    rates: Scalars,
-    timestep: Scalar,
-) -> After:
-    """From the body's acceleration to the limb's.
+def after(limb: Limb, held: Held, carrier: Motion, rates: Scalars, timestep: Scalar) -> After:
+    """Compute the limb's accelerations from the body's.
 
     Args:
         rates: Of the joints before the step [rad/s].
@@ -279,17 +271,12 @@ def after(
 
 
 def links_at(limb: Limb, angles: Sequence[Scalar], rates: Sequence[Scalar]) -> list[Link]:
-    """The links of a limb.
-
-    Args:
-        angles: Of the joints [rad].
-        rates: Of the joints [rad/s].
-    """
+    """The links of a limb at joint angles [rad] and rates [rad/s]."""
     return _links(limb, *_turns(limb, angles), rates)
 
 
 def _turns(limb: Limb, angles: Sequence[Scalar]) -> tuple[Scalars, Scalars]:
-    """Sines and cosines of what the links are turned by about their axes."""
+    """Sines and cosines of the rotations about the joints' axes."""
     sines = tuple(j.sign * ca.sin(angle) for j, angle in zip(limb.joints, angles, strict=True))
     return sines, tuple(ca.cos(angle) for angle in angles)
 
@@ -329,7 +316,7 @@ def _behind_backlash(
     environment: Environment,
     p: Mapping[str, Scalars],
 ) -> tuple[Scalars, Scalars]:
-    """Torques of the shafts, accelerations of the rotors."""
+    """Torques of the shafts, and accelerations of the rotors."""
     half = 0.5 * environment.timestep
     shafts, spins = [], []
     for k, (joint, drive) in enumerate(zip(limb.joints, drives, strict=True)):

@@ -1,7 +1,7 @@
-"""A physics step of a whole robot as CasADi functions, derived from Pinocchio's model of it.
+"""A physics step of a whole robot as CasADi functions, derived from Pinocchio's model.
 
-The readable form: the reference kernel steps with it, logs are observed through it, and it is what
-the tests hold against Pinocchio and MuJoCo. The compiled kernel has the same formulas limb by limb
+The reference kernel steps with them, logs are computed by them, and the tests compare them with
+Pinocchio and MuJoCo. The compiled kernel has the same formulas limb by limb
 (`gaitswarm.sim.kernel.emitted.pieces`).
 """
 
@@ -50,15 +50,14 @@ T = TypeVar("T")
 
 
 class Traced(Generic[*Trees, T]):
-    """A function of trees that is run once and then repeated by CasADi.
+    """A function of trees that runs once in Python and is then repeated by CasADi.
 
-    To put scalars together one by one in Python takes much longer than to repeat it for other
-    ones. Zeros and ones are dropped anew. A quotient of which the divisor is a symbol at first, and
-    a number later, stays one, where Python's CasADi multiplies with the number's inverse.
+    Building an expression scalar by scalar in Python takes much longer than repeating it for other
+    scalars. Zeros and ones are still dropped. A quotient whose divisor is first a symbol and later
+    a number remains a quotient, whereas Python's CasADi multiplies by the inverse.
     """
 
     def __init__(self, function: Callable[[*Trees], T], *examples: *Trees) -> None:
-        """Run the function."""
         self._given = [_is_symbolic(leaf) for leaf in leaves(examples)]
         symbols = mapped(examples, lambda leaf: ca.SX.sym("x") if _is_symbolic(leaf) else leaf)
         self._made = function(*symbols)
@@ -69,38 +68,33 @@ class Traced(Generic[*Trees, T]):
         )
 
     def __call__(self, *arguments: *Trees) -> T:
-        """What the function makes of other arguments."""
         pairs = zip(leaves(arguments), self._given, strict=True)
         given: Any = ca.vertcat(*(leaf for leaf, taken in pairs if taken))
-        found = iter(ca.vertsplit(self._function(given)))
-        return mapped(self._made, lambda leaf: next(found) if _is_symbolic(leaf) else leaf)
+        results = iter(ca.vertsplit(self._function(given)))
+        return mapped(self._made, lambda leaf: next(results) if _is_symbolic(leaf) else leaf)
 
 
 def outline(tree: object) -> str:
-    """All of a tree but its symbols: trees with one outline are traced alike."""
+    """Everything of a tree but its symbols: trees with equal outlines are traced alike."""
     return repr(mapped(tree, lambda leaf: "symbol" if _is_symbolic(leaf) else float(leaf)))
 
 
 def _is_symbolic(leaf: Scalar) -> bool:
-    """Also of a number in CasADi's type: another limb may have a symbol there."""
+    """True also for a number in CasADi's type: another limb may have a symbol there."""
     return isinstance(leaf, ca.SX)
 
 
 class PhysicsModel:
-    """CasADi functions of one robot, each derived when it is first asked for.
+    """CasADi functions of one robot, derived on first use.
 
-    Their inputs are q (7+J): position, quaternion x y z w, joint angles; v (6+J): base twist in its
-    own frame, joint rates; internal_state (I), as `parameters.internal_state_size` says; duty (J):
-    motor voltage per supply voltage, or torque per torque limit; disturbance (J): torque on each
-    link [N m], or, as the parameter `displaced` says, angle [rad] by which its gearhead is turned
-    further; parameters (P), as `parameters.Layout` says.
-
-    Attributes:
-        layout: of the parameters.
+    Inputs: q (7+J): position, quaternion x y z w, joint angles; v (6+J): base twist in its own
+    frame, joint rates; internal_state (I), see `parameters.internal_state_size`; duty (J): motor
+    voltage per supply voltage, or torque per torque limit; disturbance (J): torque on each link [N
+    m], or, with the parameter `displaced`, additional angle [rad] of its gearhead; parameters (P),
+    see `parameters.Layout`.
     """
 
     def __init__(self, robot: Robot) -> None:
-        """Read a robot's URDF; `physics_model` keeps what was made of it."""
         self.layout = Layout(robot)
         self._robot = robot
         self._limbs = _limbs_by_pinocchio(robot)
@@ -108,8 +102,8 @@ class PhysicsModel:
 
     @cached_property
     def kick(self) -> Any:
-        """To v and internal state after a step at these positions, current (J), integrands (8) and
-        largest absolute current (1) at its middle; landing (1), 1 if a foot may come down within
+        """v and internal state after a step at these positions; current (J), integrands (8) and
+        largest absolute current (1) at its middle; landing (1), 1 if a foot may touch down within
         `limb.LANDING_HORIZON`.
         """
         step = self._step(self._symbols.p["timestep"][0])
@@ -128,7 +122,7 @@ class PhysicsModel:
 
     @cached_property
     def drift(self) -> Any:
-        """From q, v, internal state and time (1) [s] to q and internal state then."""
+        """(q, v, internal state, time (1) [s]) -> q and internal state after that time."""
         s, n = self._symbols, self._robot.n_joints
         time = ca.SX.sym("time")
         motors = s.internal_state[: 2 * n] if self._robot.has_backlash else []
@@ -141,10 +135,10 @@ class PhysicsModel:
 
     @cached_property
     def observe(self) -> Any:
-        """To current (J), voltage (J), load torque (J), foot force in the world (3 L), supply (1)
-        and acceleration (6+J) as `pinocchio.aba` gives it, all at this instant.
+        """Current (J), voltage (J), load torque (J), foot force in the world (3 L), supply (1) and
+        acceleration (6+J) as in `pinocchio.aba`, all at this instant.
         """
-        # Forces that depend on velocity are those of the velocities given.
+        # With a zero timestep, velocity-dependent forces are those of the given velocities.
         still = self._step(0.0)
         return _function(
             "observe",
@@ -165,7 +159,6 @@ class PhysicsModel:
 
 @lru_cache(maxsize=16)
 def physics_model(robot: Robot) -> PhysicsModel:
-    """Derive the step from a robot's URDF."""
     return PhysicsModel(robot)
 
 
@@ -182,8 +175,6 @@ class _Symbols:
 
 @dataclass(frozen=True, slots=True)
 class _Step:
-    """A step of the whole robot."""
-
     supply: Scalar
     before: Sequence[Before]
     after: Sequence[After]
@@ -202,16 +193,7 @@ class _Step:
     def integrands(self) -> list[Scalar]:
         load, power, absolute_power, current, heat, _, _ = self.tallies()
         acceleration, angular, forward = self.of_body
-        return [
-            load * load,
-            acceleration,
-            angular,
-            power,
-            forward,
-            absolute_power,
-            current,
-            heat,
-        ]
+        return [load * load, acceleration, angular, power, forward, absolute_power, current, heat]
 
 
 def _step(
@@ -230,7 +212,7 @@ def _step(
         torque=robot.is_torque_controlled,
     )
     environment = Environment(timestep, supply, *s.p["displaced"])
-    body, own = body_state(s.q, s.v, s.p["gravity"]), body_of(s.p)
+    state, body = body_state(s.q, s.v, s.p["gravity"]), body_of(s.p)
 
     def limb_before(
         limb: Limb, base: LinkState, state: LimbState, around: Environment, p: tuple[Scalars, ...]
@@ -243,21 +225,21 @@ def _step(
     befores = [
         before_of(
             k,
-            body,
+            state,
             LimbState(*(_of_limb(values, k, len(limbs)) for values in parts)),
             environment,
             tuple(_of_limb(s.p[name], k, len(limbs)) for name in layout.by_limb),
         )
         for k in range(len(limbs))
     ]
-    inertia, force = own.inertia(), body.force(own)
-    force = Force(add(force.linear, pushed(body, s.p["push"])), force.angular)
+    inertia, force = body.inertia(), state.force(body)
+    force = Force(add(force.linear, pushed(state, s.p["push"])), force.angular)
     for limb in befores:
         inertia, force = inertia.plus(limb.inertia), force.plus(limb.force)
-    falling, true = solved(body, inertia, force)
+    falling, true = solved(state, inertia, force)
     afters = [
-        after_of(k, found.held, falling, _of_limb(s.v[6:], k, len(limbs)), timestep)
-        for k, found in enumerate(befores)
+        after_of(k, limb.held, falling, _of_limb(s.v[6:], k, len(limbs)), timestep)
+        for k, limb in enumerate(befores)
     ]
     twist = [*true.linear, *true.angular]
     faster = [old + timestep * rate for old, rate in zip(s.v[:6], twist, strict=True)]
@@ -272,20 +254,20 @@ def _step(
             *(rate for limb in befores for rate in limb.motor_rates),
             *(value for limb in befores for value in limb.carried),
         ],
-        of_body=body_integrands(body, true, timestep),
+        of_body=body_integrands(state, true, timestep),
     )
 
 
 _traces: Final[dict[Hashable, Any]] = {}
-"""Functions of limbs, by all that they depend on: other robots have limbs of such kinds, too."""
+"""Traced functions by everything they depend on, shared with other robots."""
 
-_TRACES_KEPT: Final = 64
+_MAX_TRACES: Final = 64
 
 _tracing: Final = threading.Lock()
 
 
 class _ByKind(Generic[*Trees, T]):
-    """A function of limbs, traced once for all of a kind."""
+    """A function of limbs, traced once per kind."""
 
     def __init__(
         self, limbs: Sequence[Limb], function: Callable[[Limb, *Trees], T], *given: str
@@ -302,7 +284,7 @@ class _ByKind(Generic[*Trees, T]):
             with _tracing:
                 traced = _traces.pop(key, None) or self._trace(limb, kind, *arguments)
                 self._traced[kind] = _traces[key] = traced
-                if len(_traces) > _TRACES_KEPT:
+                if len(_traces) > _MAX_TRACES:
                     del _traces[next(iter(_traces))]
         return self._traced[kind](constants, *arguments)
 
@@ -337,7 +319,7 @@ def _symbols(robot: Robot, layout: Layout) -> _Symbols:
 
 def _limbs_by_pinocchio(robot: Robot) -> tuple[Limb, ...]:
     """The limbs as Pinocchio reads the URDF."""
-    limbs_of(robot)  # Refuses what cannot be simulated, with the reason.
+    limbs_of(robot)  # Raises for robots that cannot be simulated.
     model = pin.buildModelFromXML(robot.urdf.text, pin.JointModelFreeFlyer())
     limbs = []
     for number, leg in enumerate(robot.description.legs):
@@ -351,9 +333,7 @@ def _limbs_by_pinocchio(robot: Robot) -> tuple[Limb, ...]:
                     np.asarray(model.jointPlacements[j].rotation),
                     np.asarray(model.jointPlacements[j].translation),
                     BodyInertia(
-                        float(inertia.mass),
-                        np.asarray(inertia.lever),
-                        np.asarray(inertia.inertia),
+                        float(inertia.mass), np.asarray(inertia.lever), np.asarray(inertia.inertia)
                     ),
                 )
             )

@@ -1,7 +1,8 @@
-"""3-vectors and 3x3 matrices of symbolic scalars.
+"""Spatial algebra of symbolic scalars: vectors, matrices, rotations, inertias, motions and forces.
 
-Plain tuples rather than sparse CasADi matrices: CasADi drops products with the constants 0 and 1
-scalar by scalar, so structural zeros cost nothing and the algorithm stays readable.
+Plain tuples instead of sparse CasADi matrices: CasADi drops products with the constants 0 and 1
+scalar by scalar, so structural zeros cost nothing. Spatial quantities are pairs (linear, angular)
+in the frame of their own link, as in Pinocchio.
 """
 
 from __future__ import annotations
@@ -14,27 +15,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 Scalar = Any
-"""A casadi.SX scalar or a float; CasADi ships no types."""
+"""A casadi.SX scalar or a float; CasADi has no type information."""
 Vector = tuple[Scalar, Scalar, Scalar]
 Matrix = tuple[Vector, Vector, Vector]
 
 
 def vector(values: Sequence[Scalar] | NDArray[np.float64]) -> Vector:
-    """Three numbers; rounding noise of unit-sized constants becomes a structural zero.
-
-    Args:
-        values: (3,).
-    """
+    """Convert (3,) numbers; rounding noise of unit-sized constants becomes a structural zero."""
     x, y, z = (_snap(value) for value in values)
     return x, y, z
 
 
 def matrix(values: NDArray[np.float64]) -> Matrix:
-    """A constant matrix, its noise removed as by `vector`.
-
-    Args:
-        values: (3, 3).
-    """
+    """Convert a constant (3, 3) matrix, its noise removed as by `vector`."""
     return vector(values[0]), vector(values[1]), vector(values[2])
 
 
@@ -47,36 +40,23 @@ def add(*terms: Vector) -> Vector:
 
 
 def subtract(a: Vector, b: Vector) -> Vector:
-    """a - b"""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 def scale(s: Scalar, a: Vector) -> Vector:
-    """s a"""
     return s * a[0], s * a[1], s * a[2]
 
 
 def dot(a: Vector, b: Vector) -> Scalar:
-    """a . b"""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def cross(a: Vector, b: Vector) -> Vector:
-    """a x b"""
-    return (
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    )
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 def transpose(m: Matrix) -> Matrix:
-    """m^T"""
-    return (
-        (m[0][0], m[1][0], m[2][0]),
-        (m[0][1], m[1][1], m[2][1]),
-        (m[0][2], m[1][2], m[2][2]),
-    )
+    return ((m[0][0], m[1][0], m[2][0]), (m[0][1], m[1][1], m[2][1]), (m[0][2], m[1][2], m[2][2]))
 
 
 def apply(m: Matrix, a: Vector) -> Vector:
@@ -85,18 +65,15 @@ def apply(m: Matrix, a: Vector) -> Vector:
 
 
 def multiply(a: Matrix, b: Matrix) -> Matrix:
-    """a b"""
     columns = transpose(b)
     return _rows([tuple(dot(row, column) for column in columns) for row in a])
 
 
 def plus(a: Matrix, b: Matrix) -> Matrix:
-    """a + b"""
     return add(a[0], b[0]), add(a[1], b[1]), add(a[2], b[2])
 
 
 def minus(a: Matrix, b: Matrix) -> Matrix:
-    """a - b"""
     return subtract(a[0], b[0]), subtract(a[1], b[1]), subtract(a[2], b[2])
 
 
@@ -111,16 +88,12 @@ def skew(a: Vector) -> Matrix:
 
 
 def mirrored(m: Matrix) -> Matrix:
-    """m, symmetric, from its upper triangle; the lower one is never computed"""
-    return (
-        m[0],
-        (m[0][1], m[1][1], m[1][2]),
-        (m[0][2], m[1][2], m[2][2]),
-    )
+    """Symmetric matrix from the upper triangle of m; the lower one is never computed."""
+    return (m[0], (m[0][1], m[1][1], m[1][2]), (m[0][2], m[1][2], m[2][2]))
 
 
 def inverse(m: Matrix) -> Matrix:
-    """m^-1 of a symmetric m by its adjugate: one division."""
+    """m^-1 of a symmetric m by its adjugate, with one division."""
     columns = cross(m[1], m[2]), cross(m[2], m[0]), cross(m[0], m[1])
     share = 1.0 / dot(m[0], columns[0])
     return mirrored(_rows([scale(share, column) for column in columns]))
@@ -146,7 +119,7 @@ def rotation_about(axis: Vector, sine: Scalar, cosine: Scalar) -> Matrix:
 
 
 def rotation_of(quaternion: Sequence[Scalar]) -> Matrix:
-    """Rotation matrix of a quaternion."""
+    """Rotation matrix of a quaternion x y z w."""
     x, y, z, w = quaternion
     return (
         (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
@@ -172,7 +145,7 @@ T = TypeVar("T")
 
 
 def leaves(tree: object) -> Iterator[Scalar]:
-    """All leaves, in one order for all trees of a shape."""
+    """Yield all leaves of nested tuples and dataclasses, in one order for all trees of a shape."""
     if isinstance(tree, tuple):
         for branch in tree:
             yield from leaves(branch)
@@ -184,7 +157,6 @@ def leaves(tree: object) -> Iterator[Scalar]:
 
 
 def mapped(tree: T, function: Callable[[Scalar], Scalar]) -> T:
-    """A tree of the same shape with other leaves."""
     if isinstance(tree, tuple):
         return tuple(mapped(branch, function) for branch in tree)  # type: ignore[return-value]
     if is_dataclass(tree):
@@ -195,13 +167,14 @@ def mapped(tree: T, function: Callable[[Scalar], Scalar]) -> T:
 
 @dataclass(frozen=True, slots=True)
 class Rotation:
-    """From a link's frame to the frame before it: a turn about a joint's axis, then its rest.
+    """Rotation from a link's frame to the preceding frame: about the joint's axis, then `rest`.
+
+    A rotation about one of the frame's own axes mixes only two components; most joints have such
+    axes.
 
     Attributes:
         rest: rotation at angle zero.
-        axis: constant unit axis, in the link's frame.
-        sine: of the angle.
-        cosine: of the angle.
+        axis: constant unit axis in the link's frame.
     """
 
     rest: Matrix
@@ -210,15 +183,15 @@ class Rotation:
     cosine: Scalar
 
     def inwards(self, a: Vector) -> Vector:
-        """A vector in the frame before the link."""
+        """Express a vector in the preceding frame."""
         return apply(self.rest, self._turned(a, self.sine))
 
     def outwards(self, a: Vector) -> Vector:
-        """A vector in the link's frame."""
+        """Express a vector in the link's frame."""
         return self._turned(apply(transpose(self.rest), a), -self.sine)
 
     def tensor_inwards(self, m: Matrix) -> Matrix:
-        """A tensor in the frame before the link."""
+        """Express a tensor in the preceding frame."""
         return multiply(multiply(self.rest, self._turned_tensor(m)), transpose(self.rest))
 
     def _turned(self, a: Vector, sine: Scalar) -> Vector:
@@ -239,7 +212,7 @@ class Rotation:
         t = [list(row) for row in m]
         t[i][j], t[i][k] = c * m[i][j] - s * m[i][k], c * m[i][k] + s * m[i][j]
         t[j][i], t[k][i] = c * m[j][i] - s * m[k][i], c * m[k][i] + s * m[j][i]
-        # As s^2 + c^2 = 1, half of the products will do.
+        # Half of the products suffice as s^2 + c^2 = 1.
         change = c * (m[j][j] - m[k][k]) - s * (m[j][k] + m[k][j])
         t[j][j], t[k][k] = m[k][k] + c * change, m[j][j] - c * change
         t[j][k], t[k][j] = m[j][k] + s * change, m[k][j] + s * change
@@ -253,8 +226,8 @@ def _from(i: int) -> tuple[int, int, int]:
 
 @dataclass(frozen=True, slots=True)
 class Inertia:
-    """Articulated inertia in a link's frame: force = linear a + coupling alpha,
-    moment = coupling^T a + angular alpha.
+    """Articulated inertia in a link's frame: force = linear a + coupling alpha, moment = coupling^T
+    a + angular alpha.
 
     Attributes:
         linear: [kg].
@@ -267,7 +240,6 @@ class Inertia:
     angular: Matrix
 
     def plus(self, other: Inertia) -> Inertia:
-        """Sum."""
         return Inertia(
             mirrored(plus(self.linear, other.linear)),
             plus(self.coupling, other.coupling),
@@ -276,7 +248,7 @@ class Inertia:
 
     @classmethod
     def at_point(cls, at: Vector, resistance: Matrix) -> Inertia:
-        """What resists the acceleration of one point of a link.
+        """Resistance to the acceleration of one point of a link.
 
         Args:
             at: The point [m].
@@ -287,7 +259,7 @@ class Inertia:
         return cls(resistance, coupling, mirrored(multiply(lever, coupling)))
 
     def less_outer(self, scaled: Force, column: Force) -> Inertia:
-        """Difference to the product scaled column^T, which is symmetric."""
+        """Subtract the product scaled column^T, which is symmetric."""
         return Inertia(
             mirrored(minus(self.linear, outer(scaled.linear, column.linear))),
             minus(self.coupling, outer(scaled.linear, column.angular)),
@@ -295,7 +267,7 @@ class Inertia:
         )
 
     def in_parent(self, rotation: Rotation, offset: Vector) -> Inertia:
-        """The same seen from the parent's frame.
+        """Express in the parent's frame.
 
         Args:
             offset: Of this frame's origin in the parent's [m].
@@ -311,7 +283,7 @@ class Inertia:
 
 @dataclass(frozen=True, slots=True)
 class RigidBody:
-    """A body's mass and where it is, in the body's own frame.
+    """Inertial parameters of a body in its own frame.
 
     Attributes:
         mass: [kg].
@@ -324,13 +296,12 @@ class RigidBody:
     angular: Matrix
 
     def inertia(self) -> Inertia:
-        """The same as a spatial inertia."""
         mass = self.mass
         diagonal = ((mass, 0.0, 0.0), (0.0, mass, 0.0), (0.0, 0.0, mass))
         return Inertia(diagonal, transpose(skew(self.moment)), self.angular)
 
     def force(self, angular_velocity: Vector, acceleration: Motion, tensor: Matrix) -> Force:
-        """Force that makes the body move so (Newton's and Euler's equations).
+        """Force that gives the body this motion (Newton-Euler equations).
 
         Args:
             angular_velocity: omega [rad/s].
@@ -339,7 +310,7 @@ class RigidBody:
         linear = add(scale(self.mass, acceleration.linear), apply(tensor, self.moment))
         w, alpha, inertia = angular_velocity, acceleration.angular, self.angular
         turning = []
-        # I alpha + omega x I omega, component by component: its products are the tensor's.
+        # I alpha + omega x I omega by components: its products are the tensor's.
         for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
             turning.append(
                 inertia[i][i] * alpha[i]
@@ -353,14 +324,14 @@ class RigidBody:
 
 
 def angular_acceleration_tensor(velocity: Vector, acceleration: Vector) -> Matrix:
-    """What gives the acceleration of a body's points against one of them, by their offsets.
+    """[alpha]x + [omega]x^2 (Angeles, Fundamentals of Robotic Mechanical Systems).
+
+    Times the offset of one point of a body from another, it is the difference of their
+    accelerations.
 
     Args:
         velocity: omega of the body [rad/s].
         acceleration: alpha [rad/s2].
-
-    Returns:
-        [alpha]x + [omega]x^2 (Angeles, Fundamentals of Robotic Mechanical Systems).
     """
     x, y, z = velocity
     a, b, c = acceleration
@@ -398,15 +369,13 @@ class Force:
     angular: Vector
 
     def plus(self, other: Force) -> Force:
-        """Sum."""
         return Force(add(self.linear, other.linear), add(self.angular, other.angular))
 
     def less(self, other: Force) -> Force:
-        """Difference."""
         return Force(subtract(self.linear, other.linear), subtract(self.angular, other.angular))
 
     def in_parent(self, rotation: Rotation, offset: Vector) -> Force:
-        """The same seen from the parent's frame.
+        """Express in the parent's frame.
 
         Args:
             offset: Of this frame's origin in the parent's [m].

@@ -1,1 +1,1 @@
-"""A kernel's C: emitted from symbols, and joined with what is written by hand."""
+"""A kernel's C source: generated from symbols and joined with hand-written files."""

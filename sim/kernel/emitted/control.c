@@ -1,16 +1,16 @@
-/* Sensors, control laws and PWM of all lanes around tick.c. Included after it. */
+/* Sensors, control laws and PWM of all lanes, around tick.c. Included after it. */
 
-/* Sensors and PWM in coded integers, and the rates; one for a whole batch. */
+/* Coded integers of sensors and PWM, and rates; common to a batch. */
 typedef struct {
   double angle_counts, current_counts, duty_per_count;
   int64_t angle_step, current_step, pwm_step, pwm_counts;
   int64_t substeps;   /* physics steps in a round */
-  int64_t refinement; /* rounds in a control tick in which a foot may come down; else one */
-  int64_t inner_ticks; /* of the actuators' joint PD in a control tick */
-  const double *robot; /* NR, its constants */
+  int64_t refinement; /* rounds in a control tick in which a foot may touch down; else one */
+  int64_t inner_ticks; /* ticks of the actuators' joint PD in a control tick */
+  const double *robot; /* NR constants */
 } Coding;
 
-/* gaitswarm.sim.controllers.base.LookupTable; values is NULL where there is none. */
+/* gaitswarm.sim.controllers.base.LookupTable; values is NULL for no table. */
 typedef struct {
   const int8_t *values;
   int64_t n_error, n_current, n_velocity;
@@ -46,7 +46,7 @@ static void set_table(Tables *t, int k, const Table *table, dvec *gain, double u
   OF_LANE(gain, k) = (double)table->output_gain / unit;
 }
 
-/* A lane's control law, and nothing to remember. */
+/* Sets a lane's control law and clears its state. */
 static void set_control(Gains *g, Past *p, int k, const Law *law)
 {
   OF_LANE(g->proportional_gain, k) = (double)law->proportional_gain / FRACTION;
@@ -58,13 +58,13 @@ static void set_control(Gains *g, Past *p, int k, const Law *law)
   OF_LANE(p->begun, k) = 0;
 }
 
-/* A diverged lane reads nonsense; the bounds keep it inside the tables. */
+/* The bounds keep a diverged lane inside the tables. */
 static dvec code_of(dvec reading, double counts, double low, double high, int64_t step)
 {
   return coarsen(dvec_round(clamp(reading * DSPLAT(counts), DSPLAT(low), DSPLAT(high))), step);
 }
 
-/* Joint j's readings from its encoder and its current's sensor. */
+/* Readings of joint j from its encoder and its current sensor. */
 static void read_joint(Readings *r, const Past *p, const Coding *c, int j, int h, dvec angle,
                        dvec current, dvec desired)
 {

@@ -1,5 +1,5 @@
-/* The arithmetic of tick.c on lanes: whole numbers in vectors of doubles. Below 2^53, as walk.py sees to,
-   all of them are exact. Numbers of 16 or 32 fraction bits are divided by 2^16 or 2^32.
+/* The arithmetic of tick.c on lanes: whole numbers in vectors of doubles, all of them exact below
+   2^53, which walk.py ensures. Numbers of 16 or 32 fraction bits are divided by 2^16 or 2^32.
    sim/firmware/code/counts.h is the same in integers. Included after vec.h and NJ (joints). */
 
 #define FRACTION 0x1p16
@@ -14,7 +14,7 @@ typedef divec mask;    /* of lanes, -1 or 0 */
 #define COUNTS(x) DSPLAT(x)
 #define INTEGRAL_OF(x) (x)
 
-/* Of a NaN the lower bound. */
+/* A NaN becomes the lower bound. */
 static dvec clamp(dvec x, dvec low, dvec high) { return dvec_min(dvec_max(x, low), high); }
 
 static dvec choose(divec where, dvec a, dvec b) { return dvec_select(where, a, b); }
@@ -23,8 +23,8 @@ static dvec half_up(dvec x) { return dvec_floor(x + DSPLAT(0.5)); }
 static dvec whole_of_fine(dvec x) { return half_up(x); }
 static dvec whole_of_integral(dvec x) { return half_up(x); }
 
-/* Nearest multiple of step, halves away from the lower one. x is whole, so that the half that is
-   added keeps the quotient clear of whole numbers by more than the product's rounding. */
+/* Nearest multiple of step, halves away from the lower one. x is whole, so the added half keeps the
+   quotient away from whole numbers by more than the product's rounding. */
 static dvec coarsen(dvec x, int64_t step)
 {
   if (step == 1) return x;

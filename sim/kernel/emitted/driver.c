@@ -1,13 +1,12 @@
 /* The walk: per control tick read the sensors, run the controller, step the physics, measure.
-   Included after pool.c, the emitted function `kick`, and the sizes NJ (joints), NI (numbers of
-   the internal state), NP (parameters, of which TIMESTEP is the physics'). With BACKLASH the
-   internal state begins with the motors' angles, which the encoders see, and their rates.
-   Positions and sums are doubles, whatever a real is. The Python twin is reference.py. */
+   Included after pool.c, the generated function `kick`, and the sizes NJ (joints), NI (internal
+   state) and NP (parameters; TIMESTEP is the index of the physics timestep). With BACKLASH the
+   internal state begins with the angles and rates of the motors, which the encoders see. Positions
+   and sums are doubles, whatever a real is. The Python twin is reference.py. */
 
-/* The lanes: whom each of them walks and how far, and their states. A lane whose walk has ended,
-   and to which no other came, computes on; its walker has its results. A lane's control tick takes
-   one round of physics steps; one in which a foot may come down takes several rounds of short ones,
-   while other lanes are ahead. */
+/* The lanes and their states. A lane whose walk has ended computes on until another walk enters; its
+   walker has its results. A lane's control tick takes one round of physics steps, or several rounds
+   of shorter steps if a foot may touch down, while other lanes advance. */
 typedef struct {
   Walker *walker[LANES];
   Call *call[LANES];
@@ -17,21 +16,21 @@ typedef struct {
   wide q[NQ];
   wide motor[NJ]; /* motors' angles, with backlash */
   vec v[NV], internal[NI + 1], p[NP], duty[NJ], disturbance[NJ], current[NJ], landing;
-  wide timestep, weight; /* of a physics step [s], and per one of those without a landing */
+  wide timestep, weight; /* length of a physics step [s], and relative to a step without touchdown */
   Gains gains;
   Past past;
-  int filtered, disturbed, shoved; /* whether any lane's current, links or body are */
+  int filtered, disturbed, shoved; /* whether any lane has a current filter, disturbances or a shove */
   vec sensed[NJ], smoothing;
 #if TORQUE
   Inner inner;
 #endif
   wide sums[N_INTEGRANDS];
   vec peak;
-  Sensors sensors; /* the largest, and mostly not used: last */
+  Sensors sensors; /* the largest and rarely used: last */
 } Lanes;
 
-/* Rounds of physics steps that were walked for a walker, and all that were computed; and what rounds
-   took of which one in TIMED_EACH is timed, and what their control ticks took of that [ns]. */
+/* Rounds of physics steps that belonged to a walk, and all of them; time of one in TIMED_EACH
+   rounds, and of their control ticks [ns]. */
 enum { TIMED_EACH = 64 };
 typedef struct {
   int64_t walked, computed, timed, control;
@@ -44,7 +43,7 @@ static int64_t nanoseconds(void)
   return (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
 }
 
-/* A walker at its start, and nothing left of who was in the lane before. */
+/* Starts a walker in a lane, and clears the state of the previous one. */
 static void enter(Lanes *s, int k, Call *call, Walker *w)
 {
   s->call[k] = call;
@@ -81,14 +80,14 @@ static void leave(Lanes *s, int k, int64_t status)
   for (int i = 0; i < NQ; i++) w->end[i] = OF_LANE(s->q[i], k);
   w->peak_current = s->peak[k];
   s->walking[k] = 0;
-  /* The last that is done to another call's memory. */
+  /* The last access to another call's memory. */
   __atomic_sub_fetch(&s->call[k]->left, 1, __ATOMIC_RELEASE);
 }
 
 static dvec encoder(const Lanes *s, int j, int h) { return BACKLASH ? s->motor[j][h] : s->q[7 + j][h]; }
 
 #if TORQUE
-/* The joint PD of lanes whose inner tick begins. */
+/* Joint PD of lanes whose inner tick begins. */
 static void inner_tick(Lanes *s, const Coding *c, const divec *begins, const dvec *ago)
 {
   joint_pd(&s->inner, s->duty, BACKLASH ? s->motor : s->q + 7, BACKLASH ? s->internal + NJ : s->v + 6,
@@ -96,7 +95,7 @@ static void inner_tick(Lanes *s, const Coding *c, const divec *begins, const dve
 }
 #endif
 
-/* Lanes that are done with their control ticks begin the next one. */
+/* Starts the next control tick of lanes that have finished one. */
 static void begin_ticks(Lanes *s, const Coding *c)
 {
   for (int k = 0; k < LANES; k++) {
@@ -119,7 +118,7 @@ static void begin_ticks(Lanes *s, const Coding *c)
   }
 }
 
-/* Where some sensors have errors, what all of them tell. */
+/* Readings of all sensors, if some have errors. */
 static void read_sensors(Lanes *s, const vec *current)
 {
   for (int j = 0; j < NJ; j++) {
@@ -214,8 +213,8 @@ static divec all_finite(const Lanes *s, int h)
   return precise + vec_widened(&residue, h) == DSPLAT(0.0);
 }
 
-/* Positions after some steps at these velocities, as body.py has it. The increments are too small
-   for floats. */
+/* Positions after some steps at these velocities, see body.py. The increments are too small for
+   floats. */
 static void drift(Lanes *s, int h, double steps)
 {
   const dvec one = DSPLAT(1.0), half = DSPLAT(0.5), t = DSPLAT(steps) * s->timestep[h];
@@ -284,7 +283,7 @@ static void round_of_steps(Lanes *s, const Coding *c)
   }
 }
 
-/* Walks that have come to an end by now leave their lanes; returns how many were walked. */
+/* Finished walks leave their lanes; returns the number of walks in lanes. */
 static int end_round(Lanes *s)
 {
   int walked = 0;
@@ -306,8 +305,8 @@ static int end_round(Lanes *s)
   return walked;
 }
 
-/* A lane whose walk has ended gets the next one; or, if there is none, one of the thread's own call
-   that does not count: the memory of another call may be gone by now. */
+/* A lane whose walk has ended takes the next one; or, if there is none, one of the thread's own call
+   whose results are discarded: the memory of another call may already be freed. */
 static void fill(Lanes *s, int k, Pool *pool, Call *own, int64_t bound)
 {
   Walker *w = own->walkers;
@@ -317,9 +316,9 @@ static void fill(Lanes *s, int k, Pool *pool, Call *own, int64_t bound)
   s->walking[k] = call != NULL;
 }
 
-/* All walks of a call, in order; when a walk ends, the next one enters its lane. When all have begun,
-   lanes are filled with walks of other calls of the pool that came before the own one had ended.
-   Returns how many of the call's walks are in other threads' lanes yet. */
+/* Computes all walks of a call in order; when a walk ends, the next one enters its lane. When all
+   have begun, lanes take walks of the pool's other calls that came before this call ended. Returns
+   how many of the call's walks are still in other threads' lanes. */
 int64_t gaitswarm_walk(Pool *pool, Call *own, const Coding *coding, LaneUse *use)
 {
   Lanes s;

@@ -1,4 +1,12 @@
-"""CasADi function -> C on a vector type: one statement per scalar operation, walkers in lanes."""
+"""CasADi function -> C on a vector type: one statement per scalar operation, one walk per lane.
+
+Compilers mostly keep the order of a long block of arithmetic, and so CasADi's: it defines a limb's
+positions and velocities, and uses most of them hundreds of operations later, when they have been
+spilled to memory. Statements are therefore reordered by integrated prepass scheduling (Goodman and
+Hsu, Code Scheduling and Register Allocation in Large Basic Blocks, 1988): while registers are free,
+the statement furthest from the end goes first; otherwise the one that frees most of them. Results
+do not depend on the order.
+"""
 
 from __future__ import annotations
 
@@ -12,11 +20,11 @@ import casadi
 from gaitswarm.sim.errors import SimulationError
 
 REGISTERS: Final = 31
-"""Values that are kept while the furthest from the end goes first: AVX-512's and NEON's registers,
-but for one. With the 16 of AVX2, 31 is as good as any number that was tried."""
+"""Values held while the furthest from the end goes first: the registers of AVX-512 and NEON minus
+one. With the 16 of AVX2, 31 was as good as any other number tried."""
 
 PATIENCE: Final = 16
-"""Statements for which a value may be waited; processors look ahead themselves."""
+"""Statements that a value may be waited for; processors look ahead themselves."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,12 +32,11 @@ class Statement:
     """Lines of C.
 
     Attributes:
-        text: The lines.
-        defines: Names of the values that are defined.
-        reads: Names of values of other statements.
-        operations: How many statements of one operation it stands for; 0 for what is an operand
-            in memory, a constant or an input, and takes no register until it is used.
-        latency: Operations that others could do until its values are there.
+        defines: names of the defined values.
+        reads: names of values of other statements.
+        operations: number of one-operation statements that it counts as; 0 for an operand in
+            memory, a constant or an input, which takes no register until used.
+        latency: operations that could be executed until its values are available.
     """
 
     text: str
@@ -40,12 +47,12 @@ class Statement:
 
 
 def ordered(statements: Sequence[Statement]) -> Iterator[Statement]:
-    """The same statements in an order that suits registers and pipelines."""
+    """Order statements for registers and pipelines."""
     return _Schedule(statements).run()
 
 
 class _Schedule:
-    """Statements by number; `sources` are those that one reads from, `readers` the other way."""
+    """Statements by number; each reads from its `_sources`, and is read by its `_readers`."""
 
     def __init__(self, statements: Sequence[Statement]) -> None:
         self._statements = statements
@@ -61,61 +68,62 @@ class _Schedule:
         for k in reversed(range(len(statements))):
             further = max((self._to_end[reader] for reader in self._readers[k]), default=0)
             self._to_end[k] = statements[k].latency + further
+        # Pending readers, by statement.
         self._unread = [len(readers) for readers in self._readers]
-        """Readers to come, by statement."""
-        self._there = [0] * len(statements)
-        """When all that a statement reads is there, as far as is known."""
+        # Time at which the operands written so far are available, by statement.
+        self._available = [0] * len(statements)
+        # Time at which the last operand was written, by statement.
         self._newest = [0] * len(statements)
-        """When the last one was written of those that a statement reads."""
+        # Number of values that no other statement reads afterwards, by statement.
         self._last_reads = [sum(self._unread[j] == 1 for j in of) for of in self._sources]
-        """How many values nothing reads after a statement."""
+        # Number of a statement's values that are read.
         self._born = [len(s.defines) * bool(self._readers[k]) for k, s in enumerate(statements)]
-        """How many values of a statement are read."""
-        self._kept = 0
-        """Values in registers."""
+        self._held = 0  # values in registers
 
     def run(self) -> Iterator[Statement]:
-        """Write one statement after the other, the preferred one of those that are ready."""
+        """Yield the preferred one of the ready statements until none is left."""
         missing = [len(of) for of in self._sources]
         ready = [k for k, s in enumerate(self._statements) if s.operations and not missing[k]]
-        given: set[int] = set()
+        loaded: set[int] = set()
         written: set[int] = set()
         now = 0
         while ready:
             k = min(ready, key=lambda k: self._preference(k, now))
             ready.remove(k)
             for j in self._in_memory[k]:
-                if j not in given:
-                    given.add(j)
+                if j not in loaded:
+                    loaded.add(j)
                     yield self._statements[j]
             yield self._statements[k]
             written.add(k)
-            self._kept += self._more_kept(k)
+            self._held += self._more_held(k)
             for j in self._sources[k]:
                 self._unread[j] -= 1
                 if self._unread[j] == 1:
                     (last,) = (reader for reader in self._readers[j] if reader not in written)
                     self._last_reads[last] += 1
-            now = max(now + self._statements[k].operations, self._there[k])
+            now = max(now + self._statements[k].operations, self._available[k])
             for reader in self._readers[k]:
                 missing[reader] -= 1
-                self._there[reader] = max(self._there[reader], now + self._statements[k].latency)
+                self._available[reader] = max(
+                    self._available[reader], now + self._statements[k].latency
+                )
                 self._newest[reader] = now
                 if not missing[reader]:
                     ready.append(reader)
         for k, statement in enumerate(self._statements):
-            if not statement.operations and k not in given:
+            if not statement.operations and k not in loaded:
                 yield statement
 
     def _preference(self, k: int, now: int) -> tuple[int, ...]:
-        """The least is written next."""
-        late = max(0, self._there[k] - now)
-        if self._kept >= REGISTERS:
-            return self._more_kept(k), late, -self._to_end[k], -self._newest[k], k
+        """Sort key; the smallest is written next."""
+        late = max(0, self._available[k] - now)
+        if self._held >= REGISTERS:
+            return self._more_held(k), late, -self._to_end[k], -self._newest[k], k
         return max(0, late - PATIENCE), -self._to_end[k], -self._newest[k], k
 
-    def _more_kept(self, k: int) -> int:
-        """Values that it defines, less those that nothing reads after it."""
+    def _more_held(self, k: int) -> int:
+        """Number of values that it defines minus those read last by it."""
         return self._born[k] - self._last_reads[k]
 
 
@@ -135,7 +143,7 @@ _UNARY: Final[dict[str, str]] = {
 }
 
 _LATENCIES: Final[dict[str, int]] = {"OP_DIV": 13, "OP_INV": 13, "OP_SQRT": 13}
-"""Of operations that take longer than sums and products [operations that others could do]."""
+"""Of operations slower than sums and products [operations executed meanwhile]."""
 
 
 def emit_c(
@@ -148,17 +156,16 @@ def emit_c(
 ) -> str:
     """C source of `static void <name>(const vec *i0, ..., vec *o0, ...)`.
 
-    Inputs and outputs must not overlap, unless it is to work in place. The sine and cosine of one
-    angle share their range reduction, a divisor used more than once is inverted once, and a
-    product that is only a term of sums is rounded with each of them (fused multiply-add). The order
-    of statements is that of `order.ordered`.
+    Inputs and outputs must not overlap, unless `in_place`. The sine and cosine of one angle share
+    their range reduction, a divisor used more than once is inverted once, and a product used only
+    as a term of sums is rounded with each of them (fused multiply-add).
     """
     return _Emitter(function, uniform, added, in_place=in_place).source(name)
 
 
 @dataclass(frozen=True, slots=True)
 class _Uses:
-    """How often each value is an operand, a divisor, a term of a sum; factors of the products."""
+    """Counts of each value as operand, divisor and term of a sum; factors of the products."""
 
     operands: Counter[str] = field(default_factory=Counter)
     divisors: Counter[str] = field(default_factory=Counter)
@@ -166,11 +173,11 @@ class _Uses:
     products: dict[str, tuple[str, str]] = field(default_factory=dict)
 
     def fused(self, value: str) -> bool:
-        """Whether a value is a product that is only ever a term of sums."""
+        """Whether a value is a product that is only used as a term of sums."""
         return value in self.products and self.operands[value] == self.terms[value] > 0
 
     def factors(self, value: str) -> tuple[str, ...]:
-        """What is read where a value is: itself, or the factors of one that is fused."""
+        """Values read in place of a value: itself, or the factors if it is fused."""
         return self.products[value] if self.fused(value) else (value,)
 
 
@@ -190,18 +197,13 @@ def _fused(operation: str, product: str, term: str, uses: _Uses) -> str:
 
 
 def _value(name: str, uses: _Uses) -> str:
-    """Where both terms of a sum are products, the first one is rounded."""
+    """If both terms of a sum are products, the first one is rounded."""
     return " * ".join(uses.products[name]) if uses.fused(name) else name
 
 
 class _Emitter:
     def __init__(
-        self,
-        function: Any,
-        uniform: Container[str],
-        added: Container[str],
-        *,
-        in_place: bool,
+        self, function: Any, uniform: Container[str], added: Container[str], *, in_place: bool
     ) -> None:
         self._in_place = in_place
         self._added = [function.name_out(k) in added for k in range(function.n_out())]
@@ -258,7 +260,7 @@ class _Emitter:
         return uses
 
     def _replay(self, visit: Callable[[int, str, list[str]], None]) -> None:
-        """Walk the instructions, naming each value once."""
+        """Visit the instructions; each value gets one name."""
         f = self._function
         for k in range(f.n_instructions()):
             op = self._names[f.instruction_id(k)]
@@ -292,7 +294,7 @@ class _Emitter:
     def _result(
         self, k: int, op: str, operands: list[str], uses: _Uses
     ) -> tuple[str, Sequence[str]]:
-        """What an operation comes to, and which values that reads."""
+        """Return an operation's expression and the values that it reads."""
         f = self._function
         reads: Sequence[str] = [x for value in operands for x in uses.factors(value)]
         if op == "OP_CONST":

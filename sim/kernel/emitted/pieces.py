@@ -1,7 +1,7 @@
-"""A physics step in pieces: functions of the body and of a kind of limb, and the C that joins them.
+"""A physics step in pieces: C functions of the body and of each kind of limb.
 
-Limbs of one kind share a function that is called in a loop; what they differ in is data. Machine
-code then is as large as one limb and stays in the first-level caches.
+Limbs of one kind share a function called in a loop; their differences are data. The machine code is
+then as large as one limb and stays in the first-level caches.
 """
 
 from __future__ import annotations
@@ -26,25 +26,25 @@ from gaitswarm.sim.robot.description import JOINTS_PER_LEG
 from gaitswarm.sim.robot.limbs import Limb, limbs_of
 
 _PASSED: Final = 27
-"""Numbers that a limb passes to the body: an inertia (6 + 9 + 6), and a force (6)."""
+"""Numbers that a limb passes to the body: an inertia (6 + 9 + 6) and a force (6)."""
 
 _FORCE: Final = 21
-"""Where among them the force begins."""
+"""Index of the force among them."""
 
 _N_TALLIES: Final = 7
 
 _CONSTANTS: Final = "constants"
-"""Name of the input that all walkers share."""
+"""Name of the input shared by all walks."""
 
 
 def kernel_pieces(robot: Robot) -> str:
-    """C text of `kick` for a robot."""
+    """C source of `kick` for a robot."""
     return _Pieces(robot).text()
 
 
 @dataclass(frozen=True, slots=True)
 class _Input:
-    """An input of a piece: how many numbers, and where they are in C."""
+    """An input of a piece: its length and its address in C."""
 
     size: int
     at: str
@@ -94,7 +94,7 @@ class _Pieces:
         )
 
     def _copies(self) -> list[str]:
-        """Of what a limb carries in the internal state."""
+        """C that copies a limb's results into the internal state."""
         copy = "    for (int i = 0; i < {size}; i++) ({at})[i] = {of}[i];"
         size, copies = CONTACT_LAWS[self._law].internal_state_size, []
         if self._robot.has_backlash:
@@ -114,7 +114,7 @@ class _Pieces:
     def _limb_pieces(self) -> list[tuple[str, str]]:
         calls = []
         for number, kind in enumerate(self._distinct):
-            limb = next(limb for limb, its in self._by_limb() if its == kind)
+            limb = next(limb for limb, kind_of_limb in self._by_limb() if kind_of_limb == kind)
             first, second, held = self._limb_functions(limb, kind)
             self._held = max(self._held, held)
             a = self._emit(f"before_{number}", first, ["gathered", "held[l]", "spun", "carried"])
@@ -125,7 +125,7 @@ class _Pieces:
         return calls
 
     def _emit(self, name: str, piece: tuple[Any, Sequence[str]], outputs: Sequence[str]) -> str:
-        """Adds a function's text; returns its call."""
+        """Append a function's text; return its call."""
         function, arguments = piece
         self._text.append(
             emit_c(function, name, (_CONSTANTS,), added=("added",), in_place="tallies" in outputs)
@@ -150,7 +150,7 @@ class _Pieces:
         symbols: Any,
         added: int | None = None,
     ) -> tuple[Any, list[str]]:
-        """A function and its arguments in C; one of its outputs may be added to what is there."""
+        """Return a function and its arguments in C. The output `added` is an increment."""
         vectors = [ca.vertcat(*o) if o else ca.SX(0, 1) for o in outputs]
         names = list(inputs)
         outs = ["added" if k == added else f"out{k}" for k in range(len(vectors))]
@@ -209,7 +209,7 @@ class _Pieces:
         return self._function(inputs, outputs, symbols)
 
     def _limb_functions(self, limb: Limb, kind: LimbKind) -> tuple[Any, Any, int]:
-        """Both pieces of a kind of limb, and how many numbers are held between them."""
+        """Return both functions of a kind of limb, and the number of values held between them."""
         n, backlash = JOINTS_PER_LEG, self._robot.has_backlash
         moving = n if backlash else 0
         constants = _Input(len(kind.numbers_of(limb)), "robot + start[l]")
@@ -234,7 +234,7 @@ class _Pieces:
         }
         symbols, s = _symbols(inputs)
         symbolic = kind.symbolic(limb, s[_CONSTANTS])
-        found = before(
+        result = before(
             symbolic,
             self._law,
             _body_of(s["body"]),
@@ -242,7 +242,7 @@ class _Pieces:
             Environment(s["timestep"][0], s["supply"][0], *s["displaced"]),
             {name: s[name] for name in self._layout.by_limb},
         )
-        cut = [leaf for leaf in leaves(found.held) if _varies(leaf)]
+        cut = [leaf for leaf in leaves(result.held) if _varies(leaf)]
         later = {
             "held": _Input(len(cut), "held[l]"),
             "falling": _Input(6, "falling"),
@@ -252,7 +252,7 @@ class _Pieces:
         }
         symbols_later, s = _symbols(later)
         left = iter(s["held"])
-        held: Held = mapped(found.held, lambda leaf: next(left) if _varies(leaf) else leaf)
+        held: Held = mapped(result.held, lambda leaf: next(left) if _varies(leaf) else leaf)
         linear, angular = s["falling"][:3], s["falling"][3:]
         done = after(
             kind.symbolic(limb, s[_CONSTANTS]),
@@ -262,19 +262,19 @@ class _Pieces:
             s["timestep"][0],
         )
         outputs: list[Sequence[Scalar]] = [done.rates, done.currents, done.tallies]
-        # Not all that a limb knows is asked for later.
+        # Only part of the held values is read later.
         read = {x.element_hash() for o in outputs for x in ca.symvar(ca.vertcat(*o))}
-        kept = [k for k, x in enumerate(s["held"]) if x.element_hash() in read]
-        symbols_later["held"] = ca.vertcat(*(s["held"][k] for k in kept))
+        read_later = [k for k, x in enumerate(s["held"]) if x.element_hash() in read]
+        symbols_later["held"] = ca.vertcat(*(s["held"][k] for k in read_later))
         second = self._function(later, outputs, symbols_later)
-        passed = [*_triangles(found.inertia), *leaves(found.force)]
+        passed = [*_triangles(result.inertia), *leaves(result.force)]
         before_body: list[Sequence[Scalar]] = [
             passed,
-            [cut[k] for k in kept],
-            found.motor_rates,
-            found.carried,
+            [cut[k] for k in read_later],
+            result.motor_rates,
+            result.carried,
         ]
-        return self._function(inputs, before_body, symbols, added=0), second, len(kept)
+        return self._function(inputs, before_body, symbols, added=0), second, len(read_later)
 
 
 def _symbols(inputs: Mapping[str, _Input]) -> tuple[dict[str, Any], dict[str, tuple[Scalar, ...]]]:
@@ -294,7 +294,7 @@ def _any_body() -> LinkState:
 
 
 def _body_numbers() -> list[Scalar]:
-    """What of the body's state is no constant."""
+    """The non-constant numbers of the body's state."""
     return [leaf for leaf in leaves(_any_body()) if _varies(leaf)]
 
 
@@ -304,7 +304,7 @@ def _body_of(numbers: Sequence[Scalar]) -> LinkState:
 
 
 def _triangles(inertia: Inertia) -> list[Scalar]:
-    """An inertia's numbers, of its symmetric parts the upper triangles."""
+    """Numbers of an inertia; upper triangles of its symmetric parts."""
     upper = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]
     return [
         *(inertia.linear[i][j] for i, j in upper),
@@ -326,9 +326,9 @@ def _passed_of(numbers: Sequence[Scalar]) -> tuple[Inertia, Force]:
 
 
 _KICK: Final = """\
-/* Changes velocities by a step at fixed positions; currents, integrands and the largest current are
-   those of its middle. landing: 1 if a foot may come down within a control tick. shoved: whether
-   any walker's body may be pushed. */
+/* Advances velocities by a step at fixed positions; currents, integrands and the largest current
+   are those of its middle. landing: 1 if a foot may touch down within a control tick. shoved:
+   whether any walk's body may be pushed. */
 static void kick(const vec *q, vec *v, vec *internal, const vec *duty, const vec *disturbance,
                  const vec *p, const double *robot, int shoved, vec *current, vec *integrands,
                  vec *largest, vec *landing)

@@ -1,12 +1,12 @@
-/* What sensors get wrong before control.c codes it: white noise, and delays by whole control ticks.
+/* Sensor errors before control.c codes the readings: white noise, and delays by whole control ticks.
    Included before driver.c. The Python twin is sensors.py. */
 
-/* Readings that are kept of a sensor; a power of two, above the longest delay. */
+/* Readings stored for each sensor; a power of two above the longest delay. */
 #define KEPT_READINGS 16
 
 enum { ANGLE, CURRENT, SENSORS };
 
-/* gaitswarm.sim.kernel.sensors.SensorErrors. Field by field as in native.py. */
+/* gaitswarm.sim.kernel.sensors.SensorErrors. Fields as in native.py. */
 typedef struct {
   double noise[SENSORS];  /* per unit of a sum of bytes [rad], [A] */
   int64_t delay[SENSORS]; /* control ticks */
@@ -15,11 +15,11 @@ typedef struct {
 
 /* Of all lanes. */
 typedef struct {
-  int noisy, late; /* whether any lane's are */
+  int noisy, late; /* whether any lane's sensors are */
   wide noise[SENSORS];
   int64_t delay[SENSORS][LANES];
   divec key[2][HALVES];
-  wide seen[SENSORS][NJ]; /* exact until disturb, then what is coded */
+  wide seen[SENSORS][NJ]; /* exact before disturb(), then with errors */
   wide kept[SENSORS][KEPT_READINGS][NJ];
 } Sensors;
 
@@ -50,7 +50,7 @@ static void philox(divec *c, divec key0, divec key1)
   }
 }
 
-/* Sum of the eight bytes of two words, less its mean. */
+/* Sum of the eight bytes of two words minus its mean. */
 static dvec centred_bytes(divec a, divec b)
 {
   const divec even = DWHOLE(0x00ff00ff), low = DWHOLE(0xffff);
@@ -71,23 +71,24 @@ static void add_noise(Sensors *s, const int64_t *tick)
     }
 }
 
-/* Of ticks before the walk the first reading is told. */
-static void tell_late(Sensors *s, int k, int n, int64_t tick)
+/* Delayed readings; those from before the walk equal the first one. */
+static void delay_reading(Sensors *s, int k, int n, int64_t tick)
 {
   const int64_t then = tick > s->delay[n][k] ? tick - s->delay[n][k] : 0;
-  wide *const now = s->kept[n][tick % KEPT_READINGS], *const told = s->kept[n][then % KEPT_READINGS];
+  wide *const now = s->kept[n][tick % KEPT_READINGS];
+  wide *const past = s->kept[n][then % KEPT_READINGS];
   for (int j = 0; j < NJ; j++) {
     OF_LANE(now[j], k) = OF_LANE(s->seen[n][j], k);
-    OF_LANE(s->seen[n][j], k) = OF_LANE(told[j], k);
+    OF_LANE(s->seen[n][j], k) = OF_LANE(past[j], k);
   }
 }
 
-/* What the controllers are told of what is to be seen; lanes in the midst of a tick read nothing. */
+/* Adds errors to the readings; lanes within a control tick read nothing. */
 static void disturb(Sensors *s, const int64_t *tick, const divec *begins)
 {
   if (s->noisy) add_noise(s, tick);
   if (!s->late) return;
   for (int k = 0; k < LANES; k++)
     for (int n = 0; n < SENSORS; n++)
-      if (OF_LANE(begins, k) && s->delay[n][k]) tell_late(s, k, n, tick[k]);
+      if (OF_LANE(begins, k) && s->delay[n][k]) delay_reading(s, k, n, tick[k]);
 }

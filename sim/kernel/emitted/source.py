@@ -1,4 +1,4 @@
-"""A robot's kernel as C text, and the digest of all that this text depends on."""
+"""A robot's kernel as C source, and the digest of everything that the source depends on."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from gaitswarm.sim.robot.limbs import limbs_of
 if TYPE_CHECKING:
     from gaitswarm.sim.kernel.walk import Precision
 
-_MADE_BY: Final = ("gaitswarm.sim.kernel.dynamics", "gaitswarm.sim.kernel.emitted")
-"""Rooms whose files, each of them, the source depends on, beside the layout of parameters."""
+_GENERATORS: Final = ("gaitswarm.sim.kernel.dynamics", "gaitswarm.sim.kernel.emitted")
+"""Packages whose files all determine the source, besides the layout of parameters."""
 
 _deriving: Final = threading.Lock()
-"""CasADi's symbols are made by one thread at a time."""
+"""CasADi's symbols must be created by one thread at a time."""
 
 
 @lru_cache(maxsize=128)
 def kernel_identity(robot: Robot, precision: Precision = "double") -> bytes:
-    """All that a kernel's source depends on, without deriving it."""
+    """Digest of everything that a kernel's source depends on, without deriving it."""
     options = (
         precision,
         robot.n_joints,
@@ -41,7 +41,7 @@ def kernel_identity(robot: Robot, precision: Precision = "double") -> bytes:
 
 
 def kernel_source(robot: Robot, precision: Precision = "double") -> str:
-    """Derive a robot's physics and write it as C, some seconds of work."""
+    """Derive a robot's physics and write it as C; takes some seconds."""
     # Imported only to compile: a worker with a warm cache needs neither CasADi nor Pinocchio.
     from gaitswarm.sim.kernel.emitted.pieces import kernel_pieces  # noqa: PLC0415
 
@@ -61,33 +61,33 @@ def kernel_source(robot: Robot, precision: Precision = "double") -> str:
             *(["#define SINGLE"] if precision == "single" else []),
             vector_header(),
             pieces,
-            _own_file("counts.h"),
+            _file("counts.h"),
             control_tick(),
-            _own_file("sensors.c"),
-            _own_file("control.c"),
-            _own_file("pool.c"),
-            *([_own_file("torque.c")] if robot.is_torque_controlled else []),
-            _own_file("driver.c"),
+            _file("sensors.c"),
+            _file("control.c"),
+            _file("pool.c"),
+            *([_file("torque.c")] if robot.is_torque_controlled else []),
+            _file("driver.c"),
         ]
     )
 
 
 def control_tick() -> str:
-    """The control tick in C, which says nothing of the arithmetic that it is computed in."""
-    return _own_file("tick.c")
+    """C source of the control tick, independent of its arithmetic (counts.h)."""
+    return _file("tick.c")
 
 
-def _own_file(name: str) -> str:
+def _file(name: str) -> str:
     return (resources.files("gaitswarm.sim.kernel.emitted") / name).read_text(encoding="utf-8")
 
 
 @lru_cache(maxsize=1)
 def _generator() -> bytes:
-    """What the source of every robot's kernel depends on."""
+    """Digest of what the source of every robot's kernel depends on."""
     digest = hashlib.sha256(vector_header().encode())
     digest.update((resources.files("gaitswarm.sim.kernel") / "parameters.py").read_bytes())
-    for room in _MADE_BY:
-        for file in sorted(resources.files(room).iterdir(), key=lambda file: file.name):
+    for package in _GENERATORS:
+        for file in sorted(resources.files(package).iterdir(), key=lambda file: file.name):
             if file.name.endswith((".py", ".c", ".h")):
                 digest.update(file.read_bytes())
     digest.update(f"{metadata.version('casadi')}".encode())

@@ -1,13 +1,13 @@
 /* The control tick (thesis 5.3): from coded readings to PWM counts, in whole numbers.
 
-   The one source for simulator and robot: the kernel compiles it on vectors of doubles, a lane a
-   walker, the firmware on integers. Included after counts.h, the arithmetic of either, which says what
-   a count, a fine and an integral number are, and after NJ (joints), LANES (walkers) and HALVES
-   (vectors for all lanes): on a microcontroller one and one. The Python twin is reference.py. */
+   The single source for simulator and robot: the kernel compiles it for vectors of doubles, one lane
+   per walk, the firmware for integers. Included after counts.h, which defines the types count, fine
+   and integral and their arithmetic, and after NJ (joints), LANES (walks) and HALVES (vectors for
+   all lanes), both 1 on a microcontroller. The Python twin is control_tick.py. */
 
 #define CODE_LIMIT 65535
 
-/* An input of a table: index of x is x * gain + middle, rounded and held in 0..last. */
+/* An input of a table: index of x is x * gain + middle, rounded and clamped to 0..last. */
 typedef struct {
   fine gain[HALVES];
   count middle[HALVES], last[HALVES], stride[HALVES];
@@ -26,19 +26,19 @@ typedef struct {
   Tables direct, integrated;
 } Gains;
 
-/* What the controllers remember from tick to tick. */
+/* State of the controllers between ticks. */
 typedef struct {
   integral sum[NJ][HALVES];
   count error[NJ][HALVES];
   mask begun[HALVES]; /* lanes that have an error to compare with */
 } Past;
 
-/* Coded angle errors, their change since the tick before, and absolute currents. */
+/* Coded angle errors, their change since the previous tick, and absolute currents. */
 typedef struct {
   count error[NJ][HALVES], change[NJ][HALVES], current[NJ][HALVES];
 } Readings;
 
-/* Joint j's readings from the codes of its encoder, its current's sensor and the gait. */
+/* Readings of joint j from the codes of its encoder, its current sensor and the gait. */
 static void read_codes(Readings *r, const Past *p, int j, int h, count desired, count angle,
                        count current)
 {
@@ -54,7 +54,7 @@ static count index_of(const Axis *a, int h, count x)
   return (count)clamp(index, (fine)COUNTS(0), (fine)a->last[h]) * a->stride[h];
 }
 
-/* All joints at once: lanes' numbers are written and read apart, which stalls if it follows at once. */
+/* All joints together: reading a lane's number directly after writing the vector stalls. */
 static void look_up(const Tables *t, const Readings *r, count (*values)[HALVES])
 {
   place at[NJ][HALVES];
@@ -79,7 +79,7 @@ static void look_up_if_used(const Tables *t, const Readings *r, count (*values)[
     for (int h = 0; h < HALVES; h++) values[j][h] = COUNTS(0);
 }
 
-/* PWM counts of all joints, to full scale; lanes that do not begin a tick keep what they remember. */
+/* PWM counts of all joints, clamped to full scale; lanes that do not begin a tick keep their state. */
 static void control(const Gains *g, Past *p, const Readings *r, const mask *begins, count full,
                     int64_t pwm_step, count (*pwm)[HALVES])
 {

@@ -1,4 +1,4 @@
-"""Motor controllers: variables to tune and their compilation to integers."""
+"""Motor controllers: design variables, and their compilation to integers."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from gaitswarm.sim.controllers.linear import PI, PID, P
 from gaitswarm.sim.plugins import KnownName, Plugin, Registry, check_is, check_name
 
 
-def _accepted(plugin: Plugin, brought: object) -> Controller:
-    controller: Controller = check_is(plugin, brought, Controller)  # type: ignore[type-abstract]
+def _accepted(plugin: Plugin, candidate: object) -> Controller:
+    controller: Controller = check_is(plugin, candidate, Controller)  # type: ignore[type-abstract]
     check_name(plugin, controller.name)
     return controller
 
@@ -31,14 +31,14 @@ CONTROLLERS: Final = Registry[Controller](
     },
     _accepted,
 )
-"""By name, as in job specs and on the command line."""
+"""By name."""
 
 ControllerName: TypeAlias = Annotated[str, KnownName(CONTROLLERS)]
 
 
 @lru_cache(maxsize=192)
 def control_law(controller: ControllerName, gains: tuple[tuple[str, float], ...]) -> ControlLaw:
-    """A design as it runs on the robot, made once for all that it walks through."""
+    """Compile a design, once for all scenarios."""
     return CONTROLLERS[controller].compile(dict(gains))
 
 

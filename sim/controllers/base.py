@@ -1,4 +1,4 @@
-"""What a motor controller is to the rest: variables to tune, published values, a control law."""
+"""Interface of motor controllers: variables, published designs, and the compiled control law."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LookupTable:
-    """A quantised function of error, current and velocity error, as the microcontroller has it.
+    """A quantised function of error, current and velocity error, as stored in the microcontroller.
 
-    Gains have 16 fractional bits and shifts round half up; indices clamp:
-    i_error = n_error / 2 + (error * error_gain) >> 16, i_current = (current * current_gain) >> 16,
-    i_velocity = n_velocity / 2 + (change * velocity_gain) >> 16, where change is the error's over
-    one tick. The output is value * output_gain.
+    Gains have 16 fractional bits and shifts round half up; indices are clamped: i_error = n_error /
+    2 + (error * error_gain) >> 16, i_current = (current * current_gain) >> 16, i_velocity =
+    n_velocity / 2 + (change * velocity_gain) >> 16, where change is that of the error over one
+    tick. The output is value * output_gain.
 
     Attributes:
-        values: (n_error, n_current, n_velocity) int8, each a power of two, 1 for an input that
-            does not matter.
-        output_gain: of a value.
+        values: (n_error, n_current, n_velocity) int8, sizes a power of two each, 1 for an unused
+            input.
+        output_gain: per value.
         error_gain: index per count of error.
         current_gain: index per count of current.
         velocity_gain: index per count of change.
@@ -45,11 +45,11 @@ class LookupTable:
     def __post_init__(self) -> None:
         if self.values.ndim != 3 or not self.values.size:
             raise SimulationInputError(
-                f"values: a table of shape {self.values.shape}; it needs three axes, none empty"
+                f"values: table of shape {self.values.shape}; three non-empty axes are required"
             )
 
     def respond(self, error: Ints, current: Ints, change: Ints) -> Ints:
-        """Look up what the table holds.
+        """Look up the outputs.
 
         Args:
             error: Coded angle errors, (J,) [counts].
@@ -69,7 +69,7 @@ class LookupTable:
 
 
 class Response(Protocol):
-    """What a control law looks up: a table, or for comparison the inference that it came from."""
+    """A function used by a control law: a table, or for comparison the inference behind it."""
 
     def respond(self, error: Ints, current: Ints, change: Ints) -> Ints:
         """Output of every joint.
@@ -86,10 +86,10 @@ class Response(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class JointPd:
-    """What torque-controlled actuators do between control ticks, at their own rate.
+    """PD of torque-controlled actuators, at their own rate between control ticks.
 
-    tau = stiffness (q_d - q) + damping (dq_d - dq) + feed_forward tau_ff, beside the torque that
-    the rest of the control law commands.
+    tau = stiffness (q_d - q) + damping (dq_d - dq) + feed_forward tau_ff, added to the torque
+    commanded by the rest of the control law.
 
     Attributes:
         stiffness: K_p [N m/rad].
@@ -104,22 +104,21 @@ class JointPd:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ControlLaw:
-    """A controller as it runs on the robot: integers only, errors and PWM in coded counts.
+    """A compiled controller: integers only, errors and PWM in coded counts.
 
     Full scale of its output is the voltage of a DC motor's bridge, or the torque limit of a
     torque-controlled actuator.
 
-    With change the error's over one tick, the direct part is the sum of error * proportional_gain,
-    change * derivative_gain and what `direct` answers, >> 16; the integral part is the sum over
-    ticks of error * integral_gain and what `integrated` answers, clamped to the PWM's range, >> 32.
+    With change that of the error over one tick, the direct part is the sum of error *
+    proportional_gain, change * derivative_gain and the output of `direct`, >> 16; the integral part
+    is the sum over ticks of error * integral_gain and the output of `integrated`, clamped to the
+    PWM's range, >> 32.
 
     Attributes:
         proportional_gain: with 16 fraction bits.
         integral_gain: with 32 fraction bits.
         derivative_gain: with 16 fraction bits.
-        direct: adds to the direct part.
-        integrated: adds to the integral part.
-        joint_pd: of torque-controlled actuators, in numbers of any precision; None for none.
+        joint_pd: of torque-controlled actuators, in floating point.
     """
 
     proportional_gain: int = 0
@@ -132,13 +131,12 @@ class ControlLaw:
 
 @dataclass(frozen=True, slots=True)
 class Universe:
-    """An input or output of a fuzzy inference, of which the inference itself sees shares.
+    """An input or output of a fuzzy inference, which computes with shares of it.
 
     Attributes:
-        name: of the input or output.
         unit: of its values.
         full_range: share 1, in the unit.
-        counts: coded counts of one unit, as a table takes or gives them.
+        counts: coded counts per unit, as used by a table.
     """
 
     name: str
@@ -149,14 +147,11 @@ class Universe:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Inference:
-    """One output of a fuzzy controller: the inference, and the table that is shipped in its place.
+    """One output of a fuzzy controller: the inference, and the table that replaces it on the robot.
 
     Attributes:
-        output: its universe.
-        inputs: their universes, in the system's order.
-        system: the inference.
+        inputs: in the system's order.
         axes: of the table, by input.
-        table: what is shipped.
     """
 
     output: Universe
@@ -167,7 +162,7 @@ class Inference:
 
 
 def names_of(controller: Controller) -> frozenset[str]:
-    """All that a design may give a controller."""
+    """All design variables and conventions of a controller."""
     return frozenset(v.name for v in (*controller.variables, *controller.conventions))
 
 
@@ -181,25 +176,25 @@ class Controller(Protocol):
 
     @property
     def description(self) -> str:
-        """What it is, with its source."""
+        """A sentence with its source."""
 
     @property
     def variables(self) -> tuple[Variable, ...]:
-        """Design variables with bounds and units, of which a design gives every one."""
+        """Design variables with bounds and units; a design gives a value for each."""
 
     @property
     def conventions(self) -> tuple[Variable, ...]:
-        """What the thesis leaves open, each with the default for designs that do not give it."""
+        """Choices that the thesis leaves open, with the defaults for designs that omit them."""
 
     @property
     def published(self) -> Mapping[str, Mapping[str, float]]:
         """Designs from the literature, by the preference or study that they belong to.
 
-        One that was tuned together with a gait has the gait's variables, too.
+        A design tuned together with a gait includes the gait's variables.
         """
 
     def compile(self, design: Mapping[str, float]) -> ControlLaw:
-        """A design as it runs on the robot.
+        """Compile a design to the integers that run on the robot.
 
         Args:
             design: Value of every variable by name.
@@ -212,13 +207,13 @@ class Controller(Protocol):
         """
 
     def inferences(self, design: Mapping[str, float]) -> tuple[Inference, ...]:
-        """The fuzzy inferences that a design's tables stand for.
+        """Return the fuzzy inferences behind a design's tables.
 
         Args:
             design: Value of every variable by name.
 
         Returns:
-            By output; none if the controller is not fuzzy.
+            By output; empty if the controller is not fuzzy.
 
         Raises:
             SimulationInputError: A value is missing or cannot be represented; names the variable.

@@ -1,27 +1,27 @@
 /* Estimates of a Mamdani inference over a grid, for inference.c; after vec.h.
 
-   The area of the union of clipped sets is, by inclusion and exclusion, a sum over groups of sets of
-   +-G(least level), where G(t) is the area of the group's common membership, clipped at t. G grows
-   with t, so that it can be exchanged with min and max: as a level is a maximum of minima of
-   weighted grades, G of a level is a maximum of minima of G of weighted grades. These depend on one
-   axis each and are looked up along the axes; a cell is left with a few minima and maxima. The
-   moment about the universe's lower end grows with t, too. Where the system is odd or even in its
-   first input, half of the rows mirror the others. */
+   By inclusion and exclusion, the area of the union of clipped sets is a sum over groups of sets of
+   +-G(least level), where G(t) is the area of the group's common membership, clipped at t. G is
+   increasing, so it commutes with min and max: as a level is a maximum of minima of weighted grades,
+   G of a level is a maximum of minima of G of weighted grades. These depend on one axis each and are
+   tabulated along the axes; a cell needs only a few minima and maxima. The moment about the
+   universe's lower end is increasing too. If the system is odd or even in its first input, half of
+   the rows mirror the others. */
 
 enum { BLOCK = 4, MAX_SETS = 32, MAX_RULES = 16, MAX_POINTS = 128, MAX_GROUPED = 5 };
 enum { AREA, MOMENT, QUANTITIES, GROUPS = 1 << MAX_GROUPED };
 
-/* Bound of an estimate's error in universes. At most 31 groups, each a sum of some hundred
-   roundings: the error is below 2e-12. */
+/* Bound of an estimate's error relative to the universe. At most 31 groups, each a sum of some
+   hundred roundings: the error is below 2e-12. */
 #define ERROR_BOUND 1e-11
 
-/* An area below which products of grades and points may have lost their digits to underflow. */
+/* Below this area, products of grades and points may have lost digits to underflow. */
 #define TINY 1e-200
 
-/* Blocks must live in registers, which -O2 alone does not see to. */
+/* Keeps blocks in registers, which -O2 alone does not. */
 #define UNROLLED _Pragma("GCC unroll 4")
 
-/* The grid is n_outer x n_inner cells, n_first values of the first input in its rows. By rule:
+/* The grid has n_outer x n_inner cells, with n_first values of the first input in its rows. By rule:
    outer and inner degrees, weight, consequent. */
 typedef struct {
   int64_t n_first, n_outer, n_inner, n_rules, n_sets, n_points;
@@ -38,29 +38,29 @@ typedef struct {
   double below[QUANTITIES][MAX_POINTS + 1], above[QUANTITIES][MAX_POINTS + 1];
 } Curve;
 
-/* By group of sets, a bit a set: its curve, and the curve at the inner degrees of every rule. */
+/* By group of sets (a bitmask): its curve, and the curve at the inner degrees of every rule. */
 typedef struct {
   const System *system;
   Curve *curves;
   double *along; /* GROUPS x n_rules x QUANTITIES x n_inner */
-  int64_t varies[MAX_RULES]; /* whether a rule's inner degrees are not all one */
-  int64_t n_rules[MAX_GROUPED], rules[MAX_GROUPED][MAX_RULES]; /* by set, those that speak of it */
+  int64_t varies[MAX_RULES]; /* whether a rule's inner degrees differ */
+  int64_t n_rules[MAX_GROUPED], rules[MAX_GROUPED][MAX_RULES]; /* rules by consequent set */
 } Groups;
 
-/* What a row holds of a rule whose degree varies along the row. */
+/* Part of a rule in a row whose degree varies along the row. */
 typedef struct {
   double held[QUANTITIES];
   const double *along; /* QUANTITIES x n_inner */
 } Clause;
 
-/* One set of a group: the largest of what the row holds and of its clauses. */
+/* One set of a group: the maximum of `held` and its clauses. */
 typedef struct {
   double held[QUANTITIES];
   int64_t n_clauses;
   Clause clauses[MAX_RULES];
 } Member;
 
-/* One group: the least of what the row holds and of its members. */
+/* One group: the minimum of `held` and its members. */
 typedef struct {
   double held[QUANTITIES];
   int64_t adds, n_members;
@@ -74,8 +74,8 @@ static void build_curve(Curve *curve, const System *s, int64_t group)
   for (int64_t k = 0; k < s->n_points; k++) {
     double joint = 1.0;
     for (int64_t set = 0; set < s->n_sets; set++) {
-      const double own = s->memberships[set * s->n_points + k];
-      if (group >> set & 1 && own < joint) joint = own;
+      const double membership = s->memberships[set * s->n_points + k];
+      if (group >> set & 1 && membership < joint) joint = membership;
     }
     if (!(joint > 0.0)) continue;
     int64_t place = n++;
@@ -91,9 +91,9 @@ static void build_curve(Curve *curve, const System *s, int64_t group)
   curve->below[AREA][0] = curve->below[MOMENT][0] = 0.0;
   curve->above[AREA][n] = curve->above[MOMENT][n] = 0.0;
   for (int64_t k = 0; k < n; k++) {
-    const double own = curve->membership[k];
-    curve->below[AREA][k + 1] = curve->below[AREA][k] + own;
-    curve->below[MOMENT][k + 1] = curve->below[MOMENT][k] + own * arm[k];
+    const double membership = curve->membership[k];
+    curve->below[AREA][k + 1] = curve->below[AREA][k] + membership;
+    curve->below[MOMENT][k + 1] = curve->below[MOMENT][k] + membership * arm[k];
   }
   for (int64_t k = n; k-- > 0;) {
     curve->above[AREA][k] = curve->above[AREA][k + 1] + 1.0;
@@ -101,7 +101,7 @@ static void build_curve(Curve *curve, const System *s, int64_t group)
   }
 }
 
-/* A curve at t; the rank is looked for from the last one on, as neighbours ask for near ones. */
+/* A curve at t; the search for the rank starts at the previous one, as neighbours are near. */
 static void look_up(const Curve *curve, double t, int64_t *rank, double *value)
 {
   int64_t at = *rank;
@@ -134,7 +134,7 @@ static const Curve *curve_of(const Groups *g, int64_t group)
   return curve;
 }
 
-/* All groups of the sets that fire in a row. rank: by group and rule, where it was last. */
+/* All groups of the sets that fire in a row. rank: the previous one, by group and rule. */
 static int64_t terms_of(const Groups *g, int64_t row, int64_t (*rank)[MAX_RULES], Term *terms)
 {
   const System *s = g->system;
@@ -181,7 +181,7 @@ static int64_t terms_of(const Groups *g, int64_t row, int64_t (*rank)[MAX_RULES]
   return n;
 }
 
-/* Crisp outputs of a block of cells by the row's terms, NaN where they cannot be told. */
+/* Crisp outputs of a block of cells from the row's terms, NaN if undetermined. */
 static void estimate_block(const System *s, const Term *terms, int64_t n_terms, int64_t column,
                            vec *crisp)
 {
@@ -225,26 +225,26 @@ static void estimate_block(const System *s, const Term *terms, int64_t n_terms, 
                           SPLAT(__builtin_nan("")));
 }
 
-/* Whether each rule has a partner that holds as far where the first input is mirrored about its
-   middle value, and speaks of the same set, or of the mirrored one. */
+/* Whether each rule has a partner with equal degrees when the first input is mirrored about its
+   middle value, and the same consequent, or the mirrored one. */
 static int is_symmetric(const System *s, int odd)
 {
   const int64_t width = s->n_outer / s->n_first;
   for (int64_t r = 0; r < s->n_rules; r++) {
-    int found = 0;
-    for (int64_t other = 0; other < s->n_rules && !found; other++) {
+    int equal = 0;
+    for (int64_t other = 0; other < s->n_rules && !equal; other++) {
       const double *a = s->memberships + s->consequent[r] * s->n_points;
       const double *b = s->memberships + s->consequent[other] * s->n_points;
-      found = s->weight[r] == s->weight[other];
-      for (int64_t k = 0; k < s->n_points && found; k++)
-        found = a[k] == b[odd ? s->n_points - 1 - k : k];
-      for (int64_t k = 0; k < s->n_inner && found; k++)
-        found = s->inner[r * s->n_inner + k] == s->inner[other * s->n_inner + k];
-      for (int64_t k = width; k < s->n_outer && found; k++)
-        found = s->outer[r * s->n_outer + k] ==
+      equal = s->weight[r] == s->weight[other];
+      for (int64_t k = 0; k < s->n_points && equal; k++)
+        equal = a[k] == b[odd ? s->n_points - 1 - k : k];
+      for (int64_t k = 0; k < s->n_inner && equal; k++)
+        equal = s->inner[r * s->n_inner + k] == s->inner[other * s->n_inner + k];
+      for (int64_t k = width; k < s->n_outer && equal; k++)
+        equal = s->outer[r * s->n_outer + k] ==
                 s->outer[other * s->n_outer + (s->n_first - k / width) * width + k % width];
     }
-    if (!found) return 0;
+    if (!equal) return 0;
   }
   return 1;
 }

@@ -1,4 +1,4 @@
-"""Design values to the integers that the microcontroller computes with."""
+"""Conversion of design values to the integers of the microcontroller."""
 
 from __future__ import annotations
 
@@ -15,11 +15,10 @@ from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.variables import Variable
 
 FRACTION_BITS: Final = 16
-"""Fractional bits of proportional gains and table index scales."""
+"""Of proportional gains and table index scales."""
 
 INTEGRAL_BITS: Final = 32
-"""Fractional bits of the integrator: in the least of its units the smallest gain still keeps three
-digits."""
+"""Of the integrator: in its smallest unit, the smallest gain still keeps three digits."""
 
 CONTROL_PERIOD: Final = 0.002
 """One control tick [s]."""
@@ -36,12 +35,12 @@ VOLT_COUNTS: Final = 511.0 / 11.3
 
 
 class IntegratorUnit(IntEnum):
-    """What an integrator's gain is counted in; the thesis's table 4.4 says V/rad."""
+    """Unit of an integrator's gain; the thesis's table 4.4 says V/rad."""
 
     COUNTS = 0
     """PWM counts per (error count x second)."""
     VOLT_PER_RADIAN = 1
-    """V/rad, added up at every control tick."""
+    """V/rad, added at every control tick."""
     VOLT_PER_RADIAN_SECOND = 2
     """V/(rad s)."""
 
@@ -58,19 +57,16 @@ INTEGRATOR_UNIT: Final = Variable(
 
 
 def required(design: Mapping[str, float], name: str, *, low: float, high: float) -> float:
-    """A design's value, checked against what the controller can represent.
+    """Return a design's value, checked against the bounds that the controller can represent.
 
     Args:
         design: Values by name.
         name: Of the value.
-        low: Least value.
+        low: Smallest value.
         high: Largest value.
 
-    Returns:
-        The value.
-
     Raises:
-        SimulationInputError: It is missing, no number, or out of bounds.
+        SimulationInputError: It is missing, not a number, or out of bounds.
     """
     try:
         value = float(design[name])
@@ -86,7 +82,6 @@ def required(design: Mapping[str, float], name: str, *, low: float, high: float)
 
 
 def required_integer(design: Mapping[str, float], name: str, *, low: int, high: int) -> int:
-    """A design's whole value."""
     value = required(design, name, low=low, high=high)
     if not value.is_integer():
         raise SimulationInputError(f"{name}: {value:g} is not a whole number {low} to {high}")
@@ -96,21 +91,18 @@ def required_integer(design: Mapping[str, float], name: str, *, low: int, high: 
 def given_or_default(
     design: Mapping[str, float], variable: Variable, low: float, high: float
 ) -> float:
-    """A convention's value, checked against what the controller can represent."""
+    """Return a convention's value, checked against what the controller can represent."""
     if variable.name not in design and variable.default is not None:
         return variable.default
     return required(design, variable.name, low=low, high=high)
 
 
 def to_fixed(value: float, fraction_bits: int) -> int:
-    """Nearest fixed-point number.
+    """Convert to the nearest fixed-point number.
 
     Args:
         value: To be represented.
         fraction_bits: Of the fixed-point number.
-
-    Returns:
-        Its integer.
     """
     return math.floor(value * (1 << fraction_bits) + 0.5)
 
@@ -122,13 +114,10 @@ def descale(value: NDArray[np.int64], bits: int) -> NDArray[np.int64]:
 
 
 def integral_gain(design: Mapping[str, float]) -> int:
-    """Gain of the integrator in fixed point.
+    """Return the integrator's gain in PWM counts per (error count x tick), with `INTEGRAL_BITS`.
 
     Args:
-        design: Values by name, with the gain `I` and, if it is not the default, its unit.
-
-    Returns:
-        PWM counts per (error count x tick), with `INTEGRAL_BITS` fraction bits.
+        design: Values by name, with the gain `I` and, if not the default, its unit.
 
     Raises:
         SimulationInputError: A value is missing or cannot be represented; names the variable.
@@ -147,4 +136,4 @@ _COUNTS_PER_TICK: Final[Mapping[IntegratorUnit, float]] = MappingProxyType(
         IntegratorUnit.VOLT_PER_RADIAN_SECOND: VOLT_COUNTS / ANGLE_COUNTS * CONTROL_PERIOD,
     }
 )
-"""One of the unit in PWM counts per (error count x tick)."""
+"""One of the unit, in PWM counts per (error count x tick)."""

@@ -1,8 +1,8 @@
 """Fuzzy-PI of chapter 4: a Mamdani fuzzy-P as a quantised table, plus an integrator.
 
-The proportional part answers to the angle error and the absolute motor current; high current
-reverses the motor, which protects motor and battery (thesis table 4.3). What is simulated is what
-is shipped: a 10 bit x 6 bit table of 8-bit outputs (section 5.3).
+The inputs of the proportional part are the angle error and the absolute motor current; a high
+current reverses the motor, which protects motor and battery (thesis table 4.3). Simulations use the
+table of the robot: 10 bit x 6 bit with 8-bit outputs (section 5.3).
 """
 
 from __future__ import annotations
@@ -98,11 +98,7 @@ def quantised_table(
     error: Axis = ERROR,
     current: Axis = CURRENT,
 ) -> Quantised:
-    """The inference of `inference_system` on the axes' grid.
-
-    Returns:
-        (n_error, n_current) in 8 bits.
-    """
+    """Return the inference of `inference_system` as (n_error, n_current) 8-bit values."""
     system = inference_system(fw1, fw23, fw4, fw56, shape, sets)
     return quantised(system, {"error": error, "current": current})
 
@@ -161,16 +157,14 @@ class FuzzyPi:
     published: Final[Mapping[str, Mapping[str, float]]] = _PUBLISHED
 
     def compile(self, design: Mapping[str, float]) -> ControlLaw:
-        """The table of 10 x 6 bits, and the integrator's gain."""
         return self.compile_with(design, ERROR, CURRENT)
 
     def compile_with(self, design: Mapping[str, float], error: Axis, current: Axis) -> ControlLaw:
-        """The same controller with a table of other resolution."""
+        """Compile with a table of another resolution."""
         p = _Parameters.of(design)
         return ControlLaw(integral_gain=p.integral, direct=p.table(error, current))
 
     def inferences(self, design: Mapping[str, float]) -> tuple[Inference, ...]:
-        """The inference of its proportional part."""
         p = _Parameters.of(design)
         fuzzy_p = Inference(
             output=Universe("FO", "PWM counts", p.output_range, counts=1 << FRACTION_BITS),
@@ -185,7 +179,7 @@ class FuzzyPi:
         return (fuzzy_p,)
 
     def without_table(self, design: Mapping[str, float]) -> ControlLaw:
-        """The same controller by full inference, for comparison (reference kernel only)."""
+        """Compile with the inference in place of the table (reference kernel only)."""
         p = _Parameters.of(design)
         system = inference_system(*p.weights, p.shape, p.sets)
         exact = ExactInference(system, p.error_range, p.current_range, p.output_range)
@@ -194,7 +188,7 @@ class FuzzyPi:
 
 @dataclass(frozen=True, slots=True)
 class _Parameters:
-    """A design's values, checked. weights: FW1, FW23, FW4, FW56."""
+    """A design's checked values. weights: FW1, FW23, FW4, FW56."""
 
     integral: int
     error_range: float
@@ -220,7 +214,6 @@ class _Parameters:
         )
 
     def table(self, error: Axis, current: Axis) -> LookupTable:
-        """The proportional part as the microcontroller has it."""
         table = quantised_table(*self.weights, self.shape, self.sets, error, current)
         return LookupTable(
             values=table.values[:, :, np.newaxis],

@@ -1,7 +1,7 @@
-"""Fuzzy-PI of chapter 3: error, current and velocity error in, voltage and its integral out.
+"""Fuzzy-PI of chapter 3: from error, current and velocity error to voltage and its integral.
 
-Rule 1 speaks of both outputs. The voltage FzzP does not depend on the velocity error, so its table
-has two inputs; the integrated FzzI has three (thesis 3.3.2, fig. 3.5, table 3.4).
+Rule 1 has both outputs. The voltage FzzP does not depend on the velocity error, so its table has
+two inputs; the integrated FzzI has three (thesis 3.3.2, fig. 3.5, table 3.4).
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ CURRENT: Final = Axis(bits=6, centred=False)
 COARSE_ERROR: Final = Axis(bits=6, centred=True)
 COARSE_CURRENT: Final = Axis(bits=4, centred=False)
 VELOCITY: Final = Axis(bits=6, centred=True)
-"""A range of 30 000 counts/s is 60 counts a tick, so 6 bits resolve all that can be measured."""
+"""A range of 30 000 counts/s is 60 counts per tick, so 6 bits resolve every measurable value."""
 
 _INTEGRAL_AXES: Final = {"error": COARSE_ERROR, "current": COARSE_CURRENT, "velocity": VELOCITY}
 
@@ -48,7 +48,7 @@ _CONVENTIONS: Final = (
     LARGE_BEGINS,
     SMALL_ENDS,
     POSITIVE_PEAK,
-    # Without extreme outputs, this universe holds all sets whole.
+    # Without extreme outputs, this universe contains all sets entirely.
     UNIVERSE.model_copy(update={"default": 2.0}),
 )
 
@@ -98,7 +98,7 @@ _PUBLISHED: Final[Mapping[str, Mapping[str, float]]] = MappingProxyType(
         ),
     }
 )
-"""Optima of table 3.5, each with the gait that was tuned together with it."""
+"""Optima of table 3.5, each with the gait tuned together with it."""
 
 DEFAULT_SETS: Final = MembershipSets.of({}, _CONVENTIONS)
 
@@ -213,30 +213,28 @@ class FuzzyPi3:
     published: Final[Mapping[str, Mapping[str, float]]] = _PUBLISHED
 
     def compile(self, design: Mapping[str, float]) -> ControlLaw:
-        """A table of the voltage, and one of the integrated voltage's rate."""
         return self.compile_with(design, ERROR, CURRENT)
 
     def compile_with(self, design: Mapping[str, float], error: Axis, current: Axis) -> ControlLaw:
-        """The same controller with a table of the voltage of other resolution."""
+        """Compile with a table of the voltage of another resolution."""
         voltage, rate = _inferences(design, error, current)
         return ControlLaw(direct=voltage.table, integrated=rate.table)
 
     def inferences(self, design: Mapping[str, float]) -> tuple[Inference, ...]:
-        """The inferences of the voltage, and of the integrated voltage's rate."""
         return _inferences(design, ERROR, CURRENT)
 
 
 def _inferences(
     design: Mapping[str, float], error_axis: Axis, current_axis: Axis
 ) -> tuple[Inference, Inference]:
-    """Of the voltage, whose table has these axes, and of the integrated voltage's rate."""
+    """Inferences of the voltage, with these axes, and of the integrated voltage's rate."""
     error_range = required(design, "A_ERR", low=64.0, high=65535.0)
     current_range = required(design, "I_MA", low=0.1, high=30.0)
     velocity_range = required(design, "V_ERR", low=100.0, high=1e7)
     weights = [required(design, w, low=0.0, high=1.0) for w in ("W1", "W2", "W34", "W56", "W78")]
     error = Universe("error", "counts", error_range)
     current = Universe("current", "A", current_range, counts=CURRENT_COUNTS)
-    # The kernel's change of error is over one tick.
+    # The kernel's change of the error is over one tick.
     velocity = Universe("velocity", "counts/s", velocity_range, counts=CONTROL_PERIOD)
     return (
         _voltage(design, weights, error, current, {"error": error_axis, "current": current_axis}),

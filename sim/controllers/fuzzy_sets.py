@@ -1,8 +1,8 @@
-"""Membership functions that the fuzzy controllers share, on normalised universes.
+"""Membership functions of the fuzzy controllers, on normalised universes.
 
-The thesis draws but does not list them. What its drawings leave open are conventions, which a
-design may set. The defaults are sets with which table 4.3's own weights and the published optima A
-and B reverse the drive at extreme current, as 4.3.2 and fig. 4.5 say; see docs/model.md.
+The thesis draws but does not list them. Choices that the drawings leave open are conventions, which
+a design may set. With the default sets, table 4.3's own weights and the published optima A and B
+reverse the drive at extreme current, as in 4.3.2 and fig. 4.5; see docs/model.md.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from gaitswarm.sim.variables import Variable
 SIGNED: Final[Mapping[str, FuzzySet]] = MappingProxyType(
     {"negative": FuzzySet(-1.0, 1.0), "zero": FuzzySet(0.0, 1.0), "positive": FuzzySet(1.0, 1.0)}
 )
-"""Of an error, angle or velocity."""
+"""Sets of an angle or velocity error."""
 
 LARGE_BEGINS: Final = Variable(
     name="large_begins",
@@ -68,20 +68,15 @@ _LIMITS: Final[Mapping[str, tuple[float, float]]] = MappingProxyType(
         "universe": (0.1, 10.0),
     }
 )
-"""What can be inferred with, which is more than what is worth searching."""
+"""Values that can be computed, a wider range than that worth searching."""
 
 
 @dataclass(frozen=True, slots=True)
 class MembershipSets:
-    """Sets of a current's absolute value and of an output.
+    """Sets of a current's absolute value and of an output, for the conventions above.
 
     Attributes:
-        large_begins: share of the current's range from which a current is large.
-        small_ends: share of the current's range up to which a current is small.
-        positive_peak: share of the output's range at which the positive output peaks.
-        universe: share of the output's range up to which the centroid is taken.
-        extreme_peak: share of the output's range at which the extreme positive output peaks; None
-            for an output without extremes.
+        extreme_peak: None for an output without extremes.
     """
 
     large_begins: float
@@ -92,7 +87,6 @@ class MembershipSets:
 
     @classmethod
     def of(cls, design: Mapping[str, float], conventions: Iterable[Variable]) -> MembershipSets:
-        """The sets that a design asks for."""
         return cls(
             **{
                 variable.name: given_or_default(design, variable, *_LIMITS[variable.name])
@@ -113,8 +107,8 @@ class MembershipSets:
     def output(self) -> dict[str, FuzzySet]:
         """Sets of the output.
 
-        All are equally wide: from a peak to its foot is as far as from null to positive, so that
-        these are spread as Matlab spreads sets, each ending where its neighbour peaks.
+        All have the same width, the distance from null to positive, so that null and positive each
+        end where the other peaks, as in Matlab.
         """
         peaks = {"null": 0.0, "positive": self.positive_peak, "negative": -self.positive_peak}
         if self.extreme_peak is not None:

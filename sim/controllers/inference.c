@@ -2,9 +2,9 @@
    and estimate.c.
 
    A cell's output is the centroid of the union of clipped sets: sums over some hundred points, in
-   order, so that both twins give the same bits. Nearly all cells do without those sums. They are
-   estimated first, and summed only where the estimate's error bound leaves the byte open, or the
-   table's largest output, of which bytes are shares. */
+   order, so that both twins give the same bits. Most cells avoid those sums: they are estimated
+   first, and summed only if the estimate's error bound leaves the byte open, or for the table's
+   largest output, to which bytes are relative. */
 
 /* Largest value of a byte. */
 #define FULL 127.0
@@ -13,13 +13,13 @@ typedef int8_t bytes __attribute__((vector_size(LANES)));
 
 static int any(ivec mask)
 {
-  int found = 0;
-  for (int k = 0; k < LANES; k++) found |= mask[k] != 0;
-  return found;
+  int result = 0;
+  for (int k = 0; k < LANES; k++) result |= mask[k] != 0;
+  return result;
 }
 
-/* Crisp outputs of a block of cells by the sums themselves. A set that fires nowhere in the block
-   is skipped, as most are. */
+/* Crisp outputs of a block of cells by the full sums. Sets that fire nowhere in the block, which is
+   most, are skipped. */
 static void sum_block(const System *s, int64_t row, int64_t column, vec *crisp)
 {
   vec level[MAX_SETS][BLOCK], moment[BLOCK], area[BLOCK];
@@ -30,8 +30,8 @@ static void sum_block(const System *s, int64_t row, int64_t column, vec *crisp)
     for (int b = 0; b < BLOCK; b++) {
       vec degree;
       memcpy(&degree, s->inner + r * s->n_inner + column + b * LANES, sizeof degree);
-      vec *known = &level[s->consequent[r]][b];
-      *known = vec_max(*known, vec_min(held, degree) * SPLAT(s->weight[r]));
+      vec *strength = &level[s->consequent[r]][b];
+      *strength = vec_max(*strength, vec_min(held, degree) * SPLAT(s->weight[r]));
     }
   }
   int64_t set[MAX_SETS], active = 0;
@@ -67,7 +67,7 @@ static void sum_block(const System *s, int64_t row, int64_t column, vec *crisp)
   }
 }
 
-/* The largest absolute output; blocks that may hold it are summed. */
+/* The largest absolute output; blocks that may contain it are summed. */
 static double largest_of(const System *s, double *crisp)
 {
   const int64_t cells = s->n_outer * s->n_inner;
@@ -95,22 +95,22 @@ static double largest_of(const System *s, double *crisp)
   return largest;
 }
 
-/* Shares of the largest output, to the nearest byte; blocks with a cell close to the middle
-   between two are summed. */
+/* Shares of the largest output, rounded to bytes; blocks with a cell close to the middle between two
+   bytes are summed. */
 static void quantise(const System *s, const double *crisp, double largest, int8_t *values)
 {
   const vec scale = SPLAT(FULL / (largest > 0.0 ? largest : 1.0));
   const vec clear = SPLAT(0.5 - 1e-12) - scale * SPLAT(ERROR_BOUND * -s->points[0]);
   for (int64_t cell = 0; cell < s->n_outer * s->n_inner; cell += BLOCK * LANES) {
     vec block[BLOCK];
-    ivec told = ISPLAT(-1);
+    ivec decided = ISPLAT(-1);
     memcpy(block, crisp + cell, sizeof block);
     UNROLLED
     for (int b = 0; b < BLOCK; b++) {
       const vec share = block[b] * scale;
-      told &= vec_abs(share - dvec_round(share)) < clear;
+      decided &= vec_abs(share - dvec_round(share)) < clear;
     }
-    if (any(~told)) sum_block(s, cell / s->n_inner, cell % s->n_inner, block);
+    if (any(~decided)) sum_block(s, cell / s->n_inner, cell % s->n_inner, block);
     for (int b = 0; b < BLOCK; b++) {
       const bytes rounded = __builtin_convertvector(dvec_round(block[b] * scale), bytes);
       memcpy(values + cell + b * LANES, &rounded, sizeof rounded);
@@ -118,9 +118,9 @@ static void quantise(const System *s, const double *crisp, double largest, int8_
   }
 }
 
-/* The table of a system of up to MAX_RULES rules, MAX_SETS sets and MAX_POINTS points; n_inner is
-   a multiple of BLOCK * LANES, scratch has gaitswarm_scratch(...) doubles. Gives the largest
-   output. */
+/* Computes the table of a system of up to MAX_RULES rules, MAX_SETS sets and MAX_POINTS points;
+   n_inner is a multiple of BLOCK * LANES, scratch has gaitswarm_scratch(...) doubles. Returns the
+   largest output. */
 double gaitswarm_table(int64_t n_first, int64_t n_outer, int64_t n_inner, int64_t n_rules,
                        int64_t n_sets, int64_t n_points, const double *outer,
                        const double *inner, const double *weight, const int64_t *consequent,

@@ -1,4 +1,4 @@
-"""The joint PD with feed-forward, run by torque-controlled actuators themselves."""
+"""Joint PD with feed-forward, run by torque-controlled actuators."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from gaitswarm.sim.controllers.fixed_point import required
 from gaitswarm.sim.variables import Variable
 
 LARGEST_GAIN: Final = 1e5
-"""Of a gain that can be simulated [N m/rad], [N m s/rad]."""
+"""Largest gain that can be simulated [N m/rad], [N m s/rad]."""
 
 
 class JointPdController:
     """tau = K_p (q_d - q) + K_d (dq_d - dq) + share of the torque that carries the robot.
 
     The law of the low-level interfaces of the MIT Mini Cheetah (Katz, Di Carlo, Kim 2019), Solo
-    (Grimminger et al. 2020) and of the makers of quadrupeds.
+    (Grimminger et al. 2020) and commercial quadrupeds.
     """
 
     name: Final = "joint-pd"
@@ -49,12 +49,10 @@ class JointPdController:
     published: Final[Mapping[str, Mapping[str, float]]] = MappingProxyType({})
 
     def compile(self, design: Mapping[str, float]) -> ControlLaw:
-        """Its gains; nothing is left to the control tick."""
         stiffness, damping = (required(design, k, low=0.0, high=LARGEST_GAIN) for k in ("Kp", "Kd"))
         share = required(design, "feed_forward", low=-10.0, high=10.0)
         return ControlLaw(joint_pd=JointPd(stiffness, damping, share))
 
     def inferences(self, design: Mapping[str, float]) -> tuple[Inference, ...]:
-        """None: it is not fuzzy."""
         del design
         return ()

@@ -31,13 +31,10 @@ _D: Final = Variable(
 
 @dataclass(frozen=True, slots=True)
 class LinearController:
-    """PWM = P error + I integral of error dt + D derivative of error; terms left out are zero.
+    """PWM = P error + I integral of error dt + D derivative of error; missing terms are zero.
 
     Attributes:
-        name: as in job specs and on the command line.
-        description: what it is, with its source.
-        variables: its gains.
-        conventions: the unit of the integrator's, if it has one.
+        conventions: the unit of the integrator, if it has one.
         published: designs from the literature, by study.
     """
 
@@ -48,7 +45,6 @@ class LinearController:
     published: Mapping[str, Mapping[str, float]]
 
     def compile(self, design: Mapping[str, float]) -> ControlLaw:
-        """Gains in fixed point."""
         gains = {v.name: required(design, v.name, low=0.0, high=100.0) for v in self.variables}
         return ControlLaw(
             proportional_gain=to_fixed(gains["P"], FRACTION_BITS),
@@ -57,7 +53,6 @@ class LinearController:
         )
 
     def inferences(self, design: Mapping[str, float]) -> tuple[Inference, ...]:
-        """None: it is not fuzzy."""
         del design
         return ()
 
@@ -76,7 +71,7 @@ PI: Final = LinearController(
     (INTEGRATOR_UNIT,),
     MappingProxyType(
         {
-            # Optima of table 3.5, each with the gait that was tuned together with it.
+            # Optima of table 3.5, each with the gait tuned together with it.
             "pi-pso-ps": MappingProxyType(
                 {
                     "P": 0.454,

@@ -1,8 +1,8 @@
-"""Mamdani inference as in Matlab's Fuzzy Logic Toolbox (optimization page, section 3).
+"""Mamdani inference as in Matlab's Fuzzy Logic Toolbox (docs/optimizers.md).
 
 min AND, max aggregation, min implication of the firing strength times the rule's weight, centroid
-on 101 points; where no rule fires, the mean of the output range. Inputs and output are given as
-shares of their range; the output's universe may reach beyond it.
+on 101 points; if no rule fires, the mean of the output range. Inputs and output are shares of their
+range; the output's universe may extend beyond it.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class FuzzySet:
     """A symmetric membership function.
 
     Attributes:
-        peak: where the membership is one.
+        peak: position of membership one.
         half_width: the triangle's distance from peak to foot.
     """
 
@@ -44,19 +44,16 @@ class FuzzySet:
     half_width: float
 
     def membership(self, x: Floats, shape: Shape = Shape.TRIANGLE) -> Floats:
-        """Degrees of membership.
+        """Degrees of membership, (n,) in [0, 1].
 
         Args:
             x: Points of the universe, (n,).
-
-        Returns:
-            (n,) in [0, 1].
         """
         distance = np.abs(x - self.peak) / self.half_width
         if shape is Shape.TRIANGLE:
             return np.maximum(0.0, 1.0 - distance)
         if shape is Shape.GAUSS:
-            # exp(-d^2 / (2 sigma^2)) is one half where the triangle is, at half the half-width.
+            # exp(-d^2 / (2 sigma^2)) is one half at half the half-width, like the triangle.
             return np.exp(-4.0 * math.log(2.0) * distance**2)
         inner = 1.0 - 2.0 * distance**2
         outer = 2.0 * np.maximum(0.0, 1.0 - distance) ** 2
@@ -68,9 +65,8 @@ class Rule:
     """IF every antecedent holds THEN consequent.
 
     Attributes:
-        antecedents: by input the name of its set; inputs left out don't matter.
-        consequent: name of the output's set.
-        weight: of the rule, in [0, 1].
+        antecedents: name of the set, by input; inputs left out do not matter.
+        weight: in [0, 1].
     """
 
     antecedents: Mapping[str, str]
@@ -83,11 +79,9 @@ class Mamdani:
     """A fuzzy inference system with one output.
 
     Attributes:
-        inputs: by name, the sets by name.
-        outputs: the output's sets by name, all of one shape.
-        rules: all of them.
-        output_shape: of the output's sets.
-        universe: where the output's universe ends on either side.
+        inputs: sets by input and name.
+        outputs: the output's sets by name, all of `output_shape`.
+        universe: limit of the output's universe on either side.
     """
 
     inputs: Mapping[str, Mapping[str, FuzzySet]]
@@ -97,13 +91,13 @@ class Mamdani:
     universe: float = 1.0
 
     def degrees(self, grid: Mapping[str, Floats]) -> list[Floats]:
-        """How far each rule's antecedents hold.
+        """Degree to which each rule's antecedents hold.
 
         Args:
-            grid: By input its values, (n_i,).
+            grid: Values by input, (n_i,).
 
         Returns:
-            By input (n_rules, n_i), 1 where a rule leaves the input out.
+            By input (n_rules, n_i), 1 where a rule omits the input.
         """
         degrees = []
         for name, values in grid.items():
@@ -114,7 +108,7 @@ class Mamdani:
         return degrees
 
     def consequents(self) -> list[int]:
-        """By rule, the index of the output set that it speaks of."""
+        """Index of the output set, by rule."""
         names = list(self.outputs)
         return [names.index(rule.consequent) for rule in self.rules]
 
@@ -127,13 +121,10 @@ class Mamdani:
         return _points(self.universe)
 
     def infer(self, grid: Mapping[str, Floats]) -> Floats:
-        """Crisp output over the product of the inputs' values.
+        """Crisp output over the product of the inputs' values, (n_1, n_2, ...).
 
         Args:
-            grid: By input, in the order of `inputs`, its values inside the range, (n_i,).
-
-        Returns:
-            (n_1, n_2, ...), inside the universe.
+            grid: By input in the order of `inputs`, values inside the range, (n_i,).
         """
         degrees = self.degrees(grid)
         along = [
@@ -143,13 +134,10 @@ class Mamdani:
         return self._crisp(along, tuple(degree.shape[1] for degree in degrees))
 
     def infer_at(self, points: Mapping[str, Floats]) -> Floats:
-        """Crisp output at points.
+        """Crisp output at points, (n,).
 
         Args:
-            points: By input, in the order of `inputs`, its coordinates inside the range, (n,).
-
-        Returns:
-            (n,), inside the universe.
+            points: By input in the order of `inputs`, coordinates inside the range, (n,).
         """
         degrees = self.degrees(points)
         return self._crisp(degrees, degrees[0].shape[1:])
@@ -174,15 +162,15 @@ def _points(universe: float) -> Floats:
     return _read_only(np.arange(-half, half + 1) / half * universe)
 
 
+# A job needs few: its designs differ mostly in their weights.
 @lru_cache(maxsize=64)
 def _memberships(sets: tuple[FuzzySet, ...], shape: Shape, universe: float) -> Floats:
-    """Few in a job, whose designs differ in their weights mostly."""
     points = _points(universe)
     return _read_only(np.stack([s.membership(points, shape) for s in sets]))
 
 
 def centroid(levels: Floats, memberships: Floats, points: Floats) -> Floats:
-    """Centre of area of the clipped sets' union.
+    """Centre of area of the union of clipped sets.
 
     Sums run over the points in order, so that the compiled version gives the same bits.
 

@@ -30,14 +30,14 @@ class Axis:
 
     Attributes:
         bits: of the index.
-        centred: about zero, as errors are; else from zero up, as currents.
+        centred: symmetric about zero, like errors; otherwise from zero up, like currents.
     """
 
     bits: int
     centred: bool
 
     def grid(self) -> NDArray[np.float64]:
-        """Shares of the input's range that the indices stand for, (2 ** bits,).
+        """Shares of the input's range at the indices, (2 ** bits,).
 
         Zero falls on the middle index of a centred axis, so the first index repeats the second.
         """
@@ -54,12 +54,9 @@ class Axis:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ExactInference:
-    """Answers by the inference itself in 64-bit numbers, which no table stands between.
-
-    For the reference kernel only.
+    """Response by the inference itself in 64-bit numbers, without a table; reference kernel only.
 
     Attributes:
-        system: the inference.
         error_range: coded counts of share 1.
         current_range: coded counts of share 1.
         output_range: PWM counts of share 1.
@@ -73,7 +70,6 @@ class ExactInference:
     def respond(
         self, error: NDArray[np.int64], current: NDArray[np.int64], change: NDArray[np.int64]
     ) -> NDArray[np.int64]:
-        """What the inference answers; the change does not matter."""
         del change
         crisp = self.system.infer_at(
             {
@@ -85,11 +81,7 @@ class ExactInference:
 
 
 def table_bytes(input_bits: tuple[int, ...], output_bits: int, outputs: int = 1) -> int:
-    """Memory of a lookup table, eq. 5.1: N_O * R_O / 8 * 2^(sum of input bits).
-
-    Returns:
-        [B].
-    """
+    """Memory of a lookup table [B], eq. 5.1: N_O * R_O / 8 * 2^(sum of input bits)."""
     return outputs * output_bits * (1 << sum(input_bits)) // 8
 
 
@@ -99,7 +91,7 @@ class Quantised:
 
     Attributes:
         values: (2 ** bits of each axis) in 1/127ths of the largest output, read-only.
-        largest: output anywhere in the table, as a share of the output's range.
+        largest: output in the table, as a share of the output's range.
     """
 
     values: NDArray[np.int8]
@@ -107,17 +99,17 @@ class Quantised:
 
     @property
     def step(self) -> float:
-        """Share of the output's range that one table value stands for."""
+        """Share of the output's range that one unit of a table value represents."""
         return self.largest / OUTPUT_SCALE
 
 
 @dataclass(slots=True)
 class TableTime:
-    """What making tables took, of those who ask for it.
+    """Accumulated cost of building tables.
 
     Attributes:
-        seconds: wall time, added to [s].
-        made: tables, added to.
+        seconds: wall time [s].
+        made: number of tables.
     """
 
     seconds: float = 0.0
@@ -129,7 +121,7 @@ _table_time: Final[ContextVar[TableTime | None]] = ContextVar("table_time", defa
 
 @contextmanager
 def timing_tables() -> Iterator[TableTime]:
-    """Time the tables that this thread makes inside the block."""
+    """Measure the tables that this thread builds inside the block."""
     spent = TableTime()
     before = _table_time.set(spent)
     try:
@@ -139,10 +131,10 @@ def timing_tables() -> Iterator[TableTime]:
 
 
 def quantised(system: Mamdani, axes: Mapping[str, Axis]) -> Quantised:
-    """An inference on the axes' grid.
+    """Tabulate an inference on the axes' grid.
 
-    An output that reaches beyond its range is covered, and none loses resolution to a universe that
-    the centroid never comes near the ends of.
+    The resolution follows the largest output in the table, neither clipped to the output's range
+    nor wasted on parts of the universe that the centroid never reaches.
     """
     begun = time.perf_counter()
     grid = {name: axis.grid() for name, axis in axes.items()}
@@ -158,10 +150,10 @@ def quantised(system: Mamdani, axes: Mapping[str, Axis]) -> Quantised:
 def reference_table(
     system: Mamdani, grid: Mapping[str, NDArray[np.float64]]
 ) -> tuple[NDArray[np.int8], float]:
-    """The oracle of the compiled table, and its replacement where there is no compiler.
+    """Oracle of the compiled table, and its replacement without a compiler.
 
     Args:
-        grid: By input of the system, in its order, the values (n_i,), inside the range.
+        grid: Values by input in the system's order, inside the range, (n_i,).
 
     Returns:
         Values in 1/127ths of the largest output, (n_1, n_2, ...), and that output, absolute.
@@ -174,16 +166,15 @@ def reference_table(
 def compiled_table(
     system: Mamdani, grid: Mapping[str, NDArray[np.float64]], *, library: ctypes.CDLL | None = None
 ) -> tuple[NDArray[np.int8], float] | None:
-    """An inference in 8 bits, with the bits of `quantisation.reference_table`.
+    """Tabulate an inference in a fraction of a millisecond, with the bits of `reference_table`.
 
     Args:
-        grid: By input, in the order of the system's, the values (n_i,), inside the range.
+        grid: Values by input in the system's order, inside the range, (n_i,).
 
     Returns:
-        Values in 1/127ths of the largest output over the product of the inputs' values,
-        (n_1, n_2, ...), and that output, absolute, as a share of the output's range. None for a
-        system that is too large, or a grid that is not of whole blocks, and on a machine without a
-        C compiler.
+        Values in 1/127ths of the largest output over the product of the inputs' values, (n_1, n_2,
+        ...), and that output, absolute, as a share of the output's range. None for a system that is
+        too large, a grid that does not consist of whole blocks, or without a C compiler.
     """
     *firsts, inner = system.degrees(grid)
     memberships, points = system.output_memberships(), system.output_points()
@@ -197,7 +188,7 @@ def compiled_table(
     ):
         return None
     outer = reduce(_both_hold, firsts)
-    values = np.empty([len(own) for own in grid.values()], dtype=np.int8)
+    values = np.empty([len(axis) for axis in grid.values()], dtype=np.int8)
     sizes = (
         len(values),
         outer.shape[1],
@@ -229,7 +220,6 @@ def _both_hold(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.flo
 
 
 def inference_source() -> str:
-    """The compiled inference's source."""
     here = resources.files("gaitswarm.sim.controllers")
     parts = [(here / name).read_text(encoding="utf-8") for name in ("estimate.c", "inference.c")]
     return "\n".join([vector_header(), *parts])

@@ -1,4 +1,4 @@
-"""What a fuzzy controller answers over error and current: by inference and by its table."""
+"""Response surface of a fuzzy controller over error and current, by inference and by table."""
 
 from __future__ import annotations
 
@@ -16,16 +16,15 @@ from gaitswarm.sim.controllers.quantisation import OUTPUT_BITS, Axis, table_byte
 Floats = NDArray[np.float64]
 
 SURFACE_AXES: Final = ("error", "current")
-"""Inputs that a surface lies over; others are held."""
+"""Inputs of a surface; others are held constant."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Memberships:
-    """An input's or output's range and sets.
+    """Range and sets of an input or output.
 
     Attributes:
-        universe: of the input or output.
-        limits: where the universe ends, in its unit; an output's may lie beyond its range.
+        limits: of the universe, in its unit; an output's may lie beyond its range.
         values: (n,), in its unit.
         degrees: by set, (n,) [1].
     """
@@ -41,10 +40,7 @@ class Surface:
     """One output over (error, current), in its unit.
 
     Attributes:
-        source: what it is the surface of.
-        inputs: by name.
-        output: of the inference.
-        held: by input that is neither, the value at which it is held, in its unit.
+        held: constant value of each other input, in its unit.
         inference: (n_error, n_current), at the inputs' `values`.
         table: (n_error, n_current), at the inputs' `values`.
     """
@@ -63,22 +59,23 @@ class Surface:
 
     @property
     def largest_difference(self) -> float:
-        """Of table and inference."""
+        """Between table and inference."""
         return float(np.abs(self.table - self.inference).max())
 
     @property
     def rms_difference(self) -> float:
-        """Of table and inference."""
+        """Between table and inference."""
         return float(np.sqrt(np.mean((self.table - self.inference) ** 2)))
 
 
 def surface(
     source: Inference, *, error_points: int, current_points: int, velocity: float = 0.0
 ) -> Surface:
-    """An output on an even grid of whole counts.
+    """Compute an output on an even grid of whole counts.
 
     Args:
-        velocity: At which an input of that name is held, rounded to whole counts a tick [counts/s].
+        velocity: Constant value of an input of that name, rounded to whole counts per tick
+            [counts/s].
     """
     points = {"error": error_points, "current": current_points, "velocity": error_points}
     inputs = {
@@ -104,7 +101,7 @@ def surface(
 def _input(
     universe: Universe, axis: Axis, points: int, sets: Mapping[str, FuzzySet]
 ) -> Memberships:
-    """Evenly over the range; what is measured is whole counts."""
+    """Even over the range; measured values are whole counts."""
     limits = (-universe.full_range if axis.centred else 0.0, universe.full_range)
     low, high = (limit * universe.counts for limit in limits)
     counts = np.rint(np.linspace(low, high, points))
@@ -123,14 +120,14 @@ def _output(source: Inference) -> Memberships:
 
 
 def _inferred(source: Inference, values: Mapping[str, Floats]) -> Floats:
-    """(n_error, n_current) by the inference itself."""
+    """(n_error, n_current) by the inference."""
     grid = {name: _shares(source.inputs[name], values[name]) for name in values}
     crisp = source.system.infer(grid) * source.output.full_range
     return crisp.reshape(len(values["error"]), len(values["current"]))
 
 
 def _looked_up(source: Inference, values: Mapping[str, Floats]) -> Floats:
-    """(n_error, n_current) as the microcontroller computes it, in whole numbers."""
+    """(n_error, n_current) as the microcontroller computes it, in integers."""
     counts = {
         name: np.rint(values[name] * source.inputs[name].counts).astype(np.int64) for name in values
     }

@@ -1,4 +1,4 @@
-"""A design as C for a microcontroller, with the walks that it must repeat to the bit."""
+"""A design as C for a microcontroller, with simulated walks that it must reproduce exactly."""
 
 from __future__ import annotations
 

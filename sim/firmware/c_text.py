@@ -1,4 +1,4 @@
-"""C text of firmware: numbers of a control law, tables, trajectories, what is expected."""
+"""Text of the firmware's files: numbers of a control law, tables, trajectories, README."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from gaitswarm.sim.firmware.memory import BUDGET, Memory, TrajectoryTable
 from gaitswarm.sim.robot import Robot
 
 _WIDTH: Final = 24
-"""Numbers on a line."""
+"""Numbers per line."""
 
 
-def own_file(path: str) -> str:
-    """A file that every folder of firmware has."""
+def code_file(path: str) -> str:
+    """Read a file that every firmware folder has."""
     return (resources.files("gaitswarm.sim.firmware") / "code" / path).read_text(encoding="utf-8")
 
 
 def filled(path: str, **values: object) -> str:
-    """A file of which some words are filled in."""
-    return Template(own_file(path)).substitute(values)
+    """Read a template and fill in its values."""
+    return Template(code_file(path)).substitute(values)
 
 
 def law_header(law: LawIntegers) -> str:
@@ -43,7 +43,7 @@ def law_header(law: LawIntegers) -> str:
     return filled(
         "law.h",
         ranges="\n".join(
-            f"   {own.name:8} {own.largest:>20} {own.bits:>3}  {own.meaning}" for own in law.ranges
+            f"   {r.name:8} {r.largest:>20} {r.bits:>3}  {r.meaning}" for r in law.ranges
         ),
         numbers="\n".join(f"#define {name} {value}" for name, value in numbers.items()),
     )
@@ -62,7 +62,7 @@ def _table_numbers(part: str, table: LookupTable | None) -> dict[str, int]:
     return {
         f"{part}_USED": int(table is not None),
         **{f"{part}_{name}": size for name, size in sizes},
-        # A product in the preprocessor's terms may not fit an int of 16 bits.
+        # A product evaluated by the preprocessor may not fit an int of 16 bits.
         f"{part}_CELLS": int(np.prod(shape)),
         f"{part}_LARGEST": largest,
         **{f"{part}_{name}": gain for name, gain in scales},
@@ -70,14 +70,14 @@ def _table_numbers(part: str, table: LookupTable | None) -> dict[str, int]:
 
 
 def controller_header(robot: Robot, controller: str, label: str) -> str:
-    """`controller.h`: what a leg's firmware calls, with units and scales."""
+    """`controller.h`: the functions that a leg's firmware calls, with units and scales."""
     sensors, pwm = robot.description.sensors, robot.description.pwm
     assert pwm is not None  # noqa: S101 - only DC motors get firmware
     return filled(
         "controller.h",
-        label=_remark(label),
+        label=_comment(label),
         controller=controller,
-        robot=_remark(robot.description.name),
+        robot=_comment(robot.description.name),
         rate=round(1.0 / CONTROL_PERIOD),
         angle_counts=f"{sensors.angle_counts:g}",
         angle_step=sensors.angle_step,
@@ -125,7 +125,7 @@ def trajectories_source(tables: Sequence[TrajectoryTable]) -> str:
 
 
 def expected_header(law: LawIntegers, walks: int, legs: int) -> str:
-    """`test/expected.h`: how many walks and tables are compared."""
+    """`test/expected.h`: numbers of compared walks and tables."""
     return filled("test/expected.h", legs=legs, walks=walks, tables=len(_tables(law)))
 
 
@@ -147,7 +147,7 @@ def expected_source(law: LawIntegers, walks: Mapping[str, int]) -> str:
             "",
             "const Expected_table expected_tables[] = {",
             *tables,
-            "    {0, 0, 0, 0}, /* the end: there may be none */",
+            "    {0, 0, 0, 0}, /* end of the list, which may be empty */",
             "};",
             "",
         ]
@@ -173,8 +173,8 @@ def _rows(values: NDArray[np.integer]) -> Iterable[str]:
         yield "    " + ", ".join(map(str, flat[start : start + _WIDTH])) + ","
 
 
-def _remark(text: str) -> str:
-    """What neither ends a remark nor begins another one."""
+def _comment(text: str) -> str:
+    """Make a text neither end a C comment nor begin another one."""
     return text.replace("*/", "* /").replace("/*", "/ *").replace("\n", " ")
 
 
@@ -186,7 +186,7 @@ def readme(
     scenarios: Sequence[str],
     robot: str,
 ) -> str:
-    """`README.md` of a folder of firmware."""
+    """`README.md` of a firmware folder."""
     rows = [
         f"| {t.name} | {len(t.rows)} | {t.rows.shape[1]} |"
         f" {t.repeats_from if t.repeats else 'none'} | {t.bytes} | {t.bytes_of_a_leg} |"

@@ -50,16 +50,15 @@ Codes = NDArray[np.int16]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ControlLog:
-    """Every sample of a walk's controllers; T ticks, J joints.
+    """Coded inputs and outputs of a walk's controllers; T ticks, J joints.
 
     Attributes:
-        scenario: that was walked, in the gait of the design.
-        status: how the walk ended.
+        scenario: in the gait of the design.
         desired: (T, J) [counts of angle].
         angle: of the motors, (T, J) [counts of angle].
         current: absolute, (T, J) [counts of current].
-        pwm: that the controllers gave, (T, J) [PWM counts].
-        objectives: what the walk is worth, f1 to f6, (6,), NaN where there is none.
+        pwm: output of the controllers, (T, J) [PWM counts].
+        objectives: f1 to f6, (6,), NaN where undefined.
     """
 
     scenario: Scenario
@@ -72,14 +71,13 @@ class ControlLog:
 
     @property
     def ticks(self) -> int:
-        """T."""
         return len(self.pwm)
 
 
 def control_logs(
     robot: Robot, scenarios: Sequence[Scenario], law: ControlLaw, gait: Mapping[str, float]
 ) -> tuple[ControlLog, ...]:
-    """Let a control law walk, and keep what it read and gave."""
+    """Simulate a control law and log its inputs and outputs."""
     kernel = kernel_of(robot)
     coding, timestep = control_steps(robot)
     walked = [with_gait(scenario, gait) for scenario in scenarios]
@@ -88,7 +86,7 @@ def control_logs(
         require_reachable(robot, scenario)
         plan = plan_walk(robot, scenario, timestep)
         if plan is None:
-            raise AssertionError("a gait within reach is planned")
+            raise AssertionError("a reachable gait has a plan")
         setups.append(plan(law))
     results = kernel.walk(setups, coding, log=True)
     return tuple(
@@ -106,7 +104,7 @@ def _control_log(
     result: WalkResult,
 ) -> ControlLog:
     if result.states is None:
-        raise AssertionError("states are kept of a walk whose log is asked for")
+        raise AssertionError("a walk with a log has states")
     walked = int(np.isfinite(result.states).all(axis=1).sum())
     states = split_states(robot, result.states[:walked])
     desired = setup.desired[:walked].astype(np.int64)
@@ -126,12 +124,12 @@ def _control_log(
 
 
 MANIFEST: Final = "firmware.json"
-"""File that says what the others are, by which a folder is known as firmware."""
+"""File that lists the others; it identifies a folder as firmware."""
 
 FORMAT: Final = "gaitswarm firmware 1"
 
-MOST_BITS: Final = (12, 8)
-"""Of the indices of a table that is not the usual one: angle error and current."""
+MAX_BITS: Final = (12, 8)
+"""Largest resolution of a table's indices: angle error and current."""
 
 _CODE: Final = (
     "Makefile",
@@ -146,7 +144,7 @@ _CODE: Final = (
     "target/board.ld",
     "target/cycles.awk",
 )
-"""Files that are the same in every folder, as they are in this package."""
+"""Files of this package that are copied unchanged."""
 
 _MAGIC: Final = b"GSWALK1\0"
 
@@ -156,13 +154,11 @@ class Firmware:
     """A design for a microcontroller.
 
     Attributes:
-        files: content by path, of which the manifest is the last.
-        law: the control law in integers.
+        files: content by path; the manifest is the last.
         trajectories: desired angles, by scenario.
-        logs: of the simulated walks that a test of the files repeats.
-        memory: that it takes.
-        table_difference: by objective, how far its walks are from those by the usual table, at most
-            [1]; None with the usual table.
+        logs: simulated walks that a test of the files repeats.
+        table_difference: by objective, largest relative difference from walks with the default
+            table [1]; None with the default table.
     """
 
     files: Mapping[str, bytes]
@@ -174,7 +170,7 @@ class Firmware:
 
     @property
     def samples(self) -> int:
-        """Outputs that a test of the files compares."""
+        """Number of outputs that a test of the files compares."""
         return sum(log.pwm.size for log in self.logs)
 
 
@@ -187,7 +183,7 @@ def firmware_of(
     label: str,
     table_bits: tuple[int, int] | None = None,
 ) -> Firmware:
-    """Write a design as C, and let it walk for the test of it."""
+    """Write a design as C, and simulate the walks that test it."""
     gait = {name: value for name, value in design.items() if name in GAIT_CATALOGUE}
     gains = {name: value for name, value in design.items() if name not in gait}
     check_drives_by_pwm(robot)
@@ -208,8 +204,8 @@ def firmware_of(
         difference = _difference(logs, control_logs(machine, scenarios, usual, gait))
     walks = {f"test/walks/{log.scenario.name}.walk": log for log in logs}
     legs = machine.n_joints // JOINTS_PER_LEG
-    names, own_scenarios = _scenario_files(scenarios)
-    robot_option, own_robot = _robot_files(robot)
+    names, scenario_files = _scenario_files(scenarios)
+    robot_option, robot_files = _robot_files(robot)
     texts = {
         **{name: own_file(name) for name in _CODE},
         "tick.c": control_tick(),
@@ -220,8 +216,8 @@ def firmware_of(
         "test/expected.h": expected_header(integers, len(logs), legs),
         "test/expected.c": expected_source(integers, {f: log.ticks for f, log in walks.items()}),
         "README.md": readme(label, controller, memory, trajectories, names, robot_option),
-        **own_scenarios,
-        **own_robot,
+        **scenario_files,
+        **robot_files,
     }
     files = {name: text.encode() for name, text in sorted(texts.items())}
     files |= {name: _walk_file(log) for name, log in walks.items()}
@@ -240,37 +236,38 @@ def firmware_of(
 
 
 def parsed_table_bits(text: str) -> tuple[int, int]:
-    """Read the resolution of a table."""
+    """Parse the resolution of a table."""
     error, _, current = text.partition("x")
     if not (error.isascii() and error.isdigit() and current.isascii() and current.isdigit()):
-        raise SimulationInputError(f"{text!r} is not like 8x6")
+        raise SimulationInputError(f"{text!r} is not a resolution such as 8x6")
     return int(error), int(current)
 
 
 def check_drives_by_pwm(robot: RobotChoice) -> None:
-    """Check that firmware is what drives a robot."""
+    """Check that the robot's drives are DC motors."""
     machine = load_robot(robot)
     if machine.is_torque_controlled:
         raise SimulationInputError(
-            f"firmware gives the PWM of DC motors; {machine.description.name} has torque-controlled"
-            " actuators, which take torques or a joint PD's gains from their own interface"
+            f"firmware outputs the PWM of DC motors; {machine.description.name} has"
+            " torque-controlled actuators, which take torques or a joint PD's gains"
         )
 
 
 def check_table_bits(controller: ControllerName, bits: tuple[int, int]) -> None:
-    """Check that a controller can have a table of other resolution."""
+    """Check that a controller supports a table of this resolution."""
     _tabulated(controller)
-    for name, own, most in zip(("angle error", "current"), bits, MOST_BITS, strict=True):
-        if not 2 <= own <= most:
-            raise SimulationInputError(f"{own} bits of {name} are not 2 to {most}")
+    for name, requested, most in zip(("angle error", "current"), bits, MAX_BITS, strict=True):
+        if not 2 <= requested <= most:
+            raise SimulationInputError(f"{requested} bits of {name}: must be 2 to {most}")
 
 
 @runtime_checkable
 class _Tabulated(Protocol):
     """A controller whose direct part is a table."""
 
-    def compile_with(self, design: Mapping[str, float], error: Axis, current: Axis) -> ControlLaw:
-        """With a table of these axes."""
+    def compile_with(
+        self, design: Mapping[str, float], error: Axis, current: Axis
+    ) -> ControlLaw: ...
 
 
 def _tabulated(controller: ControllerName) -> _Tabulated:
@@ -281,14 +278,14 @@ def _tabulated(controller: ControllerName) -> _Tabulated:
 
 
 def _difference(logs: Sequence[ControlLog], usual: Sequence[ControlLog]) -> dict[str, float]:
-    """Largest over scenarios, by objective but the height loss, which is near zero."""
+    """Largest over scenarios by objective, except the height loss, which is near zero."""
     ours, theirs = (np.array([log.objectives for log in walked]) for walked in (logs, usual))
     largest = np.abs(ours / theirs - 1.0).max(axis=0)
     return dict(zip(OBJECTIVE_NAMES[:-1], largest[:-1].tolist(), strict=True))
 
 
 def _scenario_files(scenarios: Sequence[Scenario]) -> tuple[list[str], dict[str, str]]:
-    """What the command line calls the scenarios, and files for those that are no presets."""
+    """Command-line names of the scenarios, and files of those that are not presets."""
     names, files = [], {}
     for scenario in scenarios:
         name = scenario.name
@@ -300,7 +297,7 @@ def _scenario_files(scenarios: Sequence[Scenario]) -> tuple[list[str], dict[str,
 
 
 def _robot_files(robot: RobotChoice) -> tuple[str, dict[str, str]]:
-    """What the command line calls the robot, nothing for the default, and files of one's own."""
+    """Command-line name of the robot, empty for the default, and files of a custom one."""
     if isinstance(robot, str):
         return ("" if robot == DEFAULT_ROBOT else robot), {}
     if isinstance(robot, RobotVariant):
@@ -311,7 +308,7 @@ def _robot_files(robot: RobotChoice) -> tuple[str, dict[str, str]]:
 
 
 def _walk_file(log: ControlLog) -> bytes:
-    """Little-endian; leg by leg, tick by tick: desired angles, angles, currents, PWM counts."""
+    """Little-endian; by leg and tick: desired angles, angles, currents, PWM counts."""
     ticks, joints = log.pwm.shape
     legs = joints // JOINTS_PER_LEG
     columns = np.stack(

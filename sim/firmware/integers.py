@@ -1,4 +1,4 @@
-"""How wide a control law's integers must be on a microcontroller."""
+"""Integer widths that a control law needs on a microcontroller."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ _WIDE: Final = 64
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """How large a number of the control tick can become.
+    """Largest value of a number in the control tick.
 
     Attributes:
         name: in tick.c.
         meaning: with its unit.
         largest: absolute.
-        bits: of the integer that holds it, its sign included.
+        bits: of the integer that holds it, sign included.
     """
 
     name: str
@@ -41,14 +41,12 @@ class Range:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LawIntegers:
-    """A control law as a microcontroller computes it.
+    """A control law in the integers of a microcontroller.
 
     Attributes:
-        law: the control law; tables only.
         full_scale: of the PWM [counts].
         pwm_step: resolution of the PWM [counts].
-        fine_bits: of numbers with 16 fraction bits, 32 or 64: the narrower one that holds all.
-        ranges: of the numbers of the control tick.
+        fine_bits: width of numbers with 16 fraction bits, 32 or 64: the smaller one that suffices.
     """
 
     law: ControlLaw
@@ -59,17 +57,15 @@ class LawIntegers:
 
     @property
     def direct(self) -> LookupTable | None:
-        """The table of the direct part, if there is one."""
         return as_table(self.law.direct)
 
     @property
     def integrated(self) -> LookupTable | None:
-        """The table of what is integrated, if there is one."""
         return as_table(self.law.integrated)
 
 
 def law_integers(law: ControlLaw, coding: Coding) -> LawIntegers:
-    """Bound every number of the control tick, for readings of any size."""
+    """Bound every number of the control tick for any readings."""
     check_gains(law, torque=False)
     direct, integrated = as_table(law.direct), as_table(law.integrated)
     half = 1 << (FRACTION_BITS - 1)
@@ -87,7 +83,7 @@ def law_integers(law: ControlLaw, coding: Coding) -> LawIntegers:
         + _largest_output(integrated)
         + (1 << (INTEGRAL_BITS - 1))
     )
-    # The middle of an axis is added to its index; tables have fewer rows than 2^16.
+    # The middle of an axis is added to its index; tables have fewer than 2^16 rows.
     fine = _NARROW if max(products, now) <= _INT32 - (1 << 16) else _WIDE
     return LawIntegers(
         law=law,
@@ -107,19 +103,17 @@ def law_integers(law: ControlLaw, coding: Coding) -> LawIntegers:
 
 
 def as_table(response: Response | None) -> LookupTable | None:
-    """A part of a control law as a table."""
     if response is None or isinstance(response, LookupTable):
         return response
-    raise SimulationInputError("firmware looks up tables; an inference has none")
+    raise SimulationInputError("firmware requires a table instead of an inference")
 
 
 def in_16_bits(
     codes: NDArray[np.int64], kind: type[Narrow], what: str, joints: Sequence[str]
 ) -> NDArray[Narrow]:
-    """Codes as the robot has them: angles of half a turn in either direction, absolute currents.
+    """Check and convert codes (T, J) [counts] to the robot's 16 bits.
 
-    Args:
-        codes: (T, J) [counts].
+    These hold angles of half a turn in either direction, and absolute currents.
     """
     limits = np.iinfo(kind)
     beyond = (codes < limits.min) | (codes > limits.max)
@@ -127,7 +121,7 @@ def in_16_bits(
         tick, joint = (int(index) for index in np.argwhere(beyond)[0])
         raise SimulationInputError(
             f"{what} of {joints[joint]} is {int(codes[tick, joint])} counts after {tick} ticks,"
-            " which the 16 bits of firmware do not hold; leave this scenario out"
+            " which exceeds the firmware's 16 bits; leave this scenario out"
         )
     return codes.astype(kind)
 

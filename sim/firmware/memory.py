@@ -1,4 +1,4 @@
-"""What firmware takes of the thesis's microcontroller (5.2), and the way out if it is too much."""
+"""Memory of firmware on the thesis's microcontroller (5.2): trajectories, tables, code."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from gaitswarm.sim.robot.description import JOINTS_PER_LEG
 from gaitswarm.sim.scenario import Scenario
 
 _MOST_CYCLES: Final = 4
-"""A cycle that is no whole number of ticks may repeat after some."""
+"""Cycles after which a gait may repeat if its cycle is not a whole number of ticks."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrajectoryTable:
-    """Desired angles by row and column, played at the control rate.
+    """Desired angles of a walk as a table, played at the control rate.
 
-    Row 0 is the pose in which a walk begins; after the last one comes row `repeats_from`.
+    Row 0 is the pose at the start of a walk; row `repeats_from` follows the last one.
 
     Attributes:
         name: of the scenario.
         rows: (N, C) [counts of angle].
         repeats_from: a row; N for a walk that does not repeat.
-        columns: by joint its column, (J,).
+        columns: column by joint, (J,).
     """
 
     name: str
@@ -40,7 +40,6 @@ class TrajectoryTable:
 
     @property
     def repeats(self) -> bool:
-        """Whether the walk can go on for ever."""
         return self.repeats_from < len(self.rows)
 
     @property
@@ -50,18 +49,18 @@ class TrajectoryTable:
 
     @property
     def bytes_of_a_leg(self) -> int:
-        """Memory of one leg's columns, should its microcontroller keep them [B]."""
+        """Memory of one leg's columns, if its microcontroller stores them [B]."""
         return len(self.rows) * JOINTS_PER_LEG * self.rows.itemsize
 
 
 def trajectory_table(robot: Robot, scenario: Scenario) -> TrajectoryTable:
-    """Fold a gait's desired angles, to the bit, where they repeat."""
+    """Find the period at which a gait's coded angles repeat exactly, and keep one period."""
     cycle = scenario.cycle_time / CONTROL_PERIOD
     for cycles in range(1, _MOST_CYCLES + 1):
         period = round(cycles * cycle)
         if abs(cycles * cycle - period) > 1e-6:
             continue
-        # Once more than it takes, to see that it repeats.
+        # One period more than needed, to verify the repetition.
         codes = _codes(robot, scenario, max(scenario.cycles, 2.0 * cycles + 1.0))
         differing = np.flatnonzero((codes[:-period] != codes[period:]).any(axis=1))
         begins = int(differing[-1]) + 1 if differing.size else 0
@@ -79,7 +78,7 @@ def _codes(robot: Robot, scenario: Scenario, cycles: float) -> NDArray[np.int16]
 
 
 def _table(name: str, codes: NDArray[np.int16], repeats_from: int) -> TrajectoryTable:
-    """Each column once, in the order of the joints that have it first."""
+    """Store equal columns once, in the order of their first joints."""
     distinct, first, columns = np.unique(codes, axis=1, return_index=True, return_inverse=True)
     order = np.argsort(first)
     rank = np.empty_like(order)
@@ -94,10 +93,9 @@ class Budget:
     """A microcontroller.
 
     Attributes:
-        name: of the type.
         flash: [B].
         ram: [B].
-        cycles: of a control tick.
+        cycles: per control tick.
     """
 
     name: str
@@ -107,21 +105,22 @@ class Budget:
 
 
 BUDGET: Final = Budget("MSP430F2618", flash=116 << 10, ram=8 << 10, cycles=32_000)
-"""One a leg: 16 MHz at 500 Hz."""
+"""One per leg: 16 MHz at 500 Hz."""
 
 CODE_BYTES: Final = 2048
-"""Of the control tick without its tables, with room: a Cortex-M0's is half as long."""
+"""Estimate for the control tick without tables, with a margin: a Cortex-M0's is half as long."""
 
 
 @dataclass(frozen=True, slots=True)
 class Memory:
-    """Bytes of firmware; trajectories are played by the robot's central ARM, or kept on the legs.
+    """Memory of firmware; trajectories are played by the robot's central ARM, or stored on the
+    legs.
 
     Attributes:
         tables: of the fuzzy tables, eq. 5.1 [B].
         trajectories: of all joints of all scenarios [B].
-        trajectories_of_a_leg: the same of one leg's joints [B].
-        ram: that the controller remembers from tick to tick [B].
+        trajectories_of_a_leg: of one leg's joints [B].
+        ram: state of the controller between ticks [B].
     """
 
     tables: int
@@ -131,9 +130,8 @@ class Memory:
 
     @classmethod
     def of(cls, law: LawIntegers, trajectories: Sequence[TrajectoryTable]) -> Memory:
-        """Add up what is written."""
         tables = (table for table in (law.direct, law.integrated) if table is not None)
-        # An integral of 64 bits and an error of 32 a joint, and a flag.
+        # A 64-bit integral and a 32-bit error per joint, and a flag.
         return cls(
             tables=sum(table.values.nbytes for table in tables),
             trajectories=sum(table.bytes for table in trajectories),
@@ -143,34 +141,33 @@ class Memory:
 
     @property
     def flash(self) -> int:
-        """Of the controller, its code taken as `CODE_BYTES` [B]."""
+        """Of the controller, its code counted as `CODE_BYTES` [B]."""
         return self.tables + CODE_BYTES
 
     @property
     def fits(self) -> bool:
-        """Whether the controller fits the microcontroller, its trajectories kept elsewhere."""
+        """Whether the controller fits the microcontroller, without trajectories."""
         return self.flash <= BUDGET.flash
 
     @property
     def trajectories_fit(self) -> bool:
-        """Whether a leg's trajectories fit beside its controller."""
+        """Whether a leg's trajectories fit in addition to its controller."""
         return self.flash + self.trajectories_of_a_leg <= BUDGET.flash
 
     def remarks(self) -> tuple[str, ...]:
-        """What does not fit, and the way out."""
+        """Describe what does not fit, with the remedy."""
         remarks = []
         if not self.fits:
             remarks.append(
-                f"tables of {self.tables} B and some {CODE_BYTES} B of code are"
-                f" {self.flash - BUDGET.flash} B more than the flash of an {BUDGET.name}"
-                f" ({BUDGET.flash} B); take a table of fewer bits (8x6 are 16384 B in place of"
-                " 65536 B), or a microcontroller with more"
+                f"tables of {self.tables} B and about {CODE_BYTES} B of code exceed the flash of an"
+                f" {BUDGET.name} ({BUDGET.flash} B) by {self.flash - BUDGET.flash} B; use a table"
+                " of fewer bits (8x6: 16384 B instead of 65536 B) or a microcontroller with more"
             )
         if not self.trajectories_fit:
             rest = max(0, BUDGET.flash - self.flash)
             remarks.append(
-                f"a leg's trajectories take {self.trajectories_of_a_leg} B, and {rest} B of its"
-                f" {BUDGET.name} are left; let the robot's central processor play them, as the"
-                " thesis's does, or write fewer scenarios"
+                f"a leg's trajectories take {self.trajectories_of_a_leg} B, but its {BUDGET.name}"
+                f" has {rest} B left; let the robot's central processor play them, as in the"
+                " thesis, or write fewer scenarios"
             )
         return tuple(remarks)

@@ -122,10 +122,10 @@ def test_a_folder_of_something_else_is_refused(gaitswarm: Gaitswarm, tmp_path: P
         (("published:A", "--scenarios", "moonwalk"), "unknown scenario"),
         (("published:A", "--controller", "pi"), "pi-pso-ps"),
         (("published:A", "--robot", "nobody"), "unknown robot"),
-        (("published:A", "--table-bits", "8"), "table_bits: '8' is not like 8x6"),
+        (("published:A", "--table-bits", "8"), "table_bits: '8' is not a resolution such as 8x6"),
         (
             ("published:A", "--table-bits", "18x6"),
-            "table_bits: 18 bits of angle error are not 2 to",
+            "table_bits: 18 bits of angle error: must be 2 to",
         ),
         (
             ("published:2011", "--controller", "p", "--table-bits", "8x6"),

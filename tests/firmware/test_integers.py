@@ -67,7 +67,7 @@ def test_an_inference_has_no_firmware() -> None:
         def respond(self, error: object, current: object, change: object) -> object:
             raise NotImplementedError
 
-    with pytest.raises(SimulationInputError, match="looks up tables"):
+    with pytest.raises(SimulationInputError, match="requires a table"):
         law_integers(ControlLaw(direct=Inference()), CODING)  # type: ignore[arg-type]
 
 

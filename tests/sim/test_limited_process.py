@@ -155,7 +155,7 @@ def test_a_kernel_whose_derivation_is_ended_is_an_error_that_names_the_robot(
         raise ProcessEnded("took more than 4096 MiB of memory")
 
     monkeypatch.setattr(derivation.PROCESSES, "ask", ended)
-    with pytest.raises(KernelBuildError, match="'quadruped': its derivation took more than 4096 MiB"):
+    with pytest.raises(KernelBuildError, match="'quadruped': its derivation took more than"):
         derivation.derived_source(parse_robot(TOML, URDF))
 
 

@@ -56,5 +56,5 @@ def test_a_robot_without_a_kernel_fails_its_job_and_the_runner_takes_the_next(
     failed = store.job(first.id)
     assert failed.state is JobState.FAILED
     assert failed.error is not None
-    assert "deriving it took more than 4096 MiB of memory" in failed.error
+    assert "its derivation took more than 4096 MiB of memory" in failed.error
     assert store.job(second.id).state is JobState.SUCCEEDED

@@ -1,8 +1,9 @@
-/* The arithmetic of tick.c on a microcontroller: integers, no floating point. The simulator computes the
-   same text on vectors of doubles, which hold the same whole numbers. law.h says how wide they are.
+/* The arithmetic of tick.c on a microcontroller: integers, no floating point. The simulator compiles
+   the same source for vectors of doubles, which hold the same whole numbers. law.h defines the
+   widths.
 
-   Shifts of negative numbers are arithmetic, as every compiler for a microcontroller has them; C leaves
-   it open, so it is checked here. */
+   Shifts of negative numbers are arithmetic with every compiler for microcontrollers; C leaves it
+   open, so it is checked here. */
 #ifndef COUNTS_H
 #define COUNTS_H
 

@@ -1,5 +1,5 @@
-/* The control law in integers. Gains have 16 fraction bits, but those of the integral part, which have
-   32. How large the numbers of tick.c can become, whatever is read, and the bits that hold them:
+/* The control law in integers. Gains have 16 fraction bits, those of the integral part 32. Largest
+   values of the numbers of tick.c for any readings, and the bits that hold them:
 
 $ranges
 */

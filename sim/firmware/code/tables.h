@@ -1,4 +1,5 @@
-/* Fuzzy tables: an entry for each angle error, current and change of the error, the last one fastest. */
+/* Fuzzy tables: an entry for each angle error, current and change of the error, the last one
+   fastest. */
 #ifndef TABLES_H
 #define TABLES_H
 
@@ -13,7 +14,7 @@ extern const int8_t direct_table[DIRECT_CELLS];
 extern const int8_t integrated_table[INTEGRATED_CELLS];
 #endif
 
-/* A file of C has something in it. */
+/* A C file must not be empty. */
 typedef int8_t Table_cell;
 
 #endif

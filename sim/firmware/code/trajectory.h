@@ -1,6 +1,6 @@
-/* Desired angles of a walk, as a table that is played at CONTROLLER_RATE: row 0 is the pose in which it
-   begins; after the last row comes row `repeats_from`, or, if that is `n_rows`, the last one again.
-   Joints that move alike share a column. */
+/* Desired angles of a walk as a table, played at CONTROLLER_RATE: row 0 is the pose at the start;
+   after the last row comes row `repeats_from`, or, if that is `n_rows`, the last one again. Joints
+   that move alike share a column. */
 #ifndef TRAJECTORY_H
 #define TRAJECTORY_H
 

@@ -1,6 +1,6 @@
 /* A Cortex-M board in qemu, without a C library: start-up, semihosting, and a clock that counts
-   instructions. qemu runs with -icount shift=10: an instruction takes 1024 ns of the board's time, and
-   SysTick counts that time at the processor's clock. */
+   instructions. With qemu's -icount shift=10 an instruction takes 1024 ns of the board's time, which
+   SysTick counts at the processor's clock. */
 #include "controller.h"
 #include "machine.h"
 
@@ -53,12 +53,12 @@ void machine_close(void)
 
 void machine_print(const char *text) { semihost(SYS_WRITE0, text); }
 
-/* Where a trace of instructions ends that began at controller_tick. */
+/* End of a trace of instructions that began at controller_tick. */
 __attribute__((noinline)) void tick_done(void) { __asm__ volatile(""); }
 
 static uint32_t now(void) { return SYSTICK[2]; }
 
-/* Clock ticks in instructions. SysTick counts down. */
+/* Converts clock ticks to instructions. SysTick counts down. */
 static uint32_t instructions(uint32_t before, uint32_t after)
 {
   const uint64_t clock = (before - after) & SYSTICK_MOST;

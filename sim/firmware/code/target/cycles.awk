@@ -1,7 +1,7 @@
-# Cycles of controller_tick: the first file is a disassembly, the second qemu's trace of a Cortex-M0, an
-# instruction a line. Costs of the Cortex-M0 are those of its technical reference manual, memory without
-# wait states. The MSP430 has no instructions of 32 bits: what it would take for the same work is
-# estimated from its family's user's guide (SLAU144), each operation on 32 bits as two on 16.
+# Cycles of controller_tick: the first file is a disassembly, the second qemu's trace of a Cortex-M0, one
+# instruction per line. Costs of the Cortex-M0 are from its technical reference manual, memory without
+# wait states. The MSP430 has no 32-bit instructions: its cycles are estimated from the family's user's
+# guide (SLAU144), each 32-bit operation as two of 16 bits.
 
 function cost(of, taken, count) {
     m0 = 1; msp = 2

@@ -1,4 +1,4 @@
-/* What replay.c compares with. */
+/* Expected values for replay.c. */
 #ifndef EXPECTED_H
 #define EXPECTED_H
 

@@ -1,7 +1,7 @@
-/* Gives the controller what simulated walks gave theirs, and compares what it answers, sample by sample.
+/* Feeds the controller the inputs of simulated walks and compares its outputs, sample by sample.
 
-   A walk's file, of little-endian 16-bit numbers after its head: "GSWALK1\0", legs (32 bits), ticks (32
-   bits); then leg by leg, tick by tick the leg's desired angles, angles, currents and PWM counts. */
+   A walk's file, of little-endian 16-bit numbers after its head: "GSWALK1\0", legs (32 bits), ticks
+   (32 bits); then by leg and tick the leg's desired angles, angles, currents and PWM counts. */
 #include "controller.h"
 #include "expected.h"
 #include "machine.h"
@@ -65,7 +65,7 @@ static void compare_targets(Tally *tally, const uint8_t *row, int walk, int leg,
 }
 #endif
 
-/* Returns 0 if the file is not what is expected. */
+/* Returns 0 if the file is not the expected one. */
 static int replay(Tally *tally, int walk)
 {
   uint8_t head[16], row[8 * JOINTS];
@@ -93,7 +93,7 @@ static int replay(Tally *tally, int walk)
 }
 
 #ifndef TRACED_TICKS
-/* FNV-1a of 32 bits: a walk does not come to every cell of a table. */
+/* 32-bit FNV-1a: a walk does not visit every cell of a table. */
 static int table_is_sound(const Expected_table *table)
 {
   uint32_t hash = 2166136261u;
@@ -101,7 +101,7 @@ static int table_is_sound(const Expected_table *table)
     hash = (hash ^ (uint8_t)table->values[i]) * (uint32_t)16777619;
   machine_print(table->name);
   machine_print(": ");
-  say(table->size, hash == table->hash ? " cells, as they were written\n" : " cells, CHANGED\n");
+  say(table->size, hash == table->hash ? " cells, unchanged\n" : " cells, CHANGED\n");
   return hash == table->hash;
 }
 #endif

@@ -45,7 +45,7 @@ class LookupTable:
     def __post_init__(self) -> None:
         if self.values.ndim != 3 or not self.values.size:
             raise SimulationInputError(
-                f"values: table of shape {self.values.shape}; three non-empty axes are required"
+                f"values: table of shape {self.values.shape}; it needs three axes, none empty"
             )
 
     def respond(self, error: Ints, current: Ints, change: Ints) -> Ints:

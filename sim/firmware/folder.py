@@ -17,11 +17,11 @@ from gaitswarm.sim.controllers import CONTROLLERS, ControlLaw, ControllerName, c
 from gaitswarm.sim.controllers.quantisation import Axis
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.firmware.c_text import (
+    code_file,
     controller_header,
     expected_header,
     expected_source,
     law_header,
-    own_file,
     readme,
     tables_source,
     trajectories_source,
@@ -207,7 +207,7 @@ def firmware_of(
     names, scenario_files = _scenario_files(scenarios)
     robot_option, robot_files = _robot_files(robot)
     texts = {
-        **{name: own_file(name) for name in _CODE},
+        **{name: code_file(name) for name in _CODE},
         "tick.c": control_tick(),
         "controller.h": controller_header(machine, controller, label),
         "law.h": law_header(integers),

@@ -1,1 +1,1 @@
-"""Foot trajectories, inverse kinematics and the smoothing of desired angles."""
+"""Foot trajectories, inverse kinematics and smoothing of the desired angles."""

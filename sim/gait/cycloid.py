@@ -1,7 +1,7 @@
-"""The foot's closed curve: a straight support phase and a composite cycloid as swing.
+"""Foot curve with a straight support phase and a composite cycloid as swing.
 
 Sakakibara, Kan, Hosoda, Hattori and Fujie, "Foot trajectory for a quadruped walking machine", IROS
-1990: no velocity and no acceleration where the foot leaves the ground and comes down.
+1990: zero velocity and acceleration at lift-off and touchdown.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Torques with which the legs that a gait has on the ground carry the robot."""
+"""Joint torques with which the legs on the ground carry the robot."""
 
 from __future__ import annotations
 
@@ -15,24 +15,23 @@ from gaitswarm.sim.robot.legs import ChainLeg, KneeUpLeg, LegKinematics
 Floats = NDArray[np.float64]
 
 _ON_THE_GROUND: Final = 0.1
-"""Share of a foot's lift up to which it counts as on the ground: a filter rounds its path."""
+"""Share of a foot's lift up to which it counts as on the ground: the filter rounds its path."""
 
 
 _LIFTED: Final = 1e-4
-"""Height up to which no foot counts as lifted [m]: those of a robot that stands are there but for
-rounding."""
+"""Height up to which no foot counts as lifted [m], for rounding errors of a standing robot."""
 
 _DECIMALS: Final = 9
-"""Of torques in N m that are kept: a walk must be the same anywhere."""
+"""Decimals of torques in N m, for equal walks on all machines."""
 
 
 def carrying_torques(robot: Robot, trajectory: Trajectory, gravity: float) -> Floats:
     """Feed-forward of a walk: the feet on the ground share the robot's weight evenly.
 
-    tau = -J^T (0, 0, f), f the weight by the number of feet that are down, J of the desired angles:
-    the static part of the feed-forward of Di Carlo et al. (Dynamic locomotion in the MIT Cheetah 3
-    through convex model-predictive control, 2018), without its optimization. The body is taken as
-    level; loads, which a robot does not know of, are left out.
+    tau = -J^T (0, 0, f), with f the weight per foot on the ground and J the Jacobian at the desired
+    angles: the static part of the feed-forward of Di Carlo et al. (Dynamic locomotion in the MIT
+    Cheetah 3 through convex model-predictive control, 2018), without its optimization. The body is
+    taken as level; loads, unknown to the robot, are ignored.
 
     Args:
         gravity: [m/s2].
@@ -43,8 +42,8 @@ def carrying_torques(robot: Robot, trajectory: Trajectory, gravity: float) -> Fl
     angles = trajectory.angles
     height, slopes = np.empty((len(angles), len(robot.legs))), np.empty_like(angles)
     for number, leg in enumerate(robot.legs):
-        own = slice(JOINTS_PER_LEG * number, JOINTS_PER_LEG * (number + 1))
-        height[:, number], slopes[:, own] = _height(leg, angles[:, own])
+        joints = slice(JOINTS_PER_LEG * number, JOINTS_PER_LEG * (number + 1))
+        height[:, number], slopes[:, joints] = _height(leg, angles[:, joints])
     lowest, highest = height.min(axis=0), height.max(axis=0)
     down = height <= lowest + np.maximum(_ON_THE_GROUND * (highest - lowest), _LIFTED)
     force = robot.mass * gravity / np.maximum(down.sum(axis=1), 1)
@@ -54,7 +53,7 @@ def carrying_torques(robot: Robot, trajectory: Trajectory, gravity: float) -> Fl
 
 
 def _height(leg: LegKinematics, angles: Floats) -> tuple[Floats, Floats]:
-    """Of the foot in the body's frame (T,) [m], and its derivatives by angle (T, 3) [m]."""
+    """Height of the foot in the body's frame (T,) [m], and its derivatives by angle (T, 3) [m]."""
     if isinstance(leg, ChainLeg):
         at, slopes = leg.feet(angles)
         return at[:, 2], slopes[:, 2, :]

@@ -1,9 +1,9 @@
-"""Gaits by name: when each leg comes down, for the legs that a robot has.
+"""Gaits by name, and each leg's part of a gait.
 
-A gait is the order of footfalls: by leg the *lag*, the share of the cycle by which its foot comes
+A gait is the order of footfalls: by leg the *lag*, the share of the cycle by which its foot touches
 down after the first one (Hildebrand 1965, "Symmetrical gaits of horses", Science 150; 1989, "The
-quadrupedal gaits of vertebrates", BioScience 39). Which feet stand at a moment depends on the duty
-factor beside it, which is the scenario's.
+quadrupedal gaits of vertebrates", BioScience 39). The feet on the ground at any time also depend on
+the scenario's duty factor.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from gaitswarm.sim.scenario import BY_LEG_GROUP, GaitName, Scenario
 from gaitswarm.sim.variables import split_name
 
 Rows = tuple[Sequence[int], Sequence[int]]
-"""Indices of the legs on the left and on the right, from the front."""
+"""Indices of the legs on the left and on the right, from front to hind."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,12 +33,11 @@ class Gait:
     """An order of footfalls.
 
     Attributes:
-        name: as scenarios have it.
-        description: what it is, with its source.
-        legs: numbers of legs that it is defined for, the same on both sides; any if empty.
-        lags: from the legs' rows to the lag of each, by its index.
-        duty_factor: from the number of legs to the share of the support at which a foot leaves the
-            ground as soon as another one has come down [1].
+        description: with its source.
+        legs: numbers of legs that it is defined for, half of them on each side; any if empty.
+        lags: from the legs' rows to the lag of each leg, by its index.
+        duty_factor: from the number of legs to the share of support at which a foot lifts off when
+            another one has touched down [1].
     """
 
     name: GaitName
@@ -49,12 +48,11 @@ class Gait:
 
     @property
     def legs_in_words(self) -> str:
-        """Numbers of legs that it is defined for."""
         return " or ".join(map(str, self.legs)) if self.legs else "any"
 
 
 def _places(rows: Rows) -> Iterator[tuple[int, int, int, int]]:
-    """Leg, its side (0 left, 1 right), its place from the front, and the legs of its side."""
+    """Leg, side (0 left, 1 right), place from the front, and the number of legs on its side."""
     for side, row in enumerate(rows):
         for place, leg in enumerate(row):
             yield leg, side, place, len(row)
@@ -155,11 +153,10 @@ _GAITS: Final = (
 )
 
 GAITS: Final[Mapping[GaitName, Gait]] = MappingProxyType({gait.name: gait for gait in _GAITS})
-"""All but `own`, which a robot's description has."""
+"""All but `own`, which is defined by a robot's description."""
 
 
 def find_gait(name: str) -> Gait:
-    """A gait that has a name."""
     for gait in _GAITS:
         if gait.name == name:
             return gait
@@ -173,38 +170,36 @@ def suits(gait: Gait, legs: Sequence[LegKinematics]) -> bool:
 
 
 def lags_of(gait: Gait, legs: Sequence[LegKinematics]) -> tuple[float, ...]:
-    """When each leg of a robot comes down."""
+    """Return the lag of each leg of a robot."""
     if not suits(gait, legs):
         fitting = ", ".join(name for name, other in GAITS.items() if suits(other, legs))
         left, right = rows_of(legs)
         raise SimulationInputError(
             f"gait: {gait.name} is for {gait.legs_in_words} legs, half of them on each side, not"
-            f" for {len(left)} on the left and {len(right)} on the right; for these there are"
-            f" {fitting}, or phases of your own"
+            f" for {len(left)} on the left and {len(right)} on the right; choose {fitting}, or"
+            " custom phases"
         )
     lags = gait.lags(rows_of(legs))
     return tuple(lags[leg] for leg in range(len(legs)))
 
 
 def phases_of(robot: Robot, scenario: Scenario) -> tuple[float, ...]:
-    """Where each leg is in its cycle when the gait begins, before `start_phase`."""
+    """Return each leg's phase when the gait begins, before `start_phase`."""
     if scenario.phases is not None:
         names = [leg.name for leg in robot.legs]
         if scenario.phases.keys() != set(names):
             raise SimulationInputError(
-                f"phases: of {', '.join(scenario.phases)}; {robot.description.name} has the legs"
-                f" {', '.join(names)}, each of which needs one"
+                f"phases: given for {', '.join(scenario.phases)}; {robot.description.name} has the"
+                f" legs {', '.join(names)}, and each needs one"
             )
         return tuple(scenario.phases[name] for name in names)
     if scenario.gait == "own":
         return tuple(leg.phase for leg in robot.description.legs)
-    # Whoever comes down later is not as far in its cycle.
+    # A leg that touches down later is not as far in its cycle.
     return tuple((1.0 - lag) % 1.0 for lag in lags_of(GAITS[scenario.gait], robot.legs))
 
 
 Floats = NDArray[np.float64]
-
-_NONE: Final[dict[int, float]] = {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,11 +223,11 @@ class LegGait:
 
 @dataclass(frozen=True, slots=True)
 class Sway:
-    """How the body moves beside its way, while the feet keep their places on the ground.
+    """Motion of the body relative to its course, while the feet keep their places on the ground.
 
     Attributes:
-        lateral: amplitude to the left and right, once a cycle [m].
-        longitudinal: amplitude along the way, twice a cycle [m].
+        lateral: amplitude to the left and right, once per cycle [m].
+        longitudinal: amplitude along the course, twice per cycle [m].
         begin: share of the cycle at the start of the walk since the body was furthest left.
     """
 
@@ -242,20 +237,16 @@ class Sway:
 
     @classmethod
     def of(cls, scenario: Scenario) -> Sway | None:
-        """The sway of a scenario's body."""
         if not scenario.sway_lateral and not scenario.sway_longitudinal:
             return None
         begin = scenario.start_phase - scenario.sway_phase
         return cls(scenario.sway_lateral, scenario.sway_longitudinal, begin)
 
     def body(self, cycles: Floats) -> tuple[Floats, Floats]:
-        """Where the body is, seen from where it would be.
+        """Displacement of the body along the course and to the left, (T,) each [m].
 
         Args:
             cycles: Time in cycles, (T,).
-
-        Returns:
-            Along the way and to the left, (T,) each [m].
         """
         angle = 2.0 * np.pi * (cycles + self.begin)
         # Forward while a left hind leg steps, back while the left front leg does: a lying eight.
@@ -263,11 +254,11 @@ class Sway:
 
 
 def leg_gaits(robot: Robot, scenario: Scenario) -> tuple[LegGait, ...]:
-    """What every leg of a robot does in a scenario."""
-    own = _by_parameter(robot, scenario)
-    strides, heights = own.get("stride", _NONE), own.get("height", _NONE)
-    duties, begins = own.get("duty_factor", _NONE), own.get("start_phase", _NONE)
-    radii = own.get("radius", _NONE)
+    values = _by_parameter(robot, scenario)
+    strides, heights, duties, begins, radii = (
+        values.get(name, {})
+        for name in ("stride", "height", "duty_factor", "start_phase", "radius")
+    )
     return tuple(
         LegGait(
             phase=phase + begins.get(k, scenario.start_phase),
@@ -281,7 +272,7 @@ def leg_gaits(robot: Robot, scenario: Scenario) -> tuple[LegGait, ...]:
 
 
 def _by_parameter(robot: Robot, scenario: Scenario) -> dict[str, dict[int, float]]:
-    """Values of legs whose groups have some of their own, by parameter and leg."""
+    """Values of legs whose groups differ from the scenario, by parameter and leg."""
     of_groups: dict[str, dict[str, float]] = {}
     for name, value in (scenario.by_group or {}).items():
         parameter, group = split_name(name)
@@ -294,13 +285,10 @@ def _by_parameter(robot: Robot, scenario: Scenario) -> dict[str, dict[int, float
 
 
 def supporting(gaits: Sequence[LegGait], cycles: Floats) -> NDArray[np.bool_]:
-    """Which feet stand by plan.
+    """Return which feet are planned to be on the ground, (T, L).
 
     Args:
         cycles: Time since the start in cycles, (T,).
-
-    Returns:
-        (T, L).
     """
     phases = np.array([gait.phase for gait in gaits])
     shares = np.array([gait.support_share for gait in gaits])

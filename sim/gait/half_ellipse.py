@@ -1,4 +1,4 @@
-"""The foot's closed curve: a straight support phase and a half-ellipse swing (table 3.2)."""
+"""Foot curve with a straight support phase and a half-ellipse as swing (table 3.2)."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Joint angles that put a foot where it is wanted.
+"""Inverse kinematics of the legs.
 
-In closed form for the thesis's legs (appendix, eq. 4, misprints mended), by Gauss-Newton steps for
-any other leg of three joints.
+In closed form for the thesis's legs (appendix, eq. 4, misprints corrected), by Gauss-Newton steps
+for any other leg of three joints.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from gaitswarm.sim.robot.legs import ChainLeg
 Floats = NDArray[np.float64]
 
 
-_STEPS: Final = 60
-"""Gauss-Newton steps at most; a target within reach takes about six."""
+_MAX_STEPS: Final = 60
+"""Limit of Gauss-Newton steps; a reachable target takes about six."""
 
-_FIRST_DAMPING, _MOST_DAMPING = 1e-3, 1e9
-"""In units of the squared Jacobian's trace, as all damping."""
+_FIRST_DAMPING, _MAX_DAMPING = 1e-3, 1e9
+"""In units of the trace of the squared Jacobian."""
 
 _REACHED: Final = 1e-9
 """Distance from a target at which it counts as reached [m]."""
 
 _EXACT: Final = 1e-14
-"""Distance from all targets [m], or change of all angles [rad], below which steps end."""
+"""Distance from all targets [m], or change of all angles [rad], at which the steps end."""
 
 
 def leg_angles(
@@ -50,7 +50,7 @@ def leg_angles(
     distance = np.hypot(outward, vertical)
     longest, shortest = femur + tibia, abs(femur - tibia)
     miss = np.maximum(0.0, np.maximum(distance - longest, shortest - distance))
-    # Cosine rule; the clip keeps a missed target's angles finite.
+    # Cosine rule; clipping keeps a missed target's angles finite.
     cos_knee = (distance**2 - femur**2 - tibia**2) / (2.0 * femur * tibia)
     theta2 = -np.arccos(np.clip(cos_knee, -1.0, 1.0))
     theta1 = np.arctan2(vertical, outward) - np.arctan2(
@@ -63,17 +63,17 @@ def chain_angles(leg: ChainLeg, targets: Floats) -> tuple[Floats, Floats]:
     """Angles of a leg of any mounting, on the branch of its stance.
 
     Levenberg-Marquardt steps from the stance, first half of the way to the targets, so that a knee
-    does not turn over.
+    does not flip.
 
     Args:
         targets: Of its foot in the body's frame, (T, 3) [m].
 
     Returns:
         Angles (T, 3) [rad]; and the miss (T,) [m] by which the target lies outside the leg's reach,
-        0 inside; the angles of a missed target are the nearest that were found.
+        0 inside; the angles of a missed target are the closest ones.
     """
-    # A walk comes back to where it was: equal targets are met once. But numpy does not round a row
-    # that is alone as it does others, so that it stays with its equals.
+    # Equal targets are solved once. However, numpy rounds a single row differently than several, so
+    # equal rows of a constant target stay together.
     rows = np.ascontiguousarray(targets).view(f"V{targets.itemsize * 3}")[:, 0]
     _, first, where = np.unique(rows, return_index=True, return_inverse=True)
     if len(first) == 1:
@@ -88,7 +88,7 @@ def chain_angles(leg: ChainLeg, targets: Floats) -> tuple[Floats, Floats]:
 
 
 class _Pose(NamedTuple):
-    """Of a leg at several times: angles (T, 3) [rad], foot (T, 3) [m] and its derivatives."""
+    """A leg at several times: angles (T, 3) [rad], foot (T, 3) [m] and its derivatives."""
 
     angles: Floats
     at: Floats
@@ -100,8 +100,8 @@ def _stepped(leg: ChainLeg, pose: _Pose, targets: Floats) -> _Pose:
     missed = targets - at
     squares = np.einsum("ti,ti->t", missed, missed)
     damping = np.full(len(targets), _FIRST_DAMPING)
-    for _ in range(_STEPS):
-        # The least damping keeps a stretched leg's step finite.
+    for _ in range(_MAX_STEPS):
+        # The smallest damping keeps a stretched leg's step finite.
         normal = np.einsum("tij,tik->tjk", jacobian, jacobian)
         scale = np.einsum("tii->t", normal)
         normal += ((damping + 1e-15) * scale)[:, None, None] * np.eye(3)
@@ -117,7 +117,7 @@ def _stepped(leg: ChainLeg, pose: _Pose, targets: Floats) -> _Pose:
         jacobian = np.where(good[:, None, None], slopes, jacobian)
         missed = np.where(good[:, None], left, missed)
         squares = np.where(good, better, squares)
-        damping = np.where(good, 0.1 * damping, np.minimum(10.0 * damping, _MOST_DAMPING))
+        damping = np.where(good, 0.1 * damping, np.minimum(10.0 * damping, _MAX_DAMPING))
         damping = np.where(squares < _REACHED**2, 0.0, damping)
         if squares.max() < _EXACT**2 or np.abs(steps).max() < _EXACT:
             break

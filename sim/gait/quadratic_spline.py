@@ -1,7 +1,7 @@
-"""The foot's curve of 2011: a straight support and a swing by a quadratic spline.
+"""Foot curve of 2011 with a straight support phase and a quadratic spline as swing.
 
-Appendix .2.1, eq. 1-3, with the weights (1-a)^2, 2a(1-a), a^2. `gaitswarm.sim.gait.driving_2011`
-says when its points were sent.
+Appendix .2.1, eq. 1-3, with the weights (1-a)^2, 2a(1-a), a^2. For the timing of its points see
+`gaitswarm.sim.gait.driving_2011`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Static stability of a planned gait: whether its feet hold the centre of mass at every moment."""
+"""Static stability of a planned gait: whether its feet support the centre of mass at any time."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from gaitswarm.sim.scenario import Scenario
 
 Floats = NDArray[np.float64]
 
-_MOMENTS: Final = 240
-"""Of a cycle that are looked at."""
+_SAMPLES: Final = 240
+"""Number of sampled times in a cycle."""
 
 
 @dataclass(frozen=True, slots=True)
 class Stability:
-    """How well a gait's feet hold the body, were it to stand still at any moment.
+    """Static stability of a gait.
 
     Attributes:
-        margin: least distance of the centre of mass, along gravity, from the edge of the polygon of
-            the feet that stand [m]; negative outside of it, as wherever fewer than three stand. The
-            static stability margin of McGhee and Frank (1968), Mathematical Biosciences 3. None
-            while no foot stands at some moment.
-        fewest_feet: that stand at any moment.
+        margin: smallest distance of the centre of mass, projected along gravity, from the edge of
+            the polygon of the supporting feet [m]; negative outside of it, as with fewer than three
+            feet. The static stability margin of McGhee and Frank (1968), Mathematical Biosciences
+            3. None if at some time no foot is on the ground.
+        fewest_feet: minimum of feet on the ground.
         duty_factor: mean of the legs' shares of support [1].
     """
 
@@ -42,25 +42,24 @@ class Stability:
 
     @property
     def stable(self) -> bool:
-        """Whether the gait is statically stable."""
         return self.margin is not None and self.margin > 0.0
 
 
 @lru_cache(maxsize=64)
 def static_stability(robot: Robot, scenario: Scenario) -> Stability:
-    """Look at all moments of a cycle as it is planned, without any simulation."""
+    """Evaluate a planned cycle, without simulation."""
     require_reachable(robot, scenario)
     plan = scenario.model_copy(update={"cycles": 1.0, "fir_ms": 0, "trajectory_rate": 500.0})
     angles = desired_angles(robot, plan).angles
-    ticks = np.unique(np.linspace(0, len(angles) - 1, _MOMENTS).astype(np.intp))
+    ticks = np.unique(np.linspace(0, len(angles) - 1, _SAMPLES).astype(np.intp))
     gaits = leg_gaits(robot, scenario)
     cycles = np.asarray(ticks * CONTROL_PERIOD / scenario.cycle_time, dtype=np.float64)
     stands = supporting(gaits, cycles)
     feet, centre = feet_and_centre_of_mass(robot, angles[ticks], scenario.load)
     duty = float(np.mean([gait.support_share for gait in gaits]))
-    found = Stability(None, int(stands.sum(axis=1).min()), duty)
-    if not found.fewest_feet:
-        return found
+    result = Stability(None, int(stands.sum(axis=1).min()), duty)
+    if not result.fewest_feet:
+        return result
     ground = np.min(np.where(stands, feet[:, :, 2], np.inf), axis=1)
     downhill = math.radians(scenario.slope_direction) + math.pi
     lean = (centre[:, 2] - ground) * math.tan(math.radians(scenario.slope))
@@ -69,18 +68,17 @@ def static_stability(robot: Robot, scenario: Scenario) -> Stability:
         support_margin(points[standing, :2], at)
         for points, standing, at in zip(feet, stands, below, strict=True)
     ]
-    return replace(found, margin=min(margins))
+    return replace(result, margin=min(margins))
 
 
 def support_margin(feet: Floats, point: Floats) -> float:
-    """Distance of a point from the edge of the feet's convex hull.
+    """Distance of a point from the edge of the feet's convex hull [m].
+
+    Positive inside the hull; negative outside, or if the feet are collinear.
 
     Args:
-        feet: (n, 2) [m], one at least.
+        feet: (n, 2) [m], n >= 1.
         point: (2,) [m].
-
-    Returns:
-        Positive inside of the hull, negative outside, and where the feet are on one line [m].
     """
     hull = _convex_hull([(x, y) for x, y in feet.tolist()])
     x, y = point.tolist()
@@ -96,7 +94,7 @@ def support_margin(feet: Floats, point: Floats) -> float:
 
 
 def _convex_hull(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Its corners, counter-clockwise (Andrew's monotone chain)."""
+    """Corners, counter-clockwise (Andrew's monotone chain)."""
     ordered = sorted(set(points))
     if len(ordered) < 3:
         return ordered
@@ -112,5 +110,5 @@ def _convex_hull(points: list[tuple[float, float]]) -> list[tuple[float, float]]
 
 
 def _turn(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
-    """Positive where the way from a over b to c turns left."""
+    """Positive if the path from a over b to c turns left."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])

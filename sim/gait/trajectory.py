@@ -25,32 +25,29 @@ from gaitswarm.sim.scenario import Scenario
 Floats = NDArray[np.float64]
 
 _BLOCK: Final = 2048
-"""Ticks that are filtered together: their sums stay in the processor's cache, however long a walk
-is."""
+"""Ticks filtered together, so that sums stay in the processor's cache."""
 
 FirWindow = Literal["moving_average", "hamming"]
-"""`hamming` is the default of Matlab's fir1: a windowed sinc."""
+"""Of the low-pass FIR filter (thesis section 5.4, table 3.2). `hamming` is the default of Matlab's
+fir1: a windowed sinc."""
 
 
 def fir_gains(fir_ms: int, window: FirWindow) -> Floats:
-    """Coefficients of the filter at the control rate; their sum, the gain at 0 Hz, is 1.
+    """Coefficients of the filter at the control rate, (n,), oldest angle first; the sum is 1.
 
     Args:
         fir_ms: Length of the filter [ms].
-        window: `moving_average`: equal coefficients, one a control period. `hamming`: as
-            fir1(order, cut-off), order being the number of control periods, so that the delay is
-            half of the length. The cut-off is one over the number of coefficients times the
-            control period: the main lobe of the ideal low-pass then just fills the filter.
-
-    Returns:
-        (n,), oldest angle first.
+        window: `moving_average`: equal coefficients, one per control period. `hamming`: fir1(order,
+            cut-off) with the number of control periods as order, so that the delay is half of the
+            length. The cut-off is one over the number of coefficients times the control period: the
+            main lobe of the ideal low-pass then just fills the filter.
     """
     order = round(fir_ms * 1e-3 / CONTROL_PERIOD)
     taps = max(1, order) if window == "moving_average" else order + 1
-    # One or two coefficients that are symmetric are equal, and have no cut-off below Nyquist's.
+    # One or two symmetric coefficients are equal, and have no cut-off below Nyquist's.
     if window == "moving_average" or taps < 3:
         return np.full(taps, 1.0 / taps)
-    # Slow to import, and only for this window.
+    # Slow to import, and needed only for this window.
     require_room_for_scipy()
     from scipy.signal import firwin  # noqa: PLC0415
 
@@ -58,14 +55,11 @@ def fir_gains(fir_ms: int, window: FirWindow) -> Floats:
 
 
 def low_pass(angles: Floats, fir_ms: int, window: FirWindow = "moving_average") -> Floats:
-    """Filtered angles, at rest before t = 0.
+    """Filtered angles (T, J), at rest before t = 0.
 
     Args:
         angles: At the control rate, (T, J).
         fir_ms: Length of the filter [ms].
-
-    Returns:
-        (T, J).
     """
     gains = fir_gains(fir_ms, window)
     taps, ticks = len(gains), len(angles)
@@ -78,8 +72,7 @@ def low_pass(angles: Floats, fir_ms: int, window: FirWindow = "moving_average") 
             for delay, gain in enumerate(gains):
                 block += padded[begin + delay : end + delay] * gain
         else:
-            # Tick by tick from the oldest on: a running sum would be faster still, but rounds
-            # otherwise.
+            # Tick by tick from the oldest on: a running sum would be faster but rounds differently.
             for delay in range(1, taps):
                 block += padded[begin + delay : end + delay]
     if window == "moving_average":
@@ -88,7 +81,7 @@ def low_pass(angles: Floats, fir_ms: int, window: FirWindow = "moving_average") 
 
 
 _DECIMALS: Final = 12
-"""Of angles in radians that are kept: a start pose is not coded, and must be the same anywhere."""
+"""Decimals of angles in radians: a start pose is not coded, and must be equal on all machines."""
 
 _CURVES: Final = {
     "half_ellipse": half_ellipse,
@@ -99,15 +92,15 @@ _CURVES: Final = {
 
 Limits = tuple[tuple[float, float], ...]
 
-_KEPT: Final = 64
-"""Trajectories that are kept for whoever asks for the same; most have a tenth of a megabyte."""
+_CACHE_SIZE: Final = 64
+"""Number of cached trajectories; most have a tenth of a megabyte."""
 
-_LONGEST_KEPT: Final = 10_000
-"""Control ticks of a trajectory that is kept."""
+_LONGEST_CACHED: Final = 10_000
+"""Longest cached trajectory [control ticks]."""
 
 _CHECKED_TICKS: Final = 10_000
-"""Control ticks of a walk that are looked at to tell whether legs reach it: two of the longest
-cycles at least, so all of a foot's path."""
+"""Control ticks checked for reachability: at least two of the longest cycles, so all of a foot's
+path."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,7 +111,7 @@ class Trajectory:
 
     Attributes:
         columns: (T, C) [rad]; row 0 is the pose at rest.
-        joints: by joint its column, (J,).
+        joints: column by joint, (J,).
         miss: largest distance by which a leg's target lies outside its reach, (L,) [m].
         excess: largest angle by which a joint would leave its limits, (J,) [rad].
     """
@@ -140,17 +133,13 @@ class Trajectory:
 
     @property
     def reachable(self) -> bool:
-        """Whether every target can be reached within the joints' limits."""
         return not (self.miss.any() or self.excess.any())
 
     def codes(self, angle_counts: float) -> NDArray[np.int32]:
-        """As the controller receives them.
+        """Encode for the controller, (T, J) [counts].
 
         Args:
-            angle_counts: Code of one radian [counts/rad].
-
-        Returns:
-            (T, J) [counts].
+            angle_counts: [counts/rad].
         """
         coded = np.rint(self.columns * angle_counts).astype(np.int32)
         return np.asarray(coded.take(self.joints, axis=1))
@@ -158,10 +147,7 @@ class Trajectory:
 
 @dataclass(frozen=True, slots=True)
 class _Foot:
-    """What any leg's angles depend on besides what all legs have in common.
-
-    limits: of the joints [rad].
-    """
+    """A leg's part in the angles. limits: of the joints [rad]."""
 
     gait: LegGait
     limits: Limits
@@ -169,8 +155,9 @@ class _Foot:
 
 @dataclass(frozen=True, slots=True)
 class _KneeUpFoot(_Foot):
-    """Of a leg as the thesis's. lengths: of its links. lateral: outward from the coxa's axis.
-    ground: below it [m]. side: of the leg, 0 if it makes no difference.
+    """Foot of a leg like the thesis's.
+
+    lateral: outward from the coxa's axis [m]. ground: below it [m]. side: 0 if irrelevant.
     """
 
     lengths: tuple[float, float, float]
@@ -188,13 +175,12 @@ class _KneeUpFoot(_Foot):
 
 @dataclass(frozen=True, slots=True)
 class _ChainFoot(_Foot):
-    """Of any other leg. rest: where the foot is in the body's frame in mid-support, (3,) [m]."""
+    """Of any other leg. rest: position of the foot in the body's frame in mid-support, (3,) [m]."""
 
     leg: ChainLeg
     rest: tuple[float, float, float]
 
     def angles(self, forward: Floats, left: Floats | None, lift: Floats) -> tuple[Floats, Floats]:
-        """Angles (T, 3) [rad], and the miss (T,) [m]."""
         x, y, z = self.rest
         aside = np.full_like(forward, y) if left is None else y + left
         targets = np.stack([x + forward, aside, z + lift], axis=1)
@@ -203,7 +189,7 @@ class _ChainFoot(_Foot):
 
 @dataclass(frozen=True, slots=True)
 class _Gait:
-    """What all legs have in common, as the scenario has it. ticks: of the whole walk."""
+    """The scenario's part in the angles, common to all legs. ticks: of the whole walk."""
 
     ticks: int
     cycle_time: float
@@ -228,24 +214,24 @@ class _Gait:
         )
 
     def time(self) -> Floats:
-        """When what a tick asks for was planned, (T,) [s]."""
+        """Time at which a tick's target was planned, (T,) [s]."""
         ticks = np.arange(self.ticks)
         if self.trajectory_rate * CONTROL_PERIOD >= 1.0:
             return np.asarray(ticks * CONTROL_PERIOD)
-        # Signals of a slow trajectory source are held between its updates (stepped, section 5.4).
+        # Targets of a slow source are held between its updates (stepped, section 5.4).
         updates = np.floor(ticks * (CONTROL_PERIOD * self.trajectory_rate) + 1e-9)
         return np.asarray(updates / self.trajectory_rate)
 
 
 def n_ticks(scenario: Scenario) -> int:
-    """Control ticks of a whole walk."""
     return max(1, round(scenario.duration / CONTROL_PERIOD))
 
 
 def desired_angles(robot: Robot, scenario: Scenario) -> Trajectory:
-    """A whole walk's desired angles, filtered as the robot's controller receives them."""
+    """Return a whole walk's desired angles, filtered as the robot's controller receives them."""
     feet, gait = _feet(robot, scenario), _Gait.of(scenario)
-    return _kept(feet, gait) if gait.ticks <= _LONGEST_KEPT else _trajectory(feet, gait)
+    plan = _cached_trajectory if gait.ticks <= _LONGEST_CACHED else _trajectory
+    return plan(feet, gait)
 
 
 def _feet(robot: Robot, scenario: Scenario) -> tuple[_KneeUpFoot | _ChainFoot, ...]:
@@ -257,7 +243,7 @@ def _feet(robot: Robot, scenario: Scenario) -> tuple[_KneeUpFoot | _ChainFoot, .
 def _foot(
     leg: LegKinematics, gait: LegGait, scenario: Scenario, sole: float, hips: float
 ) -> _KneeUpFoot | _ChainFoot:
-    """hips: height of the highest one in the body's frame [m]."""
+    """hips: height of the highest hip in the body's frame [m]."""
     ground = scenario.hip_height - sole
     limits = tuple((lower, upper) for lower, upper in leg.limits.tolist())
     if isinstance(leg, ChainLeg):
@@ -288,28 +274,27 @@ def _trajectory(feet: tuple[_KneeUpFoot | _ChainFoot, ...], gait: _Gait) -> Traj
     return Trajectory(columns, joints, miss, excess)
 
 
-_kept: Final = lru_cache(maxsize=_KEPT)(_trajectory)
+_cached_trajectory: Final = lru_cache(maxsize=_CACHE_SIZE)(_trajectory)
 
 
 def _planned(foot: _KneeUpFoot | _ChainFoot, gait: _Gait) -> tuple[Floats, float, Floats]:
-    """As `_unfiltered`: whether a walk is in reach is asked for before it is walked."""
-    plan = _unfiltered if gait.ticks <= _LONGEST_KEPT else _unfiltered.__wrapped__
+    plan = _unfiltered if gait.ticks <= _LONGEST_CACHED else _unfiltered.__wrapped__
     return plan(foot, gait)
 
 
-@lru_cache(maxsize=_KEPT)
+@lru_cache(maxsize=_CACHE_SIZE)
 def _unfiltered(foot: _KneeUpFoot | _ChainFoot, gait: _Gait) -> tuple[Floats, float, Floats]:
     """Angles (T, 3) [rad], the largest miss [m], and by joint the largest excess (3,) [rad]."""
-    cycles, own = gait.time() / gait.cycle_time, foot.gait
+    cycles, leg = gait.time() / gait.cycle_time, foot.gait
     forward, lift = _CURVES[gait.curve](
-        np.mod(cycles + own.phase, 1.0),
-        stride=own.stride,
-        height=own.height,
-        duty_factor=own.support_share,
+        np.mod(cycles + leg.phase, 1.0),
+        stride=leg.stride,
+        height=leg.height,
+        duty_factor=leg.support_share,
     )
     left = None
     if gait.sway is not None:
-        # Seen from the body, the feet go the other way.
+        # Relative to the body, the feet move in the opposite direction.
         ahead, aside = gait.sway.body(cycles)
         forward, left = forward - ahead, -aside
     if gait.backward:
@@ -321,21 +306,21 @@ def _unfiltered(foot: _KneeUpFoot | _ChainFoot, gait: _Gait) -> tuple[Floats, fl
 
 
 def require_reachable(robot: Robot, scenario: Scenario) -> None:
-    """Check that a robot's legs reach a walk's feet. Takes no longer for a long walk.
+    """Check that the legs reach the planned feet; takes no longer for a long walk.
 
-    Of a walk of more than 20 s the beginning is looked at, which has all of the foot's path; later
-    cycles may meet it a fraction of a control tick earlier or later.
+    Of a walk of more than 20 s only the beginning is checked, which has all of the foot's path;
+    later cycles may sample it a fraction of a control tick earlier or later.
     """
     _check_reach(robot, scenario)
 
 
-@lru_cache(maxsize=_KEPT)
+# Cached: most jobs have the same scenarios.
+@lru_cache(maxsize=_CACHE_SIZE)
 def _check_reach(robot: Robot, scenario: Scenario) -> None:
-    """`require_reachable`, which every job asks for of the scenarios that most jobs have."""
     gait = _Gait.of(scenario)
     gait = replace(gait, ticks=min(gait.ticks, _CHECKED_TICKS))
     feet = _feet(robot, scenario)
-    # The filter is left out: it smooths angles, and a target is missed before.
+    # Without the filter, which only smooths angles.
     planned = {foot: _planned(foot, gait)[1:] for foot in dict.fromkeys(feet)}
     worst = max(range(len(feet)), key=lambda leg: planned[feet[leg]][0])
     miss, _ = planned[feet[worst]]

@@ -1,1 +1,1 @@
-"""A robot in MuJoCo: its export, and walks by another engine."""
+"""MuJoCo as a second engine: models of a robot, their export, and walks."""

@@ -1,4 +1,4 @@
-"""Engines that a walk can be computed in, as data."""
+"""Names and descriptions of the engines; MuJoCo itself is not imported."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from gaitswarm.sim.variables import Variable
 EngineName = Literal["mujoco", "mujoco-contacts"]
 
 OWN: Final = "gaitswarm"
-"""The engine of all other walks: the compiled kernel, or its interpreter."""
+"""gaitswarm's own kernels."""
 
 ENGINE: Final = "engine"
-"""Name of the column of worlds that says which engine computes them."""
+"""Name of the column of worlds that selects the engine."""
 
 ENGINES: Final[Mapping[EngineName, str]] = MappingProxyType(
     {
@@ -25,16 +25,16 @@ ENGINES: Final[Mapping[EngineName, str]] = MappingProxyType(
         " as stiff, damped and rough as our soles",
     }
 )
-"""By name, for people."""
+"""Descriptions by name."""
 
 LIBRARY: Final = "mujoco-core"
-"""The distribution that all of them compute with."""
+"""The distribution that provides all of them."""
 
 _MODULE: Final = "mujoco"
 
 
 def engine_variable(engines: Sequence[EngineName] = tuple(ENGINES)) -> Variable:
-    """Which engine computes a walk, as a column of worlds."""
+    """The engine of a walk as a column of worlds."""
     return Variable(
         name=ENGINE,
         kind="categorical",
@@ -45,8 +45,8 @@ def engine_variable(engines: Sequence[EngineName] = tuple(ENGINES)) -> Variable:
 
 
 def check_installed() -> None:
-    """Check that the library of the engines is there; it is not imported."""
+    """Check that the engines' library is installed, without importing it."""
     if find_spec(_MODULE) is None:
         raise SimulationInputError(
-            f"mujoco needs {LIBRARY}, not installed here: pip install 'gaitswarm[mujoco]'"
+            f"mujoco requires {LIBRARY}, not installed here: pip install 'gaitswarm[mujoco]'"
         )

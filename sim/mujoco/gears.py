@@ -1,4 +1,4 @@
-"""Motors, battery and gears as numbers, written anew from docs/model.md."""
+"""Motors, battery and gears in numbers, independent of the kernel's formulas (docs/model.md)."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drive:
-    """Of the motors at an instant, (J,) each.
+    """State of the motors at an instant, (J,) each.
 
     Attributes:
         voltage: [V].
         current: [A].
         torque: at the gearheads' outputs, after friction [N m].
-        damping: by which these fall as rates grow, static friction left out [N m s/rad].
+        damping: decrease of the torque per rate, without static friction [N m s/rad].
     """
 
     voltage: Floats
@@ -35,10 +35,10 @@ class Drive:
 
 
 class Motors(Protocol):
-    """Motors of either kind, with the friction behind them."""
+    """Motors with the friction behind them."""
 
     def __call__(self, duty: Floats, rates: Floats) -> Drive:
-        """The motors at an instant.
+        """Return the state at an instant.
 
         Args:
             duty: Motor voltage per supply voltage, or torque per torque limit, (J,) [1].
@@ -46,25 +46,18 @@ class Motors(Protocol):
         """
 
     def current_after(self, drive: Drive, faster: Floats) -> Floats:
-        """Currents under the same command when the rates have grown.
-
-        Args:
-            faster: By which the rates have grown, (J,) [rad/s].
-
-        Returns:
-            After, (J,) [A].
-        """
+        """Currents (J,) [A] for the same command and rates higher by `faster` (J,) [rad/s]."""
 
 
 class _Friction:
-    """Of joints and gears. numbers: as for `DcMotors`."""
+    """Friction of joints and gears. numbers: see `DcMotors`."""
 
     def __init__(self, numbers: Mapping[str, Floats]) -> None:
         self.viscous = numbers["viscous"]
         self._static = numbers.get("static_friction", np.empty(0))
 
     def behind(self, torque: Floats, rates: Floats) -> Floats:
-        """What is left of torques [N m] at rates [rad/s] (J,)."""
+        """Torques [N m] reduced by friction at rates [rad/s] (J,)."""
         torque = torque - self.viscous * rates
         if self._static.size:
             torque -= self._static * np.clip(rates / STATIC_FRICTION_RATE, -1.0, 1.0)
@@ -72,7 +65,7 @@ class _Friction:
 
 
 class TorqueMotors:
-    """Torque-controlled actuators: what is commanded, within what the speed leaves of it."""
+    """Torque-controlled actuators: the command, limited by the speed."""
 
     def __init__(self, actuators: JointActuators, numbers: Mapping[str, Floats]) -> None:
         self._a, self._friction = actuators, _Friction(numbers)
@@ -80,14 +73,13 @@ class TorqueMotors:
         self._internal = float(numbers["supply_resistance"][0])
 
     def __call__(self, duty: Floats, rates: Floats) -> Drive:
-        """The actuators at an instant."""
-        a, wanted = self._a, duty * self._a.torque_limit
-        power = float(a.resistance @ (wanted / a.torque) ** 2 + wanted @ rates)
+        a, commanded = self._a, duty * self._a.torque_limit
+        power = float(a.resistance @ (commanded / a.torque) ** 2 + commanded @ rates)
         # U (source - U) / internal = power.
         square = max(0.25 * self._source**2 - self._internal * power, 0.0)
         stall = a.stall_torque + a.stall_torque_per_volt * (0.5 * self._source + math.sqrt(square))
         least, most = (sign * stall - a.torque_drop * rates for sign in (-1.0, 1.0))
-        torque = np.clip(wanted, np.minimum(least, 0.0), np.maximum(most, 0.0))
+        torque = np.clip(commanded, np.minimum(least, 0.0), np.maximum(most, 0.0))
         on_the_line = (torque == most) | (torque == least)
         current = torque / a.torque
         voltage = a.resistance * current + a.torque * rates
@@ -95,7 +87,6 @@ class TorqueMotors:
         return Drive(voltage, current, self._friction.behind(torque, rates), damping)
 
     def current_after(self, drive: Drive, faster: Floats) -> Floats:
-        """The same where torques are held, less where speed limits them."""
         after: Floats = (
             drive.current - (drive.damping - self._friction.viscous) / (self._a.torque) * faster
         )
@@ -106,9 +97,8 @@ class DcMotors:
     """Quasi-static currents on a battery of finite resistance (thesis 2.2.5).
 
     Args:
-        numbers: `viscous` and, of a robot that has it, `static_friction` (J,), and the battery's
-            `supply_voltage` and `supply_resistance` (1,), as `sim.kernel.parameters.Layout` has
-            them.
+        numbers: `viscous` and optionally `static_friction` (J,), `supply_voltage` and
+            `supply_resistance` (1,), as in `sim.kernel.parameters.Layout`.
     """
 
     def __init__(self, actuators: JointActuators, numbers: Mapping[str, Floats]) -> None:
@@ -119,14 +109,7 @@ class DcMotors:
         self._damping = self._k**2 / self._r + self._friction.viscous
 
     def __call__(self, duty: Floats, rates: Floats) -> Drive:
-        """The motors at an instant.
-
-        The battery gives sum(duty I) at U = source - internal sum(duty I).
-
-        Args:
-            duty: Motor voltage per supply voltage, (J,) [1].
-            rates: Of the gearheads' outputs, (J,) [rad/s].
-        """
+        """The battery's voltage is U = source - internal sum(duty I)."""
         back = self._k * rates
         share = duty / self._r
         supply = (self._source + self._internal * (share @ back)) / (
@@ -138,24 +121,15 @@ class DcMotors:
         return Drive(voltage, current, torque, self._damping)
 
     def current_after(self, drive: Drive, faster: Floats) -> Floats:
-        """Currents at the same voltages when the rates have grown.
-
-        Args:
-            faster: By which the rates have grown, (J,) [rad/s].
-
-        Returns:
-            After, (J,) [A].
-        """
         after: Floats = drive.current - self._k / self._r * faster
         return after
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Actuation:
-    """Of motors and gears at an instant.
+    """State of motors and gears at an instant.
 
     Attributes:
-        drive: of the motors.
         torque: on the links, (J,) [N m].
     """
 
@@ -164,10 +138,9 @@ class Actuation:
 
 
 class Gears(Protocol):
-    """Motors and what joins them to the links.
+    """Motors and their coupling to the links.
 
     Attributes:
-        motors: the motors.
         armature: rotor inertia that turns with the links, (J,) [kg m2].
     """
 
@@ -176,46 +149,28 @@ class Gears(Protocol):
 
     @property
     def memory(self) -> tuple[Floats, ...]:
-        """Angles [rad] and rates [rad/s] of rotors of their own, (J,) each; else nothing."""
+        """Angles [rad] and rates [rad/s] of separate rotors, (J,) each; else empty."""
 
     def encoders(self, angles: Floats) -> Floats:
-        """What the encoders see.
-
-        Args:
-            angles: Of the links, (J,) [rad].
-
-        Returns:
-            (J,) [rad].
-        """
+        """Angles seen by the encoders (J,) [rad] at these angles of the links (J,) [rad]."""
 
     def actuate(
         self, duty: Floats, angles: Floats, rates: Floats, ahead: Floats | float = 0.0
     ) -> Actuation:
-        """What motors and gears do at an instant.
+        """Return the action of motors and gears at an instant.
 
         Args:
             duty: Motor voltage per supply voltage, (J,) [1].
             angles: Of the links, (J,) [rad].
             rates: Of the links, (J,) [rad/s].
-            ahead: By which gearheads are turned further, (J,) [rad].
+            ahead: Additional angle of the gearheads, (J,) [rad].
         """
 
     def kick(self, actuation: Actuation, timestep: float, implicit: float = 0.0) -> Floats | None:
-        """Step the rates of rotors of their own.
-
-        Args:
-            timestep: [s].
-
-        Returns:
-            Accelerations of these rotors, (J,) [rad/s2]; None where they turn with the links.
-        """
+        """Step the rates of separate rotors; return their accelerations (J,) [rad/s2], or None."""
 
     def drift(self, time: float) -> None:
-        """Turn rotors of their own.
-
-        Args:
-            time: For how long [s].
-        """
+        """Turn separate rotors for a time [s]."""
 
 
 class FirmGears:
@@ -226,40 +181,36 @@ class FirmGears:
 
     @property
     def memory(self) -> tuple[Floats, ...]:
-        """Nothing."""
         return ()
 
     def encoders(self, angles: Floats) -> Floats:
-        """The links' angles."""
         return angles
 
     def actuate(
         self, duty: Floats, angles: Floats, rates: Floats, ahead: Floats | float = 0.0
     ) -> Actuation:
-        """The motors' torques."""
         del angles, ahead
         drive = self.motors(duty, rates)
         return Actuation(drive, drive.torque)
 
     def kick(self, actuation: Actuation, timestep: float, implicit: float = 0.0) -> Floats | None:
-        """Nothing: MuJoCo turns them as the links' armature."""
+        """None: MuJoCo turns the rotors as the links' armature."""
         del actuation, timestep, implicit
         return None
 
-    def drift(self, time: float) -> None:
-        """Nothing."""
+    def drift(self, time: float) -> None: ...
 
 
 class LooseGears:
-    """Rotors of their own that touch the links at either end of a play, through damped shafts.
+    """Separate rotors that touch the links at either end of a play, through damped shafts.
 
     Args:
         play: Of all joints, end to end, (J,) [rad].
-        angles: At which rotors and links begin, at rest, (J,) [rad].
+        angles: Initial angles of rotors and links at rest, (J,) [rad].
 
     Attributes:
         angles: of the rotors at the gearheads' outputs, (J,) [rad].
-        rates: likewise, (J,) [rad/s].
+        rates: of the same, (J,) [rad/s].
     """
 
     def __init__(self, robot: Robot, motors: Motors, play: Floats, angles: Floats) -> None:
@@ -272,36 +223,32 @@ class LooseGears:
 
     @property
     def memory(self) -> tuple[Floats, ...]:
-        """The rotors' angles and rates."""
         return self.angles, self.rates
 
     def encoders(self, angles: Floats) -> Floats:
-        """The rotors' angles."""
         del angles
         return self.angles
 
     def actuate(
         self, duty: Floats, angles: Floats, rates: Floats, ahead: Floats | float = 0.0
     ) -> Actuation:
-        """The shafts' torques."""
-        passed = self._shaft_torques(self.angles + ahead - angles, self.rates - rates)
-        return Actuation(self.motors(duty, self.rates), passed)
+        torque = self._shaft_torques(self.angles + ahead - angles, self.rates - rates)
+        return Actuation(self.motors(duty, self.rates), torque)
 
     def kick(self, actuation: Actuation, timestep: float, implicit: float = 0.0) -> Floats | None:
         """Motors damp at the given time of the step, shafts at its beginning."""
         inertia = self._inertia + implicit * timestep * actuation.drive.damping
-        own: Floats = (actuation.drive.torque - actuation.torque) / inertia
-        self.rates = self.rates + timestep * own
-        return own
+        spin: Floats = (actuation.drive.torque - actuation.torque) / inertia
+        self.rates = self.rates + timestep * spin
+        return spin
 
     def drift(self, time: float) -> None:
-        """Angles at constant rates."""
         self.angles = self.angles + time * self.rates
 
     def _shaft_torques(self, ahead: Floats, faster: Floats) -> Floats:
         """Torques on the links [N m] of rotors that are ahead [rad] and faster [rad/s] (J,).
 
-        None inside the play; beyond it a spring and damper that never pulls back.
+        Zero inside the play; beyond it a spring and damper that never pulls back.
         """
         beyond = ahead - np.clip(ahead, -self._half, self._half)
         side = np.sign(beyond)
@@ -311,11 +258,10 @@ class LooseGears:
 
 
 def gears_of(robot: Robot, numbers: Mapping[str, Floats], angles: Floats) -> Gears:
-    """The gears of a robot, motors and links at the same angles and at rest.
+    """Return the gears of a robot, motors and links at the same angles (J,) [rad] and at rest.
 
     Args:
-        numbers: As for `DcMotors`; of a robot with backlash `backlash` (J,), too.
-        angles: (J,) [rad].
+        numbers: See `DcMotors`; with backlash also `backlash` (J,).
     """
     kind = TorqueMotors if robot.is_torque_controlled else DcMotors
     motors = kind(robot.actuators(), numbers)

@@ -1,4 +1,4 @@
-"""Forces of the ground on the feet as numbers, written anew from docs/model.md."""
+"""Ground forces on the feet in numbers, independent of the kernel's formulas (docs/model.md)."""
 
 from __future__ import annotations
 
@@ -16,15 +16,14 @@ Floats = NDArray[np.float64]
 
 
 class Ground(ABC):
-    """A clamped spring and damper along the ground's normal, and a law of friction.
+    """A clamped spring and damper along the ground's normal, and a friction law.
 
     Args:
-        numbers: (L,) each, by the names of `gaitswarm.sim.robot.description.Contact`: those of
+        numbers: (L,) each, by the names of `gaitswarm.sim.robot.description.Contact` listed in
             `gaitswarm.sim.kernel.parameters.CONTACT_LAWS`.
 
     Attributes:
-        numbers: these.
-        memory: what the law knows of the steps before, (L, m).
+        memory: internal state of the law, (L, m).
     """
 
     def __init__(self, numbers: Mapping[str, Floats]) -> None:
@@ -34,7 +33,7 @@ class Ground(ABC):
         self.memory: Floats = np.zeros((len(self._mu), 0))
 
     def press(self, position: Floats, velocity: Floats) -> tuple[NDArray[np.bool_], Floats]:
-        """What the normal does: F_z = k p - c dz/dt while the sole touches, never pulling.
+        """F_z = k p - c dz/dt while the sole touches, never pulling.
 
         Args:
             position: Of the feet, (L, 3) [m].
@@ -60,15 +59,12 @@ class Ground(ABC):
         return bool(((depth <= 0.0) & (depth > velocity[:, 2] * time)).any())
 
     def forces(self, position: Floats, velocity: Floats, timestep: float) -> tuple[Floats, Floats]:
-        """The ground's answer to all feet; `memory` stays as it is.
+        """Return forces on the feet, (L, 3) [N], and the memory after the step.
 
         Args:
             position: Of the feet, (L, 3) [m].
             velocity: Of the feet, (L, 3) [m/s].
-            timestep: For how long it will be [s].
-
-        Returns:
-            Forces on the feet, (L, 3) [N], and the memory after the step.
+            timestep: [s].
         """
         touching, normal = self.press(position, velocity)
         rub, memory = self.friction(touching, self._mu * normal, velocity[:, :2], timestep)
@@ -78,16 +74,12 @@ class Ground(ABC):
     def friction(
         self, touching: NDArray[np.bool_], limit: Floats, slip: Floats, timestep: float
     ) -> tuple[Floats, Floats]:
-        """Forces along the ground.
+        """Return forces along the ground, (L, 2) [N], and the memory after the step.
 
         Args:
-            touching: Which feet do, (L,).
             limit: mu F_z, (L,) [N].
             slip: Velocities along the ground, (L, 2) [m/s].
             timestep: [s].
-
-        Returns:
-            Forces, (L, 2) [N], and the memory after the step.
         """
 
 
@@ -105,7 +97,7 @@ class LinearZone(Ground):
 
 
 class Karnopp(Ground):
-    """Full friction along each axis of the world that the foot moves along fast enough."""
+    """Full friction along each axis of the world along which the foot moves fast enough."""
 
     def friction(
         self, touching: NDArray[np.bool_], limit: Floats, slip: Floats, timestep: float
@@ -117,7 +109,7 @@ class Karnopp(Ground):
 
 
 class DeadZone(Ground):
-    """Friction against the slip: none below one velocity, full from another one on."""
+    """Friction against the slip: none below one velocity, full above another."""
 
     def friction(
         self, touching: NDArray[np.bool_], limit: Floats, slip: Floats, timestep: float
@@ -135,8 +127,8 @@ class Stick(Ground):
     """A spring and damper along the ground that slips where it would pull more than mu F_z.
 
     Its memory (L, 2) is the springs' elongation along the world's axes [m]: it grows by the step's
-    motion before it pulls, shrinks by the share by which a slipping foot's pull is cut, and is gone
-    when the foot lifts off.
+    motion before it pulls, shrinks in proportion to the reduced pull of a slipping foot, and
+    vanishes at lift-off.
     """
 
     def __init__(self, numbers: Mapping[str, Floats]) -> None:
@@ -146,7 +138,6 @@ class Stick(Ground):
     def friction(
         self, touching: NDArray[np.bool_], limit: Floats, slip: Floats, timestep: float
     ) -> tuple[Floats, Floats]:
-        """The springs' and dampers' pull, cut to mu F_z."""
         spring, damper = self.numbers["stick_stiffness"], self.numbers["stick_damping"]
         longer = np.where(touching[:, None], self.memory + timestep * slip, 0.0)
         pull = -(spring[:, None] * longer + damper[:, None] * slip)
@@ -158,4 +149,3 @@ class Stick(Ground):
 GROUNDS: Final[Mapping[ContactLaw, type[Ground]]] = MappingProxyType(
     {"linear_zone": LinearZone, "karnopp": Karnopp, "stick": Stick, "dead_zone": DeadZone}
 )
-"""By name of the law."""

@@ -1,9 +1,9 @@
-"""Walks whose rigid bodies and steps are MuJoCo's.
+"""Kernel whose rigid bodies and integrator are MuJoCo's.
 
-A kernel like the others, some hundred times slower than the compiled one. MuJoCo's own are the
-equations of motion and the integrator, semi-implicit Euler, and with soles that it knows the
-contacts. Control ticks, sensors and their errors, and the numbers of a world are the simulator's;
-motors, gears and ground are this room's.
+Some hundred times slower than the compiled kernel. MuJoCo computes the equations of motion, the
+integration (semi-implicit Euler), and with soles also the contacts. Control ticks, sensors with
+their errors, and the parameters of a world are the simulator's; motors, gears and ground are this
+package's.
 """
 
 from __future__ import annotations
@@ -48,40 +48,40 @@ from gaitswarm.sim.robot.inertia import BodyInertia, parallel_axis
 Floats = NDArray[np.float64]
 
 RATE: Final = 5_000
-"""Steps a second [Hz] of MuJoCo's Euler, whose error is of first order in their length."""
+"""Steps per second [Hz] of MuJoCo's Euler, whose error is of first order in their length."""
 
 BACKLASH_RATE: Final = 40_000
 """The same with backlash, where links are light without their rotors."""
 
 LANDING_RATE: Final = 80_000
-"""Steps a second [Hz] in control ticks in which a foot may come down: its damper stops it sooner
-than in a longer step, and nearly all of the error comes from there."""
+"""Steps per second [Hz] in control ticks in which a foot may touch down: its damper stops it sooner
+than in a longer step, which causes nearly all of the error."""
 
-_HUGE: Final = 1e10
-"""Of velocities, mjMAXVAL: MuJoCo calls a state that is greater unstable."""
+_MAX_VELOCITY: Final = 1e10
+"""mjMAXVAL: MuJoCo calls a state with a larger velocity unstable."""
 
 _HORIZON: Final = 1.25 * CONTROL_PERIOD
-"""How far ahead that is seen [s]."""
+"""Look-ahead for touchdowns [s]."""
 
-_TICKS_A_GLANCE: Final = 50
-"""Between looks at whether anybody waits for the walk."""
+_TICKS_PER_POLL: Final = 50
+"""Control ticks between calls of `should_stop`."""
 
 
 def _multiple(rate: int, inner: int) -> int:
-    """The least multiple of an inner rate that is a rate at least."""
+    """Round a rate up to a multiple of the inner rate."""
     return inner * math.ceil(rate / inner)
 
 
 class WalkStopped(Exception):
-    """Nobody waits for a walk any more."""
+    """`should_stop` ended a walk."""
 
 
 class MujocoKernel:
     """Walks in MuJoCo.
 
     Args:
-        rate: MuJoCo's steps a second [Hz], all of one length, of a multiple of the control rate;
-            None for `RATE`, or `BACKLASH_RATE`, and shorter ones where a foot may come down.
+        rate: Steps per second [Hz], constant, a multiple of the control rate; None for `RATE` or
+            `BACKLASH_RATE`, and shorter steps if a foot may touch down.
     """
 
     backend: Final = "mujoco"
@@ -102,7 +102,7 @@ class MujocoKernel:
         self._layout = Layout(robot)
 
     def walk(self, setups: Sequence[WalkSetup], coding: Coding, *, log: bool) -> WalkResults:
-        """All walks, one after the other."""
+        """Compute the walks one after the other."""
         for setup in setups:
             check_gains(setup.control_law, torque=self._robot.is_torque_controlled)
             setup.check(
@@ -123,7 +123,7 @@ class MujocoKernel:
         rows: list[Floats] = []
         status = Status.OK
         for tick, desired in enumerate(setup.desired):
-            if tick % _TICKS_A_GLANCE == 0 and self._should_stop():
+            if tick % _TICKS_PER_POLL == 0 and self._should_stop():
                 raise WalkStopped
             error, load = coded(*sensors.read(step.encoders(), sensed), desired, coding)
             counts = control(setup.control_law, coding, error, load, past)
@@ -132,7 +132,7 @@ class MujocoKernel:
             if log:
                 rows.append(np.concatenate([step.q, step.v, step.internal_state, sensed, duty]))
             begin, end = setup.shove_ticks
-            further = None if setup.disturbance is None else setup.disturbance[tick]
+            disturbance = None if setup.disturbance is None else setup.disturbance[tick]
             rate = self._landing_rate if step.landing(_HORIZON) else self._rate
             substeps = round(CONTROL_PERIOD * rate)
             share = coding.substeps / substeps
@@ -141,7 +141,7 @@ class MujocoKernel:
             for walked in range(substeps):
                 if walked and walked % (substeps // coding.inner_ticks) == 0:
                     duty = inner.command(*step.motors())
-                integrands, current = step.step(duty, further, shoved=begin <= tick < end)
+                integrands, current = step.step(duty, disturbance, shoved=begin <= tick < end)
                 sensed = low_pass(sensed, current, smoothing)
                 sums += share * integrands
                 peak_current = max(peak_current, float(current.max()))
@@ -158,7 +158,7 @@ class MujocoKernel:
 
 
 class _Stepper:
-    """MuJoCo's state of one walk, with gears and ground beside it."""
+    """MuJoCo's state of one walk, with gears and ground."""
 
     def __init__(self, robot: Robot, setup: WalkSetup, soles: Soles) -> None:
         self._numbers = numbers = Layout(robot).fields(setup.parameters)
@@ -170,9 +170,9 @@ class _Stepper:
         self._velocity, self._acceleration = self._d.qvel, self._d.qacc
         self._applied = self._d.qfrc_applied
         self._angles, self._rates = self._d.qpos[7:], self._velocity[6:]
-        # The first body is the world, the next the robot's.
+        # Body 0 is the world, body 1 the robot's.
         self._ahead = self._d.xmat[1, 0:6:3]
-        # Of the feet, by MuJoCo's sensors: positions [m], and velocities [m/s].
+        # Positions [m] and velocities [m/s] of the feet, by MuJoCo's sensors.
         self._of_feet: tuple[Floats, Floats] = tuple(self._d.sensordata.reshape(2, -1, 3))
         self._gears = gears_of(robot, numbers, setup.start[7:])
         self._ground = GROUNDS[robot.description.contact_law](numbers)
@@ -185,13 +185,13 @@ class _Stepper:
 
     @property
     def q(self) -> Floats:
-        """Positions as a kernel has them: quaternion x y z w."""
+        """Positions in the kernel's convention: quaternion x y z w."""
         qpos = self._d.qpos
         return np.concatenate([qpos[:3], qpos[4:7], qpos[3:4], qpos[7:]])
 
     @property
     def v(self) -> Floats:
-        """Velocities as a kernel has them: the base's twist in its own frame."""
+        """Velocities in the kernel's convention: the base's twist in its own frame."""
         qvel = self._d.qvel
         attitude = np.empty(9)
         mujoco.mju_quat2Mat(attitude, self._d.qpos[3:7])
@@ -199,37 +199,39 @@ class _Stepper:
 
     @property
     def internal_state(self) -> Floats:
-        """Rotors, then what the ground remembers."""
+        """Rotors, then the ground's memory."""
         return np.concatenate([*self._gears.memory, self._ground.memory.ravel()])
 
     def landing(self, time: float) -> bool:
-        """Whether a foot may come down within a time [s]."""
+        """Whether a foot may touch down within a time [s]."""
         self._derive()
         return self._ground.landing(*self._of_feet, time)
 
     def refine(self, timestep: float) -> None:
-        """Set the length of the steps that follow [s]."""
+        """Set the length of the following steps [s]."""
         self._m.opt.timestep = timestep
 
     def encoders(self) -> Floats:
-        """What the encoders see, (J,) [rad]."""
+        """Angles seen by the encoders, (J,) [rad]."""
         return self._gears.encoders(self._angles).copy()
 
     def motors(self) -> tuple[Floats, Floats]:
-        """Angles [rad] and rates [rad/s] that the encoders see, (J,) each."""
+        """Angles [rad] and rates [rad/s] seen by the encoders, (J,) each."""
         rotors = self._gears.memory
         return (rotors[0], rotors[1]) if rotors else (self._angles, self._rates)
 
-    def step(self, duty: Floats, further: Floats | None, *, shoved: bool) -> tuple[Floats, Floats]:
-        """One step; `INTEGRANDS` and absolute currents (J,) [A] at its beginning."""
+    def step(
+        self, duty: Floats, disturbance: Floats | None, *, shoved: bool
+    ) -> tuple[Floats, Floats]:
+        """Step once; return `INTEGRANDS` and absolute currents (J,) [A] at the step's beginning."""
         m, d, numbers, timestep = self._m, self._d, self._numbers, self._m.opt.timestep
         self._derive()
         angles, rates, applied = self._angles, self._rates, self._applied
-        displaced = 0.0 if further is None or not self._displaced else further
+        displaced = 0.0 if disturbance is None or not self._displaced else disturbance
         actuation = self._gears.actuate(duty, angles, rates, displaced)
         torque = actuation.torque
-        if further is not None and not self._displaced:
-            torque = torque + further
+        if disturbance is not None and not self._displaced:
+            torque = torque + disturbance
         applied[:3] = numbers["push"] if shoved else 0.0
         applied[3:6] = 0.0
         applied[6:] = torque
@@ -246,12 +248,12 @@ class _Stepper:
         mujoco.mj_fwdAcceleration(m, d)
         mujoco.mj_fwdConstraint(m, d)
         mujoco.mj_Euler(m, d)
-        self.diverged = not self._velocity @ self._velocity < _HUGE * _HUGE
+        self.diverged = not self._velocity @ self._velocity < _MAX_VELOCITY * _MAX_VELOCITY
         self._gears.kick(actuation, timestep)
         self._gears.drift(timestep)
-        gained = self._acceleration
-        load = float(np.abs(torque - self._gears.armature * gained[6:]).sum())
-        drive, acceleration, turn = actuation.drive, gained[:3], gained[3:6]
+        gain = self._acceleration
+        load = float(np.abs(torque - self._gears.armature * gain[6:]).sum())
+        drive, acceleration, turn = actuation.drive, gain[:3], gain[3:6]
         current = np.abs(drive.current)
         power = drive.voltage * drive.current
         integrands = np.array(
@@ -269,9 +271,7 @@ class _Stepper:
         return integrands, current
 
     def _derive(self) -> None:
-        """All that follows from positions and velocities: mj_step1 without its checks, which would
-        write to a file of the user's.
-        """
+        """mj_step1 without its checks, which would write to a file of the user."""
         m, d = self._m, self._d
         mujoco.mj_fwdPosition(m, d)
         mujoco.mj_sensorPos(m, d)
@@ -279,17 +279,17 @@ class _Stepper:
         mujoco.mj_sensorVel(m, d)
 
     def _push_feet(self) -> None:
-        """The ground's forces, beside those that are applied already."""
+        """Add the ground's forces to those already applied."""
         m, d = self._m, self._d
         position, velocity = self._of_feet
         forces, self._ground.memory = self._ground.forces(position, velocity, m.opt.timestep)
         for foot in forces[:, 2].nonzero()[0].tolist():
             mujoco.mj_applyFT(
-                m, d, forces[foot], _NOTHING, position[foot], self._feet[foot], self._applied
+                m, d, forces[foot], _NO_TORQUE, position[foot], self._feet[foot], self._applied
             )
 
 
-_NOTHING: Final = np.zeros(3)
+_NO_TORQUE: Final = np.zeros(3)
 
 
 def _model(robot: Robot, numbers: Mapping[str, Floats], soles: Soles) -> mujoco.MjModel:
@@ -308,14 +308,14 @@ def _surroundings(robot: Robot, numbers: Mapping[str, Floats]) -> Surroundings:
     xx, yy, zz, xy, xz, yz = numbers["base_inertia"].tolist()
     about_origin = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     body = BodyInertia(mass, centre, about_origin - mass * parallel_axis(centre))
-    own = CONTACT_LAWS[robot.description.contact_law].parameters
+    names = CONTACT_LAWS[robot.description.contact_law].parameters
     contacts = tuple(
-        contact.model_copy(update={name: float(numbers[name][leg]) for name in own})
+        contact.model_copy(update={name: float(numbers[name][leg]) for name in names})
         for leg, contact in enumerate(robot.contacts())
     )
     return Surroundings(body, numbers["gravity"], contacts)
 
 
 def _smoothing(smoothing: float, share: float) -> float:
-    """The analog low-pass over a share of the step that it is given for."""
+    """The analog low-pass over a share of the step."""
     return smoothing if smoothing >= 1.0 else -math.expm1(share * math.log1p(-smoothing))

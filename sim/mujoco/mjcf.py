@@ -1,7 +1,7 @@
-"""A robot as MJCF, MuJoCo's own format of models.
+"""A robot as MJCF, MuJoCo's model format.
 
-MuJoCo itself is not needed to write it. Joints keep the order of the robot's joint arrays. Every
-foot is a site of the leg's name, with a sensor of its position and one of its velocity.
+Written without MuJoCo. Joints keep the order of the robot's joint arrays. Every foot is a site of
+the leg's name, with a sensor of its position and one of its velocity.
 """
 
 from __future__ import annotations
@@ -27,18 +27,17 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 Soles = Literal["none", "spheres", "points"]
-"""What meets the ground: nothing, so that forces on the feet come from outside; spheres of the
-sole's length about the tibias' ends; or, with the ground raised by as much, these ends
-themselves."""
+"""Contact with the ground: none, with external forces on the feet; spheres of the sole's length
+about the tibias' ends; or, with the ground raised by that length, these ends as points."""
 
 TIMESTEP: Final = 2e-4
-"""Of a model for which none is given [s]."""
+"""Default [s]."""
 
 _FULL: Final = ([0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2])
 """MJCF's order of an inertia's elements: xx, yy, zz, xy, xz, yz."""
 
 _POINT: Final = "1e-7"
-"""Radius of a sphere that stands for a point [m]."""
+"""Radius of a sphere that represents a point [m]."""
 
 _COLOURS: Final[Mapping[str, str]] = {
     "body": "0.45 0.5 0.55 1",
@@ -52,10 +51,10 @@ _COLOURS: Final[Mapping[str, str]] = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surroundings:
-    """What a walk changes of a robot's model.
+    """Properties of a robot's model that depend on the walk.
 
     Attributes:
-        body: inertia of the body with all that it carries, in its own frame.
+        body: inertia of the body with its load, in its own frame.
         gravity: in a world whose z axis is normal to the ground, (3,) [m/s2].
         contacts: of the feet, in the order of the legs.
     """
@@ -78,20 +77,19 @@ class Surroundings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rig:
-    """What of a robot a model has, beside its rigid bodies.
+    """Optional parts of a model besides its rigid bodies.
 
     Attributes:
         timestep: of MuJoCo's steps [s].
-        soles: what meets the ground.
-        contacts: attributes of each foot's contact pair, in the order of the legs; none for
+        contacts: attributes of each foot's contact pair, in the order of the legs; empty for
             MuJoCo's defaults.
-        friction_impedance: MuJoCo's impratio, how much stiffer than a contact's normal constraint
-            its tangential one is [1].
+        friction_impedance: MuJoCo's impratio, stiffness of a contact's tangential constraint
+            relative to the normal one [1].
         voltage_motors: whether joints have actuators that turn a motor's voltage [V] into its
-            torque, quasi-static, friction included; those of torque-controlled joints take the
-            torque [N m]. Else torques come from outside.
-        looks: links with shapes to be seen; soles are drawn as they are.
-        start: positions of a keyframe `start`, as MuJoCo's qpos; None for no keyframe.
+            torque, quasi-static, friction included (torque-controlled joints: that take the torque
+            [N m]); else torques are external.
+        looks: links with visible shapes; soles are drawn as they are.
+        start: qpos of a keyframe `start`; None for no keyframe.
     """
 
     timestep: float = TIMESTEP
@@ -105,7 +103,7 @@ class Rig:
 
 def mjcf(robot: Robot, surroundings: Surroundings, rig: Rig) -> str:
     """Write a robot on a free joint as MJCF."""
-    limbs_of(robot)  # Refuses what cannot be simulated, with the reason.
+    limbs_of(robot)  # Raises for robots that cannot be simulated.
     root = ET.Element("mujoco", model=robot.description.name)
     ET.SubElement(root, "compiler", angle="radian", autolimits="false")
     option = ET.SubElement(
@@ -156,16 +154,16 @@ def _plane_height(contacts: Sequence[Contact], soles: Soles) -> float:
         return 0.0
     lengths = {contact.sole for contact in contacts}
     if len(lengths) > 1:
-        raise ValueError("soles of several lengths cannot meet one ground as points")
+        raise ValueError("point contacts require soles of equal length")
     return lengths.pop()
 
 
 def _add_leg(
     base: ET.Element, robot: Robot, number: int, drawn: Mapping[str, Sequence[Shape]]
 ) -> ET.Element:
-    """The leg's last body."""
+    """Add a leg; return its last body."""
     urdf, leg = robot.urdf, robot.description.legs[number]
-    # Behind backlash, rotors do not turn with the links.
+    # With backlash, rotors do not turn with the links.
     rotors = np.zeros(robot.n_joints) if robot.has_backlash else robot.actuators().armature
     armature = dict(zip(robot.joint_names, rotors.tolist(), strict=True))
     joints = {joint.name: joint for joint in urdf.joints}
@@ -219,7 +217,7 @@ def _add_inertia(body: ET.Element, inertia: BodyInertia) -> None:
 
 
 def _shapes(robot: Robot, looks: Sequence[VisibleLink]) -> dict[str, list[Shape]]:
-    """By link that is a body of its own: what is fixed to one, and soles, are left out."""
+    """Shapes by link, for links that are bodies of their own, without soles."""
     return {
         link.name: [shape for shape in link.shapes if shape.role != "foot"]
         for link in looks
@@ -265,7 +263,7 @@ def _add_pairs(
 
 
 def _add_sensors(root: ET.Element, sites: Sequence[str]) -> None:
-    """All feet's positions, then all their velocities, in the world."""
+    """Positions of all feet, then their velocities, in the world."""
     sensor = ET.SubElement(root, "sensor")
     for kind in ("framepos", "framelinvel"):
         for site in sites:

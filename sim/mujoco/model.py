@@ -1,8 +1,8 @@
-"""Compiled models of a robot, MuJoCo's contacts fitted to it.
+"""Compiled models of a robot, with MuJoCo's contacts fitted to it, and their export.
 
-MuJoCo's contact force is [s p - b v - d a] / ((1 - d) A) for a penetration p that the force gives
-the acceleration a, s and b being solref's direct stiffness and damping, d the impedance and A the
-inverse mass that MuJoCo ascribes to the two bodies at the contact.
+MuJoCo's contact force is [s p - b v - d a] / ((1 - d) A) for a penetration p with the acceleration
+a due to the force, s and b being solref's direct stiffness and damping, d the impedance and A the
+inverse mass that MuJoCo assigns to the two bodies at the contact.
 """
 
 from __future__ import annotations
@@ -28,18 +28,18 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Feet:
-    """MuJoCo's own contact of soles on a plane, in place of forces that are applied.
+    """MuJoCo's own contact of soles on a plane, in place of applied forces.
 
     Attributes:
         drags: tangential force per slip velocity below the friction limit, by leg [N s/m].
-        points: whether the ground is raised by the sole's length and met by the tibias' ends
-            themselves, so that its forces act there, as ours do, and not at the bottom of a sphere.
+        points: whether the ground is raised by the sole's length and touched by the tibias' ends,
+            so that its forces act there, as in the kernel, and not at the bottom of a sphere.
         impedance: MuJoCo's d, the share of a contact's effect that the constraint may force. The
-            smaller, the more exactly the soft constraint is a spring and damper; the default is
-            the least that MuJoCo takes.
-        friction_impedance: impratio, how much stiffer than the normal constraint the tangential
-            one is. At 1 a sliding foot would also be lifted; the tangential impedance is this
-            times `impedance`.
+            smaller, the closer the soft constraint is to a spring and damper; the default is
+            MuJoCo's minimum.
+        friction_impedance: impratio, stiffness of the tangential constraint relative to the normal
+            one. At 1 a sliding foot would also be lifted; the tangential impedance is this times
+            `impedance`.
     """
 
     drags: tuple[float, ...]
@@ -56,7 +56,7 @@ def model(
     feet: Feet | None = None,
     voltage_motors: bool = False,
 ) -> mujoco.MjModel:
-    """The compiled model of a robot in a scenario.
+    """Return the compiled model of a robot in a scenario.
 
     Args:
         timestep: Of MuJoCo's steps [s].
@@ -87,15 +87,12 @@ def with_contacts(robot: Robot, surroundings: Surroundings, rig: Rig, feet: Feet
 def even_drags(
     robot: Robot, surroundings: Surroundings, standing: float | None = None
 ) -> tuple[float, ...]:
-    """Drags with which friction is full at the slip that the robot's law has it full at.
+    """Drags, by leg [N s/m], with which friction is full at the same slip as in the robot's law.
 
-    A law's drag follows the normal force; MuJoCo's is one number for all loads.
+    A law's drag follows the normal force; MuJoCo's is constant.
 
     Args:
         standing: Feet that carry the weight evenly [1]; None for half of them.
-
-    Returns:
-        By leg [N s/m].
     """
     mass = robot.urdf.total_mass - robot.urdf.body.mass + surroundings.body.mass
     share = -float(surroundings.gravity[2]) * mass / (standing or 0.5 * len(robot.legs))
@@ -114,7 +111,7 @@ def _pair(
     body = free.site_bodyid[free.site(foot).id]
     per_force = float(free.body_invweight0[body, 0]) * (1.0 - d)
     spring, damper = contact.stiffness * per_force, contact.damping * per_force
-    # Tangential constraints have no position, hence no stiffness that would matter.
+    # Tangential constraints have no position, hence no relevant stiffness.
     rub = drag * per_force / feet.friction_impedance
     return {
         "solimp": f"{d!r} {d!r} 0.001 0.5 2",
@@ -124,12 +121,12 @@ def _pair(
 
 
 def exported(robot: Robot, scenario: Scenario, *, contacts: bool = True) -> str:
-    """Write a robot in a scenario as MJCF that MuJoCo's viewer opens and steps.
+    """Write a robot in a scenario as MJCF for MuJoCo's viewer.
 
-    It has the scenario's load and slope, joints with the motors' voltages as controls [V], or with
-    torques [N m] where these are controlled, shapes to be seen, and a keyframe `start`, the pose in
-    which a walk through the scenario begins. Backlash, limits of torque by speed, the battery's sag
-    and static friction are not in it.
+    It has the scenario's load and slope, joints with the motors' voltages [V] as controls (torques
+    [N m] if torque-controlled), visible shapes, and a keyframe `start`, the pose at the beginning
+    of a walk through the scenario. Backlash, limits of torque by speed, the battery's sag and
+    static friction are omitted.
     """
     require_reachable(robot, scenario)
     surroundings = Surroundings.of(robot, scenario)

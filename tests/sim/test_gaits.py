@@ -147,7 +147,7 @@ def test_a_gait_for_another_number_of_legs_is_refused_with_those_that_fit(
 
 
 def test_phases_of_other_legs_than_the_robots_are_refused_with_its_legs(hexapod: Robot) -> None:
-    with pytest.raises(SimulationInputError, match=r"^phases: of FL; szabadka2 has.*right_front"):
+    with pytest.raises(SimulationInputError, match=r"^phases: given for FL; .*right_front"):
         desired_angles(hexapod, level(phases={"FL": 0.0}))
 
 

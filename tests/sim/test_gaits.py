@@ -135,7 +135,7 @@ def test_phases_of_ones_own_are_by_leg(hexapod: Robot) -> None:
 @pytest.mark.parametrize(
     ("gait", "said"),
     [
-        ("tripod", "tripod is for 6 legs.*these there are alternating, wave, trot, pace, bound"),
+        ("tripod", "tripod is for 6 legs.*choose alternating, wave, trot, pace, bound"),
         ("ripple", "ripple is for 6 or 8 or 10 or 12 legs"),
     ],
 )

@@ -11,7 +11,7 @@ import numpy as np
 
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
 from gaitswarm.sim.errors import SimulationInputError
-from gaitswarm.sim.gait.driving_2011 import driven_as_in_2011
+from gaitswarm.sim.gait.quadratic_spline import driven_as_in_2011
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
 from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.outcome import Status

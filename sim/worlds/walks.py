@@ -21,8 +21,8 @@ from gaitswarm.sim.kernel.walk import (
     Kernel,
     Precision,
     Walking,
-    WalkSetup,
     WalkRequest,
+    WalkSetup,
     walk_together,
 )
 from gaitswarm.sim.mujoco.engines import ENGINES, check_installed

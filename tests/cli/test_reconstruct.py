@@ -21,7 +21,7 @@ from gaitswarm.cli.reconstruction.optimality import OPTIMA, optimality, random_d
 from gaitswarm.cli.reconstruction.plan import TARGETS, Size, calibrations
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, judge
 from gaitswarm.sim.controllers import CONTROLLERS
-from gaitswarm.sim.gait.driving_2011 import driven_as_in_2011
+from gaitswarm.sim.gait.quadratic_spline import driven_as_in_2011
 from gaitswarm.sim.gait_variables import with_gait
 from gaitswarm.sim.scenario import SCENARIOS
 from tests.cli.conftest import Gaitswarm

@@ -13,10 +13,9 @@ from hypothesis import strategies as st
 
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.errors import UnreachablePose
-from gaitswarm.sim.gait.driving_2011 import driven_as_in_2011
 from gaitswarm.sim.gait.half_ellipse import half_ellipse
 from gaitswarm.sim.gait.inverse_kinematics import leg_angles
-from gaitswarm.sim.gait.quadratic_spline import quadratic_spline
+from gaitswarm.sim.gait.quadratic_spline import driven_as_in_2011, quadratic_spline
 from gaitswarm.sim.gait.trajectory import desired_angles, n_ticks, require_reachable
 from gaitswarm.sim.robot import Robot, load_robot
 from gaitswarm.sim.robot.posture import feet_below_body, resting_height

@@ -28,7 +28,7 @@ from unittest.mock import patch
 from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
 from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.search.swarm.pso import PsoSettings
+from gaitswarm.services.optimizer.search.pso import PsoSettings
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.runtime import open_store, run_embedded
 from gaitswarm.services.worker import EvaluatorKind

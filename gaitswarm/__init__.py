@@ -61,26 +61,13 @@ if TYPE_CHECKING:
     from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference
     from gaitswarm.services.optimizer.run.outage import Backoff
     from gaitswarm.services.optimizer.search.automatic import AutoSettings
-    from gaitswarm.services.optimizer.search.evolution.cma_es import CmaEsSettings
-    from gaitswarm.services.optimizer.search.evolution.differential_evolution import DeSettings
-    from gaitswarm.services.optimizer.search.evolution.genetic import GaSettings
-    from gaitswarm.services.optimizer.search.evolution.hype import HypeSettings
-    from gaitswarm.services.optimizer.search.local.annealing import AnnealingSettings
-    from gaitswarm.services.optimizer.search.local.directed_tabu import DirectedTabuSettings
-    from gaitswarm.services.optimizer.search.local.mads import MadsSettings
-    from gaitswarm.services.optimizer.search.local.nelder_mead import NelderMeadSettings
-    from gaitswarm.services.optimizer.search.local.pattern_search import PatternSearchSettings
-    from gaitswarm.services.optimizer.search.model.bayesian import BayesianSettings
-    from gaitswarm.services.optimizer.search.multistart.global_search import (
-        GlobalBfgsSettings,
-        GlobalNelderMeadSettings,
-        GlobalUnirandiSettings,
-    )
+    from gaitswarm.services.optimizer.search.bayesian import BayesianSettings
+    from gaitswarm.services.optimizer.search.cma_es import CmaEsSettings
+    from gaitswarm.services.optimizer.search.differential_evolution import DeSettings
+    from gaitswarm.services.optimizer.search.hype import HypeSettings
+    from gaitswarm.services.optimizer.search.pso import PsoSettings
+    from gaitswarm.services.optimizer.search.pso_ps import PsoPsSettings
     from gaitswarm.services.optimizer.search.random_search import RandomSearchSettings
-    from gaitswarm.services.optimizer.search.swarm.gsa import GsaSettings
-    from gaitswarm.services.optimizer.search.swarm.pso import PsoSettings
-    from gaitswarm.services.optimizer.search.swarm.pso_ps import PsoPsSettings
-    from gaitswarm.services.optimizer.search.swarm.tlbo import TlboSettings
     from gaitswarm.sim.calibration.targets import Target, TargetWalk
     from gaitswarm.sim.controllers import CONTROLLERS
     from gaitswarm.sim.identification.recorded_walk import RecordedWalk
@@ -128,7 +115,6 @@ __all__ = [
     "PREFERENCES",
     "PRESETS",
     "SCENARIOS",
-    "AnnealingSettings",
     "AsyncDatabaseJobs",
     "AsyncJobs",
     "AsyncServerJobs",
@@ -143,7 +129,6 @@ __all__ = [
     "Conflict",
     "DatabaseJobs",
     "DeSettings",
-    "DirectedTabuSettings",
     "EvaluationTable",
     "EvaluationView",
     "EvaluatorUnavailable",
@@ -151,12 +136,7 @@ __all__ = [
     "FirmwareView",
     "Forbidden",
     "FrontView",
-    "GaSettings",
     "GaitswarmError",
-    "GlobalBfgsSettings",
-    "GlobalNelderMeadSettings",
-    "GlobalUnirandiSettings",
-    "GsaSettings",
     "HistoryIterationView",
     "HypeSettings",
     "IdempotencyConflict",
@@ -175,11 +155,8 @@ __all__ = [
     "JobView",
     "Jobs",
     "LeaseLost",
-    "MadsSettings",
-    "NelderMeadSettings",
     "NotFound",
     "OptimizationResult",
-    "PatternSearchSettings",
     "Preference",
     "PreferenceForView",
     "ProvenanceChanged",
@@ -208,7 +185,6 @@ __all__ = [
     "Target",
     "TargetWalk",
     "TargetsView",
-    "TlboSettings",
     "TooManyRequests",
     "TuningWorlds",
     "Unauthorized",
@@ -280,24 +256,13 @@ _MODULES: Final = {
     "gaitswarm.services.optimizer.jobs.kinds.tuning": ("JobSpec",),
     "gaitswarm.services.optimizer.jobs.kinds.tuning_worlds": ("TuningWorlds",),
     "gaitswarm.services.optimizer.search.automatic": ("AutoSettings",),
-    "gaitswarm.services.optimizer.search.evolution.cma_es": ("CmaEsSettings",),
-    "gaitswarm.services.optimizer.search.evolution.differential_evolution": ("DeSettings",),
-    "gaitswarm.services.optimizer.search.evolution.genetic": ("GaSettings",),
-    "gaitswarm.services.optimizer.search.evolution.hype": ("HypeSettings",),
-    "gaitswarm.services.optimizer.search.local.annealing": ("AnnealingSettings",),
-    "gaitswarm.services.optimizer.search.local.directed_tabu": ("DirectedTabuSettings",),
-    "gaitswarm.services.optimizer.search.local.mads": ("MadsSettings",),
-    "gaitswarm.services.optimizer.search.local.nelder_mead": ("NelderMeadSettings",),
-    "gaitswarm.services.optimizer.search.local.pattern_search": ("PatternSearchSettings",),
-    "gaitswarm.services.optimizer.search.model.bayesian": ("BayesianSettings",),
-    "gaitswarm.services.optimizer.search.multistart.global_search": (
-        "GlobalBfgsSettings", "GlobalNelderMeadSettings", "GlobalUnirandiSettings",
-    ),
+    "gaitswarm.services.optimizer.search.cma_es": ("CmaEsSettings",),
+    "gaitswarm.services.optimizer.search.differential_evolution": ("DeSettings",),
+    "gaitswarm.services.optimizer.search.hype": ("HypeSettings",),
+    "gaitswarm.services.optimizer.search.bayesian": ("BayesianSettings",),
     "gaitswarm.services.optimizer.search.random_search": ("RandomSearchSettings",),
-    "gaitswarm.services.optimizer.search.swarm.gsa": ("GsaSettings",),
-    "gaitswarm.services.optimizer.search.swarm.pso": ("PsoSettings",),
-    "gaitswarm.services.optimizer.search.swarm.pso_ps": ("PsoPsSettings",),
-    "gaitswarm.services.optimizer.search.swarm.tlbo": ("TlboSettings",),
+    "gaitswarm.services.optimizer.search.pso": ("PsoSettings",),
+    "gaitswarm.services.optimizer.search.pso_ps": ("PsoPsSettings",),
     "gaitswarm.services.optimizer.run.outage": ("Backoff",),
     "gaitswarm.sim.controllers": ("CONTROLLERS",),
     "gaitswarm.sim.calibration.targets": ("Target", "TargetWalk"),

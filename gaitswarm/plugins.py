@@ -11,9 +11,11 @@ from gaitswarm.services.optimizer.search.optimizer import (
     matrix,
     parse_state,
 )
+from gaitswarm.services.optimizer.search.pattern_search import Polls, PollSettings, polls
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
-from gaitswarm.services.optimizer.search.replayed import Proposals
-from gaitswarm.services.optimizer.search.space import Axis, Space
+from gaitswarm.services.optimizer.search.registry import create_search
+from gaitswarm.services.optimizer.search.replayed import Proposals, Start
+from gaitswarm.services.optimizer.search.space import Axis, Judged, Space
 from gaitswarm.sim.case import Case, LongCase, Walk
 from gaitswarm.sim.case_registry import CaseFamily, CaseSettings
 from gaitswarm.sim.controllers.base import ControlLaw, Controller, Inference, LookupTable, Response
@@ -44,6 +46,7 @@ __all__ = [
     "ControlLaw",
     "Controller",
     "Inference",
+    "Judged",
     "Kernel",
     "LongCase",
     "LookupTable",
@@ -51,6 +54,8 @@ __all__ = [
     "Objective",
     "Optimizer",
     "Outcome",
+    "PollSettings",
+    "Polls",
     "Proposals",
     "RandomNumbers",
     "Response",
@@ -59,16 +64,19 @@ __all__ = [
     "SearchSettings",
     "SimulationInputError",
     "Space",
+    "Start",
     "Status",
     "Variable",
     "Walk",
     "checked_fitness",
     "checked_start",
+    "create_search",
     "from_generator",
     "integral_gain",
     "load_robot",
     "matrix",
     "parse_state",
+    "polls",
     "required",
     "to_fixed",
 ]

@@ -13,7 +13,7 @@ from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
 from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.run.embedded import run_embedded
-from gaitswarm.services.optimizer.search.swarm.pso import PsoSettings
+from gaitswarm.services.optimizer.search.pso import PsoSettings
 from gaitswarm.services.optimizer.store.port.base import Store
 from gaitswarm.services.optimizer.store.sql_store import open_store
 from gaitswarm.services.worker import EvaluatorKind

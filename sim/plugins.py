@@ -178,10 +178,15 @@ class Registry(MutableMapping[str, T]):
     """
 
     def __init__(
-        self, kind: Kind, built_in: Mapping[str, T], accept: Callable[[Plugin, object], T]
+        self,
+        kind: Kind,
+        built_in: Mapping[str, T],
+        accept: Callable[[Plugin, object], T],
+        elsewhere: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
         self._kind: Kind = kind
         self._built_in = dict(built_in)
+        self._elsewhere = elsewhere
         self._accept = accept
         self._loaded: dict[Plugin, T] = {}
         self._broken: dict[Plugin, str] = {}
@@ -245,7 +250,9 @@ class Registry(MutableMapping[str, T]):
         return f"unknown {self._kind} {name!r}; {self.instead_of(name, self)}"
 
     def instead_of(self, name: str, known: Iterable[str]) -> str:
-        """What may help whoever gave a name that is none."""
+        """Say how an unknown name can be corrected, or which package brings it."""
+        if name in self._elsewhere and not any(p.name == name for p in self.plugins()):
+            return self._elsewhere[name]
         known = list(known)
         found = [self.problem(plugin) for plugin in self.plugins() if plugin.name == name]
         reasons = [reason for reason in found if reason is not None]

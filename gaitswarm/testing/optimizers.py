@@ -206,6 +206,28 @@ class SearchContract:
             assert 1 <= len(positions) <= min(PARTICLES, most or PARTICLES)
             optimizer.tell(answer(self.name, positions))
 
+    def test_start_positions_are_asked_for_first_and_survive_a_load(self) -> None:
+        box = self.spaces["mixed"]
+        start = box.from_unit(np.linspace(0.2, 0.7, 3)[:, np.newaxis] * np.ones(box.dimension))
+
+        def started() -> Optimizer:
+            optimizer = search(self.name)
+            optimizer.start_from(start)
+            return optimizer
+
+        whole = bits(path(started(), self.name, evaluations=30))
+        assert whole[: len(start)] == bits(start)
+        optimizer, found = started(), list[bytes]()
+        while optimizer.evaluations < 30:
+            positions = optimizer.ask(30 - optimizer.evaluations)
+            found += bits(positions)
+            optimizer.tell(answer(self.name, positions))
+            state = through_json(optimizer)
+            optimizer = started()
+            optimizer.load(state)
+        assert found == whole
+        refused(ValueError, "start", partial(search(self.name).start_from, start + 1e6))
+
     def test_asking_twice_gives_the_same_positions(self) -> None:
         optimizer = search(self.name)
         first = optimizer.ask()

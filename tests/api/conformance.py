@@ -36,7 +36,7 @@ from schemathesis.specs.openapi.checks import (
 )
 
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.search.swarm.pso import PsoSettings
+from gaitswarm.services.optimizer.search.pso import PsoSettings
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
 from gaitswarm.services.runtime import open_evaluator, run_embedded

@@ -12,7 +12,7 @@ from gaitswarm.services.optimizer.jobs.iteration import Ask, CompletedIteration
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.search.swarm.pso import PsoSettings
+from gaitswarm.services.optimizer.search.pso import PsoSettings
 from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from gaitswarm.sim.outcome import N_OBJECTIVES, Outcome, Status
 

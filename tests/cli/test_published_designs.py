@@ -9,7 +9,7 @@ from gaitswarm.cli.inputs.design_file import read_design
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.reference import on_the_jobs_terms
-from gaitswarm.services.optimizer.search.swarm.pso import PsoSettings
+from gaitswarm.services.optimizer.search.pso import PsoSettings
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE
 from tests.cli.conftest import Gaitswarm, WriteJson

@@ -5,9 +5,14 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from importlib import metadata
 from pathlib import Path
+from unittest.mock import patch
 
 from gaitswarm.sim.plugins import find_plugins, plugin_versions
+
+RESEARCH = "gaitswarm-research"
+"""The distribution in research/, which development installs."""
 
 
 def install(
@@ -37,12 +42,18 @@ def install(
 
 @contextmanager
 def installed(folder: Path) -> Iterator[None]:
-    """This process, as if it had been started with a folder on its path."""
+    """Run as if this process had a folder on its path, and no plug-ins of gaitswarm-research."""
     before = set(sys.modules)
+
+    def entry_points() -> metadata.EntryPoints:
+        others = (d for d in metadata.distributions() if d.name != RESEARCH)
+        return metadata.EntryPoints(point for other in others for point in other.entry_points)
+
     sys.path.insert(0, str(folder))
     _forget()
     try:
-        yield
+        with patch.object(metadata, "entry_points", entry_points):
+            yield
     finally:
         sys.path.remove(str(folder))
         for name in set(sys.modules) - before:

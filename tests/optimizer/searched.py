@@ -7,9 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from gaitswarm.services.optimizer.search.local.walk import Point, Walk
-from gaitswarm.services.optimizer.search.optimizer import SearchSettings
-from gaitswarm.services.optimizer.search.registry import METHODS, create_search
+from gaitswarm.services.optimizer.search.registry import create_search
 from gaitswarm.services.optimizer.search.space import Axis, Space
 
 Floats = NDArray[np.float64]
@@ -36,10 +34,6 @@ def mixed_bowl(designs: Floats) -> Floats:
     return bowl + 0.3 * (x[:, 2] != 2.0) + np.abs(x[:, 4] - 640.0) / 1000.0
 
 
-def settings_of(name: str, **settings: object) -> SearchSettings:
-    return METHODS[name].settings.model_validate({"name": name, **settings})
-
-
 def designs_asked(
     name: str,
     space: Space,
@@ -49,7 +43,7 @@ def designs_asked(
     **settings: object,
 ) -> list[Floats]:
     """The designs of each ask of a run, in order."""
-    search = create_search(settings_of(name, **settings), space, budget, seed)
+    search = create_search({"name": name, **settings}, space, budget, seed)
     asked = []
     while search.evaluations < budget:
         designs = space.designs(search.ask(budget - search.evaluations))
@@ -63,13 +57,3 @@ def calls_to(target: float, asked: list[Floats], formula: Formula) -> int:
     values = formula(np.vstack(asked))
     reached = np.flatnonzero(values <= target)
     return int(reached[0]) + 1 if len(reached) else len(values) + 1
-
-
-def walked(walk: Walk, formula: Formula) -> tuple[Point, list[Floats]]:
-    """Where a local search ends, and what it proposed."""
-    proposals = [next(walk)]
-    while True:
-        try:
-            proposals.append(walk.send(formula(proposals[-1])))
-        except StopIteration as stop:
-            return stop.value, proposals

@@ -11,6 +11,7 @@ from gaitswarm.services.optimizer.jobs.documents import SPECS
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.spec import create_optimizer
 from gaitswarm.services.optimizer.search.automatic import RULES, AutoSettings, Rule, chosen_method
+from gaitswarm.services.optimizer.search.pso import PsoSettings
 from gaitswarm.services.optimizer.search.random_search import RandomSearchSettings
 from gaitswarm.services.optimizer.search.registry import (
     DEFAULT_METHOD,
@@ -20,7 +21,6 @@ from gaitswarm.services.optimizer.search.registry import (
     OptimizerSettings,
 )
 from gaitswarm.services.optimizer.search.space import Axis, Space
-from gaitswarm.services.optimizer.search.swarm.pso import PsoSettings
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from tests.calibration.conftest import spec as calibration

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gaitswarm.services.optimizer.search.model.gaussian_process import GaussianProcess
+from gaitswarm.services.optimizer.search.bayesian import GaussianProcess
 from gaitswarm.services.optimizer.search.space import Axis, Space
 from tests.optimizer.searched import MIXED, designs_asked, mixed_bowl
 

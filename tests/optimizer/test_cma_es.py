@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gaitswarm.services.optimizer.search.evolution.symmetric import eigen, product
+from gaitswarm.services.optimizer.search.cma_es import eigen, product
 from gaitswarm.services.optimizer.search.registry import METHODS, create_search
 from gaitswarm.services.optimizer.search.space import Axis, Space
 from tests.optimizer.searched import MIXED, calls_to, designs_asked, mixed_bowl

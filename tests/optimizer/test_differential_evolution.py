@@ -9,14 +9,14 @@ import pytest
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from gaitswarm.services.optimizer.search.evolution.differential_evolution import (
+from gaitswarm.services.optimizer.search.differential_evolution import (
     DeSettings,
     DifferentialEvolution,
     gains,
     lehmer_mean,
 )
+from gaitswarm.services.optimizer.search.pso import ParticleSwarm, PsoSettings
 from gaitswarm.services.optimizer.search.space import Axis, Space
-from gaitswarm.services.optimizer.search.swarm.pso import ParticleSwarm, PsoSettings
 
 Floats = NDArray[np.float64]
 

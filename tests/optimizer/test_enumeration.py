@@ -49,7 +49,7 @@ def test_what_is_no_state_of_it_is_refused_and_changes_nothing() -> None:
     before = search.dump()
     for change, words in (
         ({"optimizer": "pso"}, "not a state of random: optimizer: pso"),
-        ({"asked": 4}, "asked: 4 positions, more than random gives"),
+        ({"asked": 4}, "asked: 4 positions, more than random asks for"),
         ({"schema_version": 2}, "schema_version"),
         ({"told": []}, "told"),
     ):
@@ -59,7 +59,7 @@ def test_what_is_no_state_of_it_is_refused_and_changes_nothing() -> None:
 
 
 def test_it_begins_with_its_first_position_and_needs_to_be_asked() -> None:
-    with pytest.raises(ValueError, match="begins with the first"):
+    with pytest.raises(ValueError, match="does not accept start positions"):
         enumeration().start_from(np.zeros((1, 1)))
     with pytest.raises(ValueError, match="before ask"):
         enumeration().tell(np.zeros(3))

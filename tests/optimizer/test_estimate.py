@@ -14,8 +14,8 @@ from gaitswarm.services.optimizer.jobs.job import Job, Progress
 from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.services.optimizer.search.pso import PsoSettings
 from gaitswarm.services.optimizer.search.random_search import RandomSearchSettings
-from gaitswarm.services.optimizer.search.swarm.pso import PsoSettings
 from gaitswarm.sim.identification.recorded_walk import RecordedWalk
 from gaitswarm.sim.kernel.walk import Walking
 from gaitswarm.sim.robot import RobotVariant

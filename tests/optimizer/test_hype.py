@@ -11,8 +11,12 @@ import pytest
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from gaitswarm.services.optimizer.search.evolution.hype import Hype, HypeSettings
-from gaitswarm.services.optimizer.search.evolution.pareto import SampledHypervolume, pareto_ranks
+from gaitswarm.services.optimizer.search.hype import (
+    Hype,
+    HypeSettings,
+    SampledHypervolume,
+    pareto_ranks,
+)
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.services.optimizer.search.space import Axis, Space
 

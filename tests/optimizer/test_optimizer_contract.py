@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import platform
-
 import pytest
 
 from gaitswarm.services.optimizer.search.registry import METHODS
@@ -18,19 +16,17 @@ from gaitswarm.testing.optimizers import (
 )
 
 INSTALLED = [name for name, method in METHODS.built_in.items() if not method.missing]
-"""Methods whose libraries are here; with the development lock, all that this machine can have."""
+"""Methods whose libraries are installed; with the development lock, all."""
 
-REPLAYED_UNTIL = {"bayesian": 24, "ga": 30, "mads": 30}
+REPLAYED_UNTIL = {"bayesian": 24}
 """Evaluations of methods whose loads repeat all that was told, which takes the square of them."""
 
-WITHOUT_WHEEL = set() if platform.machine() == "x86_64" else {"mads"}
+
+def test_every_method_is_tested() -> None:
+    assert set(METHODS.built_in) == set(INSTALLED)
 
 
-def test_every_method_is_tested_where_its_libraries_can_be_had() -> None:
-    assert set(METHODS.built_in) - set(INSTALLED) <= WITHOUT_WHEEL
-
-
-@pytest.mark.variants(without=("bayesian", "mads"))
+@pytest.mark.variants(without=("bayesian",))
 class TestBuiltIn(SearchContract):
     @pytest.fixture(autouse=True, params=INSTALLED)
     def method(self, request: pytest.FixtureRequest) -> None:

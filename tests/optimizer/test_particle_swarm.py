@@ -13,15 +13,15 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
-from gaitswarm.services.optimizer.search.random_stream import uniform
-from gaitswarm.services.optimizer.search.registry import OPTIMIZERS
-from gaitswarm.services.optimizer.search.space import Space
-from gaitswarm.services.optimizer.search.swarm.pso import (
+from gaitswarm.services.optimizer.search.pso import (
     ParticleSwarm,
     PsoSettings,
     absorb,
     reflect,
 )
+from gaitswarm.services.optimizer.search.random_stream import uniform
+from gaitswarm.services.optimizer.search.registry import OPTIMIZERS
+from gaitswarm.services.optimizer.search.space import Space
 from gaitswarm.sim.variables import Variable
 
 Function = Callable[[NDArray[np.float64]], NDArray[np.float64]]

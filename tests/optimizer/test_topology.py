@@ -9,10 +9,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from gaitswarm.services.optimizer.search.pso import (
+    ParticleSwarm,
+    PsoSettings,
+    leaders,
+    random_informants,
+    ring,
+)
 from gaitswarm.services.optimizer.search.registry import OPTIMIZERS
 from gaitswarm.services.optimizer.search.space import Axis, Space
-from gaitswarm.services.optimizer.search.swarm.pso import ParticleSwarm, PsoSettings
-from gaitswarm.services.optimizer.search.swarm.topology import leaders, random_informants, ring
 
 Floats = NDArray[np.float64]
 

@@ -27,7 +27,7 @@ def search(settings, space, budget, random):
     while True:
         yield space.from_unit(random.uniform(settings.particles, space.dimension))
 
-METHOD = from_generator({name}Settings, "Random designs", "{module}:search")
+METHOD = from_generator({name}Settings, "Random designs", search)
 """
 
 BROKEN = {
@@ -37,7 +37,7 @@ BROKEN = {
     "empty": ({"empty": ""}, "empty:METHOD", "AttributeError"),
     "no_method": ({"no_method": "METHOD = 7"}, "no_method:METHOD", "is a int, not a Method"),
     "other": (
-        {"other": METHOD.format(name="another", module="other")},
+        {"other": METHOD.format(name="another")},
         "other:METHOD",
         "calls itself 'another'",
     ),
@@ -48,7 +48,7 @@ GROUP = "gaitswarm.optimizers"
 
 
 def method(name: str, module: str) -> dict[str, str]:
-    return {module: METHOD.format(name=name, module=module)}
+    return {module: METHOD.format(name=name)}
 
 
 def sound(site: Path) -> None:
@@ -128,7 +128,8 @@ def test_its_version_changes_with_any_byte_of_its_code(site: Path) -> None:
 
 
 def test_a_worker_with_other_plug_ins_is_refused(site: Path) -> None:
-    without = Introduction.of({"host": "node", "gaitswarm": "1", **fingerprint()})
+    with installed(site):
+        without = Introduction.of({"host": "node", "gaitswarm": "1", **fingerprint()})
     sound(site)
     with installed(site):
         here = Introduction.of({"host": "head", "gaitswarm": "1", **fingerprint()})
@@ -156,3 +157,14 @@ def test_help_does_not_look_for_plug_ins() -> None:
     looked = "import importlib.metadata as m; m.entry_points = None"
     statements = f"{looked}; from gaitswarm.cli.main import run; raise SystemExit(run(['--help']))"
     assert python("-c", statements).returncode == 0
+
+
+@pytest.mark.parametrize("optimizer", ["gsa", {"name": "gsa", "particles": 7}])
+def test_a_method_of_research_is_refused_with_the_command_that_installs_it(
+    site: Path, optimizer: object
+) -> None:
+    with (
+        installed(site),
+        pytest.raises(ValidationError, match=r"'gsa'; .*: pip install ./research"),
+    ):
+        JobSpec.model_validate({"optimizer": optimizer})

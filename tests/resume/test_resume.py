@@ -17,7 +17,7 @@ from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.run.evaluator import Evaluator
 from gaitswarm.services.optimizer.run.runner import Runner
-from gaitswarm.services.optimizer.search.evolution.hype import HypeSettings
+from gaitswarm.services.optimizer.search.hype import HypeSettings
 from gaitswarm.services.optimizer.search.registry import METHODS
 from gaitswarm.services.optimizer.store.port.base import Store
 from gaitswarm.services.runtime import open_evaluator, open_store, run_embedded

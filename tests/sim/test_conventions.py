@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.search.swarm.pso import PsoSettings
+from gaitswarm.services.optimizer.search.pso import PsoSettings
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
 from gaitswarm.sim.controllers.base import LookupTable
 from gaitswarm.sim.controllers.mamdani import Shape

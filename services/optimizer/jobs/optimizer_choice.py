@@ -18,7 +18,7 @@ from gaitswarm.services.optimizer.search.automatic import (
 from gaitswarm.services.optimizer.search.method import settings_of
 from gaitswarm.services.optimizer.search.optimizer import SearchSettings
 from gaitswarm.services.optimizer.search.registry import DEFAULT_METHOD, METHODS
-from gaitswarm.sim.near_names import instead_of, nearest
+from gaitswarm.sim.near_names import instead_of
 from gaitswarm.sim.plugins import PluginSettings
 
 _BUILT_IN: Final[dict[str, type[SearchSettings]]] = {
@@ -48,9 +48,9 @@ def optimizer_settings(choice: object) -> object:
         return choice
     if choice in CHOICES:
         return CHOICES[choice]
-    near = nearest(choice, CHOICES)
-    otherwise = "; or give an object: settings of your own" if near is None else ""
-    raise ValueError(f"{CHOICES.unknown(choice)}{otherwise}")
+    reason = CHOICES.unknown(choice)
+    otherwise = "; or give an object: settings of your own" if "known are" in reason else ""
+    raise ValueError(f"{reason}{otherwise}")
 
 
 def with_settings(choice: object, settings: Mapping[str, Any]) -> object:

@@ -1,4 +1,4 @@
-"""`auto`: the method that suits a job's budget and variables."""
+"""`auto`: a method chosen by the variables and budget of a job."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from gaitswarm.sim.plugins import KnownName
 
 
 class AutoSettings(SearchSettings):
-    """The method is chosen when the job is submitted; the job then names that method."""
+    """Settings that are replaced by those of a method when the job is submitted."""
 
     name: Literal["auto"] = "auto"
 
@@ -33,24 +33,23 @@ if TYPE_CHECKING:
     ChosenSettings: TypeAlias = SearchSettings
 else:
     ChosenSettings = AutoSettings | OptimizerSettings
-"""What a spec may have before it is resolved; a stored job has the settings of a method."""
+"""Settings of a spec before it is resolved; a stored job has the settings of a method."""
 
 CHOICES: Final = NamedSettings(MappingProxyType({"auto": AutoSettings()}))
-"""Everything that a job may name, with the settings that the name stands for."""
+"""Names that a job may use, with the settings they stand for."""
 
 ChoiceName: TypeAlias = Annotated[str, KnownName(CHOICES)]
-"""What a job may name."""
 
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """Searches for which one method is chosen.
+    """Conditions under which a method is chosen.
 
     Attributes:
-        settings: Of the method; its `particles` become those of the job.
-        largest_budget: Evaluations, at most.
-        largest_dimension: Variables, at most.
-        kinds: Kinds of variables that there may be.
+        settings: Settings of the method; its `particles` are replaced by the job's.
+        largest_budget: Largest number of evaluations.
+        largest_dimension: Largest number of variables.
+        kinds: Kinds of variables allowed.
     """
 
     settings: OptimizerSettings
@@ -59,7 +58,7 @@ class Rule:
     kinds: frozenset[Kind] = frozenset({"continuous", "integer", "categorical"})
 
     def suits(self, space: Space, budget: int) -> bool:
-        """Whether it is for a search."""
+        """Return whether a search meets the conditions."""
         method = METHODS[self.settings.name]
         return (
             not method.missing
@@ -74,12 +73,11 @@ RULES: Final = (
     Rule(CHOICES[DEFAULT_METHOD], largest_dimension=64),
     Rule(CHOICES["de"]),
 )
-"""The first one that suits a search is taken; the last one suits all.
+"""The first rule that suits a search applies; the last one suits every search.
 
-None of ten searches raced on the job of chapter 4 with twenty seeds was better than CMA-ES. On
-those of chapter 3 `de` is; which property of theirs makes it so is not known. The decomposition of
-CMA-ES costs the cube of the dimension: some 0.2 s a generation for 64 variables, more than the
-walks for many.
+No method compared on the job of chapter 4 with twenty seeds was better than CMA-ES
+(research/docs/comparison.md). The decomposition of CMA-ES costs the cube of the dimension: about
+0.2 s per generation for 64 variables.
 """
 
 

@@ -1,4 +1,4 @@
-"""Positions that follow from their number alone, asked for in order."""
+"""An optimizer that enumerates positions without learning."""
 
 from __future__ import annotations
 
@@ -15,8 +15,6 @@ Floats = NDArray[np.float64]
 
 
 class _CountedState(BaseModel):
-    """What `dump` writes."""
-
     model_config = ConfigDict(extra="forbid", strict=True)
 
     optimizer: str
@@ -27,13 +25,13 @@ class _CountedState(BaseModel):
 
 
 class Enumeration:
-    """An optimizer that listens to nobody: position k is a function of k.
+    """An optimizer that ignores its feedback: position k is a function of k.
 
-    Its state is how far it is, whatever the number of positions before.
+    Its state is the number of positions so far.
     """
 
     def __init__(self, name: str, particles: int, positions: Callable[[int, int], Floats]) -> None:
-        """Create one that has not been asked yet."""
+        """Create an optimizer before its first ask."""
         self._name = name
         self._particles = particles
         self._positions = positions
@@ -48,28 +46,28 @@ class Enumeration:
 
     @property
     def evaluations(self) -> int:
-        """Number of positions that were told, in all."""
+        """Number of positions told so far."""
         return self._evaluations
 
     def start_from(self, positions: Floats) -> None:
-        """Refuse to begin elsewhere."""
+        """Reject start positions."""
         if len(positions):
-            raise ValueError(f"start_from(): {self._name} begins with the first of its positions")
+            raise ValueError(f"start_from(): {self._name} does not accept start positions")
 
     def ask(self, most: int | None = None) -> Floats:
-        """Give the positions to evaluate next; the same ones again until they are told."""
+        """Return the positions to evaluate next; the same ones until they are told."""
         if not self._asked:
             self._asked = self._particles if most is None else min(most, self._particles)
         return self._positions(self._evaluations, self._evaluations + self._asked)
 
     def tell(self, fitness: Floats) -> None:
-        """Go on to the next positions."""
+        """Proceed to the next positions."""
         self._evaluations += len(checked_fitness(fitness, self._asked))
         self._iteration += 1
         self._asked = 0
 
     def dump(self) -> dict[str, Any]:
-        """Give the whole state."""
+        """Return the complete state."""
         return {
             "optimizer": self._name,
             "schema_version": 1,
@@ -79,11 +77,11 @@ class Enumeration:
         }
 
     def load(self, state: dict[str, Any]) -> None:
-        """Take on a state."""
+        """Restore a state."""
         dumped = parse_state(state, self._name, _CountedState)
         if dumped.optimizer != self._name:
             raise ValueError(f"not a state of {self._name}: optimizer: {dumped.optimizer}")
         if dumped.asked > self._particles:
-            raise ValueError(f"asked: {dumped.asked} positions, more than {self._name} gives")
+            raise ValueError(f"asked: {dumped.asked} positions, more than {self._name} asks for")
         self._iteration, self._asked = dumped.iteration, dumped.asked
         self._evaluations = dumped.evaluations

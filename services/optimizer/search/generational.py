@@ -1,4 +1,4 @@
-"""The template of a method that learns from whole generations."""
+"""Base class of methods that learn from whole generations."""
 
 from __future__ import annotations
 
@@ -29,17 +29,15 @@ Worth = list[FiniteFloat | None]
 
 
 class GenerationState(BaseModel):
-    """What `Generational.dump` writes, to which a method adds its own memory.
+    """The state that `Generational.dump` writes; a method adds its memory.
 
     Attributes:
-        optimizer: Name of the method.
-        schema_version: Of the method's state.
         iteration: Completed tells.
-        evaluations: Positions told, in all.
-        generations: Generations that were learned from.
-        positions: The generation under way, empty before the first.
-        fitness: Of those of its positions that were told, in order.
-        asked: How many of the next ones are asked for.
+        evaluations: Positions told so far.
+        generations: Generations learned from.
+        positions: The current generation, empty before the first.
+        fitness: Fitness of the positions that were told, in order.
+        asked: Number of the following positions that are asked for.
     """
 
     model_config = ConfigDict(extra="forbid", strict=True)
@@ -61,25 +59,22 @@ class Generational(ABC, Generic[S, G]):
     """A search that asks for a generation, whole or in pieces, and then learns from it.
 
     Attributes:
-        settings: Of the method.
-        space: The box that is searched.
         budget: Evaluations of the planned run.
-        seed: Of all random numbers.
-        generations: How many were learned from.
-        positions: (n, d) the generation under way, (0, d) before the first.
+        generations: Number of generations learned from.
+        positions: (n, d) the current generation, (0, d) before the first.
 
-    A method says what its first and next generation are and what it keeps of one; its random
-    numbers are counted by generation, so that they do not depend on the pieces.
+    Subclasses define the generations and what is kept of one. Their random numbers are indexed by
+    generation, so that they do not depend on the pieces.
 
-    Start positions take the places of the first members of the first generation. Where there are
-    more of them than members, all are asked for, and the best are the generation.
+    Start positions replace the first members of the first generation. If there are more start
+    positions than members, all are evaluated, and the best become the generation.
     """
 
     state_model: ClassVar[type[GenerationState]]
     schema_version: ClassVar[int] = 1
 
     def __init__(self, settings: S, space: Space, budget: int, seed: int) -> None:
-        """Create a search that has not been asked yet."""
+        """Create a search before its first ask."""
         self.settings: Final = settings
         self.space: Final = space
         self.budget: Final = budget
@@ -94,7 +89,7 @@ class Generational(ABC, Generic[S, G]):
 
     @property
     def first_size(self) -> int:
-        """Size of the first generation, where start positions are more than that."""
+        """Size of the first generation if there are more start positions."""
         return self.settings.particles
 
     @property
@@ -104,27 +99,27 @@ class Generational(ABC, Generic[S, G]):
 
     @property
     def evaluations(self) -> int:
-        """Number of positions that were told, in all."""
+        """Number of positions told so far."""
         return self._evaluations
 
     def start_from(self, positions: Floats) -> None:
-        """Put positions in the places of the first members."""
+        """Replace the first members by positions."""
         begun = bool(self._evaluations or len(self.positions))
         self._start = checked_start(positions, self.space, begun=begun)
 
     def ask(self, most: int | None = None) -> Floats:
-        """Give the positions to evaluate next; the same ones again until they are told."""
-        told = len(self._fitness)
+        """Return the positions to evaluate next; the same ones until they are told."""
+        done = len(self._fitness)
         if not self._asked:
-            if told == len(self.positions):
+            if done == len(self.positions):
                 self.positions = self.propose() if self.generations else self._first()
-                self._fitness, told = np.empty(0), 0
+                self._fitness, done = np.empty(0), 0
             limit = self.settings.particles if most is None else min(most, self.settings.particles)
-            self._asked = min(limit, len(self.positions) - told)
-        return self.positions[told : told + self._asked].copy()
+            self._asked = min(limit, len(self.positions) - done)
+        return self.positions[done : done + self._asked].copy()
 
     def tell(self, fitness: Floats) -> None:
-        """Take what the positions last asked for are worth."""
+        """Receive the fitness of the positions asked for last."""
         values = self.checked(fitness, self._asked)
         self._fitness = np.concatenate([self._fitness, values]) if len(self._fitness) else values
         self._iteration += 1
@@ -137,7 +132,7 @@ class Generational(ABC, Generic[S, G]):
             self.generations += 1
 
     def dump(self) -> dict[str, Any]:
-        """Give the whole state."""
+        """Return the complete state."""
         return {
             "optimizer": self.settings.name,
             "schema_version": self.schema_version,
@@ -151,7 +146,7 @@ class Generational(ABC, Generic[S, G]):
         }
 
     def load(self, state: dict[str, Any]) -> None:
-        """Take on a state."""
+        """Restore a state."""
         name = self.settings.name
         dumped = parse_state(state, name, self.state_model)
         for field, expected in (("optimizer", name), ("schema_version", self.schema_version)):
@@ -162,7 +157,7 @@ class Generational(ABC, Generic[S, G]):
         shape = (len(dumped.positions), self.space.dimension)
         positions = self.inside(matrix(dumped.positions, shape, "positions"), "positions")
         if len(dumped.fitness) + dumped.asked > len(positions):
-            raise ValueError("asked: more than what is left of the positions")
+            raise ValueError("asked: more than the remaining positions")
         fitness = self.read(dumped.fitness)
         self.recall(dumped)  # type: ignore[arg-type]
         self._iteration, self._evaluations = dumped.iteration, dumped.evaluations
@@ -170,14 +165,14 @@ class Generational(ABC, Generic[S, G]):
         self.positions, self._fitness = positions, fitness
 
     def _first(self) -> Floats:
-        """The first generation with the start positions in it."""
+        """Return the first generation, including the start positions."""
         proposed = self.propose()
         return np.vstack([self._start, proposed[len(self._start) :]])
 
     def _keep_the_best(self) -> None:
-        """Of more start positions than members; the earlier of equals, in their order."""
-        kept = np.sort(self.best(self._fitness, self.first_size))
-        self.positions, self._fitness = self.positions[kept], self._fitness[kept]
+        """Reduce the start positions to the best; of equal ones the earlier."""
+        best = np.sort(self.best(self._fitness, self.first_size))
+        self.positions, self._fitness = self.positions[best], self._fitness[best]
 
     def inside(self, positions: Floats, name: str) -> Floats:
         """Check positions of a dumped state."""
@@ -186,46 +181,46 @@ class Generational(ABC, Generic[S, G]):
         return positions
 
     def checked(self, fitness: Floats, asked: int) -> Floats:
-        """Check what is told."""
+        """Check the feedback."""
         return checked_fitness(fitness, asked)
 
     def best(self, fitness: Floats, count: int) -> NDArray[np.intp]:
-        """Choose the best of more start positions than there are members."""
+        """Return the indices of the best start positions."""
         return np.argsort(fitness, kind="stable")[:count]
 
     def written(self, fitness: Floats) -> list[Any]:
-        """Write what was told as JSON takes it."""
+        """Convert feedback to JSON."""
         return worth(fitness)
 
     def read(self, values: list[Any]) -> Floats:
-        """Read back what `written` gave."""
+        """Convert feedback from JSON."""
         return of_worth(values)
 
     @abstractmethod
     def propose(self) -> Floats:
-        """Make the next generation, of any size >= 1.
+        """Return the next generation, of any size >= 1.
 
-        It may depend on settings, space, budget, seed, `generations` and the method's memory.
+        It may depend on settings, space, budget, seed, `generations` and the memory.
         """
 
     @abstractmethod
     def learn(self, positions: Floats, fitness: Floats) -> None:
-        """Take a whole generation into the method's memory."""
+        """Learn from a whole generation."""
 
     @abstractmethod
     def memory(self) -> dict[str, Any]:
-        """Give the method's own fields of its state, JSON-able."""
+        """Return the additional fields of the state, JSON-compatible."""
 
     @abstractmethod
     def recall(self, state: G) -> None:
-        """Check and take on the method's own fields of a state."""
+        """Check and restore the additional fields of a state."""
 
 
 def worth(fitness: Floats | list[float]) -> Worth:
-    """Write fitness values as JSON takes them."""
+    """Convert fitness values to JSON."""
     return [f if math.isfinite(f) else None for f in map(float, fitness)]
 
 
 def of_worth(values: Worth) -> Floats:
-    """Read fitness values back."""
+    """Convert fitness values from JSON."""
     return np.array([math.inf if f is None else f for f in values], dtype=np.float64)

@@ -1,4 +1,4 @@
-"""Random search: what every other method has to beat."""
+"""Random search: the baseline for every other method."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Random numbers that are a function of where they are used, not of when or in what order."""
+"""Random numbers that depend on where they are used, not on when or in which order."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ _DOUBLE_BITS: Final = 53
 def uniform(
     seed: int, purpose: int, *, iteration: int, particle: int, count: int
 ) -> NDArray[np.float64]:
-    """Uniform random numbers of one particle: Philox 4x64 (Salmon et al. 2011).
+    """Draw uniform random numbers of one particle: Philox 4x64 (Salmon et al. 2011).
 
-    The key is (seed, purpose), and the counter starts at (iteration, particle): no stream overlaps
-    another, and none depends on how many numbers another one took.
+    The key is (seed, purpose) and the counter starts at (iteration, particle), so that streams
+    neither overlap nor depend on how many numbers another stream has used.
     """
     philox = np.random.Philox(
         key=np.array([seed, purpose], dtype=np.uint64),
         counter=np.array([0, 0, particle, iteration], dtype=np.uint64),
     )
-    # numpy keeps the raw stream of a bit generator fixed for good, but not that of a Generator.
+    # numpy guarantees the raw stream of a bit generator, but not that of a Generator.
     raw = np.asarray(philox.random_raw(count), dtype=np.uint64)
     return (raw >> np.uint64(64 - _DOUBLE_BITS)).astype(np.float64) * 2.0**-_DOUBLE_BITS
 
@@ -33,7 +33,7 @@ def uniform(
 def swarm_uniform(
     seed: int, purpose: int, *, iteration: int, particles: int, count: int
 ) -> NDArray[np.float64]:
-    """Uniform random numbers of a whole swarm."""
+    """Draw uniform random numbers of a whole swarm, (particles, count)."""
     rows = [
         uniform(seed, purpose, iteration=iteration, particle=particle, count=count)
         for particle in range(particles)
@@ -42,7 +42,7 @@ def swarm_uniform(
 
 
 class RandomNumbers:
-    """One stream of random numbers, drawn in order: Philox 4x64, whose raw stream numpy keeps.
+    """A stream of random numbers, drawn in order (Philox 4x64).
 
     The same seed and purpose give the same numbers with every version of numpy.
     """
@@ -58,7 +58,7 @@ class RandomNumbers:
         """Draw numbers that are uniform in [0, 1).
 
         Args:
-            shape: of the array; none for a single number.
+            shape: Shape of the array; none for a single number.
 
         Returns:
             An array of that shape.
@@ -71,13 +71,13 @@ class RandomNumbers:
         """Draw numbers of the standard normal distribution.
 
         Args:
-            shape: of the array; none for a single number.
+            shape: Shape of the array; none for a single number.
 
         Returns:
-            An array of that shape, none beyond 8.3.
+            An array of that shape; no value exceeds 8.3.
         """
         require_room_for_scipy()
-        from scipy.special import ndtri  # noqa: PLC0415 - slow, and few searches need it
+        from scipy.special import ndtri  # noqa: PLC0415 - slow to import, and few searches need it
 
         middles = (np.floor(self.uniform(*shape) * 2.0**52) + 0.5) * 2.0**-52
         numbers: NDArray[np.float64] = ndtri(middles)
@@ -87,18 +87,18 @@ class RandomNumbers:
         """Draw an index.
 
         Args:
-            count: of things to choose from, >= 1.
+            count: Number of indices, >= 1.
 
         Returns:
-            0 to count - 1, each as likely.
+            0 to count - 1 with equal probability.
         """
         return int(self.uniform() * count)
 
     def permutation(self, count: int) -> NDArray[np.intp]:
-        """Draw an order.
+        """Draw a permutation.
 
         Args:
-            count: of things.
+            count: Number of indices.
 
         Returns:
             (count,) indices 0 to count - 1 in random order.

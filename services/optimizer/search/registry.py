@@ -1,41 +1,28 @@
-"""Every search method by name: settings, presets, and how it is made."""
+"""Search methods by name, their presets, and the creation of a search."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Final, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gaitswarm.services.optimizer.search.evolution.cma_es import CmaEs, CmaEsSettings
-from gaitswarm.services.optimizer.search.evolution.differential_evolution import (
+from gaitswarm.services.optimizer.search.bayesian import BayesianSettings, bayesian
+from gaitswarm.services.optimizer.search.cma_es import CmaEs, CmaEsSettings
+from gaitswarm.services.optimizer.search.differential_evolution import (
     DeSettings,
     DifferentialEvolution,
 )
-from gaitswarm.services.optimizer.search.evolution.genetic import GaSettings
-from gaitswarm.services.optimizer.search.evolution.hype import Hype, HypeSettings
-from gaitswarm.services.optimizer.search.local.annealing import AnnealingSettings
-from gaitswarm.services.optimizer.search.local.directed_tabu import DirectedTabuSettings
-from gaitswarm.services.optimizer.search.local.mads import MadsSettings
-from gaitswarm.services.optimizer.search.local.nelder_mead import NelderMeadSettings
-from gaitswarm.services.optimizer.search.local.pattern_search import PatternSearchSettings
+from gaitswarm.services.optimizer.search.hype import Hype, HypeSettings
 from gaitswarm.services.optimizer.search.method import Method, from_generator, settings_of
-from gaitswarm.services.optimizer.search.model.bayesian import BayesianSettings
-from gaitswarm.services.optimizer.search.multistart.global_search import (
-    GlobalBfgsSettings,
-    GlobalNelderMeadSettings,
-    GlobalUnirandiSettings,
-)
 from gaitswarm.services.optimizer.search.optimizer import Optimizer, SearchSettings
-from gaitswarm.services.optimizer.search.random_search import RandomSearchSettings
+from gaitswarm.services.optimizer.search.pso import ParticleSwarm, PsoSettings
+from gaitswarm.services.optimizer.search.pso_ps import PsoPsSettings, pso_ps
+from gaitswarm.services.optimizer.search.random_search import RandomSearchSettings, random_search
 from gaitswarm.services.optimizer.search.space import Space
-from gaitswarm.services.optimizer.search.swarm.gsa import GsaSettings
-from gaitswarm.services.optimizer.search.swarm.pso import ParticleSwarm, PsoSettings
-from gaitswarm.services.optimizer.search.swarm.pso_ps import PsoPsSettings
-from gaitswarm.services.optimizer.search.swarm.tlbo import TlboSettings
 from gaitswarm.sim.plugins import (
     KnownName,
     Plugin,
@@ -48,17 +35,13 @@ from gaitswarm.sim.plugins import (
 Floats = NDArray[np.float64]
 
 LONGEST_REPLAY: Final = 250_000
-"""Most evaluations of a job whose search is replayed when it is resumed."""
-
-
-_HERE: Final = "gaitswarm.services.optimizer.search"
+"""Largest budget [evaluations] of a job whose search is replayed when it resumes."""
 
 _BUILT_IN: Final[dict[str, Method]] = {
     "bayesian": from_generator(
         BayesianSettings,
         "Gaussian process with batches, in a trust region (scikit-learn; TuRBO, Eriksson 2019)",
-        f"{_HERE}.model.bayesian:bayesian",
-        uses_start=True,
+        bayesian,
         extra="search",
         libraries=("scikit-learn", "scipy", "threadpoolctl"),
     ),
@@ -76,67 +59,11 @@ _BUILT_IN: Final[dict[str, Method]] = {
         uses_start=True,
         libraries=("scipy",),
     ),
-    "dts": from_generator(
-        DirectedTabuSettings,
-        "Directed tabu search (Hedar and Fukushima 2006): explores, intensifies, diversifies",
-        f"{_HERE}.local.directed_tabu:directed_tabu",
-        uses_start=True,
-    ),
-    "ga": from_generator(
-        GaSettings,
-        "Genetic algorithm for mixed variables (pymoo; Blank and Deb 2020)",
-        f"{_HERE}.evolution.genetic:genetic_algorithm",
-        extra="search",
-        libraries=("pymoo",),
-    ),
-    "global-bfgs": from_generator(
-        GlobalBfgsSettings,
-        "GLOBAL (Csendes et al. 2008): clustered samples, local searches by BFGS",
-        f"{_HERE}.multistart.global_search:global_search",
-        uses_start=True,
-    ),
-    "global-nelder-mead": from_generator(
-        GlobalNelderMeadSettings,
-        "GLOBAL (Csendes et al. 2008): clustered samples, local searches by Nelder-Mead",
-        f"{_HERE}.multistart.global_search:global_search",
-        uses_start=True,
-    ),
-    "global-unirandi": from_generator(
-        GlobalUnirandiSettings,
-        "GLOBAL (Csendes et al. 2008): clustered samples, local searches by UniRandi",
-        f"{_HERE}.multistart.global_search:global_search",
-        uses_start=True,
-    ),
-    "gsa": from_generator(
-        GsaSettings,
-        "Gravitational search algorithm (Rashedi, Nezamabadi-pour and Saryazdi 2009)",
-        f"{_HERE}.swarm.gsa:gsa",
-    ),
     "hype": Method(
         HypeSettings,
-        "Multi-objective: what trades best by hypervolume, HypE (Bader and Zitzler 2011)",
+        "Multi-objective: Pareto front by hypervolume, HypE (Bader and Zitzler 2011)",
         Hype,
         multi_objective=True,
-        uses_start=True,
-    ),
-    "mads": from_generator(
-        MadsSettings,
-        "Mesh adaptive direct search (NOMAD 4; Audet, Le Digabel, Rochon Montplaisir et al. 2022)",
-        f"{_HERE}.local.mads:mads",
-        uses_start=True,
-        extra="search",
-        libraries=("PyNomadBBO",),
-    ),
-    "nelder-mead": from_generator(
-        NelderMeadSettings,
-        "Simplex of Nelder and Mead (1965), adaptive coefficients (Gao and Han 2012), restarts",
-        f"{_HERE}.local.nelder_mead:nelder_mead",
-        uses_start=True,
-    ),
-    "ps": from_generator(
-        PatternSearchSettings,
-        "Generalized pattern search on a mesh (Torczon 1997; Audet and Dennis 2003)",
-        f"{_HERE}.local.pattern_search:pattern_search",
         uses_start=True,
     ),
     "pso": Method(
@@ -148,39 +75,38 @@ _BUILT_IN: Final[dict[str, Method]] = {
     "pso-ps": from_generator(
         PsoPsSettings,
         "Particle swarm, then pattern search from its best designs (thesis 3.2.2)",
-        f"{_HERE}.swarm.pso_ps:pso_ps",
-        uses_start=True,
+        pso_ps,
     ),
     "random": from_generator(
         RandomSearchSettings,
-        "Uniform random designs, each independent of all others: what a search has to beat",
-        f"{_HERE}.random_search:random_search",
-    ),
-    "sa": from_generator(
-        AnnealingSettings,
-        "Simulated annealing with adapted steps (Corana et al. 1987), cooling over the budget",
-        f"{_HERE}.local.annealing:annealing",
-        uses_start=True,
-    ),
-    "tlbo": from_generator(
-        TlboSettings,
-        "Teaching-learning-based optimization (Rao, Savsani and Vakharia 2011)",
-        f"{_HERE}.swarm.tlbo:tlbo",
-        uses_start=True,
+        "Uniform random designs: the baseline for other methods",
+        random_search,
     ),
 }
+
+_IN_RESEARCH: Final = (
+    *("dts", "ga", "global-bfgs", "global-nelder-mead", "global-unirandi", "gsa", "mads"),
+    *("nelder-mead", "ps", "sa", "tlbo"),
+)
+"""Methods of the package gaitswarm-research, in the folder research/."""
 
 
 def _accepted(plugin: Plugin, brought: object) -> Method:
     method = check_is(plugin, brought, Method)
     check_name(plugin, method.settings.model_fields["name"].default)
-    # A job goes on with the same version of what brought its method only.
+    # A job resumes only with the same version of the distribution that brings its method.
     return replace(method, libraries=(plugin.distribution, *method.libraries))
 
 
-METHODS: Final = Registry[Method]("optimizer", _BUILT_IN, _accepted)
-"""By name, as in settings."""
-
+METHODS: Final = Registry[Method](
+    "optimizer",
+    _BUILT_IN,
+    _accepted,
+    elsewhere=dict.fromkeys(
+        _IN_RESEARCH, "it is in the package gaitswarm-research: pip install ./research"
+    ),
+)
+"""Methods by name, those of plug-ins included."""
 
 MethodName: TypeAlias = Annotated[str, KnownName(METHODS)]
 
@@ -188,30 +114,19 @@ if TYPE_CHECKING:
     OptimizerSettings: TypeAlias = SearchSettings
 else:
     OptimizerSettings = Annotated[
-        AnnealingSettings
-        | BayesianSettings
+        BayesianSettings
         | CmaEsSettings
         | DeSettings
-        | DirectedTabuSettings
-        | GaSettings
-        | GlobalBfgsSettings
-        | GlobalNelderMeadSettings
-        | GlobalUnirandiSettings
-        | GsaSettings
         | HypeSettings
-        | MadsSettings
-        | NelderMeadSettings
-        | PatternSearchSettings
         | PsoPsSettings
         | PsoSettings
-        | RandomSearchSettings
-        | TlboSettings,
+        | RandomSearchSettings,
         PluginSettings(METHODS, settings_of, "/v1/optimizers"),
     ]
-    """Settings of every method; their `name` tells them apart."""
+    """Settings of any method, distinguished by their `name`."""
 
 DEFAULT_METHOD: Final = "cma-es"
-"""The best on the robot of all that were raced (docs/optimizers.md)."""
+"""The best of the compared methods on the robot (research/docs/comparison.md)."""
 
 _PRESETS: Final[dict[str, SearchSettings]] = {
     "pso-constriction": PsoSettings(
@@ -226,7 +141,7 @@ _PRESETS: Final[dict[str, SearchSettings]] = {
 
 
 class NamedSettings(Mapping[str, SearchSettings]):
-    """What a job may name in place of settings: methods of the registry, and presets."""
+    """Default settings of every method and presets, by name."""
 
     def __init__(self, first: Mapping[str, SearchSettings] = MappingProxyType({})) -> None:
         self._first = first
@@ -245,30 +160,52 @@ class NamedSettings(Mapping[str, SearchSettings]):
 
     @property
     def built_in(self) -> tuple[str, ...]:
-        """Those of gaitswarm."""
+        """Names of gaitswarm's own methods and presets."""
         return (*self._first, *sorted({*METHODS.built_in, *_PRESETS}))
 
     def unknown(self, name: str) -> str:
-        """Say that a name is none."""
+        """Explain that a name is unknown."""
         return f"unknown optimizer {name!r}; {METHODS.instead_of(name, self)}"
 
 
 OPTIMIZERS: Final = NamedSettings()
-"""Each method by its default settings, and presets of `pso`.
+"""Default settings by method, and presets of `pso`.
 
-`pso` has an inertia that falls, `pso-thesis` one of 0.9 throughout. `pso-constriction` has the
+`pso` has a falling inertia, `pso-thesis` an inertia of 0.9 throughout. `pso-constriction` has the
 coefficients of Clerc and Kennedy (2002) in the ring of Bratton and Kennedy (2007).
 """
 
 
 def create_search(
-    settings: OptimizerSettings,
+    settings: OptimizerSettings | Mapping[str, Any] | str,
     space: Space,
     budget: int,
     seed: int,
     start: Floats | None = None,
 ) -> Optimizer:
-    """Create a search."""
+    """Create a search of any installed method, outside of a job.
+
+    Args:
+        settings: Settings of a method, as a model or as a mapping with its `name`; or the name of a
+            method or preset.
+        space: The box to search.
+        budget: Planned evaluations; methods may adapt to it.
+        seed: Of all random numbers.
+        start: (k, d) positions to begin with, or None.
+
+    Returns:
+        The search before its first ask.
+
+    Raises:
+        ValueError: The name is unknown (says which exist, or what to install) or a setting is not
+            valid.
+    """
+    if not isinstance(settings, SearchSettings):
+        name = settings if isinstance(settings, str) else str(settings.get("name"))
+        if name not in OPTIMIZERS:
+            raise ValueError(OPTIMIZERS.unknown(name))
+        chosen = OPTIMIZERS[name]
+        settings = chosen if isinstance(settings, str) else type(chosen).model_validate(settings)
     optimizer = METHODS[settings.name].create(settings, space, budget, seed)
     if start is not None and len(start):
         optimizer.start_from(start)

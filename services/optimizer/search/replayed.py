@@ -1,4 +1,4 @@
-"""Methods written as generators, whose state is what they were told."""
+"""Methods written as generators, whose state is the feedback they received."""
 
 from __future__ import annotations
 
@@ -27,25 +27,25 @@ from gaitswarm.services.optimizer.search.space import Space
 Floats = NDArray[np.float64]
 
 Proposals = Generator[Floats, Floats, None]
-"""Yields positions (n, d) inside the bounds, n >= 1; is sent their fitness (n,). Never ends."""
+"""Yields positions (n, d) inside the bounds, n >= 1; receives their fitness (n,). Never ends."""
 
 S = TypeVar("S", bound=SearchSettings)
 
 Search = Callable[[S, Space, int, RandomNumbers], Proposals]
-"""A method: (settings, space, budget [evaluations], random numbers) -> proposals.
+"""(settings, space, budget [evaluations], random numbers) -> proposals.
 
-It draws on nothing else, so that what it was told makes it the same again. A method that makes use
-of start positions has a fifth argument `start`, of type `Start | None`, None by default.
+A method uses no other input, so that the same feedback reproduces it. A method that uses start
+positions has a fifth parameter `start` of type `Start | None`, None by default.
 """
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Start:
-    """Positions that were evaluated before a method begins.
+    """Positions evaluated before a method begins.
 
     Attributes:
         positions: (k, d), inside the bounds, k >= 1.
-        fitness: (k,) of each, +inf for a failed evaluation.
+        fitness: (k,), +inf for a failed evaluation.
     """
 
     positions: Floats
@@ -53,7 +53,7 @@ class Start:
 
     @property
     def best_first(self) -> tuple[Floats, Floats]:
-        """Positions and fitness of those that did not fail, the best first."""
+        """Positions and fitness of the successful evaluations, the best first."""
         order = np.argsort(self.fitness, kind="stable")
         order = order[np.isfinite(self.fitness[order])]
         return self.positions[order], self.fitness[order]
@@ -62,13 +62,11 @@ class Start:
 _SEARCH: Final = 3
 """Purpose of random streams: never renumbered, or stored jobs would change their future."""
 
-_KEPT: Final = 32
-"""Searches under way that a process keeps, so that going on does not replay them."""
+_CACHED: Final = 32
+"""Running searches that a process caches, so that continuing does not replay them."""
 
 
-class _ToldState(BaseModel):
-    """What `dump` writes."""
-
+class _FeedbackState(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True)
 
     optimizer: str
@@ -81,14 +79,14 @@ class _ToldState(BaseModel):
 
 @dataclass(slots=True)
 class _Course:
-    """A generator with what it proposes now, and what of that was told."""
+    """A generator with its current proposal and the feedback on it."""
 
     proposals: Proposals
     positions: Floats
     fitness: list[float]
 
     def tell(self, values: Floats) -> None:
-        """Take values; when the proposal is told as a whole, move on to the next one."""
+        """Add feedback; when the proposal is complete, continue with the next one."""
         for value in values.tolist():
             self.fitness.append(value)
             if len(self.fitness) == len(self.positions):
@@ -97,19 +95,19 @@ class _Course:
 
 
 class Replayed:
-    """An optimizer over a generator. Loading a state tells the generator all of it again.
+    """An optimizer over a generator. Loading a state replays the feedback.
 
-    A method that plans by its budget keeps the plan that it began with, also in a job that is
-    extended: what it was told belongs to what that plan proposed.
+    The budget of the first run stays part of the state, also in a job that is extended, because
+    the feedback belongs to the proposals that this budget led to.
 
-    A process keeps the generators of the searches that it has under way, and takes one up again
-    where the state to load is where it stands; the path is the same either way.
+    A process caches the generators of its running searches, and continues one whose feedback equals
+    that of the state to load; the path is the same either way.
     """
 
     def __init__(
         self, search: Search[S], settings: S, space: Space, budget: int, seed: int
     ) -> None:
-        """Create a search that has not been asked yet."""
+        """Create a search before its first ask."""
 
         def begin(budget: int, start: Floats) -> Proposals:
             random = RandomNumbers(seed, _SEARCH)
@@ -125,7 +123,7 @@ class Replayed:
         self._budget = budget
         self._iteration = 0
         self._asked = 0
-        self._told: list[float] = []
+        self._feedback: list[float] = []
         self._course: _Course | None = None
 
     @property
@@ -135,37 +133,37 @@ class Replayed:
 
     @property
     def evaluations(self) -> int:
-        """Number of positions that were told, in all."""
-        return len(self._told)
+        """Number of positions told so far."""
+        return len(self._feedback)
 
     def start_from(self, positions: Floats) -> None:
-        """Ask for these before the method begins."""
-        begun = bool(self._told or self._asked)
+        """Evaluate positions before the method begins."""
+        begun = bool(self._feedback or self._asked)
         self._start = checked_start(positions, self._space, begun=begun)
         self._course = None
 
     def ask(self, most: int | None = None) -> Floats:
-        """Give the positions to evaluate next; the same ones again until they are told."""
-        course = self._under_way()
-        told = len(course.fitness)
+        """Return the positions to evaluate next; the same ones until they are told."""
+        course = self._running()
+        done = len(course.fitness)
         if not self._asked:
             limit = self._settings.particles
             limit = limit if most is None else min(most, limit)
-            self._asked = min(limit, len(course.positions) - told)
-        return course.positions[told : told + self._asked].copy()
+            self._asked = min(limit, len(course.positions) - done)
+        return course.positions[done : done + self._asked].copy()
 
     def tell(self, fitness: Floats) -> None:
-        """Take what the positions last asked for are worth."""
+        """Receive the fitness of the positions asked for last."""
         values = checked_fitness(fitness, self._asked)
-        self._under_way().tell(values)
-        self._told.extend(values.tolist())
+        self._running().tell(values)
+        self._feedback.extend(values.tolist())
         self._iteration += 1
         self._asked = 0
 
     def dump(self) -> dict[str, Any]:
-        """Give the whole state."""
+        """Return the complete state."""
         if self._course is not None:
-            _UNDER_WAY.keep(self._key(), self._course)
+            _COURSES.put(self._key(), self._course)
             self._course = None
         return {
             "optimizer": self._settings.name,
@@ -173,64 +171,59 @@ class Replayed:
             "iteration": self._iteration,
             "asked": self._asked,
             "budget": self._budget,
-            "told": worth(self._told),
+            "told": worth(self._feedback),
         }
 
     def load(self, state: dict[str, Any]) -> None:
-        """Take on a state."""
+        """Restore a state."""
         name = self._settings.name
-        dumped = parse_state(state, name, _ToldState)
+        dumped = parse_state(state, name, _FeedbackState)
         if dumped.optimizer != name:
             raise ValueError(f"not a state of {name}: optimizer: {dumped.optimizer}")
         if dumped.asked > self._settings.particles:
-            raise ValueError(f"asked: {dumped.asked} positions, more than {name} gives")
+            raise ValueError(f"asked: {dumped.asked} positions, more than {name} asks for at once")
         self._course = None
         self._iteration, self._asked = dumped.iteration, dumped.asked
-        self._budget, self._told = dumped.budget, of_worth(dumped.told).tolist()
+        self._budget, self._feedback = dumped.budget, of_worth(dumped.told).tolist()
 
-    def _under_way(self) -> _Course:
+    def _running(self) -> _Course:
         if self._course is None:
-            self._course = _UNDER_WAY.take(self._key()) or self._replay()
+            self._course = _COURSES.take(self._key()) or self._replay()
         return self._course
 
     def _replay(self) -> _Course:
         proposals = self._begin(self._budget, self._start)
         course = _Course(proposals, _proposal(next(proposals)), [])
-        course.tell(np.array(self._told))
+        course.tell(np.array(self._feedback))
         return course
 
     def _key(self) -> bytes:
         place = f"{self._place} {self._budget} {len(self._start)}".encode()
-        told = np.array(self._told).tobytes()
-        return blake2b(place + self._start.tobytes() + told, digest_size=16).digest()
+        feedback = np.array(self._feedback).tobytes()
+        return blake2b(place + self._start.tobytes() + feedback, digest_size=16).digest()
 
 
-class _UnderWay:
-    """Courses by what they are of and were told; the least recently kept ones are dropped."""
+class _CourseCache:
+    """Courses by search and feedback; drops the least recently cached ones."""
 
     def __init__(self) -> None:
         self._courses: OrderedDict[bytes, _Course] = OrderedDict()
         self._lock = threading.Lock()
 
-    def keep(self, key: bytes, course: _Course) -> None:
+    def put(self, key: bytes, course: _Course) -> None:
         with self._lock:
             self._courses[key] = course
             self._courses.move_to_end(key)
-            while len(self._courses) > _KEPT:
+            while len(self._courses) > _CACHED:
                 self._courses.popitem(last=False)
 
     def take(self, key: bytes) -> _Course | None:
-        """Each course has one user: whoever takes it, has it alone."""
+        """Remove and return a course, so that it has one user at a time."""
         with self._lock:
             return self._courses.pop(key, None)
 
 
-_UNDER_WAY: Final = _UnderWay()
-
-
-def uses_start(search: Callable[..., Proposals]) -> bool:
-    """Whether a method makes use of start positions, or goes on as if there had been none."""
-    return "start" in inspect.signature(search).parameters
+_COURSES: Final = _CourseCache()
 
 
 def _after(
@@ -241,11 +234,13 @@ def _after(
     budget: int,
     random: RandomNumbers,
 ) -> Proposals:
-    """Start positions, and then the method."""
+    """Evaluate the start positions, then run the method."""
     fitness = yield start
-    left = max(budget - len(start), 1)
-    known = {"start": Start(start, fitness)} if uses_start(search) else {}
-    yield from search(settings, space, left, random, **known)
+    remaining = max(budget - len(start), 1)
+    if "start" in inspect.signature(search).parameters:
+        yield from search(settings, space, remaining, random, start=Start(start, fitness))
+    else:
+        yield from search(settings, space, remaining, random)
 
 
 def _proposal(positions: Floats) -> Floats:

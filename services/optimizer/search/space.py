@@ -1,4 +1,4 @@
-"""The box that is searched, and the designs that its points stand for."""
+"""The box that is searched, and the designs its points represent."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 Kind = Literal["continuous", "integer", "categorical"]
 
 _RESOLUTION: Final = 2.0**40
-"""Continuous values are the same design to within this part of a range: rounding is far less."""
+"""Designs are equal if they differ by less than this part of a range; rounding is far smaller."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,9 +22,9 @@ class Axis:
     """One variable of a search.
 
     Attributes:
-        low: Lower bound, in the variable's own unit; 0 for a categorical one.
-        high: Upper bound, above it; of a categorical one, its number of choices less one.
-        kind: What values it takes.
+        low: Lower bound in the variable's own unit; 0 for a categorical variable.
+        high: Upper bound, above `low`; for a categorical variable the number of choices minus 1.
+        kind: Kind of its values.
     """
 
     low: float
@@ -36,9 +36,9 @@ class Space:
     """A box of d variables.
 
     A *position* is a point of the box, in the variables' own units, and real in every coordinate.
-    A *design* is what is judged: integer variables rounded, of categorical ones the index of the
-    choice in whose equal share of the bounds the point lies. A *unit position* is a position scaled
-    to [0, 1] in every coordinate.
+    A *design* is what is evaluated: integer variables are rounded, categorical variables become the
+    index of the choice in whose equal share of the range the point lies. A *unit position* is a
+    position scaled to [0, 1] in every coordinate.
 
     Attributes:
         axes: The d variables.
@@ -46,11 +46,11 @@ class Space:
         high: (d,) upper bounds.
         span: (d,) high - low.
         integer: (d,) true for integer variables.
-        categorical: (d,) true for categorical ones.
+        categorical: (d,) true for categorical variables.
     """
 
     def __init__(self, axes: Sequence[Axis]) -> None:
-        """Make a box."""
+        """Create a box of axes."""
         self.axes: Final = tuple(axes)
         self.low: Final[Floats] = np.array([axis.low for axis in axes], dtype=np.float64)
         self.high: Final[Floats] = np.array([axis.high for axis in axes], dtype=np.float64)
@@ -60,7 +60,7 @@ class Space:
 
     @classmethod
     def continuous(cls, low: Sequence[float] | Floats, high: Sequence[float] | Floats) -> Space:
-        """Make a box of continuous variables.
+        """Create a box of continuous variables.
 
         Args:
             low: (d,) lower bounds.
@@ -77,13 +77,13 @@ class Space:
         return len(self.axes)
 
     def designs(self, positions: Floats) -> Floats:
-        """What is judged for points of the box.
+        """Convert positions to designs.
 
         Args:
             positions: (n, d), inside the bounds.
 
         Returns:
-            (n, d): integer variables rounded, of categorical ones the index of the choice.
+            (n, d): integer variables rounded, categorical variables as indices of choices.
         """
         columns = np.array(positions, dtype=np.float64)
         columns[:, self.integer] = np.rint(columns[:, self.integer])
@@ -94,13 +94,13 @@ class Space:
         return columns
 
     def positions(self, designs: Floats) -> Floats:
-        """Points in the middle of what stands for designs.
+        """Convert designs to positions in the middle of the points that represent them.
 
         Args:
-            designs: (n, d), as `designs` gives them.
+            designs: (n, d), as `designs` returns them.
 
         Returns:
-            (n, d) positions of which `designs` gives the same back.
+            (n, d) positions that `designs` converts back to the same designs.
         """
         points = np.array(designs, dtype=np.float64)
         for j in np.flatnonzero(self.categorical):
@@ -109,7 +109,7 @@ class Space:
         return points
 
     def from_unit(self, unit: Floats) -> Floats:
-        """Positions of unit positions; what lies outside the box is brought to its nearest face.
+        """Convert unit positions to positions, clipped to the box.
 
         Args:
             unit: (n, d).
@@ -120,7 +120,7 @@ class Space:
         return np.clip(self.low + unit * self.span, self.low, self.high)
 
     def to_unit(self, positions: Floats) -> Floats:
-        """Unit positions of positions.
+        """Convert positions to unit positions.
 
         Args:
             positions: (n, d), inside the bounds.
@@ -131,7 +131,7 @@ class Space:
         return (positions - self.low) / self.span
 
     def evenly(self, unit: Floats) -> Floats:
-        """Positions of unit positions, each integer value as wide as the next.
+        """Convert unit positions to positions, giving every integer value the same width.
 
         `from_unit` gives the first and last integer half the width of the others.
 
@@ -147,15 +147,22 @@ class Space:
 
 
 class Judged:
-    """Designs that were judged, so that none is asked for twice."""
+    """The designs evaluated so far, so that none is asked for twice."""
 
     def __init__(self, space: Space) -> None:
-        """Begin with none."""
+        """Begin without a design."""
         self._space: Final = space
         self._seen: set[bytes] = set()
 
     def new(self, designs: Floats) -> NDArray[np.bool_]:
-        """Tell which designs were not judged yet, and take them as judged from now on."""
+        """Mark designs as evaluated.
+
+        Args:
+            designs: (n, d).
+
+        Returns:
+            (n,) which of them were new.
+        """
         keys = np.rint(self._space.to_unit(designs) * _RESOLUTION).astype(np.int64)
         new = np.zeros(len(designs), dtype=np.bool_)
         for i, row in enumerate(keys):

@@ -1,0 +1,1 @@
+"""Search methods for jobs and comparisons, registered as plug-ins of gaitswarm."""

@@ -1,0 +1,345 @@
+"""L-SHADE: adaptive differential evolution of a falling population."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, FiniteFloat, NonNegativeInt, model_validator
+
+from gaitswarm.services.optimizer.search.generational import (
+    Generational,
+    GenerationState,
+    Row,
+    Worth,
+    of_worth,
+    worth,
+)
+from gaitswarm.services.optimizer.search.optimizer import SearchSettings, matrix
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.space import Space
+
+Floats = NDArray[np.float64]
+
+_EVOLVE: Final = 4
+"""Purpose of random streams: never renumbered, or stored jobs would change their future."""
+
+_SPREAD: Final = 0.1
+"""Of a scale and a crossover about remembered ones (Tanabe and Fukunaga 2014)."""
+
+_DRAWS: Final = 6
+"""Scales that are drawn, of which the first positive one is taken."""
+
+_CONVERGED: Final = 1e-9
+"""Extent of a population, as a share of each variable's range, below which it starts anew."""
+
+
+class DeSettings(SearchSettings):
+    """Settings of differential evolution."""
+
+    name: Literal["de"] = "de"
+    population: int = Field(
+        default=25, ge=4, le=10_000, description="Members of the population at the start."
+    )
+    population_end: int = Field(
+        default=4,
+        ge=4,
+        le=10_000,
+        description="Members at the end of the budget, to which their number falls evenly.",
+    )
+    best_share: float = Field(
+        default=0.1,
+        gt=0.0,
+        le=1.0,
+        description="Share of the population, of its best, towards one of which a member moves.",
+    )
+    archive: float = Field(
+        default=1.0,
+        ge=0.0,
+        le=10.0,
+        description="Replaced members that are kept to take differences with, in populations.",
+    )
+    adaptation: Literal["success-history", "none"] = Field(
+        default="success-history",
+        description="Whether scale and crossover are learned from those that had success.",
+    )
+    memory: int = Field(
+        default=10, ge=1, le=1_000, description="Generations with success that are learned from."
+    )
+    scale: float = Field(
+        default=0.5, gt=0.0, le=1.0, description="Scale of differences, F, at first."
+    )
+    crossover: float = Field(
+        default=0.9,
+        ge=0.0,
+        le=1.0,
+        description="Chance of each variable to be changed, CR, at first.",
+    )
+
+    @model_validator(mode="after")
+    def _population_falls(self) -> DeSettings:
+        if self.population_end > self.population:
+            raise ValueError("population_end must not exceed population: it never grows")
+        return self
+
+
+class _PopulationState(GenerationState):
+    """What `dump` writes.
+
+    Attributes:
+        began: Evaluations before this population.
+        members: Its positions, none before its first generation was judged.
+        member_fitness: Of each; None where none has succeeded yet.
+        archive: Positions that were replaced.
+        scales: Remembered ones.
+        crossovers: Remembered ones.
+        successes: Generations with success.
+    """
+
+    began: NonNegativeInt
+    members: list[Row]
+    member_fitness: Worth
+    archive: list[Row]
+    scales: list[FiniteFloat]
+    crossovers: list[FiniteFloat]
+    successes: NonNegativeInt
+
+
+class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
+    """A population of which each member is replaced by its trial, if that is no worse.
+
+    The `de` of job specs is L-SHADE (Tanabe and Fukunaga, CEC 2014): current-to-pbest/1 with an
+    archive, binomial crossover, success-history adaptation, a population that falls over the budget
+    and is then small enough to converge.
+
+    Members are real in integer variables, too; whoever evaluates them rounds. A trial of a design
+    that the population has already, or another trial, has one variable drawn anew. A population
+    that has converged is given up for a new one, of which the former keeps nothing.
+    """
+
+    state_model = _PopulationState
+
+    _members: Floats
+    _fitness_of_members: Floats
+    _archive: Floats
+    _scales: Floats
+    _crossovers: Floats
+
+    def __init__(self, settings: DeSettings, space: Space, budget: int, seed: int) -> None:
+        """Create a search that has not been asked yet."""
+        super().__init__(settings, space, budget, seed)
+        self._begin()
+
+    @property
+    def first_size(self) -> int:
+        """Size of a new population."""
+        return self.settings.population
+
+    @property
+    def population(self) -> Floats:
+        """(n, d) the members' positions, (0, d) before their first generation was judged."""
+        return self._members.copy()
+
+    def propose(self) -> Floats:
+        """Scatter a population, or make a trial of each member."""
+        random = self._random()
+        if not len(self._members):
+            return latin_hypercube(self.space, self.settings.population, random)
+        scale, crossover = self._parameters(random)
+        trials = crossed(self._members, self._mutants(random, scale), crossover, random)
+        return without_duplicates(self.space, self._members, trials, random)
+
+    def learn(self, positions: Floats, fitness: Floats) -> None:
+        """Replace each member by its trial, if that is no worse."""
+        if len(self._members):
+            self._select(positions, fitness)
+        else:
+            self._members, self._fitness_of_members = positions.copy(), fitness.copy()
+        self._shrink()
+        if (np.ptp(self.space.to_unit(self._members), axis=0) < _CONVERGED).all():
+            self._begin()
+
+    def memory(self) -> dict[str, Any]:
+        """Give the population, its archive and what it has learned."""
+        return {
+            "began": self._began,
+            "members": self._members.tolist(),
+            "member_fitness": worth(self._fitness_of_members),
+            "archive": self._archive.tolist(),
+            "scales": self._scales.tolist(),
+            "crossovers": self._crossovers.tolist(),
+            "successes": self._successes,
+        }
+
+    def recall(self, state: _PopulationState) -> None:
+        """Take on a population, its archive and what it had learned."""
+        settings, d = self.settings, self.space.dimension
+        size = len(state.members)
+        least = settings.population_end if size else 0
+        if not least <= size <= settings.population:
+            raise ValueError(f"members: {size} of them, not {least} to {settings.population}")
+        if len(state.member_fitness) != size:
+            raise ValueError(f"member_fitness: {len(state.member_fitness)} values, not {size}")
+        for name in ("scales", "crossovers"):
+            if len(getattr(state, name)) != settings.memory:
+                raise ValueError(f"{name}: expected {settings.memory} of them")
+        judged, asked = len(state.fitness), len(state.positions)
+        # The first generation may be of more start positions than there are members.
+        whole = {size or settings.population} | (
+            {len(self._start)} if not state.generations else set()
+        )
+        if judged < asked and asked not in whole:
+            raise ValueError(f"positions: {asked} of them under way for {size} members")
+        members = self.inside(matrix(state.members, (size, d), "members"), "members")
+        shape = (len(state.archive), d)
+        self._archive = self.inside(matrix(state.archive, shape, "archive"), "archive")
+        self._members, self._fitness_of_members = members, of_worth(state.member_fitness)
+        self._scales, self._crossovers = np.array(state.scales), np.array(state.crossovers)
+        self._began, self._successes = state.began, state.successes
+
+    def _begin(self) -> None:
+        """Know nothing, as at the start."""
+        settings, d = self.settings, self.space.dimension
+        self._began = self.evaluations
+        self._members, self._fitness_of_members = np.empty((0, d)), np.empty(0)
+        self._archive = np.empty((0, d))
+        self._scales = np.full(settings.memory, settings.scale)
+        self._crossovers = np.full(settings.memory, settings.crossover)
+        self._successes = 0
+
+    def _random(self) -> RandomNumbers:
+        """Numbers of this generation, from the first on."""
+        return RandomNumbers(self.seed, _EVOLVE, iteration=self.generations)
+
+    def _parameters(self, random: RandomNumbers) -> tuple[Floats, Floats]:
+        """(n,) scale and (n,) crossover of each trial; the first numbers of a generation."""
+        n = len(self._members)
+        chosen = indices(random.uniform(n), self.settings.memory)
+        scales, crossovers = self._scales[chosen], self._crossovers[chosen]
+        if self.settings.adaptation == "none":
+            return scales, crossovers
+        crossover = np.clip(crossovers + _SPREAD * random.normal(n), 0.0, 1.0)
+        # The ratio of two normal numbers is Cauchy distributed.
+        cauchy = random.normal(n, _DRAWS) / random.normal(n, _DRAWS)
+        drawn = scales[:, np.newaxis] + _SPREAD * cauchy
+        scale = drawn[np.arange(n), np.argmax(drawn > 0.0, axis=1)]
+        return np.minimum(np.where(scale > 0.0, scale, scales), 1.0), crossover
+
+    def _mutants(self, random: RandomNumbers, scale: Floats) -> Floats:
+        """current-to-pbest/1: towards one of the best, and by a difference of two others."""
+        space, members = self.space, self._members
+        n, me = len(members), np.arange(len(members))
+        order = np.argsort(self._fitness_of_members, kind="stable")
+        best_count = min(n, max(2, round(self.settings.best_share * n)))
+        best = members[order[indices(random.uniform(n), best_count)]]
+        one = (me + 1 + indices(random.uniform(n), n - 1)) % n
+        pool = np.concatenate([members, self._archive])
+        other = indices(random.uniform(n), len(pool) - 2)
+        # Neither the member itself nor the first of the two.
+        other += other >= np.minimum(me, one)
+        other += other >= np.maximum(me, one)
+        first, second = members[one], pool[other]
+        factor = scale[:, np.newaxis]
+        mutants = members + factor * (best - members) + factor * (first - second)
+        mutants = np.where(mutants < space.low, 0.5 * (space.low + members), mutants)
+        mutants = np.where(mutants > space.high, 0.5 * (space.high + members), mutants)
+        return with_choices(space, mutants, (best, first, second), random)
+
+    def _select(self, trials: Floats, fitness: Floats) -> None:
+        """Let trials that are no worse take their members' places."""
+        before, better = self._fitness_of_members, fitness < self._fitness_of_members
+        if better.any():
+            self._archive = np.concatenate([self._archive, self._members[better]])
+            self._remember(better, gains(before, fitness))
+        taken = fitness <= before
+        self._members = np.where(taken[:, np.newaxis], trials, self._members)
+        self._fitness_of_members = np.where(taken, fitness, before)
+
+    def _remember(self, better: NDArray[np.bool_], gain: Floats) -> None:
+        """Keep what had success, by how much it gained, in place of the oldest memory."""
+        if self.settings.adaptation == "none":
+            return
+        scale, crossover = self._parameters(self._random())
+        place = self._successes % self.settings.memory
+        self._scales[place] = lehmer_mean(scale[better], gain[better])
+        self._crossovers[place] = lehmer_mean(crossover[better], gain[better])
+        self._successes += 1
+
+    def _shrink(self) -> None:
+        """Let the worst members go, and the oldest of the archive."""
+        settings = self.settings
+        done = (self.evaluations - self._began) / max(1, self.budget - self._began)
+        fall = settings.population - settings.population_end
+        planned = settings.population - round(fall * min(1.0, done))
+        order = np.argsort(self._fitness_of_members, kind="stable")
+        kept = np.sort(order[:planned])
+        self._members, self._fitness_of_members = (
+            self._members[kept],
+            self._fitness_of_members[kept],
+        )
+        room = round(settings.archive * len(kept))
+        self._archive = self._archive[max(0, len(self._archive) - room) :]
+
+
+def gains(before: Floats, after: Floats) -> Floats:
+    """By how much trials are better than their members."""
+    known = np.isfinite(before) & np.isfinite(after)
+    gain = np.where(known, np.where(known, before, 0.0) - np.where(known, after, 0.0), 0.0)
+    greatest = float(gain.max()) if (gain > 0.0).any() else 1.0
+    return np.where(np.isfinite(after) & ~np.isfinite(before), greatest, gain)
+
+
+def lehmer_mean(values: Floats, weights: Floats) -> float:
+    """Weighted Lehmer mean, of sums that are rounded once, so that their order does not matter."""
+    total = math.fsum(weights * values)
+    return math.fsum(weights * values * values) / total if total > 0.0 else 0.0
+
+
+_ANY_CHOICE: Final = 0.1
+"""Chance that a changed categorical variable takes any of its choices, not another member's."""
+
+
+def latin_hypercube(space: Space, count: int, random: RandomNumbers) -> Floats:
+    """Scatter positions so that each variable has one in each of `count` equal parts."""
+    d = space.dimension
+    cells = np.array([random.permutation(count) for _ in range(d)], dtype=np.float64).T
+    return space.evenly((cells + random.uniform(count, d)) / count)
+
+
+def with_choices(
+    space: Space, mutants: Floats, givers: tuple[Floats, Floats, Floats], random: RandomNumbers
+) -> Floats:
+    """Give mutants their choices, which have no differences: a giver's, or now and then any."""
+    lot, share = random.uniform(*mutants.shape), (1.0 - _ANY_CHOICE) / 3.0
+    conditions = [lot < share, lot < 2.0 * share, lot < 3.0 * share]
+    anything = space.from_unit((lot - 3.0 * share) / _ANY_CHOICE)
+    return np.where(space.categorical, np.select(conditions, list(givers), anything), mutants)
+
+
+def crossed(parents: Floats, mutants: Floats, crossover: Floats, random: RandomNumbers) -> Floats:
+    """Binomial crossover: of the mutant, at least one variable."""
+    n, d = mutants.shape
+    changed = random.uniform(n, d) < crossover[:, np.newaxis]
+    changed[np.arange(n), indices(random.uniform(n), d)] = True
+    return np.where(changed, mutants, parents)
+
+
+def without_duplicates(
+    space: Space, members: Floats, trials: Floats, random: RandomNumbers
+) -> Floats:
+    """Draw one variable anew of a trial whose design is a member's or another trial's, too."""
+    n, d = trials.shape
+    variable, anything = indices(random.uniform(n), d), space.evenly(random.uniform(n, d))
+    seen = {design.tobytes() for design in space.designs(members)}
+    for i, design in enumerate(space.designs(trials)):
+        if design.tobytes() in seen:
+            trials[i, variable[i]] = anything[i, variable[i]]
+        seen.add(space.designs(trials[i : i + 1]).tobytes())
+    return trials
+
+
+def indices(uniform: Floats, count: int) -> NDArray[np.intp]:
+    """Choose from `count` things."""
+    return (uniform * count).astype(np.intp)

@@ -1,1 +1,0 @@
-"""Evolutionary methods: populations that vary and select."""

@@ -1,0 +1,306 @@
+"""HypE: a population that is selected for the hypervolume that it dominates."""
+
+from __future__ import annotations
+
+from typing import Any, Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from gaitswarm.services.optimizer.search.differential_evolution import (
+    crossed,
+    indices,
+    latin_hypercube,
+    with_choices,
+    without_duplicates,
+)
+from gaitswarm.services.optimizer.search.generational import (
+    Generational,
+    GenerationState,
+    Row,
+    Worth,
+    of_worth,
+    worth,
+)
+from gaitswarm.services.optimizer.search.optimizer import SearchSettings, checked_fitness, matrix
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.space import Space
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+_VARY: Final = 7
+_SAMPLE: Final = 8
+"""Purposes of random streams: never renumbered, or stored jobs would change their future."""
+
+_CONVERGED: Final = 1e-9
+"""Extent of a population, as a share of each variable's range, below which it starts anew."""
+
+
+class HypeSettings(SearchSettings):
+    """Settings of HypE."""
+
+    name: Literal["hype"] = "hype"
+    population: int = Field(default=40, ge=4, le=500, description="Members of the population.")
+    offspring: int = Field(
+        default=25, ge=1, le=500, description="Designs that are made for each generation."
+    )
+    scale_least: float = Field(
+        default=0.4, gt=0.0, le=1.0, description="Least scale of differences, F."
+    )
+    scale_most: float = Field(
+        default=0.9, gt=0.0, le=1.0, description="Greatest scale of differences, F."
+    )
+    crossover: float = Field(
+        default=0.9, ge=0.0, le=1.0, description="Chance of each variable to be changed, CR."
+    )
+    samples: int = Field(
+        default=4_000,
+        ge=100,
+        le=20_000,
+        description="Points by which hypervolumes are estimated.",
+    )
+
+    @model_validator(mode="after")
+    def _scales_are_in_order(self) -> HypeSettings:
+        if self.scale_least > self.scale_most:
+            raise ValueError("scale_least must not exceed scale_most")
+        return self
+
+
+class _PopulationState(GenerationState):
+    """The dumped state; `fitness` has the objective vectors of the generation under way.
+
+    Attributes:
+        members: Positions of the population, empty before its first generation is evaluated.
+        vectors: Objective vectors of the members.
+    """
+
+    fitness: list[Worth]  # type: ignore[assignment]
+    members: list[Row]
+    vectors: list[Worth]
+
+
+class Hype(Generational[HypeSettings, _PopulationState]):
+    """A population of which those stay that dominate the most hypervolume together.
+
+    Selection is that of HypE (Bader and Zitzler 2011): of members and trials together, whole Pareto
+    fronts stay as long as there is room, and of the next one those whose hypervolume is the
+    greatest. Variation is that of differential evolution, current-to-best/1: a member that won a
+    tournament moves towards another winner and by a difference of two members.
+
+    The fitness that `Generational` handles is (n, M) objective vectors here; a vector with any +inf
+    belongs to a failed evaluation.
+    """
+
+    state_model = _PopulationState
+
+    _members: Floats
+    _vectors: Floats
+
+    def __init__(self, settings: HypeSettings, space: Space, budget: int, seed: int) -> None:
+        """Create a search that has not been asked yet."""
+        super().__init__(settings, space, budget, seed)
+        self._begin()
+
+    @property
+    def first_size(self) -> int:
+        """Size of a new population."""
+        return self.settings.population
+
+    @property
+    def population(self) -> tuple[Floats, Floats]:
+        """(n, d) positions and (n, M) objective vectors of the members; none at first."""
+        return self._members.copy(), self._vectors.copy()
+
+    @property
+    def objectives(self) -> int | None:
+        """Number of objectives, M; None before the first vectors are told."""
+        vectors = self._vectors if len(self._vectors) else self._fitness
+        return vectors.shape[1] if len(vectors) else None
+
+    def checked(self, fitness: Floats, asked: int) -> Floats:
+        """Check objective vectors."""
+        first = fitness.shape[1] if fitness.ndim > 1 else 0
+        return checked_fitness(fitness, asked, self.objectives or max(1, first))
+
+    def written(self, fitness: Floats) -> list[Any]:
+        """Convert objective vectors to JSON."""
+        return [worth(row) for row in fitness.tolist()]
+
+    def read(self, values: list[Any]) -> Floats:
+        """Convert objective vectors from JSON."""
+        return vectors_of(values, "fitness")
+
+    def propose(self) -> Floats:
+        """Scatter a population, or make trials."""
+        random = RandomNumbers(self.seed, _VARY, iteration=self.generations)
+        if not len(self._members):
+            return latin_hypercube(self.space, self.settings.population, random)
+        return self._trials(random)
+
+    def learn(self, positions: Floats, fitness: Floats) -> None:
+        """Let the best of members and trials be the population."""
+        pool = np.concatenate([self._members, positions])
+        vectors = np.concatenate([self._vectors, fitness]) if len(self._vectors) else fitness
+        kept = self.best(vectors, min(len(pool), self.settings.population))
+        self._members, self._vectors = pool[kept], vectors[kept]
+        if (np.ptp(self.space.to_unit(self._members), axis=0) < _CONVERGED).all():
+            self._begin()
+
+    def best(self, fitness: Floats, count: int) -> Indices:
+        """Choose whole fronts, and of the next one those that dominate the most hypervolume."""
+        ranks = pareto_ranks(fitness)
+        kept = np.empty(0, dtype=np.intp)
+        for rank in range(int(ranks.max()) + 1):
+            front = np.flatnonzero(ranks == rank)
+            room = count - len(kept)
+            if len(front) > room and np.isfinite(fitness[front]).all():
+                front = front[self._hypervolume(fitness[front]).chosen(room)]
+            kept = np.concatenate([kept, front[:room]])
+        return np.sort(kept)
+
+    def memory(self) -> dict[str, Any]:
+        """Give the population."""
+        return {"members": self._members.tolist(), "vectors": self.written(self._vectors)}
+
+    def recall(self, state: _PopulationState) -> None:
+        """Take on a population."""
+        size, most = len(state.members), self.settings.population
+        if size > most:
+            raise ValueError(f"members: {size} of them, more than {most}")
+        if len(state.vectors) != size:
+            raise ValueError(f"vectors: {len(state.vectors)} of them, not {size}")
+        vectors = vectors_of(state.vectors, "vectors")
+        told = vectors_of(state.fitness, "fitness")
+        if len(told) and size and told.shape[1] != vectors.shape[1]:
+            raise ValueError(f"fitness: vectors of {told.shape[1]}, not {vectors.shape[1]}")
+        shape = (size, self.space.dimension)
+        self._members = self.inside(matrix(state.members, shape, "members"), "members")
+        self._vectors = vectors
+
+    def _begin(self) -> None:
+        """Know nothing, as at the start."""
+        self._members, self._vectors = np.empty((0, self.space.dimension)), np.empty((0, 0))
+
+    def _hypervolume(self, front: Floats) -> SampledHypervolume:
+        random = RandomNumbers(self.seed, _SAMPLE, iteration=self.generations)
+        return SampledHypervolume(front, self.settings.samples, random)
+
+    def _trials(self, random: RandomNumbers) -> Floats:
+        """Winners of tournaments, moved towards others and by differences of any two members."""
+        settings, space, members = self.settings, self.space, self._members
+        n, m = settings.offspring, len(members)
+        places = self._places()
+        own, towards = (self._winners(places, random) for _ in range(2))
+        one, other = (members[indices(random.uniform(n), m)] for _ in range(2))
+        least, most = settings.scale_least, settings.scale_most
+        scale = least + (most - least) * random.uniform(n, 1)
+        parents, best = members[own], members[towards]
+        # What goes beyond a bound is brought to it: the best designs often lie at some.
+        moved = parents + scale * (best - parents) + scale * (one - other)
+        mutants = np.clip(moved, space.low, space.high)
+        mutants = with_choices(space, mutants, (best, one, other), random)
+        trials = crossed(parents, mutants, np.full(n, settings.crossover), random)
+        return without_duplicates(space, members, trials, random)
+
+    def _places(self) -> Indices:
+        """(m,) place of each member, 0 the best: by its front, then by its share in it."""
+        ranks = pareto_ranks(self._vectors)
+        shares = np.zeros(len(ranks), dtype=np.int64)
+        for rank in range(int(ranks.max()) + 1):
+            front = ranks == rank
+            if np.isfinite(self._vectors[front]).all():
+                shares[front] = self._hypervolume(self._vectors[front]).shares()
+        return np.argsort(np.lexsort((-shares, ranks)))
+
+    def _winners(self, places: Indices, random: RandomNumbers) -> Indices:
+        """(offspring,) the better of two members that are drawn, each."""
+        n, m = self.settings.offspring, len(places)
+        one, other = indices(random.uniform(n), m), indices(random.uniform(n), m)
+        return np.where(places[one] <= places[other], one, other)
+
+
+_BEYOND: Final = 0.1
+"""Distance of the reference point from the nadir, as a share of the range of a front."""
+
+_UNIT: Final = 2.0**32
+"""Weight of a sample, as a whole number."""
+
+
+def pareto_ranks(vectors: Floats) -> Indices:
+    """Sort objective vectors into fronts (Deb et al. 2002), all objectives minimized."""
+    ranks = np.full(len(vectors), -1, dtype=np.intp)
+    left = np.isfinite(vectors).all(axis=1)
+    no_worse = np.ones((len(vectors), len(vectors)), dtype=np.bool_)
+    for column in vectors.T:
+        no_worse &= column[:, np.newaxis] <= column
+    dominates = no_worse & ~no_worse.T
+    rank = 0
+    while left.any():
+        front = left & ~dominates[left].any(axis=0)
+        ranks[front] = rank
+        left &= ~front
+        rank += 1
+    ranks[ranks < 0] = rank
+    return ranks
+
+
+class SampledHypervolume:
+    """The box that a front dominates, estimated from points that are drawn in it.
+
+    The front is scaled to [0, 1] between its least and its greatest value in each objective; the
+    box ends at the reference point, a tenth beyond.
+    """
+
+    def __init__(self, front: Floats, samples: int, random: RandomNumbers) -> None:
+        """Draw the points."""
+        low = front.min(axis=0)
+        span = front.max(axis=0) - low
+        scaled = (front - low) / np.where(span > 0.0, span, 1.0)
+        points = random.uniform(samples, front.shape[1]) * (1.0 + _BEYOND)
+        covers = np.ones((len(front), samples), dtype=np.bool_)
+        for objective, point in zip(scaled.T, points.T, strict=True):
+            covers &= objective[:, np.newaxis] <= point
+        self._covers: Final = covers
+
+    def shares(self) -> NDArray[np.int64]:
+        """How much is dominated by each vector alone."""
+        alone = self._covers.sum(axis=0) == 1
+        return np.asarray((self._covers & alone).sum(axis=1), dtype=np.int64)
+
+    def chosen(self, count: int) -> Indices:
+        """Choose the vectors that dominate the most together (HypE; Bader and Zitzler 2011).
+
+        One after the other goes whose loss is the least to be expected, if of all that have to go
+        the others were drawn at random (equations 12 and 13 of the paper).
+        """
+        kept = np.arange(len(self._covers))
+        covered = self._covers.sum(axis=0)
+        while len(kept) > count:
+            weights = _weights(len(kept), len(kept) - count)[covered]
+            losses = (self._covers[kept] * weights).sum(axis=1)
+            gone = int(losses.argmin())
+            covered -= self._covers[kept[gone]]
+            kept = np.delete(kept, gone)
+        return kept
+
+
+def _weights(size: int, going: int) -> NDArray[np.int64]:
+    """(size + 1,) share of a point in the loss of each of so many vectors that dominate it.
+
+    It is lost only where all the others that dominate it go as well.
+    """
+    weights, chance = np.zeros(size + 1), 1.0
+    for others in range(min(size, going)):
+        weights[others + 1] = chance / (others + 1)
+        chance *= (going - others - 1) / max(1, size - others - 1)
+    return np.asarray(np.rint(weights * _UNIT), dtype=np.int64)
+
+
+def vectors_of(rows: list[Worth], name: str) -> Floats:
+    """Read objective vectors of a dumped state."""
+    if len({len(row) for row in rows}) > 1 or any(not row for row in rows):
+        raise ValueError(f"{name}: vectors of one length were expected")
+    return np.array([of_worth(row) for row in rows], dtype=np.float64)

@@ -1,1 +1,0 @@
-"""Searches that go from a point to a better one near it."""

@@ -1,1 +1,0 @@
-"""Methods that model the fitness, or are led by a library's own search."""

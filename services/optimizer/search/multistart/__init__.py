@@ -1,1 +1,0 @@
-"""Searches that start local ones from several places."""

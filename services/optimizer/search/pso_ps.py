@@ -1,0 +1,114 @@
+"""A particle swarm, then pattern search from its best (thesis 3.2.2)."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from gaitswarm.services.optimizer.search.pattern_search import Polls, PollSettings, polls
+from gaitswarm.services.optimizer.search.pso import ParticleSwarm, SwarmSettings
+from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.search.replayed import Proposals, Start
+from gaitswarm.services.optimizer.search.space import Judged, Space
+
+Floats = NDArray[np.float64]
+
+
+class PsoPsSettings(SwarmSettings, PollSettings):
+    """Settings of the hybrid: those of the swarm, of the polls, and of the turn between them."""
+
+    name: Literal["pso-ps"] = "pso-ps"
+    swarm_share: float = Field(
+        default=0.5, gt=0.0, lt=1.0, description="Share of the budget that the swarm has."
+    )
+    searches: int = Field(
+        default=1,
+        ge=1,
+        le=100,
+        description="How many of the swarm's best designs a pattern search starts from.",
+    )
+    initial_mesh: float = Field(
+        default=0.0625,
+        gt=0.0,
+        le=1.0,
+        description="First step of a pattern search, as a share of each variable's range.",
+    )
+
+
+def pso_ps(
+    settings: PsoPsSettings,
+    space: Space,
+    budget: int,
+    random: RandomNumbers,
+    start: Start | None = None,
+) -> Proposals:
+    """Search by a swarm, then by pattern searches from the best that its particles remember.
+
+    The thesis's hybrid: pattern search runs after the swarm. That of Vaz and Vicente (2007),
+    PSwarm, polls within the swarm instead, whenever an iteration has not improved its best.
+
+    The searches take turns: each batch has one poll of each that goes on. When all have ended, it
+    begins anew with another swarm and keeps nothing.
+    """
+    iterations = max(round(settings.swarm_share * budget / settings.particles), 1)
+    while True:
+        swarm = ParticleSwarm(settings, space, iterations * settings.particles, random.seed())
+        judged = Judged(space)
+        if start is not None:
+            judged.new(space.designs(start.positions))
+            _begin(swarm, start)
+            start = None
+        while swarm.generations < iterations:
+            positions = swarm.ask()
+            judged.new(space.designs(positions))
+            swarm.tell((yield positions))
+        starts, worth = best_members(swarm, settings.searches)
+        yield from _in_turns(
+            [
+                polls(settings, space, start, fitness, judged, random)
+                for start, fitness in zip(starts, worth.tolist(), strict=True)
+            ]
+        )
+
+
+def _begin(swarm: ParticleSwarm, start: Start) -> None:
+    """Let a swarm ask for what was evaluated before, and tell it."""
+    swarm.start_from(start.positions)
+    fitness = start.fitness
+    while len(fitness):
+        asked = len(swarm.ask(len(fitness)))
+        swarm.tell(fitness[:asked])
+        fitness = fitness[asked:]
+
+
+def best_members(swarm: ParticleSwarm, count: int) -> tuple[Floats, Floats]:
+    """The best designs that a swarm's particles remember."""
+    designs = swarm.space.designs(swarm.best_positions)
+    order = np.argsort(swarm.best_fitness, kind="stable")
+    order = order[np.isfinite(swarm.best_fitness[order])]
+    order = order[Judged(swarm.space).new(designs[order])][:count]
+    return designs[order], swarm.best_fitness[order]
+
+
+def _in_turns(searches: list[Polls]) -> Polls:
+    """One poll of each search in a batch, until all have ended."""
+    under_way = [(search, poll) for search in searches if (poll := next(search, None)) is not None]
+    while under_way:
+        fitness = yield np.concatenate([poll for _, poll in under_way])
+        ends = np.cumsum([len(poll) for _, poll in under_way])[:-1]
+        told = zip(under_way, np.split(fitness, ends), strict=True)
+        under_way = [
+            (search, poll)
+            for (search, _), values in told
+            if (poll := _next_poll(search, values)) is not None
+        ]
+
+
+def _next_poll(search: Polls, fitness: Floats) -> Floats | None:
+    try:
+        return search.send(fitness)
+    except StopIteration:
+        return None

@@ -1,1 +1,0 @@
-"""Searches by a population whose members learn from one another."""

@@ -31,7 +31,7 @@ from gaitswarm.views.robustness import IndexView
 
 
 class DistributionItemView(View):
-    """The designs of one iteration."""
+    """Distribution of the designs of one iteration."""
 
     index: int = Field(description="Index of the iteration, from 0.", examples=[24])
     fitness: list[float | None] = Field(
@@ -44,14 +44,14 @@ class DistributionItemView(View):
     )
     diversity: float | None = Field(
         description="Standard deviation of the designs as a share of each searched variable's"
-        " range, mean over these variables [1]: 0 when the search has come together; null for an"
+        " range, mean over these variables [1]: 0 when the search has converged; null for an"
         " iteration of a single design.",
         examples=[0.12],
     )
 
 
 class DistributionView(View):
-    """How designs are spread, in pages. It is complete when `next` is null."""
+    """A page of the designs' distribution. The list is complete when `next` is null."""
 
     quantiles: list[float] = Field(
         description="Shares of the designs that `fitness` is given for.", examples=[list(QUANTILES)]
@@ -88,7 +88,7 @@ class DistributionView(View):
 
 
 class RankingRequest(BaseModel):
-    """By what to judge the designs of a job anew."""
+    """Preference by which to rank the designs of a job."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -105,21 +105,21 @@ class RankingRequest(BaseModel):
 
 
 class RankedDesignView(View):
-    """A design and its places in two rankings; the first of equals is the earliest."""
+    """A design and its ranks; among equals the earliest comes first."""
 
-    rank: int = Field(description="Place by the preference that was asked for, from 1.")
+    rank: int = Field(description="Rank under the requested preference, from 1.")
     iteration: int = Field(description="Iteration of the job, from 0.", examples=[24])
     particle: int = Field(
         description="Number of the design in its iteration, from 0.", examples=[7]
     )
-    fitness: float = Field(description="By the preference that was asked for [1].", examples=[20.8])
+    fitness: float = Field(description="Under the requested preference [1].", examples=[20.8])
     figure_of_merit: float | None = Field(
         default=None,
-        description="To be maximized: F of eq. 3.1 [1] if chapter-3 was asked for, else null.",
+        description="To be maximized: F of eq. 3.1 [1] if chapter-3 was requested, else null.",
         examples=[6.9],
     )
     rank_before: int | None = Field(
-        description="Place by the job's own preference, from 1; null if that has none."
+        description="Rank under the job's own preference, from 1; null if it has none."
     )
     fitness_before: float | None = Field(description="By the job's own preference [1].")
     design: dict[str, float | str] = Field(
@@ -132,7 +132,7 @@ class RankedDesignView(View):
 
 
 class BestSoFarView(View):
-    """Progress as it would have looked."""
+    """Best fitness so far under the requested preference."""
 
     index: int = Field(description="Index of the iteration, from 0.", examples=[24])
     fitness: float | None = Field(
@@ -141,17 +141,17 @@ class BestSoFarView(View):
 
 
 class RankingView(View):
-    """A job's designs, judged by another preference. Nothing is simulated, nothing is stored."""
+    """A job's designs ranked by another preference, without simulation."""
 
-    preference: PreferenceChoice = Field(description="As it was asked for.")
-    evaluations: int = Field(description="Designs that were judged [1].", examples=[625])
+    preference: PreferenceChoice = Field(description="The requested preference.")
+    evaluations: int = Field(description="Designs that were ranked [1].", examples=[625])
     fitness_of_present_best: float | None = Field(
         description="By the preference that was asked for, of the design that is the job's best by"
         " its own [1]; null if it has none.",
         examples=[23.1],
     )
     correlation: float | None = Field(
-        description="Spearman's rank correlation of both rankings, over the designs that are in"
+        description="Spearman's rank correlation of both rankings, over the designs in"
         " both [1]; null where it is undefined.",
         examples=[0.83],
     )
@@ -230,14 +230,14 @@ class IndexIntervalView(View):
 
 
 class WidenedView(View):
-    """Bounds with which a search goes on where the winner is held back."""
+    """Wider bounds for a variable whose best value lies at a bound."""
 
     low: float = Field(description="Lower bound, in the variable's unit.", examples=[500.0])
     high: float = Field(description="Upper bound.", examples=[14750.0])
 
 
 class VariableImportanceView(View):
-    """What one variable has to do with what designs came to."""
+    """Influence of one variable on the results."""
 
     name: str = Field(description="Name of the variable.", examples=["FI1R"])
     unit: str = Field(description="Its unit.", examples=["counts"])
@@ -257,7 +257,7 @@ class VariableImportanceView(View):
     )
     moved_with: str | None = Field(
         description="The variable whose values went with its own the most among all designs: what"
-        " one of the two does, the other seems to do; null if there is none.",
+        " an effect of one may be due to the other; null if there is none.",
         examples=["FI2R"],
     )
     correlation: float | None = Field(
@@ -323,7 +323,7 @@ class LossView(View):
 
 
 class FamilyView(View):
-    """Some of a job's scenarios, and the design that is best by them alone."""
+    """A subset of a job's scenarios, and the design that is best in them."""
 
     scenarios: list[str] = Field(
         description="Their names, in the job's order.", examples=[["normal-slow", "slope-fast"]]
@@ -357,9 +357,9 @@ class FamilyView(View):
 
 
 class LeftOutView(View):
-    """What the job would have done without one of its scenarios."""
+    """Effect of leaving out one scenario."""
 
-    scenario: str = Field(description="Name of the one.", examples=["loaded-fast"])
+    scenario: str = Field(description="Name of the scenario left out.", examples=["loaded-fast"])
     family: FamilyView = Field(description="The others.")
     loss: LossView = Field(
         description="By how much the others' winner is worse than the job's best in the scenario"
@@ -388,10 +388,10 @@ class LeftOutView(View):
 
 
 class FamilySizeView(View):
-    """Families of so many scenarios."""
+    """Families of one size."""
 
     size: int = Field(description="Scenarios of each.", examples=[3])
-    families: int = Field(description="How many were looked at.", examples=[20])
+    families: int = Field(description="Families of this size that were evaluated.", examples=[20])
     median: float | None = Field(
         description="Median of their regrets [1]; null if the winners of half of them fail.",
         examples=[0.02],
@@ -415,7 +415,7 @@ class ScenarioFamiliesView(View):
     tolerance: float = Field(
         description="Largest regret of a smallest family [1].", examples=[0.01]
     )
-    left_out: list[LeftOutView] = Field(description="Each scenario left out in its turn.")
+    left_out: list[LeftOutView] = Field(description="Each scenario left out in turn.")
     sizes: list[FamilySizeView] = Field(
         description="Families by their size; of more than 64, so many that were drawn."
     )
@@ -466,7 +466,7 @@ def _size(size: int, found: ScenarioFamilies) -> FamilySizeView:
 
 
 class PreferenceWinnerView(View):
-    """A design that is the best of its job under some preferences."""
+    """A design that is the best of its job under at least one preference."""
 
     iteration: int = Field(description="Iteration of the job, from 0.", examples=[24])
     particle: int = Field(
@@ -499,11 +499,11 @@ class PreferenceWinnerView(View):
 class RobustPreferencesView(View):
     """Which preference's winner is the most robust, among the designs of one job."""
 
-    drawn: int = Field(description="Preferences beside A, B and C.", examples=[512])
+    drawn: int = Field(description="Preferences drawn in addition to A, B and C.", examples=[512])
     winners: int = Field(description="Different designs that win under any.", examples=[14])
-    samples: int = Field(description="Designs walked around each candidate.", examples=[128])
+    samples: int = Field(description="Designs simulated around each candidate.", examples=[128])
     radius: float = Field(
-        description="How far they were from it at most, as a share of the bounds [1].",
+        description="Largest distance from it, as a share of the bounds [1].",
         examples=[0.02],
     )
     seed: int = Field(description="Of preferences and samples.", examples=[1])
@@ -561,7 +561,7 @@ class RuleView(View):
 
 
 class QuantisationView(View):
-    """The table that is shipped in place of the inference, and what that costs."""
+    """The lookup table that replaces the inference, and its error."""
 
     error_bits: int = Field(description="Of the error's index [bit].", examples=[10])
     current_bits: int = Field(description="Of the current's index [bit].", examples=[6])
@@ -592,11 +592,11 @@ class FuzzyOutputView(UniverseView):
     )
     rules: list[RuleView] = Field(description="Its rules, in the thesis's order.")
     inference: list[list[float]] = Field(
-        description="What the rules say: a row for each error, a number for each current.",
+        description="Exact inference: a row for each error, a number for each current.",
         examples=[[[-386.8, -100.0], [386.8, 100.0]]],
     )
     table: list[list[float]] = Field(
-        description="What the microcontroller computes on the same grid.",
+        description="The lookup table on the same grid.",
         examples=[[[-387.4, -98.4], [387.4, 98.4]]],
     )
     quantisation: QuantisationView = Field(description="What of the rules the table keeps.")
@@ -624,7 +624,7 @@ class FuzzyOutputView(UniverseView):
 
 
 class SurfaceView(View):
-    """How a fuzzy controller answers."""
+    """Fuzzy sets, rules and control surfaces of a design."""
 
     controller: ControllerName = Field(description="Controller.", examples=["fuzzy-pi"])
     inputs: list[UniverseView] = Field(description="All inputs of any output.")

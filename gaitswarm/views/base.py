@@ -1,4 +1,4 @@
-"""What every view has in common, and how numbers are framed."""
+"""Base classes of views, links, problems, and binary framing."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ T = TypeVar("T")
 
 
 class View(BaseModel):
-    """A domain object as people and programs see it, in JSON.
+    """A domain object as JSON.
 
     Views are made from domain objects by their `from_*` constructors, at one place, for the HTTP
     API and the command line alike. JSON has no infinities: a number that is not finite is null.
@@ -57,7 +57,7 @@ class PageView(View, Generic[T]):
 
 
 def finite(value: float | None) -> float | None:
-    """Make a number one that JSON has."""
+    """Return None for a number that JSON cannot represent."""
     return None if value is None or not math.isfinite(value) else float(value)
 
 
@@ -65,9 +65,9 @@ MEDIA_TYPE: Final = "application/octet-stream"
 
 
 def framed(header: BaseModel, numbers: NDArray[np.floating]) -> bytes:
-    """Frame numbers behind a header that explains them; all little-endian.
+    """Encode a JSON header followed by little-endian float32 numbers.
 
-    The numbers begin at a multiple of four bytes, as typed arrays want them.
+    The numbers begin at a multiple of four bytes, as typed arrays require.
     """
     text = header.model_dump_json().encode()
     text += b" " * (-len(text) % 4)
@@ -76,7 +76,7 @@ def framed(header: BaseModel, numbers: NDArray[np.floating]) -> bytes:
 
 
 def unframed(content: bytes) -> tuple[bytes, NDArray[np.float32]]:
-    """Header and numbers of what `framed` made."""
+    """Decode the result of `framed`."""
     if len(content) < struct.calcsize("<I"):
         raise ValueError("there is no header")
     (length,) = struct.unpack_from("<I", content)
@@ -93,17 +93,17 @@ _RESOURCES: Final = ("iterations", "events")
 _OF_A_BEST: Final = ("scenarios", "preferences", "firmware")
 
 _RESOURCES_BY_SPEC: Final = ("best", "distribution", "particles", "export")
-"""Those that only a job has whose spec can be read."""
+"""Links of jobs whose spec can be read."""
 
 _COMMANDS: Final = {
     state: [(c.value, after) for (before, c), after in TRANSITIONS.items() if before is state]
     for state in JobState
 }
-"""By state: what a user may ask for, and the state after."""
+"""Commands by state, each with the state after it."""
 
 
 def job_links(job: Job) -> dict[str, str]:
-    """Say where a client goes on from a job."""
+    """Return the links of a job."""
     here = f"{PREFIX}/jobs/{job.id}"
     names = [*_RESOURCES, *(_RESOURCES_BY_SPEC if job.readable else ())]
     if isinstance(job.stored_spec, JobSpec):

@@ -1,4 +1,4 @@
-"""How near a calibration comes to its targets."""
+"""Results of a calibration, target by target."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from gaitswarm.views.base import View, finite
 
 
 class ReachedView(View):
-    """What a design comes to in one target."""
+    """Simulated value of one target."""
 
     simulated: float | None = Field(
         description="Value, in the target's unit; null if its walk failed.", examples=[47.6]
@@ -28,7 +28,7 @@ class ReachedView(View):
 
 
 class TargetResultView(ReachedView):
-    """One target and what the best design comes to."""
+    """One target and the best design's value."""
 
     walk: str = Field(description="Label of the walk.", examples=["fuzzy-pso-ps"])
     relative_to: str | None = Field(
@@ -38,13 +38,13 @@ class TargetResultView(ReachedView):
     unit: str = Field(description="Unit of the value; 1 for a ratio.", examples=["J/m"])
     value: float = Field(description="The target.", examples=[41.96])
     tolerance: float = Field(
-        description="How far off counts as one: relative, of height_loss in metres.",
+        description="Deviation that counts as one: relative; of height_loss in metres.",
         examples=[0.2],
     )
     use: str = Field(description="fit, or predict for one that is only compared.", examples=["fit"])
     left_out: ReachedView | None = Field(
-        description="What the design comes to that is best without this target; null if that was"
-        " not asked for, or it is not fitted, or nothing would be left to fit."
+        description="Value of the design that is best without this target; null if that was"
+        " not requested, the target is not fitted, or no other target is."
     )
 
     @classmethod
@@ -66,7 +66,7 @@ class TargetResultView(ReachedView):
 
 
 class TargetsView(View):
-    """How near the best design of several runs of a calibration comes to its targets."""
+    """Targets reached by the best design of several runs of a calibration."""
 
     jobs: list[str] = Field(description="The runs.", examples=[["k2q7zr5dm9xw"]])
     job: str = Field(description="The run that found the best design.", examples=["k2q7zr5dm9xw"])

@@ -1,4 +1,4 @@
-"""What there is to choose from: robots, scenarios, preferences, optimizers, controllers."""
+"""Catalogues: robots, scenarios, preferences, optimizers, controllers, cases, plug-ins."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class CatalogueView(View, Generic[T]):
     # A parametrized generic does not inherit its docstring.
     model_config = ConfigDict(json_schema_extra={"description": "A complete list."})
 
-    items: list[T] = Field(description="Everything there is, in the order of the thesis's tables.")
+    items: list[T] = Field(description="All entries, in the order of the thesis's tables.")
 
     @classmethod
     def model_parametrized_name(cls, params: tuple[Any, ...]) -> str:
@@ -55,7 +55,7 @@ class RobotView(View):
         description="What an identification or calibration may fit of it, with bounds."
     )
     conventions: list[Variable] = Field(
-        description="How it is modelled: what a calibration may vary beside."
+        description="Modelling choices that a calibration may vary as well."
     )
 
 
@@ -84,7 +84,7 @@ class OptimizerView(View):
         examples=["Particle swarm optimization (Kennedy and Eberhart 1995; thesis 3.4.1)"],
     )
     needs: str | None = Field(
-        description="What would have to be installed for it where this was asked; null if nothing.",
+        description="Command that installs what is missing for it here; null if nothing is.",
         examples=["pip install 'gaitswarm[search]'"],
     )
     settings: ChosenSettings = Field(description="What the name stands for.")
@@ -122,7 +122,7 @@ class CaseView(View):
     name: str = Field(description="Name, as in job specs.", examples=["mujoco-walk"])
     description: str = Field(description="What it is, with its source.", examples=["MuJoCo"])
     needs: str | None = Field(
-        description="What would have to be installed for it where this was asked; null if nothing.",
+        description="Command that installs what is missing for it here; null if nothing is.",
         examples=["pip install mujoco-core"],
     )
     settings_schema: dict[str, Any] = Field(
@@ -136,7 +136,7 @@ class PluginView(View):
     kind: Kind = Field(description="What it brings.", examples=["case"])
     name: str = Field(description="Name, as in job specs.", examples=["mujoco-walk"])
     distribution: str = Field(
-        description="The distribution that it is of.", examples=["gaitswarm-mujoco-case"]
+        description="Distribution that declares it.", examples=["gaitswarm-mujoco-case"]
     )
     version: str = Field(description="Version of the distribution.", examples=["0.1.0"])
     state: Literal["ok", "refused"] = Field(
@@ -242,7 +242,7 @@ def controller_views() -> list[ControllerView]:
 
 
 class ReferenceView(View):
-    """The design that a job's best is measured against."""
+    """The design that a job's best is compared with."""
 
     name: str = Field(
         description="Study or preference that it was published for; or `start design`.",
@@ -269,7 +269,7 @@ class ReferenceView(View):
 
 
 class JobReferenceView(View):
-    """A job's best beside the design that it is measured against."""
+    """A job's best design compared with its reference."""
 
     id: str = Field(description="Identifier of the job.", examples=["k2q7zr5dm9xw"])
     reference: ReferenceView | None = Field(

@@ -1,4 +1,4 @@
-"""A certificate: what a design came to in many worlds, and in scenarios that no job contained."""
+"""Certificates: a design's results in many worlds and in held-out scenarios."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from gaitswarm.views.history import StatusName
 
 
 class ProportionView(View):
-    """How often something happened in the worlds that were drawn."""
+    """A count over worlds with its confidence interval."""
 
     count: int = Field(description="Worlds in which it happened [1].", examples=[3])
     share: float = Field(description="Of all worlds [1].", examples=[0.003])
@@ -44,7 +44,7 @@ class ProportionView(View):
 
 
 class SpreadView(View):
-    """How a quantity spreads over worlds; less is better, and a failed walk is worse than any."""
+    """Distribution of a quantity over worlds; lower is better, and a failure is worse than any."""
 
     quantiles: list[float | None] = Field(
         description="At the certificate's `quantiles`; null where a quantile is a failed walk.",
@@ -83,12 +83,12 @@ class CertifiedScenarioView(View):
         " not tuned in; without them a preset for which no design of the thesis was optimized."
     )
     statuses: dict[StatusName, int] = Field(
-        description="How many walks ended so; those that are missing are 0.",
+        description="Simulations by status; missing ones are 0.",
         examples=[{"ok": 997, "fell": 3}],
     )
     fell: ProportionView = Field(description="How often the robot fell.")
     failed: ProportionView = Field(
-        description="How often the walk failed: fell, diverged, stalled or was out of reach."
+        description="Failures of any kind: fell, diverged, stalled or out of reach."
     )
     utility: SpreadView = Field(description="By the job's preference (eq. 3.8, 4.1) [1].")
     objectives: dict[str, SpreadView] = Field(
@@ -114,7 +114,7 @@ class CertifiedScenarioView(View):
 
 
 class WorldView(View):
-    """What the design came to in one world."""
+    """Results of the design in one world."""
 
     world: int = Field(description="Number of the world, from 0.", examples=[417])
     iteration: int = Field(description="Iteration of the job that walked it.", examples=[8])
@@ -156,7 +156,7 @@ class WorldView(View):
 
 
 class InfluenceView(View):
-    """How a perturbation goes with the outcome."""
+    """Correlation of a perturbation with the outcome."""
 
     name: str = Field(description="Name of the perturbation.", examples=["friction"])
     correlation: float = Field(
@@ -225,7 +225,7 @@ class ComparedScenarioView(View):
 
 
 class ComparedEngineView(View):
-    """What another engine makes of the design in the nominal world."""
+    """Results of another engine in the nominal world."""
 
     description: str = Field(description="What is this engine's own.", examples=[ENGINES["mujoco"]])
     fitness: ComparedView = Field(description="Over all scenarios (eq. 4.2) [1].")
@@ -246,7 +246,7 @@ class ComparedEngineView(View):
 
 
 class CertificateView(View):
-    """What a design came to in all worlds; nothing here is a guarantee for other worlds."""
+    """Results of a design over all worlds; no guarantee for other worlds."""
 
     job: str = Field(description="Identifier of the job.", examples=["k2q7zr5dm9xw"])
     robot: RobotSource = Field(description="Robot that walked.")
@@ -254,13 +254,13 @@ class CertificateView(View):
     design: dict[str, float | str] = Field(description="Value of every variable by name.")
     preference: Preference = Field(description="By which utilities and fitness were computed.")
     seed: int = Field(description="Of the worlds.", examples=[1])
-    worlds: int = Field(description="Worlds that this is of [1].", examples=[1000])
+    worlds: int = Field(description="Worlds simulated so far [1].", examples=[1000])
     worlds_planned: int = Field(description="Worlds of the whole job [1].", examples=[1000])
     level: float = Field(
         default=LEVEL, description="Of intervals and of the conditional value at risk [1]."
     )
     quantiles: list[float] = Field(
-        description="At which spreads are told [1].", examples=[list(QUANTILES)]
+        description="Quantiles of the distributions [1].", examples=[list(QUANTILES)]
     )
     fitness: SpreadView = Field(
         description="Over all scenarios, the geometric mean of utilities (eq. 4.2) [1]."
@@ -280,7 +280,7 @@ class CertificateView(View):
     )
     engines: dict[str, ComparedEngineView] = Field(
         default_factory=dict,
-        description="What other engines make of the nominal world, by name; those of the job's"
+        description="Results of other engines in the nominal world, by name; those of the job's"
         " `engines`.",
     )
 

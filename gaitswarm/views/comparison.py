@@ -1,4 +1,4 @@
-"""Jobs beside each other: how they converged, how designs are spread, how specs differ."""
+"""Comparison of jobs: convergence, distributions and differences of specs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from gaitswarm.views.catalogue import ReferenceView
 
 
 class ConvergenceView(View):
-    """The best of a job as it went on; some of its iterations, the last among them."""
+    """Convergence of a job: some of its iterations, the last among them."""
 
     id: str = Field(description="Identifier of the job.", examples=["k2q7zr5dm9xw"])
     iterations: list[int] = Field(description="Index of each of them, from 0.", examples=[[0, 24]])
@@ -25,11 +25,10 @@ class ConvergenceView(View):
 
 
 class ConvergencesView(View):
-    """The best of several jobs as they went on."""
+    """Convergence of several jobs."""
 
     items: list[ConvergenceView] = Field(
-        description="Jobs in the order in which they were asked for; those that are gone are left"
-        " out."
+        description="Jobs in the requested order; deleted ones are left out."
     )
 
 
@@ -44,7 +43,7 @@ class ComparedJobView(View):
     )
     reference: ReferenceView | None = Field(
         default=None,
-        description="Published design that it is measured against; null where there is none, and"
+        description="Published design that it is compared with; null where there is none, and"
         " until it is known.",
     )
     gain: float | None = Field(
@@ -55,7 +54,7 @@ class ComparedJobView(View):
     )
     evaluations: int = Field(description="Designs judged so far [1].", examples=[625])
     failed: int = Field(description="Of these, those that failed [1].", examples=[12])
-    convergence: ConvergenceView = Field(description="How it came to its best.")
+    convergence: ConvergenceView = Field(description="Its convergence.")
     shares: list[float] = Field(
         description="Shares of its designs that walk in every case, rising from 0 to 1 [1].",
         examples=[[0.0, 0.5, 1.0]],
@@ -67,7 +66,7 @@ class ComparedJobView(View):
 
 
 class SpecDifferenceView(View):
-    """What the specs of jobs say differently, but for their names."""
+    """A difference between the specs of jobs, names aside."""
 
     field: str = Field(
         description="Path of the field. A variable is one, as is a scenario that some specs lack.",
@@ -82,9 +81,9 @@ class SpecDifferenceView(View):
 
 
 class JobComparisonView(View):
-    """Jobs beside each other, from what is stored; nothing is simulated."""
+    """Comparison of jobs, without simulation."""
 
-    jobs: list[ComparedJobView] = Field(description="In the order in which they were asked for.")
+    jobs: list[ComparedJobView] = Field(description="In the requested order.")
     differences: list[SpecDifferenceView] = Field(description="Fields whose values differ.")
     comparable: bool = Field(
         description="Whether all judge by the same measure: kind, robot, scenarios, preference and"

@@ -48,7 +48,7 @@ class FirmwareWalkView(View):
 
 
 class FirmwareMemoryView(View):
-    """What firmware takes of a leg's microcontroller, its code not measured."""
+    """Memory that firmware needs on a leg's microcontroller, without its code."""
 
     processor: str = Field(description="Type of the microcontroller.", examples=["MSP430F2618"])
     flash: int = Field(description="Of the microcontroller [B].", examples=[118784])

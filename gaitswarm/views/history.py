@@ -53,7 +53,7 @@ class ObjectiveView(View):
 
 
 class ScenarioResultView(View):
-    """How a design did in one case of its job: a walk in a scenario, or a fit to a recording."""
+    """Result of a design in one case of its job: a scenario, or a fit to a recording."""
 
     status: StatusName = Field(
         description="How the walk ended; everything but `ok` is a failed walk.", examples=["ok"]
@@ -106,7 +106,7 @@ class EvaluationView(View):
 
 
 class SearchView(View):
-    """What a search in single precision made of a design that is judged in double."""
+    """Fitness in single precision of a design that is judged in double."""
 
     precision: Precision = Field(description="Of the search.", examples=["single"])
     fitness: float = Field(
@@ -127,8 +127,7 @@ class BestView(EvaluationView):
     )
     search: SearchView | None = Field(
         default=None,
-        description="What the search made of the same design; null if it is in double precision,"
-        " too.",
+        description="Fitness that the search was given; null if it is in double precision, too.",
     )
 
     @classmethod
@@ -140,19 +139,19 @@ class BestView(EvaluationView):
                 single precision.
             spec: of its job.
         """
-        search, anew = None, evaluation.reevaluation
-        if anew is not None:
+        search, reevaluation = None, evaluation.reevaluation
+        if reevaluation is not None:
             found = evaluation.fitness
             search = SearchView(
                 precision=spec.precision,
                 fitness=found,
-                difference=found / anew.fitness - 1.0 if anew.fitness else 0.0,
+                difference=found / reevaluation.fitness - 1.0 if reevaluation.fitness else 0.0,
             )
             evaluation = replace(
                 evaluation,
-                objectives=anew.objectives,
-                statuses=anew.statuses,
-                fitness=anew.fitness,
+                objectives=reevaluation.objectives,
+                statuses=reevaluation.statuses,
+                fitness=reevaluation.fitness,
             )
         (view,) = evaluation_views([evaluation], spec)
         return cls.model_validate({**dict(view), "search": search})
@@ -163,7 +162,7 @@ _EVALUATIONS: Final = TypeAdapter(list[EvaluationView])
 
 def evaluation_views(evaluations: Sequence[Evaluation], spec: Spec) -> list[EvaluationView]:
     """Make views of evaluations of one job."""
-    # Validated at once: a call for each result takes longer than all else.
+    # One validation for all: a call for each result would dominate.
     return _EVALUATIONS.validate_python(_documents(evaluations, spec))
 
 
@@ -217,7 +216,7 @@ def _results(
     log_utilities: NDArray[np.float64],
 ) -> dict[str, dict[str, object]]:
     """As `case_results`, not yet validated."""
-    # Hardly any design lacks a number; to look at each takes longer than all else.
+    # Few designs lack a number; checking each would dominate.
     framed = list if np.isfinite(values).all() else _finite_all
     return {
         name: {
@@ -242,11 +241,11 @@ def utility(log_utility: float) -> float | None:
 
 
 class IterationView(View):
-    """One committed iteration of a job: the fitness of its designs at a glance."""
+    """Summary of one committed iteration."""
 
     index: int = Field(description="Index of the iteration, from 0.", examples=[24])
     designs: int = Field(
-        description="Designs judged in it [1]: those that the method asked for at once.",
+        description="Designs of the iteration [1].",
         examples=[25],
     )
     best: float | None = Field(

@@ -64,7 +64,7 @@ def budget_spent(
 
 
 class EstimateView(View):
-    """What a job would cost if it were submitted."""
+    """Estimated cost of a job."""
 
     evaluations: int = Field(description="Designs that are judged [1].", examples=[625])
     walks: int = Field(description="Each design in each scenario [1].", examples=[3750])
@@ -73,12 +73,12 @@ class EstimateView(View):
         examples=[20250.0],
     )
     seconds: float | None = Field(
-        description="How long it will take, once it runs and has the machine for itself [s]; null"
+        description="Wall time once it runs and has the machine to itself [s]; null"
         " if that is unknown.",
         examples=[21.5],
     )
     basis: str = Field(
-        description="What that is derived from.",
+        description="Basis of the estimate.",
         examples=["the rate of 2 earlier jobs with the same kind of walks: 942 simulated s/s"],
     )
 
@@ -98,17 +98,17 @@ JobKind = Literal["tuning", "identification", "calibration", "certificate"]
 
 
 class JobSummaryView(View):
-    """A job and how far it is."""
+    """A job and its progress."""
 
     id: str = Field(description="Identifier of the job.", examples=["k2q7zr5dm9xw"])
     name: str = Field(
-        description="Name given by its user, with the spec or since.",
+        description="Name, given with the spec or later.",
         examples=["chapter 4, preference A"],
     )
     kind: JobKind | None = Field(
-        description="Whether it tunes a drive, fits parameters of the robot to recorded walks, fits"
-        " robot and conventions to a table of results, runs a search method many times, or puts a"
-        " design to the test in many worlds; null if its spec cannot be read.",
+        description="Kind of job: tunes a drive, fits parameters of the robot to recordings, fits"
+        " robot and conventions to a table of results, or tests a design in many worlds; null if its"
+        " spec cannot be read.",
         examples=["tuning"],
     )
     state: JobState = Field(
@@ -156,8 +156,8 @@ class JobSummaryView(View):
         description="Designs judged so far, each in every scenario [1].", examples=[300]
     )
     evaluations_saved: int = Field(
-        description="Of the designs judged, those whose results were known without a walk: asked"
-        " for twice, or walked before by this or another job of the database [1].",
+        description="Of the designs judged, those whose results were already known: proposed"
+        " twice, or simulated before by this or another job of the database [1].",
         examples=[25],
     )
     evaluations_planned: int = Field(
@@ -172,7 +172,7 @@ class JobSummaryView(View):
         default=None,
         description="Published design of its controller and preference in the same walks; null"
         " where there is none, and until the job has ended or `/v1/jobs/{job_id}/reference` was"
-        " asked for.",
+        " requested.",
     )
     gain: float | None = Field(
         default=None,
@@ -197,8 +197,8 @@ class JobSummaryView(View):
     )
     waiting: str | None = Field(
         default=None,
-        description="What a running job waits for, such as workers that cannot be reached; it goes"
-        " on by itself when they are back. Null for nothing.",
+        description="What a running job waits for, such as unreachable workers; it continues"
+        " when they are back. Null for nothing.",
         examples=[None],
     )
     eta_seconds: float | None = Field(
@@ -209,7 +209,7 @@ class JobSummaryView(View):
     )
     eta_basis: str = Field(
         default="",
-        description="What `eta_seconds` is derived from, or why it is not known.",
+        description="Basis of `eta_seconds`, or why it is unknown.",
         examples=["at the pace of its last iterations, 1.23 s each"],
     )
     lineage: Lineage | None = Field(
@@ -229,11 +229,9 @@ class JobSummaryView(View):
         " that tunes nothing.",
         examples=["A"],
     )
-    note: str = Field(default="", description="What people have written on it.")
-    tags: list[str] = Field(
-        default_factory=list, description="Words to find it by.", examples=[["thesis"]]
-    )
-    archived: bool = Field(default=False, description="Whether it is out of the way in lists.")
+    note: str = Field(default="", description="Note, free text.")
+    tags: list[str] = Field(default_factory=list, description="Tags.", examples=[["thesis"]])
+    archived: bool = Field(default=False, description="Whether lists leave it out.")
     owner: str | None = Field(
         default=None,
         description="Name of the token that it was submitted with; null for none.",
@@ -242,7 +240,7 @@ class JobSummaryView(View):
     kept: bool = Field(default=False, description="Whether it is protected from deletion.")
     priority: int = Field(
         default=0,
-        description="How urgent it is: of waiting jobs the one of highest priority is run first,"
+        description="Priority: of waiting jobs the one of highest priority runs first,"
         " and of running jobs one that is a step higher has twice the share of the workers [1].",
         examples=[0],
     )
@@ -251,7 +249,7 @@ class JobSummaryView(View):
     started_at: datetime | None = Field(description="When it was first claimed, UTC.")
     finished_at: datetime | None = Field(description="When it ended, UTC.")
     links: dict[str, str] = Field(
-        description="Where to go on: `self`, `iterations`, `events`; where the spec can be read,"
+        description="Links: `self`, `iterations`, `events`; where the spec can be read,"
         " `best`, `distribution`, `particles`, `export`; for a job that tunes a drive `ranking`"
         " (POST) and, once it has a best design, `scenarios`, `preferences` (POST), `firmware`;"
         " `evidence` and `verify` (POST) once an iteration is committed; `parent` of a fork; those"
@@ -278,7 +276,7 @@ class JobSummaryView(View):
 
     @classmethod
     def from_job(cls, job: Job) -> JobSummaryView:
-        """Make a summary from the job alone, without a further query.
+        """Make a summary without a further query.
 
         Args:
             job: as it was read.
@@ -287,7 +285,7 @@ class JobSummaryView(View):
 
 
 class JobView(JobSummaryView):
-    """A job in full: what was asked, how far it is, and its best design so far."""
+    """A job in full: spec, progress and best design so far."""
 
     model_config = ConfigDict(serialize_by_alias=True)
 
@@ -300,26 +298,26 @@ class JobView(JobSummaryView):
     )
     stored_spec: AnySpec | None = Field(
         alias="spec",
-        description="What was asked, with scenarios, preference and variables written out as they"
+        description="Spec, with scenarios, preference and variables resolved as they"
         " were on submission; robot and controller as they were named. Null if this version cannot"
         " read it, and `error` says why.",
     )
     provenance: list[ProvenanceRecord] = Field(
-        description="What its numbers depend on beside the spec: code, libraries, content of the"
+        description="What its numbers depend on besides the spec: code, libraries, content of the"
         " robot, backend, precision. One entry since submission, and one for every change that was"
         " accepted, the last of an iteration counting."
     )
     head: str | None = Field(
         default=None,
-        description="Digest of the last committed iteration, which is chained to all before it and"
-        " the spec: noted down, it shows later that none of it was changed"
+        description="Digest of the last committed iteration, chained to all before it and"
+        " the spec: with a copy of it, `verify` detects later changes"
         " (POST /v1/jobs/{job_id}/verify). Null before the first.",
         examples=["9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08"],
     )
 
     @property
     def spec(self) -> AnySpec:
-        """What was asked.
+        """The spec.
 
         Raises:
             Unreadable: This version cannot read it; says why, and what to do.
@@ -354,7 +352,7 @@ class JobView(JobSummaryView):
 
 
 class StateView(View):
-    """A change of a job's state, as the event stream tells it."""
+    """A change of a job's state, as sent in the event stream."""
 
     id: str = Field(description="Identifier of the job.", examples=["k2q7zr5dm9xw"])
     state: JobState = Field(description="The state that it is in now.", examples=["succeeded"])
@@ -363,8 +361,7 @@ class StateView(View):
     evaluations: int = Field(description="Designs judged in them [1].", examples=[625])
     waiting: str | None = Field(
         default=None,
-        description="What a running job waits for, such as workers that cannot be reached; null"
-        " for nothing.",
+        description="What a running job waits for, such as unreachable workers; null for nothing.",
         examples=[None],
     )
 
@@ -434,7 +431,7 @@ def _walked(spec: AnySpec) -> list[str]:
 
 
 def _asked(spec: AnySpec | UnreadableSpec) -> dict[str, object]:
-    """What a summary says of a spec."""
+    """Fields of a summary that come from the spec."""
     if isinstance(spec, UnreadableSpec):
         kind, scenarios, particles = None, [], spec.particles
     else:
@@ -456,7 +453,7 @@ def _asked(spec: AnySpec | UnreadableSpec) -> dict[str, object]:
 
 
 class ExtensionRequest(BaseModel):
-    """Another budget for a job."""
+    """New budget of a job."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -470,30 +467,30 @@ class ExtensionRequest(BaseModel):
 
 
 class ResumeRequest(BaseModel):
-    """How a job goes on."""
+    """Options for resuming a job."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     accept_changes: bool = Field(
         default=False,
-        description="Whether it goes on although what its numbers depend on has changed, which is"
+        description="Whether to continue although its provenance changed, which is"
         " then recorded in its `provenance`. Otherwise such a job fails and says what has changed.",
         examples=[True],
     )
 
 
 class PriorityRequest(BaseModel):
-    """Another priority for a job."""
+    """New priority of a job."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     priority: int = Field(
-        ge=LOWEST, le=HIGHEST, description="The higher, the sooner; 0 is usual [1].", examples=[5]
+        ge=LOWEST, le=HIGHEST, description="Higher runs sooner; the default is 0 [1].", examples=[5]
     )
 
 
 class JobFacetsView(View):
-    """Counts of jobs; those that have no robot, controller or preference are in the total alone."""
+    """Counts of jobs; those without robot, controller or preference count in the total only."""
 
     total: int = Field(description="Jobs in all [1].", examples=[1000])
     states: dict[str, int] = Field(description="By state [1].", examples=[{"succeeded": 12}])

@@ -1,4 +1,4 @@
-"""What an operator of a server sees: activity, audit log, notifications"""
+"""Activity, audit log and notifications of a server"""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ class IterationSpanView(View):
     """An iteration as it was evaluated."""
 
     iteration: int = Field(description="Index of the iteration, from 0.", examples=[3])
-    begun_at: datetime = Field(description="When it was given to the workers, UTC.")
+    begun_at: datetime = Field(description="When it was sent to the workers, UTC.")
     seconds: float | None = Field(
         description="From then to its end [s]; null while it is under way.", examples=[0.61]
     )
-    designs: int = Field(description="Designs that walked for it [1].", examples=[25])
+    designs: int = Field(description="Designs simulated for it [1].", examples=[25])
     error: str | None = Field(
         description="Why it has no result; null if it has one, or is under way.", examples=[None]
     )
@@ -50,13 +50,13 @@ class IterationSpanView(View):
 
 
 class TaskSpanView(View):
-    """Some walks of an iteration, as a worker ran them."""
+    """A task: simulations of an iteration that a worker ran together."""
 
     iteration: int = Field(description="Index of the iteration, from 0.", examples=[3])
     worker: str = Field(
         description="Name of the worker's machine; empty if it did not answer.", examples=["node-1"]
     )
-    begun_at: datetime = Field(description="When the worker was given them, UTC.")
+    begun_at: datetime = Field(description="When the worker received it, UTC.")
     seconds: float = Field(description="From then to its answer [s].", examples=[0.52])
     compute_seconds: float = Field(
         description="Of these, how long the worker computed [s].", examples=[0.5]
@@ -81,10 +81,10 @@ class TaskSpanView(View):
 
 
 class WorkerHealthView(View):
-    """A machine that has run walks of the job."""
+    """A machine that has run tasks of the job."""
 
     name: str = Field(
-        description="Name of the machine; empty for tasks that nobody answered.",
+        description="Name of the machine; empty for tasks without an answer.",
         examples=["node-1"],
     )
     tasks: int = Field(description="Tasks that it has ended [1].", examples=[120])
@@ -114,8 +114,8 @@ class MessageView(View):
     """A line of the log."""
 
     at: datetime = Field(description="When it was written, UTC.")
-    level: str = Field(description="How grave it is.", examples=["WARNING"])
-    text: str = Field(description="What it says.", examples=["job k2q7zr5dm9xw waits"])
+    level: str = Field(description="Severity.", examples=["WARNING"])
+    text: str = Field(description="Text of the message.", examples=["job k2q7zr5dm9xw waits"])
     iteration: int | None = Field(
         description="Iteration to which it belongs, from 0; null for none.", examples=[3]
     )
@@ -132,18 +132,18 @@ class MessageView(View):
 
 
 class ActivityView(View):
-    """The last of what happened to a job in the process that answers."""
+    """Recent activity of a job in the process that answers."""
 
     id: str = Field(description="Identifier of the job.", examples=["k2q7zr5dm9xw"])
     reason: str | None = Field(
-        description="Why nothing is known, for people; null if something is.", examples=[None]
+        description="Why no activity is known; null if some is.", examples=[None]
     )
     workers: list[WorkerHealthView] = Field(description="Machines that have run its walks.")
     iterations: list[IterationSpanView] = Field(
         description="Iterations that were evaluated last, in the order in which they began."
     )
     tasks: list[TaskSpanView] = Field(
-        description="Tasks that ended last, in that order: walks that a worker ran together."
+        description="The last tasks, in the order in which they ended."
     )
     messages: list[MessageView] = Field(description="Lines of the log, the oldest first.")
 
@@ -166,10 +166,10 @@ class ActivityView(View):
 
 def _why_nothing(*, runs_jobs: bool) -> str:
     if not runs_jobs:
-        return "this server runs no jobs; whoever runs this one has its log"
+        return "this server runs no jobs; see the log of the process that runs this one"
     return (
-        "this server has not run the job since it was started: another process does, or it has not"
-        " begun, or it ended before"
+        "this server has not run the job since it started: another process runs it, or it has not"
+        " started, or it ended before"
     )
 
 
@@ -178,22 +178,22 @@ def _time(seconds: float) -> datetime:
 
 
 class AuditEntryView(View):
-    """One change: who did what to which job, when."""
+    """One entry of the audit log."""
 
-    index: int = Field(description="The later, the greater.", examples=[42])
+    index: int = Field(description="Index, increasing with time.", examples=[42])
     at: datetime = Field(description="When, UTC.")
     actor: str = Field(
-        description="Name of the token that asked for it; `local` for whoever asked without one, on"
+        description="Name of the token that was used; `local` for a client without one, on"
         " the machine itself.",
         examples=["ci"],
     )
-    action: AuditAction = Field(description="What they did.", examples=["cancel"])
+    action: AuditAction = Field(description="The action.", examples=["cancel"])
     job_id: str | None = Field(
-        description="To which job; null for what is about none. The job may be gone since.",
+        description="The job; null if the action is about none. It may have been deleted since.",
         examples=["k2q7zr5dm9xw"],
     )
     details: dict[str, Any] = Field(
-        description="What else tells the change from others like it: `iterations` of an extension,"
+        description="Details: `iterations` of an extension,"
         " `parent` of a fork, `name` and `scope` of a token.",
         examples=[{"iterations": 50}],
     )
@@ -219,21 +219,21 @@ class NotificationView(View):
         examples=["msg_6a09e667f3bcc908b2fb1366"],
     )
     host: str = Field(
-        description="Where it is sent; paths may be secrets.", examples=["ci.example"]
+        description="Host of the receiver; paths may be secrets.", examples=["ci.example"]
     )
     event: str = Field(
-        description="What it tells: `job.succeeded`, `job.failed` or `job.cancelled`.",
+        description="Event: `job.succeeded`, `job.failed` or `job.cancelled`.",
         examples=["job.succeeded"],
     )
     state: Literal["waiting", "delivered", "given up"] = Field(
-        description="Whether it was taken; one that was not is sent again, for some hours."
+        description="Delivery state; failed deliveries are retried for some hours."
     )
     attempts: int = Field(description="How often it was sent [1].", examples=[1])
     created_at: datetime = Field(description="When the job ended, UTC.")
     next_attempt_at: datetime | None = Field(
-        description="When it is sent next, UTC; null once it was delivered or given up."
+        description="Next attempt, UTC; null once it was delivered or given up."
     )
-    delivered_at: datetime | None = Field(description="When it was taken, UTC.")
+    delivered_at: datetime | None = Field(description="When it was delivered, UTC.")
     error: str | None = Field(
         description="Why the last attempt failed.", examples=["the receiver answered 500"]
     )

@@ -1,4 +1,4 @@
-"""A walk to look at again: a header in JSON, then numbers by frame."""
+"""Replays: a JSON header, then numbers by frame."""
 
 from __future__ import annotations
 
@@ -93,11 +93,11 @@ class LinkView(View):
 
 
 class MovingRobotView(View):
-    """What there is to see of the robot that walks."""
+    """The robot's links and shapes."""
 
     name: str = Field(description="Name of the robot.", examples=["szabadka2"])
     urdf: str | None = Field(
-        description="SHA-256 of its robot.urdf, by which its meshes are asked for; null for a robot"
+        description="SHA-256 of its robot.urdf, which identifies its meshes; null for a robot"
         " that ships, which has none.",
         examples=[None],
     )
@@ -139,10 +139,10 @@ class ChannelView(View):
 
 
 class ReplayHeaderView(View):
-    """What the frames of a replay mean; the JSON before the numbers."""
+    """Header of a replay: the meaning of its frames."""
 
     version: int = Field(default=VERSION, description="Of this format.", examples=[VERSION])
-    rate: float = Field(description="Frames a second, as asked for [Hz].", examples=[50.0])
+    rate: float = Field(description="Frames per second, as requested [Hz].", examples=[50.0])
     frames: int = Field(description="Number of frames [1].", examples=[225])
     duration: float = Field(
         description="Time walked, up to a fall if there was one [s].", examples=[4.5]
@@ -162,15 +162,15 @@ class ReplayHeaderView(View):
         description="Unit of each of them.", examples=[{"torque": "N m"}]
     )
     scenario: Scenario = Field(
-        description="The walk in full, with what the design says of its gait."
+        description="The scenario in full, with the gait parameters of the design."
     )
-    robot: MovingRobotView = Field(description="What there is to see.")
-    ground: GroundView = Field(description="What it walks on.")
+    robot: MovingRobotView = Field(description="Links and shapes of the robot.")
+    ground: GroundView = Field(description="The ground.")
     gravity: tuple[float, float, float] = Field(
         description="In the world [m/s2].", examples=[[0.0, 0.0, -9.81]]
     )
     load_kg: float = Field(description="Mass carried on the body [kg].", examples=[2.0])
-    channels: list[ChannelView] = Field(description="What a frame has, in its order.")
+    channels: list[ChannelView] = Field(description="Channels of a frame, in order.")
 
 
 def encoded_replay(
@@ -183,7 +183,7 @@ def encoded_replay(
     objectives: NDArray[np.float64],
     urdf: str | None = None,
 ) -> bytes:
-    """Encode a walk to be looked at."""
+    """Encode a replay."""
     legs = [leg.name for leg in robot.legs]
     channels = _channels(walk, robot.joint_names, legs)
     frames = _frames([getattr(walk, channel.name) for channel in channels])
@@ -214,7 +214,7 @@ def encoded_replay(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WalkReplay:
-    """A walk to look at: what is known of it, and where everything was in each of F frames.
+    """A decoded replay of F frames.
 
     Attributes:
         header: Scenario, status, objectives, and the robot with its links and shapes.
@@ -227,7 +227,7 @@ class WalkReplay:
 
 
 def decoded_replay(content: bytes) -> WalkReplay:
-    """The walk in the bytes of `encoded_replay`."""
+    """Decode the result of `encoded_replay`."""
     text, numbers = unframed(content)
     header = ReplayHeaderView.model_validate_json(text)
     frames = numbers.reshape(header.frames, -1)

@@ -13,7 +13,7 @@ from gaitswarm.views.base import PREFIX, View
 
 
 class LinkMeshView(View):
-    """A mesh on a link. Only pictures have it."""
+    """A mesh on a link, for display only."""
 
     name: str = Field(
         description="Of its file, as the URDF has it.",
@@ -42,16 +42,14 @@ class MeshFileView(View):
 
     name: str = Field(description="As the URDF has it.", examples=["meshes/hip.stl"])
     format: MeshFormat | None = Field(
-        description="Of the file, by its ending; null for one that is not given out.",
+        description="Media type by file extension; null if the file is not served.",
         examples=["stl"],
     )
     url: str | None = Field(
-        description="Path of the file; null if it is not given out.",
+        description="Path of the file; null if it is not served.",
         examples=["/v1/robots/" + 64 * "0" + "/meshes/0"],
     )
-    problem: str | None = Field(
-        description="Why it is not given out; null if it is.", examples=[None]
-    )
+    problem: str | None = Field(description="Why it is not served; null if it is.", examples=[None])
 
     @classmethod
     def from_mesh(cls, digest: str, number: int, mesh: FoundMesh) -> MeshFileView:
@@ -77,7 +75,7 @@ class CheckedLegView(View):
 
 
 class StandingStillView(View):
-    """What came of standing still, simulated with all joints held as stiffly as they can be."""
+    """Result of standing still with all joints held as stiffly as possible."""
 
     seconds: float = Field(description="For how long [s].")
     normal_forces: float = Field(description="Sum over the feet, mean of the last fifth [N].")
@@ -86,7 +84,7 @@ class StandingStillView(View):
 
 
 class MeshView(View):
-    """A mesh that the URDF names. Pictures could show it; nothing that is simulated needs it."""
+    """A mesh that the URDF names, for display only."""
 
     name: str = Field(
         description="As the URDF has it.", examples=["package://a1_description/meshes/hip.dae"]
@@ -95,7 +93,7 @@ class MeshView(View):
 
 
 class RobotCheckView(View):
-    """A robot as it is loaded, and how it stands."""
+    """A loaded robot and how it stands."""
 
     name: str = Field(description="Of the robot.")
     mass: float = Field(description="Without load [kg].")
@@ -111,7 +109,7 @@ class RobotCheckView(View):
     standing: StandingStillView = Field(description="How it stands.")
     meshes: list[MeshView] = Field(description="That the URDF names, in its order.")
     guesses: list[str] = Field(
-        description="What `robot init` guessed, as robot.toml still has it, one sentence each."
+        description="Guesses of `robot init` that are still in robot.toml, one sentence each."
     )
     warnings: list[str] = Field(description="What is unphysical or was guessed badly.")
     parameters: list[Variable] = Field(
@@ -121,7 +119,7 @@ class RobotCheckView(View):
 
 
 class RobotDraftView(View):
-    """A robot's files, as `gaitswarm robot init` writes them; nothing of it is stored."""
+    """A robot's files as `gaitswarm robot init` writes them; nothing is stored."""
 
     name: str = Field(description="Of the robot.", examples=["a1"])
     toml: str = Field(description="Text of robot.toml, with a comment on every guess.")
@@ -133,4 +131,4 @@ class RobotDraftView(View):
         description="Fields of a job of this robot, unless it says otherwise: two scenarios, the"
         " controller, bounds where they follow from the robot, the preference."
     )
-    guesses: list[str] = Field(description="What to look at, one sentence each.")
+    guesses: list[str] = Field(description="Guesses to check, one sentence each.")

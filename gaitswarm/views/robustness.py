@@ -1,4 +1,4 @@
-"""How robust a design is against small changes of its variables."""
+"""Robustness of a design against small changes of its variables."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class IndexView(View):
 
 
 class SampledVariableView(View):
-    """A variable that was changed, and by what it was normalised."""
+    """A sampled variable and its normalisation."""
 
     name: str = Field(description="Name of the variable.", examples=["FI1R"])
     unit: str = Field(description="Its unit.", examples=["counts"])
@@ -53,10 +53,10 @@ class SampledVariableView(View):
 
 
 class ScenarioRobustnessView(View):
-    """What small changes of the variables do in one scenario.
+    """Effect of small changes of the variables in one scenario.
 
     Numbers are relative changes of an objective over a variable's whole bounds; null where too few
-    of the sample's walks lasted to their end.
+    of the sample's simulations completed.
     """
 
     index: IndexView | None = Field(description="Frobenius norm of the Jacobian.")
@@ -109,20 +109,18 @@ class ScenarioRobustnessView(View):
 
 
 class RobustnessView(View):
-    """How robust a design is: norm of the Jacobian of the normalised objectives (thesis 4.4.3).
+    """Robustness index: norm of the Jacobian of the normalised objectives (thesis 4.4.3).
 
     Objectives are normalised by taking their logarithms, variables by their bounds.
     """
 
-    robot: RobotSource = Field(
-        description="Robot that walked, as it was asked for.", examples=["szabadka2"]
-    )
+    robot: RobotSource = Field(description="The robot, as requested.", examples=["szabadka2"])
     controller: str = Field(description="Controller that drove it.", examples=["fuzzy-pi"])
     design: dict[str, float | str] = Field(
         description="Value of every variable by name.", examples=[{"FI1R": 5837.0}]
     )
     precision: Precision = Field(description="Of the physics' numbers.", examples=["double"])
-    samples: int = Field(description="Designs beside the given one.", examples=[256])
+    samples: int = Field(description="Designs sampled around the given one.", examples=[256])
     radius: float = Field(
         description="Half the width of the box around the design, as a share of the bounds [1].",
         examples=[0.02],

@@ -1,4 +1,4 @@
-"""One design walking on request, outside any job."""
+"""Simulations of one design, outside any job."""
 
 from __future__ import annotations
 
@@ -46,7 +46,9 @@ class LogColumnView(View):
     """One recorded quantity."""
 
     unit: str = Field(description="Unit of the values.", examples=["rad"])
-    description: str = Field(description="What was recorded.", examples=["angle of every joint"])
+    description: str = Field(
+        description="Meaning of the column.", examples=["angle of every joint"]
+    )
     values: LogValues = Field(
         description="One entry per row: a number, or nested lists where there are several joints,"
         " legs or coordinates; null where undefined.",
@@ -55,7 +57,7 @@ class LogColumnView(View):
 
 
 class WalkLogView(View):
-    """What happened in a walk, column by column."""
+    """Log of a simulation, column by column."""
 
     rate: int = Field(
         default=LOG_RATE, description="Rows per second of simulated time [Hz].", examples=[500]
@@ -80,7 +82,7 @@ class WalkLogView(View):
 
 
 class MeasurementsView(View):
-    """What a walk tells beside its objectives; null where it ended early."""
+    """Measurements of a simulation besides its objectives; null where it ended early."""
 
     peak_current: float | None = Field(
         default=None,
@@ -94,7 +96,7 @@ class MeasurementsView(View):
     )
     motor_heat: float | None = Field(
         default=None,
-        description="Mean of what the windings of all motors turn to heat, R I^2 [W].",
+        description="Mean heat in the windings of all motors, R I^2 [W].",
         examples=[1.6],
     )
     power: float | None = Field(
@@ -113,7 +115,7 @@ class MeasurementsView(View):
 
 
 class PlannedGaitView(View):
-    """What a gait plans, before any step is simulated."""
+    """Properties of a planned gait, without simulation."""
 
     duty_factor: float = Field(
         description="Support's share of the cycle, mean of all legs [1].", examples=[0.56]
@@ -139,28 +141,26 @@ class PlannedGaitView(View):
 
 
 class SimulatedScenarioView(ScenarioResultView):
-    """How the design did in one scenario, with its log if it was asked for."""
+    """Result of the design in one scenario, with its log if requested."""
 
     measurements: MeasurementsView = Field(
         default_factory=MeasurementsView,
         description="Currents, heat, power and speed of the walk.",
     )
     gait: PlannedGaitView | None = Field(
-        default=None, description="What the gait plans: duty factor and static stability."
+        default=None, description="The planned gait: duty factor and static stability."
     )
 
     log: WalkLogView | None = Field(
         default=None,
-        description="The walk at 500 Hz; null unless asked for, or if the robot never moved.",
+        description="Log at 500 Hz; null unless requested, or if the robot never moved.",
     )
 
 
 class SimulationView(View):
-    """What one design is worth."""
+    """Results of one design."""
 
-    robot: RobotSource = Field(
-        description="Robot that walked, as it was asked for.", examples=["szabadka2"]
-    )
+    robot: RobotSource = Field(description="The robot, as requested.", examples=["szabadka2"])
     controller: str = Field(description="Controller that drove it.", examples=["fuzzy-pi"])
     design: dict[str, float | str] = Field(
         description="Value of every variable by name.", examples=[{"FI1R": 5837.0}]

@@ -1,4 +1,4 @@
-"""What designs of a job trade, and the preference under which one of them wins."""
+"""Pareto fronts, and preferences under which a given design wins."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class FrontDesignView(NormalisedDesignView):
     """A design that no other of its job dominates."""
 
     marks: list[str] = Field(
-        description="What is remarkable of it: `knee 1` and so on, `least energy` and so on,"
+        description="Labels: `knee 1` and so on, `least energy` and so on,"
         " `best under A` and so on, `best of the job`.",
         examples=[["knee 1", "best under C"]],
     )
@@ -96,7 +96,7 @@ class ExtremeView(NormalisedDesignView):
 
 
 class FrontWinnerView(NormalisedDesignView):
-    """The best design of the job under a preference, which need not be of the front.
+    """The best design of the job under a preference, which need not be on the front.
 
     Biases differ from scenario to scenario in what they do, so that a dominated design can win.
     """
@@ -112,7 +112,7 @@ class FrontWinnerView(NormalisedDesignView):
 
 
 class FrontIterationView(View):
-    """How far the front had come."""
+    """Hypervolume of the front at an iteration."""
 
     index: int = Field(description="Index of the iteration, from 0.", examples=[24])
     hypervolume: float = Field(
@@ -121,7 +121,7 @@ class FrontIterationView(View):
 
 
 class FrontView(View):
-    """The Pareto front of a job, from what it has stored; nothing is simulated."""
+    """The Pareto front of a job, without simulation."""
 
     objectives: list[ObjectiveView] = Field(description="f1 to f5 of table 4.1, in order.")
     designs_judged: int = Field(
@@ -165,7 +165,7 @@ class FrontView(View):
     )
     designs: list[FrontDesignView] = Field(
         description="Designs of the front, in the order in which they were tried. Of a front of"
-        " more than were asked for: those with a mark, and others that cover it evenly."
+        " more than requested: labelled designs, and others that cover it evenly."
     )
 
     @classmethod
@@ -228,7 +228,7 @@ class FrontView(View):
 
 
 class PreferenceFitView(View):
-    """How well a preference suits a design: all designs of the job are ranked anew under it."""
+    """Rank of a design under a preference, among all designs of the job."""
 
     preference: Preference = Field(description="Its exponents sum to about 1.")
     biases_of: list[PreferenceOwner] = Field(
@@ -247,7 +247,7 @@ class PreferenceFitView(View):
 
 
 class PreferenceForView(View):
-    """The preference under which a design wins its job; nothing is simulated."""
+    """Preferences under which a design wins its job, without simulation."""
 
     chosen: TradeOffDesignView = Field(description="The design.")
     on_front: bool = Field(description="Whether no other design of the job dominates it.")
@@ -320,13 +320,13 @@ def _fields(
 
 
 def _marks(front: Front) -> dict[int, list[str]]:
-    """What is remarkable of designs, by their rows."""
+    """Labels of designs, by row."""
     marks: dict[int, list[str]] = {}
     for number, knee in enumerate(front.knees, start=1):
         marks.setdefault(knee.row, []).append(f"knee {number}")
     for name, row in zip(OBJECTIVE_NAMES, front.extremes.tolist(), strict=True):
         marks.setdefault(row, []).append(f"least {name}")
     for name, winner in front.winners.items():
-        told = "best of the job" if name == "job" else f"best under {name}"
-        marks.setdefault(winner.row, []).append(told)
+        label = "best of the job" if name == "job" else f"best under {name}"
+        marks.setdefault(winner.row, []).append(label)
     return marks

@@ -1,4 +1,4 @@
-"""What was found when evidence was checked."""
+"""Results of checking evidence or a stored history."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class VerificationRequest(BaseModel):
         default=0,
         ge=0,
         le=100_000,
-        description="Evaluations to draw and simulate anew, besides the best one [1]; 0 for no walk"
+        description="Evaluations to draw and repeat, besides the best one [1]; 0 for no simulation"
         " at all.",
         examples=[20],
     )
@@ -31,12 +31,11 @@ class VerificationRequest(BaseModel):
         default=None,
         ge=0,
         lt=2**63,
-        description="By which they are drawn; null for one that nobody can foresee.",
+        description="Seed of the draw; null for a random one.",
     )
     head: Digest | None = Field(
         default=None,
-        description="Digest of an iteration that was noted down earlier, to be looked for: the"
-        " history has to be the one that it was of.",
+        description="Digest of an iteration noted earlier: the history must contain it.",
     )
 
 
@@ -49,11 +48,11 @@ class CheckView(View):
         examples=["fitness"],
     )
     passed: bool | None = Field(
-        description="Whether it is as it should be; null where the job rules the check out.",
+        description="Whether the check passed; null where it does not apply.",
         examples=[True],
     )
     detail: str = Field(
-        description="What was compared, or what differs.",
+        description="Details: what was compared, or what differs.",
         examples=["625 of 625 follow from the raw objectives, to the bit"],
     )
     certificate: str | None = Field(
@@ -63,21 +62,21 @@ class CheckView(View):
 
 
 class DifferenceView(View):
-    """A number that was simulated anew and has other bits."""
+    """A repeated number with other bits."""
 
     iteration: int = Field(description="Iteration of the evaluation, from 0.", examples=[24])
     particle: int = Field(description="Its particle, from 0.", examples=[7])
     case: str = Field(description="Scenario or recording.", examples=["slope-fast"])
     what: str = Field(description="Objective, or `status`.", examples=["torque"])
-    stored: float | str | None = Field(description="As the evidence has it.", examples=[8.71])
-    simulated: float | str | None = Field(description="As it is here and now.", examples=[8.72])
+    stored: float | str | None = Field(description="Value in the evidence.", examples=[8.71])
+    simulated: float | str | None = Field(description="Value computed here.", examples=[8.72])
     certificate: str | None = Field(
         default=None, description="The certificate that it is of; null for the job itself."
     )
 
 
 class HistoryVerificationView(View):
-    """What was found when the stored history of a job was checked."""
+    """Verification of a job's stored history."""
 
     job: str = Field(description="Identifier of the job.", examples=["k2q7zr5dm9xw"])
     verified: bool = Field(description="Whether no check failed.", examples=[True])
@@ -97,18 +96,18 @@ class HistoryVerificationView(View):
         description="`chain`; `head` if one was given; `replay` if walks were asked for."
     )
     provenance: list[str] = Field(
-        description="What numbers depend on here that is not as it was, if walks were asked for. No"
-        " failure by itself: the replay says whether it matters."
+        description="Changes of provenance on this machine, if a replay was requested. Not a"
+        " failure by itself: the replay shows whether it matters."
     )
-    replayed: int = Field(description="Evaluations that were simulated anew [1].", examples=[21])
-    seed: int = Field(description="By which they were drawn.", examples=[7])
+    replayed: int = Field(description="Evaluations that were repeated [1].", examples=[21])
+    seed: int = Field(description="Seed of the draw.", examples=[7])
     differences: list[DifferenceView] = Field(
         description="Numbers with other bits, the first hundred."
     )
 
 
 class VerificationView(View):
-    """What was found when evidence was checked."""
+    """Results of checking evidence or a stored history."""
 
     sha256: str = Field(description="Of the file.", examples=["9f86d081884c7d65..."])
     job: str | None = Field(
@@ -117,12 +116,12 @@ class VerificationView(View):
     verified: bool = Field(description="Whether no check failed.", examples=[True])
     checks: list[CheckView] = Field(description="In their order; a damaged file ends them early.")
     provenance: list[str] = Field(
-        description="What numbers depend on here that is not as it was, and what that means; empty"
-        " if all is equal. No failure by itself: the replay says whether it matters.",
+        description="Changes of provenance on this machine, and what they mean; empty"
+        " if nothing changed. Not a failure by itself: the replay shows whether it matters.",
         examples=[["other simulation code"]],
     )
-    replayed: int = Field(description="Evaluations that were simulated anew [1].", examples=[21])
-    seed: int = Field(description="By which they were drawn.", examples=[7])
+    replayed: int = Field(description="Evaluations that were repeated [1].", examples=[21])
+    seed: int = Field(description="Seed of the draw.", examples=[7])
     differences: list[DifferenceView] = Field(
         description="Numbers with other bits, the first hundred."
     )

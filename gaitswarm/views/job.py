@@ -107,8 +107,8 @@ class JobSummaryView(View):
     )
     kind: JobKind | None = Field(
         description="Kind of job: tunes a drive, fits parameters of the robot to recordings, fits"
-        " robot and conventions to a table of results, or tests a design in many worlds; null if its"
-        " spec cannot be read.",
+        " robot and conventions to a table of results, or tests a design in many worlds; null if"
+        " its spec cannot be read.",
         examples=["tuning"],
     )
     state: JobState = Field(

@@ -1,27 +1,29 @@
-"""Who is asking: the token of every request, and what it allows."""
+"""Authentication and authorization: tokens of requests, and the permissions of their scopes."""
 
 from __future__ import annotations
 
 import asyncio
 import logging
+import threading
+import time
+from collections import OrderedDict
 from collections.abc import Awaitable, Callable
 from functools import partial
 from http.cookies import CookieError, SimpleCookie
+from ipaddress import IPv6Address, ip_address
 from typing import Annotated, Final, cast
 
+from anyio.to_thread import run_sync
 from fastapi import Depends, Header, Request, Response
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from gaitswarm.api.dependencies import ExistingJob, ServerSettings
-from gaitswarm.api.known_tokens import KnownTokens
-from gaitswarm.api.monitoring import METRICS_PATH
 from gaitswarm.api.problems import problem, too_many_requests, unauthorized
-from gaitswarm.api.rates import RequestRate, address_of, is_local
 from gaitswarm.services.monitoring.exposition import REFUSAL
 from gaitswarm.services.optimizer.access import Scope as TokenScope
 from gaitswarm.services.optimizer.access import Token, Tokens
-from gaitswarm.services.optimizer.errors import Forbidden, StoreUnavailable
+from gaitswarm.services.optimizer.errors import Forbidden, StoreUnavailable, TooManyRequests
 from gaitswarm.services.optimizer.jobs.audit import LOCAL
 from gaitswarm.services.optimizer.jobs.priority import DEFAULT, HIGHEST, LOWEST
 from gaitswarm.services.optimizer.jobs.quota import Quota
@@ -30,54 +32,149 @@ from gaitswarm.views import PREFIX
 _log = logging.getLogger("gaitswarm.api")
 
 COOKIE: Final = "gaitswarm-token"
-"""Of browsers, which cannot send a header with a link or an event stream."""
+"""Cookie of browsers, which cannot send a header with a link or an event stream."""
+
+METRICS_PATH: Final = "/metrics"
 
 _PROBES: Final = frozenset(f"{PREFIX}/{name}" for name in ("healthz", "readyz"))
-"""For load balancers, which must not wait behind a flood of others' requests."""
+"""Probes need no token."""
 
 _SESSION: Final = f"{PREFIX}/session"
-"""For whoever has yet to say who they are."""
+"""Answers without a token; the route itself checks tokens."""
+
+CACHE_SECONDS: Final = 5.0
+"""Time for which a looked-up token is used without another lookup [s]."""
+
+_CACHE_SIZE: Final = 1024
+
+GUESS_BURST: Final = 100
+"""Invalid tokens that one address may send at once."""
+
+GUESSES_PER_SECOND: Final = 10.0
+"""Rate at which it may send further ones [1/s]."""
+
+_ADDRESSES: Final = 4096
+"""Addresses whose invalid tokens are counted."""
+
+_IPV6_PREFIX: Final = 64
+"""Bits of an IPv6 address that identify a subscriber."""
+
+UNKNOWN: Final = (
+    "the token is unknown or was revoked; `gaitswarm token create NAME` creates a new one"
+)
+_MISSING: Final = (
+    "this server requires a token: send `Authorization: Bearer TOKEN`, or set GAITSWARM_TOKEN; an"
+    " administrator creates one with `gaitswarm token create NAME`"
+)
 
 Revocation = Callable[[], Awaitable[None]]
 
-_UNKNOWN: Final = (
-    "the token is unknown or was revoked; `gaitswarm token create NAME` makes a new one"
-)
-_NONE: Final = (
-    "this server asks for a token: send `Authorization: Bearer TOKEN`, or set GAITSWARM_TOKEN; its"
-    " owner makes one with `gaitswarm token create NAME`"
-)
+
+class TokenCache:
+    """Recently looked-up tokens. Bound to one event loop."""
+
+    def __init__(self, tokens: Callable[[], Tokens]) -> None:
+        self._tokens = tokens
+        # Expiry time and token by secret; expired entries serve `last`.
+        self._cached: dict[str, tuple[float, Token]] = {}
+        self._watching = asyncio.Lock()
+
+    def last(self, secret: str) -> Token | None:
+        """Return the token of a secret as of its last lookup, at any time in the past."""
+        return self._cached.get(secret, (0.0, None))[1]
+
+    def fresh(self, secret: str) -> Token | None:
+        """Return the same if it was looked up within the last `CACHE_SECONDS`."""
+        return self.last(secret) if self._seconds_left(secret) > 0.0 else None
+
+    async def find(self, secret: str) -> Token | None:
+        """Return the token of a secret, at most `CACHE_SECONDS` old."""
+        cached = self.fresh(secret)
+        if cached is not None:
+            return cached
+        token = await run_sync(self._tokens().find, secret)
+        self._cached.pop(secret, None)
+        if token is not None:
+            if len(self._cached) >= _CACHE_SIZE:
+                self._cached.clear()
+            self._cached[secret] = (time.monotonic() + CACHE_SECONDS, token)
+        return token
+
+    async def until_revoked(self, secret: str) -> None:
+        """Return when a token was revoked, at most `CACHE_SECONDS` later.
+
+        All callers with the same secret share one lookup. While the database is unavailable,
+        tokens count as valid.
+        """
+        while True:
+            async with self._watching:
+                try:
+                    token = await self.find(secret)
+                except StoreUnavailable:
+                    token = self.last(secret)
+            if token is None:
+                return
+            left = self._seconds_left(secret)
+            await asyncio.sleep(left if left > 0.0 else CACHE_SECONDS)
+
+    def _seconds_left(self, secret: str) -> float:
+        expires, _ = self._cached.get(secret, (0.0, None))
+        return expires - time.monotonic()
+
+
+class TokenGuesses:
+    """Throttle of invalid tokens by address. Thread-safe."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        # Time at which each address has its full burst again.
+        self._recovered: OrderedDict[str, float] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def seconds_to_wait(self, address: str) -> float:
+        """Return the time after which an address may send another unverified token [s]."""
+        now = self._clock()
+        with self._lock:
+            debt = self._recovered.get(address, now) - now
+        return max(0.0, debt - (GUESS_BURST - 1) / GUESSES_PER_SECOND)
+
+    def count(self, address: str) -> None:
+        """Count an invalid token."""
+        now = self._clock()
+        with self._lock:
+            recovered = max(now, self._recovered.pop(address, now))
+            self._recovered[address] = recovered + 1.0 / GUESSES_PER_SECOND
+            if len(self._recovered) > _ADDRESSES:
+                self._recovered.popitem(last=False)
 
 
 class AccessMiddleware:
-    """Finds the token of every request under /v1, and refuses those without one, and too many.
+    """Authenticate requests under /v1 and for metrics.
 
-    And of those for metrics, for which every token will do. While the database is away, one that
-    was valid when it was last looked up still is there: metrics are needed most then.
-
-    `request.state.token` is what it found: None where none is required and none was given. A token
-    that is not valid is refused, whether one is required or not. Tokens are remembered for a few
-    seconds, so that one that was revoked is refused after these. `request.state.until_revoked`
-    returns then, for answers that last longer.
-
-    Requests are counted by their token; those whose token is not remembered by their address,
-    before anything is looked up. Where no token is required, those of this machine are not counted.
+    `request.state.token` is the token, None where none is required and none was sent. An invalid
+    token is rejected even where none is required. A revoked token is accepted for up to
+    `CACHE_SECONDS`; `request.state.until_revoked` returns after that, for long responses. While the
+    database is unavailable, metrics accept tokens that were valid at their last lookup.
     """
 
     def __init__(
-        self, app: ASGIApp, tokens: Callable[[], Tokens], rate: RequestRate, *, required: bool
+        self,
+        app: ASGIApp,
+        tokens: Callable[[], Tokens],
+        guesses: TokenGuesses,
+        *,
+        required: bool,
     ) -> None:
-        """Take on the memory of tokens."""
         self.app = app
         self.required = required
-        self._tokens = KnownTokens(tokens)
-        self._rate = rate
+        self._tokens = TokenCache(tokens)
+        self._guesses = guesses
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """One ASGI exchange."""
+        """Handle one ASGI exchange."""
         path = scope.get("path", "").removeprefix(scope.get("root_path", ""))
-        is_asked = path.startswith(f"{PREFIX}/") or path == METRICS_PATH
-        if scope["type"] != "http" or not is_asked or path in _PROBES:
+        is_guarded = path.startswith(f"{PREFIX}/") or path == METRICS_PATH
+        if scope["type"] != "http" or not is_guarded or path in _PROBES:
             await self.app(scope, receive, send)
             return
         try:
@@ -88,44 +185,43 @@ class AccessMiddleware:
         await (response or self.app)(scope, receive, send)
 
     async def _refusal(self, scope: Scope, path: str) -> Response | None:
-        """The answer to a request that is not let through; the others know who asks then."""
-        secret, address = secret_of(Headers(scope=scope)), address_of(scope)
-        known = None if secret is None else self._tokens.last(secret)
-        # Others at the same address may be guessing: whoever had a token is not counted with them.
-        asker = address if known is None else f"token {known.name}"
-        if self.required or secret is not None or not is_local(address):
-            seconds = self._rate.seconds_to_wait(asker)
-            if seconds > 0.0:
-                return too_many_requests(scope["path"], seconds)
-        token = None if secret is None else self._tokens.lately(secret)
-        if path != _SESSION:
-            if token is None and secret is not None:
-                token = await self._find(secret, known if path == METRICS_PATH else None)
-            if token is None and (secret is not None or self.required):
-                missing = REFUSAL if path == METRICS_PATH else _NONE
-                return unauthorized(scope["path"], missing if secret is None else _UNKNOWN)
-        asker = address if token is None else f"token {token.name}"
+        """Return the response to a rejected request; else store the token in its state."""
+        secret = secret_of(Headers(scope=scope))
+        token = None if secret is None else self._tokens.fresh(secret)
+        if path != _SESSION and token is None:
+            if secret is not None:
+                last, address = self._tokens.last(secret), address_of(scope)
+                # A token that was valid is exempt: others at its address may be guessing.
+                wait = self._guesses.seconds_to_wait(address) if last is None else 0.0
+                if wait > 0.0:
+                    return too_many_requests(scope["path"], wait)
+                token = await self._find(secret, last if path == METRICS_PATH else None)
+                if token is None:
+                    self._guesses.count(address)
+                    return unauthorized(scope["path"], UNKNOWN)
+            elif self.required:
+                missing = REFUSAL if path == METRICS_PATH else _MISSING
+                return unauthorized(scope["path"], missing)
         until_revoked = _never if secret is None else partial(self._tokens.until_revoked, secret)
-        scope.setdefault("state", {}).update(token=token, asker=asker, until_revoked=until_revoked)
+        scope.setdefault("state", {}).update(token=token, until_revoked=until_revoked)
         return None
 
-    async def _find(self, secret: str, otherwise: Token | None) -> Token | None:
-        """otherwise: what is taken for the token while the database is away, if anything."""
+    async def _find(self, secret: str, fallback: Token | None) -> Token | None:
+        """fallback: used while the database is unavailable."""
         try:
             return await self._tokens.find(secret)
         except StoreUnavailable:
-            if otherwise is None:
+            if fallback is None:
                 raise
-            return otherwise
+            return fallback
 
 
 async def _never() -> None:
-    """Where there is no token, none is revoked."""
     await asyncio.Event().wait()
 
 
 def secret_of(headers: Headers) -> str | None:
-    """The secret that a request came with."""
+    """Return the token's secret of a request."""
     scheme, _, credentials = headers.get("authorization", "").partition(" ")
     if scheme.lower() == "bearer":
         return credentials.strip()
@@ -136,98 +232,127 @@ def secret_of(headers: Headers) -> str | None:
     return None if cookie is None else cookie.value or None
 
 
-async def asking(request: Request) -> Token | None:
-    """The token that a request came with; None where none is required and none was given."""
+def address_of(scope: Scope) -> str:
+    """Return the address of a client; for IPv6 its /64 network."""
+    client = scope.get("client")
+    host = str(client[0]) if client else ""
+    try:
+        address = ip_address(host)
+    except ValueError:
+        return host
+    if not isinstance(address, IPv6Address) or address.is_loopback:
+        return str(address)
+    if address.ipv4_mapped is not None:
+        return str(address.ipv4_mapped)
+    host_bits = address.max_prefixlen - _IPV6_PREFIX
+    return f"{IPv6Address(int(address) >> host_bits << host_bits)}/{_IPV6_PREFIX}"
+
+
+def find_token(request: Request, tokens: Tokens, secret: str) -> Token | None:
+    """Look up a token outside the middleware, throttled in the same way."""
+    guesses, address = cast(TokenGuesses, request.app.state.guesses), address_of(request.scope)
+    wait = guesses.seconds_to_wait(address)
+    if wait > 0.0:
+        raise TooManyRequests("too many invalid tokens from this address", retry_after=wait)
+    token = tokens.find(secret)
+    if token is None:
+        guesses.count(address)
+    return token
+
+
+async def request_token(request: Request) -> Token | None:
+    """Return the token of a request; None where none is required and none was sent."""
     return getattr(request.state, "token", None)
 
 
-Asking = Annotated[Token | None, Depends(asking)]
+RequestToken = Annotated[Token | None, Depends(request_token)]
 
 
 async def revocation(request: Request) -> Revocation:
-    """What returns when the token of a request was revoked."""
+    """Return a coroutine function that returns when the token of a request was revoked."""
     return cast(Revocation, request.state.until_revoked)
 
 
 UntilRevoked = Annotated[Revocation, Depends(revocation)]
 
 
-async def may_submit(token: Asking) -> str | None:
-    """Refuse whoever may only read."""
+async def may_submit(token: RequestToken) -> str | None:
+    """Require scope `submit` or `admin`, and return the token's name."""
     if token is None:
         return None
     if not token.scope.allows(TokenScope.SUBMIT):
         raise Forbidden(
-            f"the token {token.name!r} may only read; this needs one of scope `submit` or `admin`"
+            f"the token {token.name!r} has scope `read`; use one of scope `submit` or `admin`"
         )
     return token.name
 
 
-async def actor(token: Asking) -> str:
-    """Whom the audit log names for what the request changes."""
+Owner = Annotated[str | None, Depends(may_submit)]
+
+
+async def actor(token: RequestToken) -> str:
+    """Return the name that the audit log records."""
     return LOCAL if token is None else token.name
 
 
 Actor = Annotated[str, Depends(actor)]
 
 
-async def may_administer(token: Asking) -> None:
-    """Refuse whoever may not see what others do."""
+async def may_administer(token: RequestToken) -> None:
+    """Require scope `admin`."""
     if token is not None and not token.scope.allows(TokenScope.ADMIN):
         raise Forbidden(
-            f"the token {token.name!r} is of scope `{token.scope}`; this needs one of scope `admin`"
+            f"the token {token.name!r} has scope `{token.scope}`; use one of scope `admin`"
         )
 
 
-Owner = Annotated[str | None, Depends(may_submit)]
+def may_command(job: ExistingJob, token: RequestToken) -> None:
+    """Require the permission to command the job of the path."""
+    if token is not None and not token.may_command(job.owner):
+        owner = "no owner" if job.owner is None else f"owner {job.owner!r}"
+        raise Forbidden(
+            f"the token {token.name!r} of scope `{token.scope}` may not command this job, which has"
+            f" {owner}; use the token that submitted it, or one of scope `admin`"
+        )
 
 
-async def quota_of(token: Asking, settings: ServerSettings) -> Quota | None:
-    """What the unfinished jobs of an owner may come to."""
+async def quota_of(token: RequestToken, settings: ServerSettings) -> Quota | None:
+    """Return the quota of the token's unfinished jobs; None for scope `admin`."""
     if token is not None and token.scope is TokenScope.ADMIN:
         return None
     return Quota(settings.api_max_unfinished_jobs, settings.api_max_unfinished_seconds)
 
 
+OwnersQuota = Annotated[Quota | None, Depends(quota_of)]
+
+
 def check_may_prioritize(token: Token | None, priority: int) -> None:
-    """Refuse whoever may not put a job before those of others."""
+    """Require scope `admin` for priorities above the default."""
     if priority > DEFAULT and token is not None and not token.scope.allows(TokenScope.ADMIN):
         raise Forbidden(
-            f"the token {token.name!r} of scope `{token.scope}` may not give a priority above"
-            f" {DEFAULT}, which puts a job before those of others; use one of scope `admin`"
+            f"the token {token.name!r} of scope `{token.scope}` may not set a priority above"
+            f" {DEFAULT}; use one of scope `admin`"
         )
 
 
 async def job_priority(
-    token: Asking,
+    token: RequestToken,
     priority: Annotated[
         int,
         Header(
             alias="Job-Priority",
             ge=LOWEST,
             le=HIGHEST,
-            description="How urgent it is: of waiting jobs the one of highest priority is run"
-            " first, and of running jobs one that is a step higher has twice the share of the"
-            " workers. Above 0 it needs a token of scope `admin`, where tokens are required.",
+            description="Priority of the job: queued jobs start in order of priority, and each step"
+            " doubles the share of workers of a running job. Values above 0 require a token of"
+            " scope `admin`, where tokens are required.",
             examples=[0],
         ),
     ] = DEFAULT,
 ) -> int:
-    """The priority that a new job is to have."""
+    """Return the priority of a new job."""
     check_may_prioritize(token, priority)
     return priority
 
 
 NewPriority = Annotated[int, Depends(job_priority)]
-
-OwnersQuota = Annotated[Quota | None, Depends(quota_of)]
-
-
-def may_command(job: ExistingJob, token: Asking) -> None:
-    """Refuse whoever may not command the job of the path."""
-    if token is not None and not token.may_command(job.owner):
-        whose = "nobody's" if job.owner is None else f"{job.owner!r}'s"
-        raise Forbidden(
-            f"the token {token.name!r} of scope `{token.scope}` may not command this job, which is"
-            f" {whose}; use the token that it was submitted with, or one of scope `admin`"
-        )

@@ -1,6 +1,6 @@
-"""Bodies by anybody: validated where they hold nobody up, robots in them checked elsewhere.
+"""Validation of request bodies in threads, with checks of the robots in them.
 
-What a body is validated by is Python: in the event loop, every other request would wait for it.
+In the event loop, validation would delay every other request.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ from gaitswarm.sim.input import with_known_keys
 from gaitswarm.sim.robot.check import MOST_ROBOTS, Location, check_files, files_of, objects_in
 
 MOST_NAMES: Final = 10_000
-"""Names of fields in a body, designs to start from aside: each may be an error to be told."""
+"""Fields in a body, without start designs; each may yield an error."""
 
 MOST_VARIABLES: Final = 128
-"""Names of a design to start from that do not count."""
+"""Fields of a start design that do not count."""
 
 
 def validated(model: Any, name: str) -> Callable[..., Any]:
-    """A dependency that reads the body of a request and validates it in a thread."""
+    """Return a dependency that reads the body of a request and validates it in a thread."""
     adapter: TypeAdapter[Any] = TypeAdapter(model)
 
     async def read(http: Request, **body: Any) -> Any:
         work = partial(_validated, model, adapter, body[name])
         return await run_sync(work, limiter=http.state.validations)
 
-    # FastAPI knows of the body and its schema by this; the validation is put off.
+    # The signature gives FastAPI the body and its schema, without validating it.
     kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
     as_sent = Annotated[model, WrapValidator(lambda document, _: document), Body()]
     read.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
@@ -51,26 +51,27 @@ def _validated(model: Any, adapter: TypeAdapter[Any], document: Any) -> Any:
     try:
         return adapter.validate_python(document)
     except ValidationError as error:
-        found = with_known_keys(error.errors(include_url=False), model)
+        entries = with_known_keys(error.errors(include_url=False), model)
         raise RequestValidationError(
-            [{**entry, "loc": ("body", *entry["loc"])} for entry in found], body=document
+            [{**entry, "loc": ("body", *entry["loc"])} for entry in entries], body=document
         ) from error
 
 
 def _check_bounds(document: Any) -> None:
-    """What is costly before it is refused: very many names, and robots."""
+    """Limit what is costly to validate: many fields, and robots."""
     names, robots = 0, list[tuple[Location, str, str]]()
     for where, part in objects_in(document):
-        # Of designs to start from the first bad one is told; there may be many.
+        # Only the first invalid start design is reported, so they do not count.
         names += len(part) if where[-2:-1] != ("start",) else max(0, len(part) - MOST_VARIABLES)
         files = files_of(part)
         if files is not None:
             robots.append((where, *files))
         if names > MOST_NAMES:
-            raise _refusal(where, f"more than {MOST_NAMES} fields by here; send fewer", document)
+            problem = f"more than {MOST_NAMES} fields in the body; send fewer"
+            raise _refusal(where, problem, document)
         if len(robots) > MOST_ROBOTS:
-            many = f"more than {MOST_ROBOTS} robots of your own; send fewer"
-            raise _refusal(where, many, document)
+            problem = f"more than {MOST_ROBOTS} custom robots; send fewer"
+            raise _refusal(where, problem, document)
     for where, toml, urdf in robots:
         try:
             check_files(toml, urdf)

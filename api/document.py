@@ -1,6 +1,6 @@
 """`python -m gaitswarm.api.document`: the OpenAPI document as JSON on stdout.
 
-It needs neither a server nor a database; the page's types are made from it.
+The page's types are generated from it. Needs neither a server nor a database.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from gaitswarm.settings import Settings
 
 
 def document() -> str:
-    """The document that /openapi.json answers, one field a line."""
-    # No route is called, so none misses the service; nor do settings of the environment matter.
+    """Return the document of /openapi.json, one field per line."""
+    # No route is called, so no service is needed; settings of the environment are ignored.
     app = create_app(cast(JobService, None), settings=Settings.model_construct())
     return json.dumps(app.openapi(), indent=1, ensure_ascii=False)
 

@@ -1,10 +1,11 @@
-"""What the API says of itself: the OpenAPI document, and /docs to read and to try it."""
+"""Documentation of the API: the OpenAPI document with links, and /docs."""
 
 from __future__ import annotations
 
 import base64
 import hashlib
 import re
+from collections.abc import Iterator
 from typing import Any, Final, cast
 
 from fastapi import FastAPI, Request, Response
@@ -12,7 +13,6 @@ from fastapi.openapi.docs import get_swagger_ui_html
 from pydantic import BaseModel
 from pydantic.json_schema import JsonSchemaMode, models_json_schema
 
-from gaitswarm.api.links import add_links
 from gaitswarm.api.middleware import security_policy
 from gaitswarm.api.problems import MEDIA_TYPE
 from gaitswarm.views import ParticlesHeaderView, ProblemView
@@ -20,81 +20,103 @@ from gaitswarm.views.base import MEDIA_TYPE as BINARY
 from gaitswarm.views.replay import ReplayHeaderView
 
 DESCRIPTION: Final = """
-Finds robust drive controllers for walking robots: a controller is tried in several walking
-scenarios at once, in a fast simulation, and a search method improves it.
+Finds robust drive controllers for walking robots: a controller is simulated in several walking
+scenarios, and a search method improves it.
 
-1. Look at what can be tuned: **GET /v1/controllers**, **/v1/robots**, **/v1/scenarios**,
+1. List the options: **GET /v1/controllers**, **/v1/robots**, **/v1/scenarios**,
    **/v1/preferences**.
-2. Try one design: **POST /v1/simulations**.
-3. Submit a job: **POST /v1/jobs** answers at once with the job's id.
-4. Follow it: **GET /v1/jobs/{id}/events** is a stream of its committed iterations.
-5. Take the result: **GET /v1/jobs/{id}/best**.
+2. Simulate one design: **POST /v1/simulations**.
+3. Submit a job: **POST /v1/jobs** returns the job's id at once.
+4. Follow it: **GET /v1/jobs/{id}/events** streams its committed iterations.
+5. Get the result: **GET /v1/jobs/{id}/best**.
 
-All objectives, utilities and fitnesses are minimized. Units are SI unless a field says otherwise;
-controller variables in `counts` are coded integers of the microcontroller. Numbers that do not
-exist (the objectives of a robot that fell) are null. Errors are problems (RFC 9457): `detail` says
-what to do, `errors` names every offending field. Every answer has an `X-Request-ID`, by which the
-server's log names it; a client may send its own.
+All objectives, utilities and fitness values are minimized. Units are SI unless a field says
+otherwise; controller variables in `counts` are coded integers of the microcontroller. Undefined
+numbers (the objectives of a robot that fell) are null. Errors are problems (RFC 9457): `detail`
+names the remedy, `errors` lists every invalid field. Every response has an `X-Request-ID`, which
+the server's log contains; clients may send their own.
 """
 
 TAGS: Final[list[dict[str, str]]] = [
     {"name": "jobs", "description": "Optimizations: submit, follow, pause, resume, cancel."},
-    {"name": "history", "description": "What a job has committed: iterations and evaluations."},
-    {"name": "analysis", "description": "Questions about all evaluations of a job at once."},
-    {"name": "recordings", "description": "Measured walks, to which a robot is fitted."},
-    {"name": "simulations", "description": "One design walking on request, outside any job."},
-    {"name": "robots", "description": "Robots of one's own, made of a URDF and looked at."},
-    {"name": "catalogue", "description": "What there is to choose from."},
-    {"name": "session", "description": "Who is asking, for browsers."},
+    {"name": "history", "description": "Committed iterations and evaluations of a job."},
+    {"name": "analysis", "description": "Analyses of all evaluations of a job."},
+    {"name": "recordings", "description": "Measured walks, for identification of a robot."},
+    {"name": "simulations", "description": "Simulations of one design, outside jobs."},
+    {"name": "robots", "description": "Drafts and checks of custom robots."},
+    {"name": "catalogue", "description": "Options for jobs and simulations."},
+    {"name": "session", "description": "Sessions of browsers."},
     {"name": "health", "description": "For load balancers and container engines."},
 ]
 
 ASSETS: Final = "/docs-assets"
-"""Where the scripts of /docs lie."""
+"""Path of the scripts of /docs."""
 
 _MEANING: Final = {
     400: "The body is not JSON.",
-    401: "A token is asked for, or the one that was sent is not valid.",
-    403: "The token does not allow this, or a page of another origin asks for it.",
-    404: "No such job, or nothing of that kind in it yet.",
-    409: "The job's state does not allow it, the idempotency key belongs to another request, or its"
-    " owner has too many unfinished jobs.",
+    401: "A token is required, or the token sent is invalid.",
+    403: "The token does not permit this, or the request comes from a page of another origin.",
+    404: "The job does not exist, or has no such data yet.",
+    409: "The job's state does not permit this, the idempotency key belongs to another request, or"
+    " the quota of unfinished jobs is exceeded.",
     413: "The body is too large.",
-    422: "A field is not valid; `errors` names it.",
-    429: "Too many requests with this token or from this address; `Retry-After` says when.",
-    500: "A bug on the server; the log names the cause under the request id.",
-    503: "The database or the simulator cannot answer now; try again later.",
+    422: "A field is invalid; `errors` names it.",
+    429: "Too many invalid tokens from this address; see `Retry-After`.",
+    500: "Internal error; the log has the cause under the request id.",
+    503: "The database or the simulator is unavailable, or busy; see `Retry-After`.",
 }
 
 _HEADERS: Final = (ReplayHeaderView, ParticlesHeaderView)
-"""What is JSON inside binary answers, which FastAPI does not see."""
+"""JSON inside binary responses, which FastAPI does not see."""
 
 _BEARER: Final = {
     "type": "http",
     "scheme": "bearer",
-    "description": "A token of this server, as `gaitswarm token create` makes them, needed wherever"
-    " the server listens beyond its own machine. Browsers send it as a cookie (`/v1/session`).",
+    "description": "A token made by `gaitswarm token create`, required if the server listens beyond"
+    " its own machine. Browsers send it as a cookie (`/v1/session`).",
 }
 
 _SCHEMAS: Final = "#/components/schemas/"
 
 _INLINE_SCRIPT: Final = re.compile(rb"<script(?![^>]*\bsrc=)[^>]*>(.*?)</script>", re.DOTALL)
 
+_SOURCES: Final[dict[str, dict[str, str]]] = {
+    "submit_job": {"job_id": "$response.body#/id"},
+    "fork_job": {"job_id": "$response.body#/id"},
+    "list_jobs": {"job_id": "$response.body#/items/0/id"},
+    "list_iterations": {
+        "job_id": "$request.path.job_id",
+        "iteration": "$response.body#/items/0/index",
+    },
+    "list_recordings": {"recording_id": "$response.body#/items/0/id"},
+    "add_recording": {"recording_id": "$response.body#/id"},
+    "record_measured_walk": {"recording_id": "$response.body#/recording/id"},
+}
+"""OpenAPI links: parameters of other operations that a response contains."""
+
+_ONLY: Final = {
+    "list_jobs": frozenset({"get_job", "list_iterations"}),
+    "list_iterations": frozenset({"list_evaluations", "get_preference_for"}),
+}
+"""Targets of links, if not every operation with one of the parameters in its path."""
+
+_PARAMETER: Final = re.compile(r"\{(\w+)\}")
+
 Responses = dict[int | str, dict[str, Any]]
 
 
-def problems(*statuses: int, asks: bool = True) -> Responses:
+def problems(*statuses: int, guarded: bool = True) -> Responses:
     """Document a route's problems."""
-    # By name: as a `model`, each of some 150 answers would have a validator of its own.
+    # By reference: as a `model`, each of some 150 responses would have a validator of its own.
     content = {MEDIA_TYPE: {"schema": {"$ref": f"{_SCHEMAS}{ProblemView.__name__}"}}}
     return {
         status: {"description": _MEANING[status], "content": content}
-        for status in (*statuses, *((401, 429) if asks else ()), 500, 503)
+        for status in (*statuses, *((401, 429) if guarded else ()), 500, 503)
     }
 
 
 def binary(description: str, *media_types: str) -> Responses:
-    """Document a route that answers bytes."""
+    """Document a route that returns bytes."""
     schema = {"type": "string", "format": "binary"}
     content = {media_type: {"schema": schema} for media_type in media_types or (BINARY,)}
     return {200: {"description": description, "content": content}}
@@ -106,13 +128,13 @@ def add_documentation(app: FastAPI) -> None:
 
     def openapi() -> dict[str, Any]:
         document = derive()
-        known = document["components"]["schemas"] | _schemas(ProblemView)
-        known = dict(sorted(known.items()))
-        document["components"]["schemas"] = _schemas(*_HEADERS) | known
+        schemas = document["components"]["schemas"] | _schemas(ProblemView)
+        schemas = dict(sorted(schemas.items()))
+        document["components"]["schemas"] = _schemas(*_HEADERS) | schemas
         document["components"]["securitySchemes"] = {"token": _BEARER}
-        # Or none: a server that listens to its own machine alone asks for no token.
+        # The empty one: a server that listens on its own machine only requires no token.
         document["security"] = [{"token": []}, {}]
-        add_links(document)
+        _add_links(document)
         return document
 
     app.openapi = openapi  # type: ignore[method-assign]
@@ -133,14 +155,14 @@ def add_documentation(app: FastAPI) -> None:
 
 
 def _schemas(*models: type[BaseModel]) -> dict[str, Any]:
-    """Of models that FastAPI does not see, with all that they refer to."""
-    wanted: list[tuple[type[BaseModel], JsonSchemaMode]] = [(m, "serialization") for m in models]
-    _, schemas = models_json_schema(wanted, ref_template=f"{_SCHEMAS}{{model}}")
+    """Return schemas of models that FastAPI does not see, and of all that they reference."""
+    inputs: list[tuple[type[BaseModel], JsonSchemaMode]] = [(m, "serialization") for m in models]
+    _, schemas = models_json_schema(inputs, ref_template=f"{_SCHEMAS}{{model}}")
     return cast(dict[str, Any], schemas["$defs"])
 
 
 def policy_of(page: bytes) -> str:
-    """The policy of a page that other projects' scripts make."""
+    """Return the content security policy of a page with inline scripts of other projects."""
     hashes = [
         f"'sha256-{base64.b64encode(hashlib.sha256(script).digest()).decode()}'"
         for script in _INLINE_SCRIPT.findall(page)
@@ -148,3 +170,41 @@ def policy_of(page: bytes) -> str:
     return security_policy(
         script_src=" ".join(["'self'", *hashes]), style_src="'self' 'unsafe-inline'"
     )
+
+
+def _add_links(document: dict[str, Any]) -> None:
+    for source, parameters in _SOURCES.items():
+        _, operation = _operations(document)[source]
+        links = dict(_links(document, source, parameters))
+        for status, response in operation["responses"].items():
+            if status.startswith("2"):
+                response["links"] = links
+
+
+def _links(
+    document: dict[str, Any], source: str, parameters: dict[str, str]
+) -> Iterator[tuple[str, dict[str, Any]]]:
+    for name, (path, operation) in _operations(document).items():
+        path_names = set(_PARAMETER.findall(path))
+        only = _ONLY.get(source)
+        if not path_names or not path_names <= set(parameters):
+            continue
+        if only is not None and name not in only:
+            continue
+        yield (
+            name,
+            {
+                "operationId": name,
+                "description": operation["summary"],
+                "parameters": {key: parameters[key] for key in sorted(path_names)},
+            },
+        )
+
+
+def _operations(document: dict[str, Any]) -> dict[str, tuple[str, dict[str, Any]]]:
+    """Return path and operation by id."""
+    return {
+        operation["operationId"]: (path, operation)
+        for path, methods in document["paths"].items()
+        for operation in methods.values()
+    }

@@ -1,21 +1,22 @@
-"""What happens to every request: an id, a limit on its body, an answer even to a bug.
-
-And what a browser may do with the answers.
-"""
+"""ASGI middleware of every request: id, metrics, host and origin checks, body limit, headers."""
 
 from __future__ import annotations
 
 import logging
 import re
+import time
 import uuid
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Final
+from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from gaitswarm.api.problems import MOST_HEADERS, headers_too_large, internal_error, problem
+from gaitswarm.api.problems import internal_error, problem
+from gaitswarm.services.monitoring.hosts import HostNames
+from gaitswarm.services.monitoring.metrics import Metrics
 from gaitswarm.services.optimizer.errors import GaitswarmError
 from gaitswarm.services.optimizer.log_context import log_context
 
@@ -24,22 +25,31 @@ _log = logging.getLogger("gaitswarm.api")
 REQUEST_ID: Final = "X-Request-ID"
 _ACCEPTABLE_ID: Final = re.compile(r"^[A-Za-z0-9_.-]{1,128}$")
 
+_METHODS: Final = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
+_SAFE_METHODS: Final = frozenset({"GET", "HEAD", "OPTIONS"})
+
+_NO_ROUTE: Final = "none"
+"""Route label of requests that match no route; their paths are arbitrary."""
+
+_SAME_SITE: Final = frozenset({"same-origin", "none"})
+"""Sec-Fetch-Site values of this server's page and of addresses that the user types."""
+
 _DRAINED: Final = 32
-"""Refused bodies are read up to this many times the limit, so that the client sees the answer:
-closing a connection with unread data resets it."""
+"""Rejected bodies are read up to this multiple of the limit: closing a connection with unread data
+resets it, and the client would not see the answer."""
 
 
 class RequestIdMiddleware:
-    """Names every request in the header X-Request-ID and answers exceptions that nobody expected.
+    """Set X-Request-ID on every response and answer unexpected exceptions.
 
-    A client's own id is kept if it is one of up to 128 letters, digits, `_`, `.` and `-`.
+    A client's own id is kept if it has 1 to 128 letters, digits, `_`, `.` or `-`.
     """
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """One ASGI exchange."""
+        """Handle one ASGI exchange."""
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
@@ -47,7 +57,7 @@ class RequestIdMiddleware:
         request_id = given if _ACCEPTABLE_ID.match(given) else uuid.uuid4().hex
         started = False
 
-        async def send_named(message: Message) -> None:
+        async def send_with_id(message: Message) -> None:
             nonlocal started
             if message["type"] == "http.response.start":
                 started = True
@@ -56,50 +66,103 @@ class RequestIdMiddleware:
 
         with log_context(request=request_id):
             try:
-                await self.app(scope, receive, send_named)
+                await self.app(scope, receive, send_with_id)
             except Exception as error:
                 what = f"{scope['method']} {scope['path']} (request {request_id})"
-                # Too late for a problem: breaking the connection is the only honest answer.
-                if started and (expected := _expected(error)) is not None:
-                    _log.error("%s: broken off: %s", what, expected)
+                # Starlette wraps errors that are raised after the response has started.
+                cause = error if isinstance(error, GaitswarmError) else error.__cause__
+                if started and isinstance(cause, GaitswarmError):
+                    _log.error("%s: response aborted: %s", what, cause)
                     return
                 _log.exception(what)
                 if started:
                     raise
                 response = internal_error(scope["path"], request_id)
-                await response(scope, receive, send_named)
+                await response(scope, receive, send_with_id)
 
 
-def _expected(error: Exception) -> GaitswarmError | None:
-    """What was raised on purpose; Starlette wraps what it can no longer answer."""
-    found = error if isinstance(error, GaitswarmError) else error.__cause__
-    return found if isinstance(found, GaitswarmError) else None
+class MetricsMiddleware:
+    """Count and time requests by method, route template and status."""
 
-
-class HeaderLimitMiddleware:
-    """Refuses requests with very many or very long headers, or a very long path, with a problem.
-
-    Heads that do not come in one piece are refused before, by `gaitswarm.api.connections`.
-    """
-
-    def __init__(self, app: ASGIApp, max_bytes: int) -> None:
+    def __init__(self, app: ASGIApp, metrics: Metrics) -> None:
         self.app = app
-        self.max_bytes = max_bytes
+        self._metrics = metrics
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """One ASGI exchange."""
-        answer = self.app
-        if scope["type"] == "http":
-            headers = scope["headers"]
-            size = len(scope.get("raw_path") or b"") + len(scope["query_string"])
-            size += sum(len(name) + len(value) for name, value in headers)
-            if len(headers) > MOST_HEADERS or size > self.max_bytes:
-                answer = headers_too_large(self.max_bytes)
-        await answer(scope, receive, send)
+        """Handle one ASGI exchange."""
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        started = time.perf_counter()
+
+        async def send_counted(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                self._count(scope, message["status"], time.perf_counter() - started)
+            await send(message)
+
+        await self.app(scope, receive, send_counted)
+
+    def _count(self, scope: Scope, status: int, seconds: float) -> None:
+        method = scope["method"] if scope["method"] in _METHODS else "other"
+        route = getattr(scope.get("route"), "path", None) or _NO_ROUTE
+        self._metrics.http_requests.labels(method, route, str(status)).inc()
+        self._metrics.http_seconds.labels(method, route).observe(seconds)
+
+
+class HostMiddleware:
+    """Reject requests whose Host is not a name of this server (DNS rebinding)."""
+
+    def __init__(self, app: ASGIApp, names: HostNames) -> None:
+        self.app = app
+        self.names = names
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Handle one ASGI exchange."""
+        host = Headers(scope=scope).get("host") if scope["type"] == "http" else None
+        refusal = self.names.refusal(host)
+        if refusal is not None:
+            response = problem(scope["path"], "unknown-host", refusal)
+            await response(scope, receive, send)
+            return
+        await self.app(scope, receive, send)
+
+
+class SameOriginMiddleware:
+    """Reject state-changing requests from pages of other origins.
+
+    Decided by Origin and Sec-Fetch-Site, which browsers send and scripts cannot forge; other
+    clients send neither.
+    """
+
+    def __init__(self, app: ASGIApp, allowed: Sequence[str]) -> None:
+        self.app = app
+        self.allowed = frozenset(name.lower() for name in allowed)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Handle one ASGI exchange."""
+        if scope["type"] == "http" and scope["method"] not in _SAFE_METHODS:
+            headers = Headers(scope=scope)
+            if not self._is_same_origin(headers):
+                detail = "requests from pages of another origin are not allowed; use this"
+                response = problem(scope["path"], "cross-origin", f"{detail} server's page")
+                await response(scope, receive, send)
+                return
+        await self.app(scope, receive, send)
+
+    def _is_same_origin(self, headers: Headers) -> bool:
+        origin = headers.get("origin")
+        if origin is None:
+            return headers.get("sec-fetch-site", "none") in _SAME_SITE
+        # Behind a TLS proxy the scheme differs from the server's.
+        host = urlsplit(origin.lower()).netloc
+        return bool(host) and (host == headers.get("host", "").lower() or host in self.allowed)
 
 
 class BodyLimitMiddleware:
-    """Refuses bodies over a limit with a problem, whether their length was declared or not."""
+    """Reject bodies over a limit, whether or not their length was declared.
+
+    larger: limits of single paths [B].
+    """
 
     def __init__(
         self, app: ASGIApp, max_bytes: int, larger: Mapping[str, int] | None = None
@@ -109,21 +172,21 @@ class BodyLimitMiddleware:
         self.larger = larger or {}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """One ASGI exchange."""
+        """Handle one ASGI exchange."""
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
         path = scope["path"].removeprefix(scope.get("root_path", ""))
-        most = max(self.max_bytes, self.larger.get(path, 0))
+        limit = max(self.max_bytes, self.larger.get(path, 0))
         length = Headers(scope=scope).get("content-length", "")
-        if length.isdecimal() and int(length) > most:
-            await self._drain(receive, 0, most)
-            advice = "a job spec takes a few kilobytes"
-            if most > self.max_bytes:
+        if length.isdecimal() and int(length) > limit:
+            await self._drain(receive, 0, limit)
+            advice = "a job spec has a few kilobytes"
+            if limit > self.max_bytes:
                 advice = "leave out cycles, or raise GAITSWARM_API_MAX_LOG_BYTES on the server"
-            detail = f"the body is larger than {most} bytes; {advice}"
-            refusal = problem(scope["path"], "body-too-large", detail)
-            await refusal(scope, receive, send)
+            detail = f"the body is larger than {limit} bytes; {advice}"
+            response = problem(scope["path"], "body-too-large", detail)
+            await response(scope, receive, send)
             return
         received = 0
 
@@ -131,23 +194,23 @@ class BodyLimitMiddleware:
             nonlocal received
             message = await receive()
             received += len(message.get("body", b""))
-            if received > most:
-                await self._drain(receive, received, most)
+            if received > limit:
+                await self._drain(receive, received, limit)
                 raise HTTPException(413)
             return message
 
         await self.app(scope, receive_limited, send)
 
-    async def _drain(self, receive: Receive, received: int, most: int) -> None:
+    async def _drain(self, receive: Receive, received: int, limit: int) -> None:
         more = True
-        while more and received < _DRAINED * most:
+        while more and received < _DRAINED * limit:
             message = await receive()
             received += len(message.get("body", b""))
             more = message.get("more_body", False)
 
 
 def security_policy(*, script_src: str = "'self'", style_src: str = "'self'") -> str:
-    """A content security policy: this server's own files and data, no frame around them."""
+    """Return a content security policy: this server's files and data only, no frames."""
     return (
         f"default-src 'none'; script-src {script_src}; style-src {style_src};"
         " img-src 'self' data: blob:; connect-src 'self'; font-src 'self'; base-uri 'none';"
@@ -163,19 +226,19 @@ _HEADERS: Final = {
 
 
 class SecurityHeadersMiddleware:
-    """Sets the headers on every answer; one that an answer has already is kept."""
+    """Set security headers on every response that does not set them itself."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """One ASGI exchange."""
+        """Handle one ASGI exchange."""
 
-        async def send_guarded(message: Message) -> None:
+        async def send_with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
                 headers = MutableHeaders(scope=message)
                 for name, value in _HEADERS.items():
                     headers.setdefault(name, value)
             await send(message)
 
-        await self.app(scope, receive, send_guarded)
+        await self.app(scope, receive, send_with_headers)

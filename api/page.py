@@ -1,43 +1,70 @@
-"""The page for people: its HTML on the paths that it knows, and its assets.
+"""The web page and the manual: static files, read on request.
 
-Nothing of it is read before it is asked for, so a page that is built while the server runs is
-served from then on.
+Files that are built while the server runs are served from then on.
 """
 
 from __future__ import annotations
 
 import mimetypes
 import re
+from html import escape
+from http import HTTPStatus
 from pathlib import Path
-from typing import Final
+from typing import Annotated, Final
 
-from fastapi import FastAPI, Request, Response
+from fastapi import Depends, FastAPI, Request, Response
 from starlette.responses import FileResponse, HTMLResponse, RedirectResponse
 
+from gaitswarm.api.documentation import policy_of
 from gaitswarm.api.problems import problem
 from gaitswarm.views import PREFIX
 
-FOLDER: Final = Path(__file__).parent / "page"
-"""`make page` builds it from web/; a wheel brings it."""
+PAGE_FOLDER: Final = Path(__file__).parent / "page"
+"""Built by `make page` from web/; part of wheels."""
+
+MANUAL_FOLDER: Final = Path(__file__).parent / "manual"
+"""Built by `make manual` from docs/; part of wheels and of the image."""
 
 PAGES: Final = ("/jobs", "/compare", "/walk", "/controller")
-"""With everything below them: the page itself tells its views apart by their paths."""
+"""Paths of the page's views, each with all paths below it."""
 
 _JOB_PAGE: Final = re.compile(r"/jobs/([a-z0-9]{12})")
 
-_UNBUILT: Final = "the page is not built; `make page` builds it, and /docs explains the API"
+_NO_PAGE: Final = "the page is not built; run `make page`, or see /docs for the API"
 
 # Browsers load no module script of another type; the machine's own table may lack these.
 _MEDIA_TYPES: Final = {".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
 
+_NO_CACHE: Final = {"Cache-Control": "no-cache"}
 
-def is_built(folder: Path = FOLDER) -> bool:
-    """Whether there is a page to serve."""
+_MANUAL_INDEX: Final = "docs/index.html"
+
+_NO_MANUAL: Final = (
+    "this server has no manual; run `make manual` in a checkout of gaitswarm, or read"
+    " docs/index.md there"
+)
+
+_NO_MANUAL_PAGE: Final = """<!doctype html>
+<html lang="en">
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width">
+<title>gaitswarm: no manual</title>
+<h1>This server has no manual</h1>
+<p>In a checkout of gaitswarm, <code>make manual</code> builds it, and the server serves it without
+a restart. Wheels of <code>make wheel</code> and the image include it.</p>
+<p>The same pages exist as Markdown: begin with <code>docs/index.md</code> of the checkout.</p>
+<p><a href="{root}/docs">Every server documents its API.</a></p>
+</html>
+"""
+
+
+def is_built(folder: Path = PAGE_FOLDER) -> bool:
+    """Return whether the page is built."""
     return (folder / "index.html").is_file()
 
 
 def add_page(app: FastAPI, folder: Path) -> None:
-    """Serve a built page; without one, `/` leads to /docs and a job's page to the job as JSON."""
+    """Serve the page. If it is not built, redirect `/` to /docs and a job's page to its JSON."""
 
     def page(request: Request) -> Response:
         try:
@@ -46,31 +73,80 @@ def add_page(app: FastAPI, folder: Path) -> None:
             instead = _without_page(request)
             if instead is not None:
                 return RedirectResponse(instead)
-            return problem(request.url.path, "not-found", _UNBUILT)
-        # It names assets that a newer build no longer has: ask every time.
-        return HTMLResponse(text, headers={"Cache-Control": "no-cache"})
+            return problem(request.url.path, "not-found", _NO_PAGE)
+        # It names assets that a newer build no longer has.
+        return HTMLResponse(text, headers=_NO_CACHE)
 
     def asset(request: Request) -> Response:
         name = request.path_params["name"]
         path = folder / "assets" / name
-        # The router gives no slash in a name; `..` remains.
+        # The router passes no slash in a name; `..` remains.
         if name.startswith(".") or not path.is_file():
-            detail = "the page has no such asset; reload the page, it was built anew"
+            detail = "the page has no such asset; reload the page, it has been rebuilt"
             return problem(request.url.path, "not-found", detail)
         media_type = _MEDIA_TYPES.get(path.suffix) or mimetypes.guess_type(name)[0]
         headers = {"Cache-Control": "public, max-age=31536000, immutable"}
         return FileResponse(path, headers=headers, media_type=media_type)
 
-    for path in ("/", *PAGES, *(f"{known}/{{rest:path}}" for known in PAGES)):
+    for path in ("/", *PAGES, *(f"{view}/{{rest:path}}" for view in PAGES)):
         app.add_route(path, page, include_in_schema=False)
     app.add_route("/assets/{name}", asset, include_in_schema=False)
 
 
 def _without_page(request: Request) -> str | None:
-    """Path of what the API itself has to show in place of a page that is not built, if anything."""
+    """Return the path of the API that replaces a path of the page, if any."""
     root = request.scope.get("root_path", "")
     path = request.url.path.removeprefix(root)
     if path == "/":
         return f"{root}/docs"
     job = _JOB_PAGE.fullmatch(path)
     return f"{root}{PREFIX}/jobs/{job[1]}" if job else None
+
+
+def add_manual(app: FastAPI, folder: Path) -> None:
+    """Serve the manual."""
+    app.state.manual_folder = folder
+
+    def index(request: Request) -> Response:
+        if not _has_manual(folder):
+            return _no_manual(request)
+        root = request.scope.get("root_path", "")
+        return RedirectResponse(f"{root}/manual/{_MANUAL_INDEX}")
+
+    def page(request: Request) -> Response:
+        if not _has_manual(folder):
+            return _no_manual(request)
+        root = folder.resolve()
+        path = (root / request.path_params["path"]).resolve()
+        if not (path.is_relative_to(root) and path.is_file()):
+            detail = "the manual has no such page; begin at /manual"
+            return problem(request.url.path, "not-found", detail)
+        if path.suffix != ".html":
+            return FileResponse(path, headers=_NO_CACHE)
+        text = path.read_bytes()
+        return HTMLResponse(text, headers={"Content-Security-Policy": policy_of(text), **_NO_CACHE})
+
+    app.add_route("/manual", index, include_in_schema=False)
+    app.add_route("/manual/", index, include_in_schema=False)
+    app.add_route("/manual/{path:path}", page, include_in_schema=False)
+
+
+def _no_manual(request: Request) -> Response:
+    """Return a page for browsers, a problem for programs."""
+    headers = {"Vary": "Accept", **_NO_CACHE}
+    if "text/html" not in request.headers.get("accept", ""):
+        return problem(request.url.path, "not-found", _NO_MANUAL, headers=headers)
+    text = _NO_MANUAL_PAGE.format(root=escape(request.scope.get("root_path", "")))
+    return HTMLResponse(text, HTTPStatus.NOT_FOUND, headers)
+
+
+def _has_manual(folder: Path) -> bool:
+    return (folder / _MANUAL_INDEX).is_file()
+
+
+async def _serves_manual(request: Request) -> bool:
+    return _has_manual(request.app.state.manual_folder)
+
+
+HasManual = Annotated[bool, Depends(_serves_manual)]
+"""Whether this server has a built manual."""

@@ -1,4 +1,4 @@
-"""Every error as HTTP: the one place where the error trees become problem+json (RFC 9457).
+"""Errors as problem+json (RFC 9457): the mapping of exceptions to responses.
 
 | raised                                        | status | type                  |
 | --------------------------------------------- | ------ | --------------------- |
@@ -7,21 +7,18 @@
 | SimulationInputError                          |        |                       |
 | Unauthorized                                  | 401    | unauthorized          |
 | Forbidden                                     | 403    | forbidden             |
-| to change something from another's page       | 403    | cross-origin          |
+| change requested by a page of another origin  | 403    | cross-origin          |
 | NotFound; no such route                       | 404    | not-found             |
 | Conflict, LeaseLost                           | 409    | conflict              |
 | IdempotencyConflict                           | 409    | idempotency-conflict  |
 | QuotaExceeded                                 | 409    | quota-exceeded        |
 | Unreadable                                    | 409    | unreadable            |
-| a request that takes too long to come         | 408    | too-slow              |
-| a body over the limit                         | 413    | body-too-large        |
-| a name of the server that is not its own      | 421    | unknown-host          |
-| a head over the limits                        | 431    | headers-too-large     |
-| what is no request of HTTP                    | 400    | malformed-request     |
-| TooManyRequests; too many by token or address | 429    | too-many-requests     |
+| body over the limit                           | 413    | body-too-large        |
+| Host that is not a name of the server         | 421    | unknown-host          |
+| TooManyRequests; too many invalid tokens      | 429    | too-many-requests     |
 | StoreUnavailable, EvaluatorUnavailable,       | 503    | unavailable           |
-| SimulationError, too many simulations         |        |                       |
-| /v1/readyz of a server that was told to end   | 503    | draining              |
+| SimulationError                               |        |                       |
+| /v1/readyz of a server that shuts down        | 503    | draining              |
 | anything else                                 | 500    | internal-error        |
 """
 
@@ -66,36 +63,33 @@ _RETRY: Final = {"Retry-After": "5"}
 _METHODS: Final = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE")
 
 _MOST_ERRORS: Final = 20
-"""A body can be wrong in ten thousand places; nobody reads them all."""
+"""A body can be invalid in ten thousand places."""
 
 _LONGEST_FIELD: Final = 300
 _LONGEST_MESSAGE: Final = 1000
 _LONGEST_DETAIL: Final = 5000
-"""Characters: what is wrong may quote a whole body."""
+"""Lengths in characters: messages may quote a whole body."""
 
 PROBLEMS: Final[dict[str, tuple[int, str]]] = {
-    "malformed-json": (400, "The body is not JSON"),
-    "invalid-request": (422, "The request is not valid"),
-    "unauthorized": (401, "The server does not know who is asking"),
-    "forbidden": (403, "Whoever asks may not do that"),
-    "cross-origin": (403, "The request comes from another origin"),
-    "not-found": (404, "There is no such thing"),
-    "method-not-allowed": (405, "The method is not allowed here"),
-    "conflict": (409, "The present state does not allow it"),
-    "idempotency-conflict": (409, "The idempotency key was used for another request"),
-    "quota-exceeded": (409, "The owner has too much under way"),
-    "unreadable": (409, "This version cannot read the job"),
-    "malformed-request": (400, "This is no request"),
-    "too-slow": (408, "The request took too long to come"),
-    "headers-too-large": (431, "The head of the request is too large"),
-    "body-too-large": (413, "The body is too large"),
-    "unknown-host": (421, "The server does not go by this name"),
-    "too-many-requests": (429, "Whoever asks does so too often"),
-    "unavailable": (503, "The service cannot do it now"),
-    "draining": (503, "The server is ending"),
-    "internal-error": (500, "Something went wrong on the server"),
+    "malformed-json": (400, "Malformed JSON"),
+    "invalid-request": (422, "Invalid request"),
+    "unauthorized": (401, "Authentication required"),
+    "forbidden": (403, "Permission denied"),
+    "cross-origin": (403, "Cross-origin request"),
+    "not-found": (404, "Not found"),
+    "method-not-allowed": (405, "Method not allowed"),
+    "conflict": (409, "Conflict with the current state"),
+    "idempotency-conflict": (409, "Idempotency key used for another request"),
+    "quota-exceeded": (409, "Quota exceeded"),
+    "unreadable": (409, "Job not readable by this version"),
+    "body-too-large": (413, "Body too large"),
+    "unknown-host": (421, "Unknown host"),
+    "too-many-requests": (429, "Too many requests"),
+    "unavailable": (503, "Service unavailable"),
+    "draining": (503, "Server shutting down"),
+    "internal-error": (500, "Internal server error"),
 }
-"""Status and title of every type of problem, by the last part of its URN."""
+"""Status and title of every problem type, by the last part of its URN."""
 
 _KINDS: Final[tuple[tuple[type[Exception], str], ...]] = (
     (InvalidRequest, "invalid-request"),
@@ -112,18 +106,21 @@ _KINDS: Final[tuple[tuple[type[Exception], str], ...]] = (
     (SimulationInputError, "invalid-request"),
     (SimulationError, "unavailable"),
 )
-"""Domain errors, the more special first."""
+"""Types of domain errors, subclasses first."""
 
 DOMAIN_ERRORS: Final = (GaitswarmError, SimulationError)
-"""What `domain_problem` answers."""
+"""Errors that `domain_problem` handles."""
 
 _HTTP: Final = {
-    400: ("malformed-json", "the body cannot be read as JSON; send one JSON object, not too deep"),
-    404: ("not-found", "no resource has this path; /docs lists those that exist"),
-    405: ("method-not-allowed", "use a method that the Allow header names; see /docs"),
-    413: ("body-too-large", "send a smaller body; a job spec takes a few kilobytes"),
+    400: (
+        "malformed-json",
+        "the body is no valid JSON or nested too deeply; send one JSON object",
+    ),
+    404: ("not-found", "no resource has this path; see /docs"),
+    405: ("method-not-allowed", "use a method of the Allow header; see /docs"),
+    413: ("body-too-large", "send a smaller body; a job spec has a few kilobytes"),
 }
-"""What to do about the errors that the framework itself raises."""
+"""Types and details of errors that the framework raises."""
 
 
 def problem(
@@ -135,22 +132,22 @@ def problem(
     errors: Sequence[FieldErrorView] = (),
     headers: Mapping[str, str] | None = None,
 ) -> Response:
-    """Make a problem."""
-    known, title = PROBLEMS.get(kind) or (status or 500, HTTPStatus(status or 500).phrase)
+    """Return a problem."""
+    code, title = PROBLEMS.get(kind) or (status or 500, HTTPStatus(status or 500).phrase)
     view = ProblemView(
         type=f"urn:gaitswarm:problem:{kind}",
         title=title,
-        status=known,
+        status=code,
         detail=shortened(detail, _LONGEST_DETAIL),
         instance=request_path,
         errors=list(errors),
     )
     body = view.model_dump_json()
-    return Response(body, known, dict(headers or {}), media_type=MEDIA_TYPE)
+    return Response(body, code, dict(headers or {}), media_type=MEDIA_TYPE)
 
 
 def unauthorized(request_path: str, detail: str) -> Response:
-    """Answer whoever has to say first who they are."""
+    """Return a 401 with its challenge."""
     headers = {"WWW-Authenticate": "Bearer"}
     return problem(request_path, "unauthorized", detail, headers=headers)
 
@@ -162,41 +159,26 @@ def unavailable(
     *,
     errors: Sequence[FieldErrorView] = (),
 ) -> Response:
-    """Answer that something is not possible now, and when to ask again."""
+    """Return a 503 with the time after which to retry, and log it."""
     _log.error("%s: %s", request_path, detail)
     return problem(request_path, kind, detail, errors=errors, headers=_RETRY)
 
 
 def too_many_requests(request_path: str, seconds: float, detail: str | None = None) -> Response:
-    """Answer whoever asks too often."""
+    """Return a 429 with the time after which to retry."""
     wait = max(1, math.ceil(seconds))
-    text = (
-        detail or f"there are too many requests with this token or from this address; wait {wait} s"
-    )
+    text = detail or f"too many invalid tokens from this address; retry in {wait} s"
     headers = {"Retry-After": str(wait)}
     return problem(request_path, "too-many-requests", text, headers=headers)
 
 
-MOST_HEADERS: Final = 100
-"""Of a request; browsers and proxies send some twenty."""
-
-
-def headers_too_large(most_bytes: int) -> Response:
-    """Answer a request whose head is too large, of which nothing is quoted."""
-    detail = (
-        f"the head of the request has more than {MOST_HEADERS} headers or {most_bytes} bytes; send"
-        " fewer, and what is long in the body"
-    )
-    return problem("/", "headers-too-large", detail)
-
-
 def internal_error(request_path: str, request_id: str) -> Response:
-    """Answer a bug: nothing of the inside is shown, but how to report it is."""
+    """Return a 500 without internals, but with the id to report."""
     return problem(
         request_path,
         "internal-error",
-        f"try again; if it stays, report it with the request id {request_id}, by which the"
-        " server's log names the cause",
+        f"try again; if the error persists, report it with the request id {request_id}, under which"
+        " the server's log has the cause",
     )
 
 
@@ -209,18 +191,17 @@ def add_problem_handlers(app: FastAPI) -> None:
 
 
 def _client_text(error: Exception) -> str:
-    """Return an error's text for clients; the text of a database's driver is for the log alone."""
+    """Return an error's text for clients, without that of a database driver."""
     return error.for_clients if isinstance(error, StoreUnavailable) else str(error)
 
 
 async def domain_problem(request: Request, error: Exception) -> Response:
-    """Answer what the domain refuses."""
+    """Return the problem of a domain error."""
     if isinstance(error, TooManyRequests):
         return too_many_requests(request.url.path, error.retry_after, str(error))
-    found = next((row for row in _KINDS if isinstance(error, row[0])), None)
-    if found is None:
+    name = next((kind for raised, kind in _KINDS if isinstance(error, raised)), None)
+    if name is None:
         raise error
-    _, name = found
     status, _ = PROBLEMS[name]
     detail = _client_text(error)
     errors = []
@@ -249,7 +230,7 @@ async def _on_http_error(request: Request, raised: Exception) -> Response:
 
 
 def _methods(request: Request) -> list[str]:
-    """Those that some route takes at the path that was asked for."""
+    """Return the methods that any route accepts at the request's path."""
     routes = request.app.routes
     scopes = {method: dict(request.scope) | {"method": method} for method in _METHODS}
     return [
@@ -261,14 +242,14 @@ def _methods(request: Request) -> list[str]:
 
 async def _on_invalid(request: Request, raised: Exception) -> Response:
     error = cast(RequestValidationError, raised)
-    found = error.errors()
-    if any(entry["type"] == "json_invalid" for entry in found):
-        entry = found[0]
+    entries = error.errors()
+    if any(entry["type"] == "json_invalid" for entry in entries):
+        entry = entries[0]
         reason = entry.get("ctx", {}).get("error", "it cannot be parsed")
         message = f"{reason} at character {entry['loc'][-1]}; send one JSON object"
         errors = [FieldErrorView(field="body", message=message)]
         return problem(request.url.path, "malformed-json", f"body: {message}", errors=errors)
-    errors = _in_the_words_of_the_request(found, error.body)
+    errors = _field_errors(entries, error.body)
     shown = [_short(entry) for entry in errors[:_MOST_ERRORS]]
     detail = "; ".join(f"{e.field}: {e.message}" if e.field else e.message for e in shown)
     if len(errors) > _MOST_ERRORS:
@@ -283,12 +264,10 @@ def _short(error: FieldErrorView) -> FieldErrorView:
     )
 
 
-def _in_the_words_of_the_request(
-    found: Sequence[Mapping[str, Any]], body: Any
-) -> list[FieldErrorView]:
-    """Of a body by its own fields; of parameters by their names."""
+def _field_errors(entries: Sequence[Mapping[str, Any]], body: Any) -> list[FieldErrorView]:
+    """Return errors by fields of the body and names of parameters."""
     in_body, in_parameters = (
-        [{**e, "loc": e["loc"][1:]} for e in found if (e["loc"][0] == "body") is of_body]
+        [{**e, "loc": e["loc"][1:]} for e in entries if (e["loc"][0] == "body") is of_body]
         for of_body in (True, False)
     )
     if in_body and not isinstance(body, dict):

@@ -1,4 +1,4 @@
-"""Jobs that event streams follow: each is watched once, and read once for all its streams."""
+"""Jobs that event streams follow: each is watched and read once for all its streams."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from functools import cached_property, partial
-from itertools import islice
 from typing import Final
 
 from anyio.to_thread import run_sync
@@ -19,25 +18,18 @@ from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.views import IterationView, StateView
 
 PAGE: Final = 200
-"""Most iterations that are read at once."""
+"""Maximum number of iterations per read."""
 
 _LONGEST_WAIT: Final = 60.0
-"""Seconds after which a job is read again, whatever was told of it."""
-
-_AT_ONCE: Final = 8
-"""Streams that are answered in one go. Each takes the loop about 0.1 ms; requests come between."""
-
-_GAP: Final = 0.004
-"""Seconds until the next ones are."""
+"""Time after which a job is read again without a notification [s]."""
 
 
 @dataclass(frozen=True)
 class News:
-    """A job, and what it has committed since; the events that tell of it are encoded once.
+    """A job and its next iterations, with events that are encoded once.
 
     Attributes:
-        version: Of the topic when the job was read; what has changed since is of a later one.
-        job: As it was read.
+        version: Version of the topic when the job was read.
         iterations: In order; at most `PAGE`.
     """
 
@@ -47,7 +39,7 @@ class News:
 
     @cached_property
     def events(self) -> tuple[bytes, ...]:
-        """An event `iteration` for each iteration, as it is sent."""
+        """Encoded events `iteration`, one for each iteration."""
         views = map(IterationView.from_iteration, self.iterations)
         return tuple(
             format_sse_event(event="iteration", id=str(view.index), data_str=view.model_dump_json())
@@ -56,26 +48,25 @@ class News:
 
     @cached_property
     def state(self) -> bytes:
-        """The event `state`, as it is sent."""
+        """The encoded event `state`."""
         text = StateView.from_job(self.job).model_dump_json()
         return format_sse_event(event="state", data_str=text)
 
 
 _Waiters = dict[asyncio.Future[News | None], None]
-"""Streams that wait for one answer, in the order in which they came; None is that of the end."""
+"""Streams that wait for the same result; None tells them that the server stops."""
 
 _Question = tuple[int, int | None]
-"""A version of the topic, and after which iteration."""
+"""A version of the topic, and the index after which iterations are read."""
 
 
 class Topic:
-    """A job that streams follow. Of one event loop.
+    """A job that streams follow. Bound to one event loop.
 
-    version: how often the job has changed, as far as this process knows.
+    version: number of changes of the job noticed by this process.
     """
 
     def __init__(self, service: JobService, job_id: str, poll_seconds: float) -> None:
-        """Begin to watch the job, at version 0."""
         self.version = 0
         self.streams = 0
         self._service = service
@@ -92,17 +83,17 @@ class Topic:
         self._watch.enter_context(changes.watch(job_id, self._wake, poll_seconds=poll_seconds))
 
     def close(self) -> None:
-        """Watch the job no more."""
+        """Stop watching the job."""
         self._timer.cancel()
         self._watch.close()
 
     def _wake(self) -> None:
-        """For any thread. The server may have ended meanwhile."""
+        """Thread-safe. The loop may have ended meanwhile."""
         with suppress(RuntimeError):
             self._loop.call_soon_threadsafe(self.advance)
 
     def advance(self) -> None:
-        """Go on to the next version, and read the job for those who wait for it."""
+        """Begin the next version, and read the job for waiting streams."""
         self._timer.cancel()
         self._timer = self._loop.call_later(_LONGEST_WAIT, self.advance)
         self.version += 1
@@ -112,7 +103,7 @@ class Topic:
                 self._read(after, waiters)
 
     def end(self) -> None:
-        """Answer all who wait, now and from now on, that the server stops."""
+        """Return None to all waiting streams and to later ones."""
         self._ended = True
         for waiters in (*self._idle.values(), *self._reads.values()):
             for waiter in waiters:
@@ -120,10 +111,10 @@ class Topic:
                     waiter.set_result(None)
 
     async def news(self, after: int | None, *, known: int | None = None) -> News | None:
-        """Read the job, and then what it has committed.
+        """Return the job and its iterations after an index; None when the server stops.
 
-        Streams that ask for the same at the same version share the answer. It is given to a few at
-        a time, so that many streams of one job hold up nothing else.
+        known: the caller's version; waits until there is a later one. Streams with the same
+        question share one read.
         """
         if self._ended:
             return None
@@ -141,11 +132,11 @@ class Topic:
         try:
             return await waiter
         finally:
-            # Who has gone is not kept until the job changes.
+            # Disconnected streams do not wait for the next change.
             waiters.pop(waiter, None)
 
     def _read(self, after: int | None, waiters: _Waiters) -> _Waiters:
-        """Begin to read for those who wait, and for those who join them until it is done."""
+        """Begin to read for these streams, and for those that join until it is done."""
         question = (self.version, after)
         self._reads[question] = waiters
         task = asyncio.ensure_future(run_sync(self._look, self.version, after))
@@ -157,36 +148,29 @@ class Topic:
         job = self._service.job(self._job_id)
         if job.progress.iterations <= (-1 if after is None else after) + 1:
             return News(version, job, ())
-        found = self._service.iterations(self._job_id, after=after, limit=PAGE)
-        return News(version, job, found.items)
+        page = self._service.iterations(self._job_id, after=after, limit=PAGE)
+        return News(version, job, page.items)
 
     def _read_is_done(self, question: _Question, task: asyncio.Task[News]) -> None:
         self._tasks.discard(task)
         waiters = self._reads.pop(question)
         if task.cancelled():
-            # With the loop, and so are all who wait.
+            # The loop is ending.
             return
         if task.exception() is None and question[0] == self.version:
             self._latest = question, task.result()
-        self._answer(waiters, task)
-
-    def _answer(self, waiters: _Waiters, task: asyncio.Task[News]) -> None:
-        """Give the answer to some, and a little later to the next ones."""
-        for waiter in list(islice(waiters, _AT_ONCE)):
-            del waiters[waiter]
+        failed = task.exception()
+        for waiter in waiters:
             if waiter.done():
                 continue
-            failed = task.exception()
             if failed is None:
                 waiter.set_result(task.result())
             else:
                 waiter.set_exception(failed)
-        if waiters:
-            self._loop.call_later(_GAP, self._answer, waiters, task)
 
 
 class Topics:
-    """All topics of a server. Of one event loop."""
+    """Topics of a server. Bound to one event loop."""
 
     def __init__(self) -> None:
         self._topics: dict[tuple[int, str], Topic] = {}
@@ -194,7 +178,7 @@ class Topics:
     @contextmanager
     def follow(self, service: JobService, job_id: str, *, poll_seconds: float) -> Iterator[Topic]:
         """Follow a job inside the block."""
-        # A topic keeps its service alive, so that no other one has that id.
+        # A topic keeps its service alive, so the id is unique.
         key = (id(service), job_id)
         topic = self._topics.get(key)
         if topic is None:
@@ -209,7 +193,7 @@ class Topics:
                 topic.close()
 
     async def end_with(self, stopping: asyncio.Event) -> None:
-        """Answer all streams when the server begins to stop."""
+        """End all streams when the server begins to stop."""
         await stopping.wait()
         for topic in self._topics.values():
             topic.end()

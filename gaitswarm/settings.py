@@ -205,25 +205,16 @@ class Settings(BaseSettings):
         description="How often jobs that event streams follow are looked at, all at once, where the"
         " database tells of no changes: SQLite, or a PostgreSQL whose listener is lost [s].",
     )
-    api_simulation_workers: int = Field(
-        default=2, ge=1, le=64, description="Simulations on request that compute at once."
-    )
-    api_simulation_queue: int = Field(
-        default=16,
-        ge=0,
-        description="Further simulations that may wait; more are told to come later.",
-    )
-    api_analysis_workers: int = Field(
+    api_compute_workers: int = Field(
         default=2,
         ge=1,
         le=64,
-        description="Questions about whole histories (fronts, certificates, evidence, forks) that"
-        " compute at once.",
+        description="Requests that simulate, or analyze whole histories, at the same time.",
     )
-    api_analysis_queue: int = Field(
+    api_compute_queue: int = Field(
         default=64,
         ge=0,
-        description="Further questions that may wait; more are told to come later.",
+        description="Further requests that may wait to compute; more get 503.",
     )
     api_max_fork_seconds: float = Field(
         default=20.0,
@@ -249,20 +240,6 @@ class Settings(BaseSettings):
         description="Longest job that is taken, all walks of all designs added [s]: by default"
         " three months of one core at 1200 x real time.",
     )
-    api_request_rate: float = Field(
-        default=100.0,
-        gt=0.0,
-        description="Requests with one token, or from one address without, that are answered a"
-        " second; on a server that asks for no token, those of its own machine are not counted.",
-    )
-    api_request_burst: int = Field(
-        default=1000,
-        ge=1,
-        description="Requests with one token, or from one address without, that may come at once.",
-    )
-    api_max_streams: int = Field(
-        default=256, ge=1, description="Event streams that one token or address may have open."
-    )
     api_max_unfinished_jobs: int = Field(
         default=10_000,
         ge=1,
@@ -276,24 +253,7 @@ class Settings(BaseSettings):
         " designs added [s].",
     )
     api_max_connections: int = Field(
-        default=512, ge=1, description="Connections that may be open; more are told to come later."
-    )
-    api_max_client_connections: int = Field(
-        default=256,
-        ge=1,
-        description="Connections of one address that may be open, unless it is a trusted proxy's.",
-    )
-    api_max_header_bytes: int = Field(
-        default=32_768,
-        ge=1024,
-        le=1 << 20,
-        description="Largest head of a request [B]; it may have 100 headers.",
-    )
-    api_head_seconds: float = Field(
-        default=10.0, gt=0.0, description="How long a client may take to send a request's head [s]."
-    )
-    api_body_seconds: float = Field(
-        default=60.0, gt=0.0, description="How long a client may take to send a request's body [s]."
+        default=1000, ge=1, description="Connections and requests in progress; more get 503."
     )
     api_idle_seconds: int = Field(
         default=15, ge=1, description="How long a connection stays open between requests [s]."

@@ -1,4 +1,4 @@
-"""Questions about all evaluations of a job at once: spread, particles, other measures."""
+"""Analyses of the stored evaluations of one or more jobs."""
 
 from __future__ import annotations
 
@@ -11,26 +11,33 @@ from gaitswarm.api.bodies import validated
 from gaitswarm.api.dependencies import (
     LARGEST_INDEX,
     AfterIteration,
-    Analysing,
+    Analyzing,
+    Computing,
     ExistingJob,
     JobId,
+    JobIdText,
     ServerSettings,
     Service,
-    Slots,
     check_sampled_length,
 )
 from gaitswarm.api.documentation import binary, problems
+from gaitswarm.api.responses import BinaryResponse, json_response
 from gaitswarm.requests.analysis import (
     DESIGNS,
     MOST_FRONT_DESIGNS,
     TOLERANCE,
     PreferencesRequest,
+    run_certificate,
     run_front,
     run_importance,
     run_preference_for,
     run_preferences,
     run_scenario_families,
 )
+from gaitswarm.requests.comparison import MOST_JOBS, run_comparison, run_convergences
+from gaitswarm.requests.identification import run_targets
+from gaitswarm.services.optimizer.analysis.certificate import MOST_WORST
+from gaitswarm.services.optimizer.analysis.targets import LeaveOut
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.views import (
@@ -38,26 +45,34 @@ from gaitswarm.views import (
     DistributionView,
     RankingRequest,
     RankingView,
-    View,
     encoded_particles,
 )
 from gaitswarm.views.analysis import ImportanceView, RobustPreferencesView, ScenarioFamiliesView
-from gaitswarm.views.base import MEDIA_TYPE
+from gaitswarm.views.calibration import TargetsView
+from gaitswarm.views.catalogue import JobReferenceView
+from gaitswarm.views.certificate import CertificateView
+from gaitswarm.views.comparison import ConvergencesView, JobComparisonView
+from gaitswarm.views.identification import IdentifiabilityView
 from gaitswarm.views.trade_offs import FrontView, PreferenceForView
 
 PreferencesBody = Annotated[PreferencesRequest, Depends(validated(PreferencesRequest, "request"))]
 
-MOST_RANKED: Final = 20_000_000
-"""Evaluations times preferences of one request: some seconds."""
+FurtherRuns = Annotated[
+    list[JobIdText] | None,
+    Query(max_length=31, description="Further runs of the same problem, with other seeds."),
+]
 
-router = APIRouter(prefix=f"{PREFIX}/jobs/{{job_id}}", tags=["analysis"])
+MOST_RANKED: Final = 20_000_000
+"""Evaluations times preferences of one request, which take some seconds."""
+
+router = APIRouter(prefix=PREFIX, tags=["analysis"])
 
 
 @router.get(
-    "/distribution",
-    dependencies=[Analysing],
+    "/jobs/{job_id}/distribution",
+    dependencies=[Analyzing],
     operation_id="get_distribution",
-    summary="See how designs are spread",
+    summary="Get the distribution of designs",
     response_model=DistributionView,
     responses=problems(404, 409, 422),
 )
@@ -65,18 +80,20 @@ def get_distribution(
     job: ExistingJob,
     service: Service,
     after: AfterIteration = None,
-    limit: Annotated[int, Query(ge=1, le=10_000, description="Most iterations on a page.")] = 1000,
+    limit: Annotated[
+        int, Query(ge=1, le=10_000, description="Maximum number of iterations.")
+    ] = 1000,
 ) -> Response:
-    """Quantiles of fitness and the diversity of the designs, iteration by iteration."""
-    found, more = service.distribution(job, after=after, limit=limit)
-    return _json(DistributionView.from_distribution(found, more=more))
+    """Return quantiles of the fitness and the diversity of the designs by iteration."""
+    distribution, more = service.distribution(job, after=after, limit=limit)
+    return json_response(DistributionView.from_distribution(distribution, more=more))
 
 
 @router.get(
-    "/particles",
-    dependencies=[Analysing],
+    "/jobs/{job_id}/particles",
+    dependencies=[Analyzing],
     operation_id="get_particles",
-    summary="Take every design as numbers",
+    summary="Get all designs as binary columns",
     response_class=Response,
     responses=binary(
         "Length of the header (uint32), header (JSON, padded with spaces), then every column's"
@@ -93,19 +110,20 @@ def get_particles(
         Query(
             ge=1,
             le=1_000_000,
-            description="Most designs; more are thinned evenly in iterations, the best is kept.",
+            description="Maximum number of designs; more are thinned evenly over the iterations,"
+            " and the best is kept.",
         ),
     ] = 100_000,
     objectives: Annotated[
         bool,
         Query(
-            description="Whether f1 to f5 follow, each as its geometric mean over the scenarios;"
-            " only jobs that tune a drive have them."
+            description="Whether to add f1 to f5, each as its geometric mean over the scenarios;"
+            " only for jobs that tune a drive."
         ),
     ] = False,
 ) -> Response:
-    """One row per design, by column, in binary: iteration, particle, fitness, the searched
-    variables, and the utility in each scenario; NaN for what does not exist.
+    """Return one row per design, by column: iteration, particle, fitness, the searched variables,
+    and the utility in each scenario; NaN where undefined.
 
     The header is a ParticlesHeaderView: it names the columns in order, with units and bounds.
     """
@@ -116,31 +134,31 @@ def get_particles(
         most=max_points,
         objectives=objectives,
     )
-    return Response(body, media_type=MEDIA_TYPE)
+    return BinaryResponse(body)
 
 
 @router.post(
-    "/ranking",
-    dependencies=[Analysing],
+    "/jobs/{job_id}/ranking",
+    dependencies=[Analyzing],
     operation_id="rank_designs",
-    summary="Judge by another preference",
+    summary="Rank designs under another preference",
     response_model=RankingView,
     responses=problems(400, 404, 409, 413, 422),
 )
 def rank_designs(request: RankingRequest, job: ExistingJob, service: Service) -> Response:
-    """All designs of a job, ranked anew from their stored objectives: no walk is simulated.
+    """Rank all designs of a job by their stored objectives; nothing is simulated.
 
     For jobs that tune a drive; a job that identifies parameters has no preference.
     """
     ranked = service.rank(job, request.resolved_preference(), top=request.top)
-    return _json(RankingView.from_ranked_job(request, ranked))
+    return json_response(RankingView.from_ranked_job(request, ranked))
 
 
 @router.get(
-    "/scenarios",
-    dependencies=[Analysing],
+    "/jobs/{job_id}/scenarios",
+    dependencies=[Analyzing],
     operation_id="get_scenario_families",
-    summary="See which scenarios matter",
+    summary="Get the importance of scenarios",
     response_model=ScenarioFamiliesView,
     responses=problems(404, 409, 422),
 )
@@ -152,34 +170,34 @@ def get_scenario_families(
         Query(ge=0.0, allow_inf_nan=False, description="Largest regret of a smallest family [1]."),
     ] = TOLERANCE,
 ) -> Response:
-    """What a job would have taken for its best with fewer scenarios: each of them left out, and
-    families of every size; from stored objectives, no walk is simulated.
+    """Return the best designs that a job would have had with fewer scenarios: without each of them,
+    and for families of every size. From stored objectives; nothing is simulated.
     """
-    return _json(run_scenario_families(service, job_id, tolerance))
+    return json_response(run_scenario_families(service, job_id, tolerance))
 
 
 @router.get(
-    "/importance",
-    dependencies=[Analysing],
+    "/jobs/{job_id}/importance",
+    dependencies=[Analyzing],
     operation_id="get_importance",
-    summary="See which variables matter",
+    summary="Get the importance of variables",
     response_model=ImportanceView,
     responses=problems(404, 409, 422),
 )
 def get_importance(job_id: JobId, service: Service) -> Response:
-    """First-order Sobol' indices of every variable for the fitness, for each objective and for
-    failing, among the designs that were tried; and whether the winner lies at a bound.
+    """Return first-order Sobol' indices of every variable for the fitness, each objective and
+    failure, among the evaluated designs; and whether the best design lies at a bound.
 
-    From stored objectives, no walk is simulated.
+    From stored objectives; nothing is simulated.
     """
-    return _json(run_importance(service, job_id))
+    return json_response(run_importance(service, job_id))
 
 
 @router.get(
-    "/front",
-    dependencies=[Analysing],
+    "/jobs/{job_id}/front",
+    dependencies=[Analyzing],
     operation_id="get_front",
-    summary="See what designs trade",
+    summary="Get the Pareto front",
     response_model=FrontView,
     responses=problems(404, 409, 422),
 )
@@ -191,25 +209,24 @@ def get_front(
         Query(
             ge=1,
             le=MOST_FRONT_DESIGNS,
-            description="Most designs; of more, those with a mark and others that cover the front"
-            " evenly.",
+            description="Maximum number of designs; of more, marked designs and others that cover"
+            " the front evenly.",
         ),
     ] = DESIGNS,
 ) -> Response:
-    """The Pareto front of a job over f1 to f5: designs that no other dominates, its knees, the best
-    in each objective and under A, B and C, and its hypervolume over the iterations.
+    """Return the Pareto front over f1 to f5: nondominated designs, its knees, the best in each
+    objective and under A, B and C, and its hypervolume by iteration.
 
-    From stored objectives, no walk is simulated; for any job that tunes a drive, whatever its
-    search was for.
+    From stored objectives; nothing is simulated. For any job that tunes a drive.
     """
-    return _json(run_front(service, job_id, most=most))
+    return json_response(run_front(service, job_id, most=most))
 
 
 @router.get(
-    "/preference-for",
-    dependencies=[Analysing],
+    "/jobs/{job_id}/preference-for",
+    dependencies=[Analyzing],
     operation_id="get_preference_for",
-    summary="Find the preference of a design",
+    summary="Find a preference for a design",
     responses=problems(404, 409, 422),
 )
 def get_preference_for(
@@ -223,7 +240,7 @@ def get_preference_for(
         Query(ge=0, le=LARGEST_INDEX, description="Number of the design in its iteration, from 0."),
     ],
 ) -> PreferenceForView:
-    """Biases and exponents under which a design is the best of its job, if there are any.
+    """Return biases and exponents under which a design is the best of its job, if there are any.
 
     409 for a design that fails in a scenario.
     """
@@ -231,9 +248,9 @@ def get_preference_for(
 
 
 @router.post(
-    "/preferences",
+    "/jobs/{job_id}/preferences",
     operation_id="find_robust_preferences",
-    summary="See whose winners are robust",
+    summary="Rank designs under many preferences",
     response_model=RobustPreferencesView,
     responses=problems(400, 404, 409, 413, 422),
 )
@@ -242,25 +259,22 @@ async def find_robust_preferences(
     job: ExistingJob,
     service: Service,
     settings: ServerSettings,
-    slots: Slots,
+    computing: Computing,
 ) -> Response:
-    """Rank a job's designs under A, B, C and drawn preferences, and list who wins.
+    """Rank a job's designs under A, B, C and random preferences, and list the winners.
 
-    From stored objectives; with `samples` so many designs walk around each winner, by which its
-    robustness index (thesis 4.4.3) is estimated, and the most robust comes first. The answer waits
-    for these walks, so the time walked is limited; what is ranked is, too.
+    From stored objectives. With `samples`, that number of designs is simulated around each winner
+    to estimate its robustness index (thesis 4.4.3), and the most robust comes first. The number of
+    ranked designs and the simulated time are limited.
     """
     _check_ranked(request, job)
-
-    def found() -> Response:
-        check = partial(check_sampled_length, settings)
-        return _json(run_preferences(service, job.id, request, check=check))
-
-    return await slots.run(found)
+    check = partial(check_sampled_length, settings)
+    return await computing.run(
+        lambda: json_response(run_preferences(service, job.id, request, check=check))
+    )
 
 
 def _check_ranked(request: PreferencesRequest, job: Job) -> None:
-    """Raises InvalidRequest."""
     most = max(1, MOST_RANKED // max(1, job.progress.evaluations))
     if request.drawn > most:
         raise InvalidRequest(
@@ -269,6 +283,131 @@ def _check_ranked(request: PreferencesRequest, job: Job) -> None:
         )
 
 
-def _json(view: View) -> Response:
-    """Serialized here: thousands of items are not validated once more on their way out."""
-    return Response(view.model_dump_json(), media_type="application/json")
+@router.get(
+    "/jobs/{job_id}/reference",
+    operation_id="get_reference",
+    summary="Compare a job's best with the published or the start design",
+    responses=problems(404, 422),
+)
+async def get_reference(job_id: JobId, service: Service, computing: Computing) -> JobReferenceView:
+    """Compare the best design so far with a reference in the job's scenarios: the published design
+    of its controller and preference, or for custom robots the middle of the bounds.
+
+    The reference is simulated once and stored with the job; job lists include it from then on.
+    """
+    return JobReferenceView.from_comparison(
+        *await computing.run(partial(service.reference, job_id))
+    )
+
+
+@router.get(
+    "/jobs/{job_id}/comparison",
+    dependencies=[Analyzing],
+    operation_id="compare_jobs",
+    summary="Compare jobs",
+    response_model=JobComparisonView,
+    responses=problems(404, 409, 422),
+)
+def compare_jobs(
+    job_id: JobId,
+    service: Service,
+    also: Annotated[
+        list[JobIdText] | None,
+        Query(max_length=MOST_JOBS - 1, description="Further jobs, each once."),
+    ] = None,
+) -> Response:
+    """Compare the convergence of jobs by iterations, evaluations and time, the distribution of
+    fitness of their designs, and their specs.
+    """
+    return json_response(run_comparison(service, [job_id, *(also or ())]))
+
+
+@router.get(
+    "/job-convergences",
+    dependencies=[Analyzing],
+    operation_id="list_convergences",
+    summary="Get short convergences of jobs",
+    responses=problems(422),
+)
+def list_convergences(
+    service: Service,
+    job: Annotated[list[JobIdText], Query(min_length=1, max_length=200, description="Job ids.")],
+    points: Annotated[
+        int, Query(ge=2, le=100, description="Maximum number of iterations per job.")
+    ] = 24,
+) -> ConvergencesView:
+    """Return the best fitness over the iterations of several jobs, for sparklines in lists."""
+    return run_convergences(service, job, points)
+
+
+@router.get(
+    "/jobs/{job_id}/certificate",
+    dependencies=[Analyzing],
+    operation_id="get_certificate",
+    summary="Get the results of a design in many worlds",
+    responses=problems(404, 409, 422),
+)
+def get_certificate(
+    job: ExistingJob,
+    service: Service,
+    worlds: Annotated[
+        int | None, Query(ge=1, le=1_000_000, description="Number of worlds, from the first.")
+    ] = None,
+    most: Annotated[
+        int, Query(ge=0, le=MOST_WORST, description="Number of worst worlds to list.")
+    ] = 5,
+) -> CertificateView:
+    """Return failure rate, worst results and their worlds for a job of kind `certificate`.
+
+    From the worlds simulated so far. The `replay` of a world is a command; its `values` are the
+    `world` of POST /v1/replays.
+    """
+    return run_certificate(service, job.id, worlds=worlds, most=most)
+
+
+@router.get(
+    "/jobs/{job_id}/targets",
+    dependencies=[Analyzing],
+    operation_id="get_targets",
+    summary="Get the deviations of a calibration from its targets",
+    responses=problems(404, 409, 422),
+)
+def get_targets(
+    job: ExistingJob,
+    service: Service,
+    also: FurtherRuns = None,
+    leave_out: Annotated[
+        LeaveOut | None,
+        Query(
+            description="Predict every target by the best design without that `target`, or without"
+            " all targets of its `walk`. Nothing is simulated."
+        ),
+    ] = None,
+) -> TargetsView:
+    """Return the values of every target for the best design of all runs of a `calibration`.
+
+    Differences are in units of the tolerance. `/parameters` has the best fitness of each choice of
+    a categorical variable.
+    """
+    return run_targets(service, [job.id, *(also or ())], leave_out)
+
+
+@router.get(
+    "/jobs/{job_id}/parameters",
+    dependencies=[Analyzing],
+    operation_id="get_parameters",
+    summary="Get the identifiability of parameters",
+    responses=problems(404, 409, 422),
+)
+def get_parameters(
+    job: ExistingJob, service: Service, also: FurtherRuns = None
+) -> IdentifiabilityView:
+    """Return the interval of every variable among designs within twelve thresholds of the best.
+
+    Mainly for jobs of kind `identification`. A single run always narrows; only runs with different
+    seeds that narrow to the same values show that a parameter is identifiable.
+    """
+    jobs = [job, *(service.job(other) for other in also or ())]
+    return IdentifiabilityView.from_identifiability(
+        [j.id for j in jobs], service.identifiability(jobs)
+    )

@@ -1,18 +1,17 @@
-"""What there is to choose from, and how a fuzzy controller answers."""
+"""Catalogue of robots, scenarios, preferences, optimizers, controllers and plug-ins."""
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Annotated
 
 from fastapi import APIRouter, Path, Response
 
-from gaitswarm.api.dependencies import Slots
+from gaitswarm.api.dependencies import Computing
 from gaitswarm.api.documentation import problems
-from gaitswarm.api.routes.simulations import NOT_STORED
+from gaitswarm.api.responses import NOT_STORED, json_response
 from gaitswarm.requests.surface import SurfaceRequest, run_surface
 from gaitswarm.services.optimizer.errors import NotFound
-from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
+from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.views import (
     PREFIX,
     CaseView,
@@ -43,7 +42,7 @@ router = APIRouter(prefix=PREFIX, tags=["catalogue"])
     responses=problems(),
 )
 def list_robots() -> CatalogueView[RobotView]:
-    """Robots that ship; a job names one, brings a variant of one, or the files of its own."""
+    """Return shipped robots. A job names one, defines a variant of one, or has files of its own."""
     return CatalogueView(items=robot_views())
 
 
@@ -54,7 +53,7 @@ def list_robots() -> CatalogueView[RobotView]:
     responses=problems(),
 )
 def list_scenarios() -> CatalogueView[ScenarioView]:
-    """The six walks of thesis table 4.2, in full; a job names them or brings its own."""
+    """Return the six scenarios of thesis table 4.2; a job names them or defines its own."""
     return CatalogueView(items=scenario_views())
 
 
@@ -65,7 +64,7 @@ def list_scenarios() -> CatalogueView[ScenarioView]:
     responses=problems(),
 )
 def list_preferences() -> CatalogueView[PreferenceView]:
-    """Biases and exponents by which objectives are weighed: thesis table 4.5, eq. 3.1."""
+    """Return biases and exponents that weight the objectives (thesis table 4.5, eq. 3.1)."""
     return CatalogueView(items=preference_views())
 
 
@@ -76,7 +75,7 @@ def list_preferences() -> CatalogueView[PreferenceView]:
     responses=problems(),
 )
 def list_optimizers() -> CatalogueView[OptimizerView]:
-    """Search methods with their settings, by the names that jobs may give them."""
+    """Return search methods with their settings, by the names that jobs use."""
     return CatalogueView(items=optimizer_views())
 
 
@@ -87,7 +86,7 @@ def list_optimizers() -> CatalogueView[OptimizerView]:
     responses=problems(),
 )
 def list_controllers() -> CatalogueView[ControllerView]:
-    """Motor controllers, their design variables with bounds and units, and published designs."""
+    """Return motor controllers with design variables, bounds, units and published designs."""
     return CatalogueView(items=controller_views())
 
 
@@ -98,7 +97,7 @@ def list_controllers() -> CatalogueView[ControllerView]:
     responses=problems(),
 )
 def list_cases() -> CatalogueView[CaseView]:
-    """What designs may be put to in place of walks in gaitswarm's simulator, by plug-ins here."""
+    """Return cases of installed plug-ins, which evaluate designs in place of the simulator."""
     return CatalogueView(items=case_views())
 
 
@@ -109,7 +108,7 @@ def list_cases() -> CatalogueView[CaseView]:
     responses=problems(),
 )
 def list_plugins() -> CatalogueView[PluginView]:
-    """Controllers, cases and search methods that other packages bring to this server."""
+    """Return controllers, cases and search methods that installed packages add."""
     return CatalogueView(items=plugin_views())
 
 
@@ -130,19 +129,12 @@ async def controller_surface(
         ),
     ],
     request: SurfaceRequest,
-    slots: Slots,
+    computing: Computing,
 ) -> Response:
-    """How a design answers to angle error and motor current: by its rules, and by its table.
+    """Return the output over angle error and motor current: by the rules, and by the lookup table.
 
-    Sets and rules are those of the thesis; the table is what the microcontroller looks up in place
-    of the inference.
+    Sets and rules are those of the thesis; the microcontroller uses the table instead of inference.
     """
     if controller not in CONTROLLERS:
         raise NotFound(CONTROLLERS.unknown(controller))
-    body = await slots.run(partial(_surface, controller, request))
-    return Response(body, media_type="application/json", headers=NOT_STORED)
-
-
-def _surface(controller: ControllerName, request: SurfaceRequest) -> str:
-    """Serialized in the worker thread, as it has thousands of numbers."""
-    return run_surface(controller, request).model_dump_json(by_alias=True)
+    return await computing.run(lambda: json_response(run_surface(controller, request), NOT_STORED))

@@ -1,16 +1,22 @@
-"""A design as C for a microcontroller: the files as an archive, and what they take."""
+"""Designs as C firmware for a microcontroller."""
 
 from __future__ import annotations
 
-import hashlib
 from functools import partial
 from typing import Annotated, Final
 
 from fastapi import APIRouter, Depends, Header, Query, Response, status
 
 from gaitswarm.api.bodies import validated
-from gaitswarm.api.dependencies import ExistingJob, ServerSettings, Service, Slots, check_length
+from gaitswarm.api.dependencies import (
+    Computing,
+    ExistingJob,
+    ServerSettings,
+    Service,
+    check_length,
+)
 from gaitswarm.api.documentation import Responses, binary, problems
+from gaitswarm.api.responses import tagged_response
 from gaitswarm.requests.firmware import (
     FirmwareRequest,
     firmware_request_of_best,
@@ -33,19 +39,18 @@ TableBits = Annotated[
     str | None,
     Query(
         pattern=r"^[0-9]{1,2}x[0-9]{1,2}$",
-        description="Bits of a fuzzy table's indices, of angle error and current, in place of"
-        " 10x6; the walks are by this table.",
+        description="Bits of the indices of a fuzzy table, for angle error and current; default"
+        " 10x6. The simulations use this table.",
         examples=["8x6"],
     ),
 ]
 
 IfNoneMatch = Annotated[
-    str | None,
-    Header(description="`ETag` of an archive received before; 304 if it is still the same."),
+    str | None, Header(description="`ETag` of a cached archive; 304 if it is unchanged.")
 ]
 
 _NOT_MODIFIED: Final[Responses] = {
-    status.HTTP_304_NOT_MODIFIED: {"description": "The archive is that of `If-None-Match`."}
+    status.HTTP_304_NOT_MODIFIED: {"description": "The archive matches `If-None-Match`."}
 }
 
 
@@ -63,18 +68,17 @@ async def get_firmware(
     job: ExistingJob,
     service: Service,
     settings: ServerSettings,
-    slots: Slots,
+    computing: Computing,
     table_bits: TableBits = None,
     if_none_match: IfNoneMatch = None,
 ) -> Response:
-    """The best design of a job that tunes a drive as C99 for a leg's microcontroller, with the
-    job's scenarios: the files of the folder that `gaitswarm firmware` writes, the same bytes every
-    time. Unpack it and run `make test`.
+    """Return the best design of a job that tunes a drive as C99 for a leg's microcontroller.
 
-    The answer waits for a walk in every scenario, whose time is limited as that of simulations.
-    404 while no design has walked in every scenario.
+    The archive has the files of `gaitswarm firmware` and is identical every time; unpack it and run
+    `make test`. The simulated time is limited, as the response waits for a simulation of every
+    scenario. 404 while no design is feasible in every scenario.
     """
-    content = await slots.run(lambda: _archive(_of_best(service, job, settings, table_bits)))
+    content = await computing.run(lambda: _archive(_of_best(service, job, settings, table_bits)))
     return _download(content, f"{job.id}-firmware.zip", if_none_match)
 
 
@@ -82,37 +86,39 @@ async def get_firmware(
     "/jobs/{job_id}/firmware/summary",
     tags=["history"],
     operation_id="get_firmware_summary",
-    summary="See what the best design's firmware takes",
+    summary="Summarize the best design's firmware",
     responses=problems(404, 409, 422),
 )
 async def get_firmware_summary(
     job: ExistingJob,
     service: Service,
     settings: ServerSettings,
-    slots: Slots,
+    computing: Computing,
     table_bits: TableBits = None,
 ) -> FirmwareView:
-    """Files with their sizes, tables, trajectories by scenario, and flash and RAM against those of
-    the thesis's microcontroller, as `gaitswarm firmware --json` prints; nothing is written.
+    """Return files with sizes, tables, trajectories by scenario, and flash and RAM compared with
+    the thesis's microcontroller, as `gaitswarm firmware --json`.
     """
-    return await slots.run(lambda: _summary(_of_best(service, job, settings, table_bits)))
+    return await computing.run(lambda: _summary(_of_best(service, job, settings, table_bits)))
 
 
 @router.post(
     "/firmware",
     tags=["simulations"],
     operation_id="write_firmware",
-    summary="Write one design as firmware",
+    summary="Download one design as firmware",
     response_class=Response,
     responses=binary("The folder, as an archive.", MEDIA_TYPE) | problems(400, 413, 422),
 )
-async def write_firmware(request: FirmwareBody, settings: ServerSettings, slots: Slots) -> Response:
-    """Any design as C99 for a leg's microcontroller, with a test that repeats its walks.
+async def write_firmware(
+    request: FirmwareBody, settings: ServerSettings, computing: Computing
+) -> Response:
+    """Return any design as C99 for a leg's microcontroller, with a test of its simulations.
 
-    Nothing is stored. The answer waits for the walks, whose time is limited as that of simulations.
+    Nothing is stored. The simulated time is limited, as the response waits for the simulations.
     """
     _check_length(settings, request)
-    content = await slots.run(partial(_archive, request))
+    content = await computing.run(partial(_archive, request))
     return _download(content, "firmware.zip", None)
 
 
@@ -120,17 +126,17 @@ async def write_firmware(request: FirmwareBody, settings: ServerSettings, slots:
     "/firmware/summary",
     tags=["simulations"],
     operation_id="summarize_firmware",
-    summary="See what a design's firmware takes",
+    summary="Summarize a design's firmware",
     responses=problems(400, 413, 422),
 )
 async def summarize_firmware(
-    request: FirmwareBody, settings: ServerSettings, slots: Slots
+    request: FirmwareBody, settings: ServerSettings, computing: Computing
 ) -> FirmwareView:
-    """Files with their sizes, tables, trajectories by scenario, and flash and RAM against those of
-    the thesis's microcontroller; nothing is stored.
+    """Return files with sizes, tables, trajectories by scenario, and flash and RAM compared with
+    the thesis's microcontroller. Nothing is stored.
     """
     _check_length(settings, request)
-    return await slots.run(partial(_summary, request))
+    return await computing.run(partial(_summary, request))
 
 
 def _of_best(
@@ -157,10 +163,5 @@ def _summary(request: FirmwareRequest) -> FirmwareView:
 
 
 def _download(content: bytes, name: str, received: str | None) -> Response:
-    """received: the request's `If-None-Match`."""
-    tag = f'"{hashlib.sha256(content).hexdigest()}"'
-    headers = {"ETag": tag}
-    if received is not None and tag in received:
-        return Response(status_code=status.HTTP_304_NOT_MODIFIED, headers=headers)
-    headers["Content-Disposition"] = f'attachment; filename="{name}"'
-    return Response(content, media_type=MEDIA_TYPE, headers=headers)
+    headers = {"Content-Disposition": f'attachment; filename="{name}"'}
+    return tagged_response(content, MEDIA_TYPE, received, headers)

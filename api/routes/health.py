@@ -1,4 +1,4 @@
-"""Whether the server lives, and whether it can work."""
+"""Liveness and readiness of the server."""
 
 from __future__ import annotations
 
@@ -23,70 +23,68 @@ router = APIRouter(prefix=PREFIX, tags=["health"])
 
 
 class HealthView(View):
-    """Good news; bad news is a problem."""
+    """The server is alive."""
 
     status: Literal["ok"] = Field(default="ok", description="Always `ok`.", examples=["ok"])
 
 
 class ComponentView(View):
-    """How a part of the server is."""
+    """Status of a component."""
 
     name: str = Field(
-        description="`database`; `events` tells streams of commits; `runner` claims queued jobs;"
-        " `workers` run their walks.",
+        description="`database`; `events` notifies event streams; `runner` claims queued jobs;"
+        " `workers` run their simulations.",
         examples=["runner"],
     )
     status: Literal["ok", "degraded", "failed"] = Field(
-        description="`degraded`: something is wrong, but the server can do without for a while.",
+        description="`degraded`: a problem that the server tolerates for a while.",
         examples=["ok"],
     )
-    detail: str = Field(default="", description="What is wrong, and what to do about it.")
+    detail: str = Field(default="", description="The problem and its remedy.")
 
 
 class ReadinessView(View):
-    """The server can work."""
+    """The server is ready."""
 
     status: Literal["ok"] = Field(default="ok", description="Always `ok`.", examples=["ok"])
-    components: list[ComponentView] = Field(description="Its parts, none of which has failed.")
+    components: list[ComponentView] = Field(description="Components, none of which has failed.")
 
 
 @router.get(
     "/healthz",
     operation_id="healthz",
-    summary="Is the server alive?",
-    responses=problems(asks=False),
+    summary="Check liveness",
+    responses=problems(guarded=False),
 )
 async def healthz() -> HealthView:
-    """Answers as long as the process does; asks nothing else."""
+    """Return ok as long as the process runs; no other component is checked."""
     return HealthView()
 
 
 @router.get(
     "/readyz",
     operation_id="readyz",
-    summary="Can it work?",
+    summary="Check readiness",
     response_model=ReadinessView,
-    responses=problems(asks=False),
+    responses=problems(guarded=False),
 )
 def readyz(service: Service, request: Request) -> ReadinessView | Response:
-    """Answers ok, component by component, if none has failed; else 503, whose `errors` name those
-    that have.
+    """Return the status of every component, or 503 whose `errors` name those that have failed.
 
-    The database fails if it does not answer, has another schema than this version's, or is a file
-    that was removed or replaced while it was open; the runner and the news for event streams fail
-    if their thread has ended or is stuck. Once the server was told
-    to end, while jobs commit their iterations under way, the answer is a 503 of the type
-    `draining`.
+    The database fails if it does not answer, has a schema of another version, or is a file that was
+    removed or replaced while it was open; the runner and the events fail if their thread has ended
+    or is stuck. While the server shuts down and jobs commit their current iterations, the response
+    is a 503 of the type `draining`.
     """
     path = request.url.path
     if request.state.draining.is_set():
         return unavailable(
-            path, "this server was told to end, and gives its jobs back to the queue", "draining"
+            path, "the server is shutting down and returns its jobs to the queue", "draining"
         )
     components = list(_components(service, request))
     failed = [component for component in components if component.status == "failed"]
     if failed:
-        errors = [FieldErrorView(field=found.name, message=found.detail) for found in failed]
+        errors = [FieldErrorView(field=part.name, message=part.detail) for part in failed]
         detail = "; ".join(f"{error.field}: {error.message}" for error in errors)
         return unavailable(path, detail, errors=errors)
     return ReadinessView(components=components)
@@ -110,11 +108,7 @@ def _components(service: JobService, request: Request) -> Iterator[ComponentView
 
 
 def add_short_paths(app: FastAPI) -> None:
-    """Send those on who ask for /healthz and /readyz, as probes are used to.
-
-    Args:
-        app: takes on the redirections.
-    """
+    """Redirect the usual paths of probes, /healthz and /readyz."""
     for path in ("/healthz", "/readyz"):
         app.add_route(path, _redirection(f"{PREFIX}{path}"), include_in_schema=False)
 

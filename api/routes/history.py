@@ -1,29 +1,29 @@
-"""What a job has committed."""
+"""The history of a job: iterations, evaluations, the best design, exports, evidence."""
 
 from __future__ import annotations
 
 from functools import partial
 from typing import Annotated
 
-from fastapi import APIRouter, Path, Query, Request, Response
+from fastapi import APIRouter, Path, Query, Response
 from fastapi.responses import StreamingResponse
+from pydantic_core import to_json
 
 from gaitswarm.api.dependencies import (
     LARGEST_INDEX,
     AfterIteration,
-    Analysing,
+    Analyzing,
+    Computing,
     ExistingJob,
     JobId,
-    Remembered,
     ServerSettings,
     Service,
-    Slots,
 )
 from gaitswarm.api.documentation import binary, problems
-from gaitswarm.api.reads import Best, Evaluations, Iterations
+from gaitswarm.api.responses import json_response
 from gaitswarm.evidence.contents import evidence
 from gaitswarm.evidence.history import run_verification
-from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
 from gaitswarm.settings import Settings
 from gaitswarm.tables import MEDIA_TYPES, TableFormat, encoded_table
 from gaitswarm.views import (
@@ -33,6 +33,8 @@ from gaitswarm.views import (
     EvaluationView,
     IterationView,
     PageView,
+    encoded_evaluations,
+    encoded_iterations,
 )
 from gaitswarm.views.verification import HistoryVerificationView, VerificationRequest
 from gaitswarm.zip_archive import MEDIA_TYPE as ZIP
@@ -48,61 +50,64 @@ router = APIRouter(prefix=f"{PREFIX}/jobs/{{job_id}}", tags=["history"])
     responses=problems(404, 422),
 )
 def list_iterations(
-    request: Request,
     job_id: JobId,
     service: Service,
-    remembered: Remembered,
     after: AfterIteration = None,
-    limit: Annotated[int, Query(ge=1, le=1000, description="Most iterations on a page.")] = 100,
+    limit: Annotated[int, Query(ge=1, le=1000, description="Maximum number of iterations.")] = 100,
 ) -> Response:
-    """Fitness of the designs, iteration by iteration, in pages; the data of a convergence plot."""
-    asked = Iterations(after, limit)
-    return asked.answer(remembered, service, service.job(job_id)).answer(request)
+    """Return a page of iterations with statistics of their fitness, for convergence plots."""
+    page = service.iterations(job_id, after=after, limit=limit)
+    items = b",".join(encoded_iterations(page.items))
+    body = b'{"items":[' + items + b'],"next":' + to_json(page.next) + b"}"
+    return Response(body, media_type="application/json")
 
 
 @router.get(
     "/iterations/{iteration}/evaluations",
     operation_id="list_evaluations",
-    summary="List an iteration's evaluations",
+    summary="List the evaluations of an iteration",
     response_model=CatalogueView[EvaluationView],
     responses=problems(404, 409, 422),
 )
 def list_evaluations(
-    request: Request,
-    job_id: JobId,
+    job: ExistingJob,
     service: Service,
-    remembered: Remembered,
     iteration: Annotated[
         int, Path(ge=0, le=LARGEST_INDEX, description="Index of a committed iteration, from 0.")
     ],
 ) -> Response:
-    """Every design: its values, its fitness, and status, utility and raw objectives by scenario.
+    """Return every design with its values, its fitness, and its results in each scenario.
 
-    Raw objectives are as simulated; utilities follow from them and the job's preference.
+    Objectives are raw; utilities follow from them and the job's preference.
     """
-    asked = Evaluations(iteration)
-    return asked.answer(remembered, service, service.job(job_id)).answer(request)
+    body = encoded_evaluations(service.evaluations(job.id, iteration), job.spec)
+    return Response(body, media_type="application/json")
 
 
 @router.get(
     "/best",
     operation_id="get_best",
-    summary="Take the best design",
-    response_model=BestView,
+    summary="Get the best design",
     responses=problems(404, 409, 422),
 )
-def get_best(request: Request, job_id: JobId, service: Service, remembered: Remembered) -> Response:
-    """The design of least fitness so far, with its results in every scenario.
+def get_best(job: ExistingJob, service: Service) -> BestView:
+    """Return the design of least fitness so far, with its results in every scenario.
 
-    404 while no design has walked in every scenario.
+    404 while no design is feasible in every scenario.
     """
-    return Best().answer(remembered, service, service.job(job_id)).answer(request)
+    best = service.best(job.id)
+    if best is None:
+        raise NotFound(
+            f"job {job.id} has no feasible design yet; try again after its next iteration, or see"
+            " the statuses of its evaluations"
+        )
+    return BestView.from_evaluation(best, job.spec)
 
 
 @router.get(
     "/export",
     operation_id="export_job",
-    summary="Download every evaluation",
+    summary="Download all evaluations",
     response_class=StreamingResponse,
     responses=binary("The table, as a file.", *MEDIA_TYPES.values()) | problems(404, 409, 422),
 )
@@ -113,8 +118,9 @@ def export_job(
         TableFormat, Query(alias="format", description="Format of the file.")
     ] = "csv",
 ) -> StreamingResponse:
-    """One row per design: iteration, particle, fitness, `design.<variable>`, and for every scenario
-    `<scenario>.status`, `<scenario>.utility` and `<scenario>.<objective>`; floats are exact.
+    """Return one row per design: iteration, particle, fitness, `design.<variable>`, and for every
+    scenario `<scenario>.status`, `<scenario>.utility` and `<scenario>.<objective>`. Floats are
+    exact.
     """
     return StreamingResponse(
         encoded_table(file_format, job.spec, service.column_pieces(job)),
@@ -126,7 +132,7 @@ def export_job(
 @router.post(
     "/verify",
     operation_id="verify_history",
-    summary="Verify what is stored",
+    summary="Verify the stored history",
     response_model=HistoryVerificationView,
     responses=problems(400, 404, 409, 413, 422, 503),
 )
@@ -135,46 +141,41 @@ async def verify_history(
     job: ExistingJob,
     service: Service,
     settings: ServerSettings,
-    slots: Slots,
+    computing: Computing,
 ) -> Response:
-    """Compute the digests of a job's iterations again, and name the first that is not the stored
-    one; with `head`, say whether a digest that was noted down earlier is among them.
+    """Recompute the digests of a job's iterations and report the first that differs.
 
-    With `replay` so many evaluations walk again, and are compared to the bit. The answer waits for
-    these walks, so the time walked is limited.
+    With `head`, report whether a digest noted earlier is among them. With `replay`, simulate that
+    number of evaluations again and compare every bit; their simulated time is limited.
     """
     check = partial(_check_length, settings)
-
-    def found() -> Response:
-        view = run_verification(service, job.id, request, check=check)
-        return Response(view.model_dump_json(), media_type="application/json")
-
-    return await slots.run(found)
+    return await computing.run(
+        lambda: json_response(run_verification(service, job.id, request, check=check))
+    )
 
 
 def _check_length(settings: Settings, seconds: float) -> None:
-    """Raises InvalidRequest."""
     limit = settings.api_max_sampled_seconds
     if seconds > limit:
         raise InvalidRequest(
-            f"the walks of these evaluations last {seconds:g} s together, more than the {limit:g} s"
-            " allowed; choose fewer",
+            f"the simulations of these evaluations last {seconds:g} s in total, more than the"
+            f" {limit:g} s allowed; choose fewer",
             field="replay",
         )
 
 
 @router.get(
     "/evidence",
-    dependencies=[Analysing],
+    dependencies=[Analyzing],
     operation_id="get_evidence",
     summary="Download evidence",
     response_class=Response,
     responses=binary("The archive.", ZIP) | problems(404, 409, 422),
 )
 def get_evidence(job: ExistingJob, service: Service) -> Response:
-    """One file that proves the run: spec, robot, provenance, every evaluation, the finished
-    certificates of its designs, pictures, and a page that opens offline; `gaitswarm verify` checks
-    it anywhere. 409 before the first iteration.
+    """Return an archive that documents the run: spec, robot, provenance, every evaluation, finished
+    certificates of its designs, figures, and a page for offline use. `gaitswarm verify` checks it
+    anywhere. 409 before the first iteration.
     """
     return Response(
         evidence(service, job.id),

@@ -1,4 +1,4 @@
-"""The session of a browser: a token as a cookie, which its links and event streams carry."""
+"""Sessions of browsers: a token in a cookie, for links and event streams."""
 
 from __future__ import annotations
 
@@ -7,86 +7,84 @@ from typing import Annotated
 from fastapi import APIRouter, Request, Response, status
 from pydantic import BaseModel, ConfigDict, Field
 
-from gaitswarm.api.access import COOKIE, secret_of
+from gaitswarm.api.access import COOKIE, UNKNOWN, find_token, secret_of
 from gaitswarm.api.dependencies import ServerSettings, Service
 from gaitswarm.api.documentation import problems
-from gaitswarm.api.manual import HasManual
+from gaitswarm.api.page import HasManual
 from gaitswarm.services.optimizer.access import Scope, Token
 from gaitswarm.services.optimizer.errors import Unauthorized
 from gaitswarm.views import PREFIX, View
 
 router = APIRouter(prefix=PREFIX, tags=["session"])
 
-_SECONDS = 30 * 24 * 3600
+_MAX_AGE_SECONDS = 30 * 24 * 3600
 
 
 class SessionRequest(BaseModel):
-    """With which token a browser asks from now on."""
+    """Token of a new session."""
 
     model_config = ConfigDict(extra="forbid")
 
     token: Annotated[str, Field(min_length=1, max_length=200)] = Field(
-        description="The secret of a token, as `gaitswarm token create` showed it.",
+        description="Secret of a token, as printed by `gaitswarm token create`.",
         examples=["gaitswarm_3q2-7wAAAA"],
     )
 
 
 class SessionView(View):
-    """Who is asking, and what the server has for readers."""
+    """Token of the session, and features of the server."""
 
-    required: bool = Field(description="Whether this server asks for a token.")
+    required: bool = Field(description="Whether this server requires a token.")
     name: str | None = Field(
-        description="Name of the token that this request came with; null without a valid one.",
+        description="Name of the request's token; null without a valid one.",
         examples=["ci"],
     )
-    scope: Scope | None = Field(description="What that token allows; null without one.")
-    manual: bool = Field(description="Whether this server has the manual at /manual.")
+    scope: Scope | None = Field(description="Scope of that token; null without one.")
+    manual: bool = Field(description="Whether this server has a manual at /manual.")
 
 
 @router.get(
     "/session",
     operation_id="get_session",
-    summary="See who is asking",
-    responses=problems(429, asks=False),
+    summary="Get the session",
+    responses=problems(429, guarded=False),
 )
 def get_session(
     request: Request, service: Service, settings: ServerSettings, manual: HasManual
 ) -> SessionView:
-    """Answers with or without a token, so that a page can tell whether it has to ask for one."""
+    """Return the session, with or without a token, so that a page knows whether to ask for one."""
     secret = secret_of(request.headers)
-    token = None if secret is None else service.store.tokens.find(secret)
+    token = None if secret is None else find_token(request, service.store.tokens, secret)
     return _view(token, required=settings.tokens_required, manual=manual)
 
 
 @router.post(
     "/session",
     operation_id="begin_session",
-    summary="Ask with a token from now on",
-    response_description="The answer sets a cookie that scripts cannot read.",
-    responses=problems(400, 401, 413, 422, 429, asks=False),
+    summary="Begin a session",
+    response_description="The response sets a cookie that scripts cannot read.",
+    responses=problems(400, 401, 413, 422, 429, guarded=False),
 )
 def begin_session(
     request: Request,
-    asked: SessionRequest,
+    body: SessionRequest,
     service: Service,
     settings: ServerSettings,
     manual: HasManual,
     response: Response,
 ) -> SessionView:
-    """For browsers, which cannot send a header with a link; programs send `Authorization`."""
-    token = service.store.tokens.find(asked.token)
+    """Store a token in a cookie, for browsers; programs send `Authorization`."""
+    token = find_token(request, service.store.tokens, body.token)
     if token is None:
-        raise Unauthorized(
-            "the token is unknown or was revoked; `gaitswarm token create NAME` makes a new one"
-        )
+        raise Unauthorized(UNKNOWN)
     response.set_cookie(
         COOKIE,
-        asked.token,
-        max_age=_SECONDS,
+        body.token,
+        max_age=_MAX_AGE_SECONDS,
         path="/",
         httponly=True,
         samesite="strict",
-        # By HTTPS, which a proxy may bring: then the cookie is not to go without it either.
+        # Also behind a TLS proxy, which sets X-Forwarded-Proto.
         secure=request.url.scheme == "https",
     )
     return _view(token, required=settings.tokens_required, manual=manual)
@@ -95,12 +93,12 @@ def begin_session(
 @router.delete(
     "/session",
     operation_id="end_session",
-    summary="Forget the token",
+    summary="End the session",
     status_code=status.HTTP_204_NO_CONTENT,
-    responses=problems(429, asks=False),
+    responses=problems(429, guarded=False),
 )
 def end_session(response: Response) -> None:
-    """The browser forgets the cookie; the token stays valid."""
+    """Delete the cookie; the token stays valid."""
     response.delete_cookie(COOKIE, path="/", httponly=True, samesite="strict")
 
 

@@ -1,15 +1,21 @@
-"""One design walking on request: what it is worth, how robust it is, and how it looks."""
+"""Simulations of single designs on request: results, robustness, replays."""
 
 from __future__ import annotations
 
 from functools import partial
-from typing import Annotated, Final
+from typing import Annotated
 
 from fastapi import APIRouter, Depends, Response
 
 from gaitswarm.api.bodies import validated
-from gaitswarm.api.dependencies import ServerSettings, Slots, check_length, check_sampled_length
+from gaitswarm.api.dependencies import (
+    Computing,
+    ServerSettings,
+    check_length,
+    check_sampled_length,
+)
 from gaitswarm.api.documentation import binary, problems
+from gaitswarm.api.responses import NOT_STORED, BinaryResponse, json_response
 from gaitswarm.requests.design import resolved
 from gaitswarm.requests.robustness import RobustnessRequest, run_robustness
 from gaitswarm.requests.simulations import (
@@ -19,7 +25,6 @@ from gaitswarm.requests.simulations import (
     run_simulation,
 )
 from gaitswarm.views import PREFIX, SimulationView
-from gaitswarm.views.base import MEDIA_TYPE
 from gaitswarm.views.robustness import RobustnessView
 
 router = APIRouter(prefix=PREFIX, tags=["simulations"])
@@ -27,14 +32,6 @@ router = APIRouter(prefix=PREFIX, tags=["simulations"])
 SimulationBody = Annotated[SimulationRequest, Depends(validated(SimulationRequest, "request"))]
 RobustnessBody = Annotated[RobustnessRequest, Depends(validated(RobustnessRequest, "request"))]
 ReplayBody = Annotated[ReplayRequest, Depends(validated(ReplayRequest, "request"))]
-
-NOT_STORED: Final = {"Cache-Control": "no-store"}
-
-
-class BinaryResponse(Response):
-    """Bytes, and documented as such."""
-
-    media_type = MEDIA_TYPE
 
 
 @router.post(
@@ -45,64 +42,60 @@ class BinaryResponse(Response):
     responses=problems(400, 413, 422),
 )
 async def simulate_design(
-    request: SimulationBody, settings: ServerSettings, slots: Slots
+    request: SimulationBody, settings: ServerSettings, computing: Computing
 ) -> Response:
-    """Let one design walk in the chosen scenarios and say what it is worth.
+    """Simulate one design in the given scenarios and return objectives, utilities and fitness.
 
-    Nothing is stored. The answer waits for the walks, so the time walked is limited; a search
-    belongs in a job.
+    Nothing is stored. The simulated time is limited, as the response waits for the simulations;
+    use a job to search.
     """
     seconds = request.simulated_seconds(request.resolved_scenarios())
     check_length(settings, seconds, logged=request.log, field="scenarios")
-    body = await slots.run(partial(_simulated, request))
-    return Response(body, media_type="application/json")
+    # Serialized in the thread: a log has hundreds of thousands of numbers.
+    return await computing.run(lambda: json_response(run_simulation(request)))
 
 
 @router.post(
     "/robustness",
     operation_id="estimate_robustness",
-    summary="Estimate how robust one design is",
+    summary="Estimate the robustness of one design",
     response_model=RobustnessView,
     responses=problems(400, 413, 422),
 )
 async def estimate_robustness(
-    request: RobustnessBody, settings: ServerSettings, slots: Slots
+    request: RobustnessBody, settings: ServerSettings, computing: Computing
 ) -> Response:
-    """Let a design and others around it walk, and estimate the norm of the Jacobian of the
-    objectives with respect to the variables, both normalised (thesis 4.4.3).
+    """Simulate a design and others around it, and estimate the norm of the Jacobian of the
+    objectives with respect to the variables, both normalized (thesis 4.4.3).
 
-    Nothing is stored. The answer waits for the walks, so the time walked is limited.
+    Nothing is stored. The simulated time is limited, as the response waits for the simulations.
     """
     seconds = request.simulated_seconds(request.resolved_scenarios())
     check_sampled_length(settings, seconds * (1 + request.samples))
-    body = await slots.run(lambda: run_robustness(request).model_dump_json())
-    return Response(body, media_type="application/json")
+    return await computing.run(lambda: json_response(run_robustness(request)))
 
 
 @router.post(
     "/replays",
     operation_id="replay",
-    summary="Replay one walk",
+    summary="Replay one simulation",
     response_class=BinaryResponse,
     responses=binary(
         "Length of the header in bytes (uint32), the header (JSON, a ReplayHeaderView, padded with"
-        " spaces to a multiple of 4), then frame after frame of float32 numbers as the header's"
-        " channels say; all little-endian."
+        " spaces to a multiple of 4), then frame after frame of float32 numbers in the order of the"
+        " header's channels; all little-endian."
     )
     | problems(400, 413, 422),
 )
-async def replay_walk(request: ReplayBody, settings: ServerSettings, slots: Slots) -> Response:
-    """Let one design walk in one scenario, and get where every link was, frame by frame.
+async def replay_walk(
+    request: ReplayBody, settings: ServerSettings, computing: Computing
+) -> Response:
+    """Simulate one design in one scenario and return the pose of every link, frame by frame.
 
-    A walk that failed is replayed up to its end, with its status in the header. Nothing is stored;
-    the time walked is limited as for simulations with logs.
+    A failed simulation is replayed up to its end, with its status in the header. Nothing is stored;
+    the simulated time is limited as for simulations with logs.
     """
     seconds = request.simulated_seconds([resolved(request.scenario)])
     check_length(settings, seconds, logged=True, field="scenario")
-    frames = await slots.run(partial(run_replay, request))
+    frames = await computing.run(partial(run_replay, request))
     return BinaryResponse(frames, headers=NOT_STORED)
-
-
-def _simulated(request: SimulationRequest) -> str:
-    """Serialized in the worker thread: a log has hundreds of thousands of numbers."""
-    return run_simulation(request).model_dump_json()

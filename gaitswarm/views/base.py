@@ -161,7 +161,7 @@ class ProblemView(View):
         description="Kind of problem, the same for every occurrence of it.",
         examples=["urn:gaitswarm:problem:invalid-request"],
     )
-    title: str = Field(description="The kind in words.", examples=["The request is not valid"])
+    title: str = Field(description="The kind in words.", examples=["Invalid request"])
     status: int = Field(description="HTTP status code.", examples=[422])
     detail: str = Field(
         description="What went wrong this time and what to do about it.",

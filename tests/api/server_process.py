@@ -14,9 +14,9 @@ from gaitswarm.settings import Settings
 def main() -> None:
     """Print where it listens, and serve until a signal comes."""
     store = open_store(sys.argv[1])
-    settings = Settings(api_event_poll_seconds=60.0)
+    settings = Settings(api_port=0, api_event_poll_seconds=60.0, api_shutdown_seconds=60)
     app = create_app(JobService(store), settings=settings)
-    server = ApiServer(app, host="127.0.0.1", port=0, shutdown_seconds=60)
+    server = ApiServer(app, settings)
     sys.stdout.write(f"{server.url}\n")
     server.run()
     store.close()

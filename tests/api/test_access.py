@@ -9,7 +9,7 @@ import httpx2
 import pytest
 
 import gaitswarm
-from gaitswarm.api.access import COOKIE, may_command, may_submit
+from gaitswarm.api.access import COOKIE, TokenGuesses, address_of, may_command, may_submit
 from gaitswarm.services.optimizer.access import Scope
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
@@ -121,7 +121,7 @@ def test_a_token_to_submit_commands_its_own_jobs_and_no_others(
     assert guarded.post(f"/v1/jobs/{own['id']}/pause").status_code == 202
     refused = guarded.post(f"/v1/jobs/{job.id}/pause")
     assert refused.status_code == 403
-    assert "nobody's" in refused.json()["detail"]
+    assert "has no owner" in refused.json()["detail"]
 
 
 def test_only_a_token_of_all_rights_puts_a_job_before_those_of_others(
@@ -139,7 +139,7 @@ def test_only_a_token_of_all_rights_puts_a_job_before_those_of_others(
         return guarded.put(path, json={"priority": priority}, headers=headers).status_code
 
     refused = submitted(own, 1)
-    assert refused.status_code == 403 and "may not give a priority above 0" in refused.text
+    assert refused.status_code == 403 and "may not set a priority above 0" in refused.text
     job = submitted(own, -1).json()
     assert job["priority"] == -1
     assert [changed(own, job["id"], priority) for priority in (-5, 0, 1)] == [200, 200, 403]
@@ -209,7 +209,7 @@ def test_the_audit_log_names_tokens_and_is_for_administrators(
 def test_a_revoked_token_is_refused_within_seconds(
     guarded: httpx2.Client, bearer: Bearer, store: SqlStore, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gaitswarm.api.known_tokens.REMEMBERED_SECONDS", 0.0)
+    monkeypatch.setattr("gaitswarm.api.access.CACHE_SECONDS", 0.0)
     headers = bearer(Scope.READ)
     assert guarded.get("/v1/jobs", headers=headers).status_code == 200
     store.tokens.revoke("read")
@@ -307,3 +307,61 @@ def test_a_cookie_that_came_by_https_goes_no_other_way(serve: Serve, bearer: Bea
     # The server's own machine is a proxy that is believed, unless another one is named.
     assert "secure" in cookie(**{"X-Forwarded-Proto": "https"})
     assert "secure" not in cookie()
+
+
+def test_throttle_allows_a_burst_and_then_a_steady_rate(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("gaitswarm.api.access.GUESS_BURST", 3)
+    monkeypatch.setattr("gaitswarm.api.access.GUESSES_PER_SECOND", 2.0)
+    now = [100.0]
+    guesses = TokenGuesses(lambda: now[0])
+
+    def guess(address: str) -> float:
+        wait = guesses.seconds_to_wait(address)
+        if wait == 0.0:
+            guesses.count(address)
+        return wait
+
+    assert [guess("a") for _ in range(5)] == [0.0, 0.0, 0.0, 0.5, 0.5]
+    assert guess("b") == 0.0
+    now[0] += 0.5
+    assert [guess("a") for _ in range(2)] == [0.0, 0.5]
+
+
+@pytest.mark.parametrize(
+    ("host", "address"),
+    [
+        ("203.0.113.9", "203.0.113.9"),
+        ("::ffff:203.0.113.9", "203.0.113.9"),
+        ("2001:db8:1:2:3:4:5:6", "2001:db8:1:2::/64"),
+        ("::1", "::1"),
+        ("a-name", "a-name"),
+    ],
+)
+def test_ipv6_addresses_of_one_network_count_together(host: str, address: str) -> None:
+    assert address_of({"type": "http", "client": (host, 1234)}) == address
+
+
+def test_guessed_tokens_are_throttled_before_any_lookup(
+    serve: Serve, store: SqlStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gaitswarm.api.access.GUESS_BURST", 3)
+    monkeypatch.setattr("gaitswarm.api.access.GUESSES_PER_SECOND", 0.001)
+    client = serve(api_access="token").client
+    valid = {"Authorization": f"Bearer {store.tokens.create('valid', Scope.READ)[1]}"}
+    assert client.get("/v1/jobs", headers=valid).status_code == 200
+
+    def guess(path: str, number: int, **headers: str) -> httpx2.Response:
+        return client.get(path, headers={"Authorization": f"Bearer {number}", **headers})
+
+    statuses = [guess(path, 0).status_code for path in ("/v1/jobs", "/metrics", "/v1/session")]
+    assert statuses == [401, 401, 200]
+    refused = guess("/v1/jobs", 4)
+    assert refused.status_code == 429
+    assert refused.json()["type"] == "urn:gaitswarm:problem:too-many-requests"
+    assert int(refused.headers["Retry-After"]) > 100
+    assert guess("/metrics", 5).status_code == 429
+    assert client.post("/v1/session", json={"token": "guess"}).status_code == 429
+    # A valid token is exempt, as are clients of a trusted proxy at other addresses, and probes.
+    assert {client.get("/v1/jobs", headers=valid).status_code for _ in range(9)} == {200}
+    assert guess("/v1/jobs", 6, **{"X-Forwarded-For": "203.0.113.9"}).status_code == 401
+    assert guess("/v1/readyz", 7).status_code == 200

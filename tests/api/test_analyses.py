@@ -1,4 +1,4 @@
-"""Questions about whole histories: so many at a time, and nobody else waits for them."""
+"""Limited concurrency of analyses; other requests do not wait for them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 import httpx2
 import pytest
 
-from gaitswarm.api.dependencies import Analysing
+from gaitswarm.api.dependencies import Analyzing
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.service import JobService
@@ -36,14 +36,14 @@ class Waiting(JobService):
 
 
 @pytest.mark.parametrize("question", ["distribution", "front", "evidence"])
-def test_of_many_questions_some_wait_and_more_are_told_to_come_later(
+def test_analyses_wait_for_capacity_and_are_rejected_when_the_queue_is_full(
     serve: Serve, service: JobService, job: Job, commit: Commit, question: str
 ) -> None:
     commit(job, 2)
     waiting = Waiting(service.store)
     waiting.begun.clear()
     waiting.go_on.clear()
-    server = serve(waiting, api_analysis_workers=1, api_analysis_queue=1)
+    server = serve(waiting, api_compute_workers=1, api_compute_queue=1)
     path = f"{server.url}/v1/jobs/{job.id}/{question}"
 
     def ask() -> int:
@@ -64,7 +64,7 @@ def test_of_many_questions_some_wait_and_more_are_told_to_come_later(
                     continue
             assert refused is not None
             assert refused.status_code == 503
-            assert "too many analyses" in refused.json()["detail"]
+            assert "too many requests" in refused.json()["detail"]
             assert refused.headers["Retry-After"]
             # Others are answered at once: no thread of theirs, and no event loop, is taken.
             for other in ("/v1/healthz", "/v1/jobs", f"/v1/jobs/{job.id}"):
@@ -75,7 +75,7 @@ def test_of_many_questions_some_wait_and_more_are_told_to_come_later(
         assert second.result() in (200, 503)
 
 
-def test_these_are_the_questions_that_are_counted(serve: Serve) -> None:
+def test_routes_that_read_whole_histories_occupy_capacity(serve: Serve) -> None:
     app = serve().app
-    counted = {route.operation_id for route in operations(app) if Analysing in route.dependencies}
+    counted = {route.operation_id for route in operations(app) if Analyzing in route.dependencies}
     assert counted == WHOLE_HISTORIES

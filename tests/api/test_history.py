@@ -117,7 +117,7 @@ def test_there_is_no_best_while_every_design_fails(
     answer = client.get(f"/v1/jobs/{job.id}/best")
 
     assert answer.status_code == 404
-    assert "no design yet" in answer.json()["detail"]
+    assert "no feasible design yet" in answer.json()["detail"]
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""A token that is revoked is of no use within seconds, whatever it has opened before."""
+"""Revoked tokens: rejected within seconds, also in open event streams."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from typing import cast
 
 import pytest
 
-from gaitswarm.api import known_tokens
-from gaitswarm.api.known_tokens import KnownTokens
+from gaitswarm.api import access
+from gaitswarm.api.access import TokenCache
 from gaitswarm.services.optimizer.access import Scope, Token, Tokens
 from gaitswarm.services.optimizer.errors import StoreUnavailable
 from gaitswarm.services.optimizer.jobs.job import Command, Job
@@ -23,15 +23,15 @@ from tests.api.conftest import Serve
 STREAMS = 40
 
 
-def test_it_is_remembered_for_as_long_as_is_said_in_the_documentation() -> None:
-    assert known_tokens.REMEMBERED_SECONDS == 5.0
+def test_lookups_are_cached_as_long_as_documented() -> None:
+    assert access.CACHE_SECONDS == 5.0
 
 
 @pytest.mark.slow
-def test_an_event_stream_ends_with_its_token_and_not_before(
+def test_event_stream_ends_when_its_token_is_revoked(
     serve: Serve, store: SqlStore, job: Job, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(known_tokens, "REMEMBERED_SECONDS", 1.0)
+    monkeypatch.setattr(access, "CACHE_SECONDS", 1.0)
     client = serve(api_access="token").client
     with ExitStack() as stack:
 
@@ -43,10 +43,10 @@ def test_an_event_stream_ends_with_its_token_and_not_before(
             return stack.enter_context(opened).iter_lines()
 
         leaked, other = stream("leaked"), stream("other")
-        assert "queued" in told(leaked) and "queued" in told(other)
+        assert "queued" in next_event(leaked) and "queued" in next_event(other)
         time.sleep(2.5)
         store.command(job.id, Command.PAUSE)
-        assert "paused" in told(leaked) and "paused" in told(other)
+        assert "paused" in next_event(leaked) and "paused" in next_event(other)
 
         store.tokens.revoke("leaked")
         until = time.monotonic() + 10.0
@@ -54,10 +54,10 @@ def test_an_event_stream_ends_with_its_token_and_not_before(
         said = list(takewhile(lambda _: time.monotonic() < until, leaked))
         assert ": the token was revoked" in said
         store.command(job.id, Command.RESUME)
-        assert "queued" in told(other)
+        assert "queued" in next_event(other)
 
 
-def told(lines: Iterator[str]) -> str:
+def next_event(lines: Iterator[str]) -> str:
     """Data of the next event."""
     return next(line for line in lines if line.startswith("data:"))
 
@@ -78,16 +78,16 @@ class CountedTokens:
         return None if self.revoked else cast(Token, object())
 
 
-def test_the_database_is_asked_once_for_all_who_wait_and_while_it_is_away_nothing_is_revoked(
+def test_one_lookup_serves_all_streams_and_outages_revoke_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(known_tokens, "REMEMBERED_SECONDS", 0.5)
+    monkeypatch.setattr(access, "CACHE_SECONDS", 0.5)
     tokens = CountedTokens()
 
     async def run() -> None:
-        known = KnownTokens(lambda: cast(Tokens, tokens))
-        assert await known.find("secret")
-        waiting = [asyncio.ensure_future(known.until_revoked("secret")) for _ in range(STREAMS)]
+        cache = TokenCache(lambda: cast(Tokens, tokens))
+        assert await cache.find("secret")
+        waiting = [asyncio.ensure_future(cache.until_revoked("secret")) for _ in range(STREAMS)]
         await asyncio.sleep(1.3)
         assert 2 <= tokens.asked < STREAMS
         tokens.away = True

@@ -71,4 +71,4 @@ def test_walks_that_last_too_long_together_are_refused(serve: Serve) -> None:
     assert answer.status_code == 422
     (error,) = answer.json()["errors"]
     assert error["field"] == "samples"
-    assert "33 s together, more than the 30 s" in error["message"]
+    assert "33 s in total, more than the 30 s" in error["message"]

@@ -98,7 +98,7 @@ def test_a_served_job_commits_its_iteration_under_way_before_the_server_ends(
 
 def test_the_url_of_a_free_port_is_known_before_the_first_request(service: JobService) -> None:
     app = create_app(service, settings=Settings())
-    server = ApiServer(app, host="127.0.0.1", port=0)
+    server = ApiServer(app, Settings(api_port=0))
     host, _, port = server.url.removeprefix("http://").partition(":")
     thread = threading.Thread(target=server.run)
 
@@ -116,7 +116,7 @@ def test_the_url_of_a_free_port_is_known_before_the_first_request(service: JobSe
 def test_a_taken_port_is_an_error_at_once(service: JobService) -> None:
     app = create_app(service, settings=Settings())
     with socket.create_server(("127.0.0.1", 0)) as taken, pytest.raises(OSError, match="in use"):
-        ApiServer(app, host="127.0.0.1", port=taken.getsockname()[1])
+        ApiServer(app, Settings(api_port=taken.getsockname()[1]))
 
 
 @pytest.mark.slow

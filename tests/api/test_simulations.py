@@ -15,13 +15,10 @@ import pytest
 
 from gaitswarm.api.dependencies import check_length
 from gaitswarm.requests.simulations import SimulationRequest, run_simulation
-from gaitswarm.services.optimizer.access import Scope as TokenScope
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from gaitswarm.sim.outcome import OBJECTIVE_NAMES, Status
 from gaitswarm.sim.scenario import find_scenario
 from gaitswarm.views import SimulationView
 from tests.api.conftest import Serve
-from tests.examples.processes import eventually
 from tests.examples.walks import PUBLISHED_A, SHORT_WALK, short_walk, walk
 
 pytestmark = pytest.mark.slow
@@ -172,8 +169,8 @@ def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[Gate]:
     gate.opened.set()
 
 
-def test_only_so_many_walks_compute_at_once_and_the_next_wait(serve: Serve, gate: Gate) -> None:
-    client = serve(api_simulation_workers=1).client
+def test_simulations_beyond_the_capacity_wait(serve: Serve, gate: Gate) -> None:
+    client = serve(api_compute_workers=1).client
     with ThreadPoolExecutor(2) as pool:
         answers = [pool.submit(simulated, client, scenarios=[SHORT_WALK]) for _ in range(2)]
         for _ in answers:
@@ -185,8 +182,8 @@ def test_only_so_many_walks_compute_at_once_and_the_next_wait(serve: Serve, gate
     assert [a.result()["scenarios"]["short"]["status"] for a in answers] == ["ok", "ok"]
 
 
-def test_when_too_many_walks_wait_the_next_is_told_to_come_later(serve: Serve, gate: Gate) -> None:
-    client = serve(api_simulation_workers=1, api_simulation_queue=0).client
+def test_simulations_beyond_the_queue_are_rejected(serve: Serve, gate: Gate) -> None:
+    client = serve(api_compute_workers=1, api_compute_queue=0).client
     with ThreadPoolExecutor(1) as pool:
         first = pool.submit(simulated, client, scenarios=[SHORT_WALK])
         assert gate.begun.acquire(timeout=20.0)
@@ -198,40 +195,8 @@ def test_when_too_many_walks_wait_the_next_is_told_to_come_later(serve: Serve, g
     assert first.result()["scenarios"]["short"]["status"] == "ok"
 
 
-def test_a_token_that_asks_for_very_many_walks_does_not_keep_another_one_waiting(
-    serve: Serve, store: SqlStore, gate: Gate
-) -> None:
-    client = serve(api_access="token", api_simulation_workers=1, api_simulation_queue=3).client
-    greedy, modest = (
-        {"Authorization": f"Bearer {store.tokens.create(name, TokenScope.READ)[1]}"}
-        for name in ("greedy", "modest")
-    )
-    ended: list[str] = []
-
-    def ask(headers: dict[str, str], name: str) -> int:
-        body = {**REQUEST, "scenarios": [SHORT_WALK]}
-        answer = client.post("/v1/simulations", json=body, headers=headers)
-        if answer.status_code == 429:
-            assert int(answer.headers["Retry-After"]) > 0
-            assert "yours" in answer.json()["detail"]
-        ended.append(name)
-        return answer.status_code
-
-    with ThreadPoolExecutor(5) as pool:
-        many = [pool.submit(ask, greedy, "greedy") for _ in range(4)]
-        for _ in many:
-            assert gate.arrived.acquire(timeout=20.0)
-        other = pool.submit(ask, modest, "modest")
-        # The queue is full, and the newest of those who fill it goes.
-        eventually(lambda: ended == ["greedy"], seconds=20.0)
-        gate.opened.set()
-    assert other.result() == 200
-    assert sorted(answer.result() for answer in many) == [200, 200, 200, 429]
-    assert ended.index("modest") <= 3
-
-
 def test_a_stopping_server_answers_what_was_asked_before(serve: Serve, gate: Gate) -> None:
-    server = serve(api_simulation_workers=1, api_shutdown_seconds=60)
+    server = serve(api_compute_workers=1, api_shutdown_seconds=60)
     with ThreadPoolExecutor(2) as pool:
         answers = [pool.submit(simulated, server.client, scenarios=[SHORT_WALK]) for _ in range(2)]
         for _ in answers:

@@ -154,23 +154,6 @@ def test_a_change_is_read_once_for_all_streams_that_wait_for_it(
     assert counted.reads == [job.id]
 
 
-def test_a_request_waits_for_few_of_the_streams_that_are_answered(
-    counted: Counted, job: Job
-) -> None:
-    counted.free.set()
-
-    async def use(topic: Topic) -> None:
-        tasks = await asked_by(100, topic)
-        most = before = 0
-        while before < len(tasks):
-            await asyncio.sleep(0)
-            done = sum(task.done() for task in tasks)
-            most, before = max(most, done - before), done
-        assert 0 < most <= 8
-
-    run(counted, job, use)
-
-
 def test_streams_that_wait_are_answered_when_the_server_stops(counted: Counted, job: Job) -> None:
     async def follow() -> None:
         topics, stopping = Topics(), asyncio.Event()

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from gaitswarm.api import dependencies
 from gaitswarm.api.app import create_app
-from gaitswarm.api.connections import ConnectionLimits
 from gaitswarm.api.server import ApiServer
 from gaitswarm.services.monitoring.activity import Activity
 from gaitswarm.services.monitoring.metrics import Metrics
@@ -77,7 +76,7 @@ class Server(Served):
         **settings: Any,
     ) -> None:
         assert set(settings) <= set(Settings.model_fields)
-        values = Settings(**{"api_event_poll_seconds": 0.02, **settings})
+        values = Settings(**{"api_port": 0, "api_event_poll_seconds": 0.02, **settings})
         self.app = create_app(
             cast(JobService, service),
             settings=values,
@@ -87,15 +86,7 @@ class Server(Served):
             components=components,
             activity=activity,
         )
-        self._server = ApiServer(
-            self.app,
-            host="127.0.0.1",
-            port=0,
-            shutdown_seconds=values.api_shutdown_seconds,
-            drain=drain,
-            limits=ConnectionLimits.of(values),
-            log_level="critical",
-        )
+        self._server = ApiServer(self.app, values, drain=drain, log_level="critical")
         self._thread = threading.Thread(target=self._server.run)
         self._thread.start()
         self.url = self._server.url

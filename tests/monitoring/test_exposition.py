@@ -156,7 +156,7 @@ def test_a_site_whose_name_is_made_to_resolve_to_a_port_of_its_own_sees_nothing(
 def test_a_known_token_reads_metrics_of_a_server_while_its_database_is_away(
     store: SqlStore, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gaitswarm.api.known_tokens.REMEMBERED_SECONDS", 0.0)
+    monkeypatch.setattr("gaitswarm.api.access.CACHE_SECONDS", 0.0)
     headers = {"Authorization": f"Bearer {store.tokens.create('prometheus', Scope.READ)[1]}"}
     server = Server(JobService(store), api_access="token")
     try:

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import sync_playwright
 
-from gaitswarm.api.page import FOLDER, is_built
+from gaitswarm.api.page import PAGE_FOLDER, is_built
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from tests.examples import requirements
@@ -115,7 +115,7 @@ def finished_job(server: ServerProcess) -> str:
 @pytest.fixture(scope="session")
 def idle_server(_chromium: str) -> Iterator[Server]:
     """A server shared by the tests of `start_server`, each with its own store."""
-    server = Server(None, page_folder=FOLDER)
+    server = Server(None, page_folder=PAGE_FOLDER)
     yield server
     server.close()
 
@@ -135,7 +135,7 @@ def start_server(
             if not settings:
                 idle_server.serve(JobService(store))
                 return idle_server
-            server = Server(JobService(store), page_folder=FOLDER, **settings)
+            server = Server(JobService(store), page_folder=PAGE_FOLDER, **settings)
             stack.callback(server.close)
             return server
 

@@ -28,7 +28,7 @@ from sqlalchemy import (
 
 from benchmarks.large_store import PARTICLES, fill
 from benchmarks.page import measure
-from gaitswarm.api.page import FOLDER
+from gaitswarm.api.page import PAGE_FOLDER
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
 from gaitswarm.services.optimizer.store.rows.tables import evaluations, iterations, jobs
@@ -122,7 +122,7 @@ def copy_rows(
 @pytest.fixture(scope="module")
 def large_server(long_job: str, database: Path, _chromium: str) -> Iterator[Server]:
     with closing(open_store(str(database))) as store:
-        server = Server(JobService(store), page_folder=FOLDER)
+        server = Server(JobService(store), page_folder=PAGE_FOLDER)
         yield server
         server.close()
 

@@ -75,7 +75,6 @@ from gaitswarm.services.optimizer.store.statements.submissions import (
     insert_job,
     repeated_job,
 )
-from gaitswarm.services.optimizer.store.transactions.at_once import SqlAtOnce
 from gaitswarm.services.optimizer.store.transactions.deletion import SqlDeletion
 from gaitswarm.services.optimizer.store.transactions.history import SqlHistory, checked_limit
 from gaitswarm.services.optimizer.store.transactions.outbox import SqlOutbox
@@ -128,7 +127,6 @@ class SqlStore(SqlDeletion, SqlHistory, SqlRecordings, SqlRuns):
         self.tokens = SqlTokens(database, clock)
         self.outbox = SqlOutbox(database, clock)
         self.changes = SqlChanges(database)
-        self.at_once = SqlAtOnce(database)
 
     # jobs, as their users see them
 
@@ -224,7 +222,7 @@ class SqlStore(SqlDeletion, SqlHistory, SqlRecordings, SqlRuns):
             with self._database.transaction(write=False) as connection:
                 return listed(connection, among, after, limit)
         while True:
-            version = self.at_once.version()
+            version = None
             with self._database.transaction(write=False) as connection:
                 found = sort_jobs(
                     connection,
@@ -365,7 +363,6 @@ class SqlStore(SqlDeletion, SqlHistory, SqlRecordings, SqlRuns):
     def close(self) -> None:
         """Close the pooled connections."""
         self.changes.close()
-        self.at_once.close()
         self._database.close()
 
 

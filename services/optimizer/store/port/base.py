@@ -23,7 +23,6 @@ from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.store.port.deletions import Deletions
 from gaitswarm.services.optimizer.store.port.labelling import Labelling
 from gaitswarm.services.optimizer.store.port.reading import (
-    AtOnce,
     Changes,
     CommittedHistory,
     Page,
@@ -43,10 +42,6 @@ class Store(CommittedHistory, Deletions, KeptRecordings, Labelling, Runs, Protoc
     @property
     def changes(self) -> Changes:
         """Of jobs, for those who wait for them."""
-
-    @property
-    def at_once(self) -> AtOnce:
-        """For threads that must not wait."""
 
     @property
     def tokens(self) -> Tokens:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any, Final, Generic, Protocol, TypeVar
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gaitswarm.services.optimizer.jobs.chain import ChainDocuments, Link
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Iteration, Known, Reevaluation
-from gaitswarm.services.optimizer.jobs.job import Job, JobState
+from gaitswarm.services.optimizer.jobs.job import JobState
 
 T = TypeVar("T")
 
@@ -73,31 +73,6 @@ class Changes(Protocol):
 
     def trouble(self) -> str | None:
         """Why changes are not told any more, for people; None if they are."""
-
-
-class AtOnce(Protocol):
-    """Reads that do not wait, neither for a lock nor for a server. Thread-safe.
-
-    Where a database, or its present state, has no such read, they say nothing; whoever wants to
-    know asks the store, and waits.
-    """
-
-    def job(self, job_id: str) -> Job | None:
-        """Read a job to show it.
-
-        Args:
-            job_id: Of the job.
-
-        Returns:
-            The same as `Store.job`; None if nothing is said, or there is no such job.
-        """
-
-    def version(self) -> Hashable | None:
-        """Tell whether anything was committed since.
-
-        Returns:
-            The same value as long as nothing is committed, by any process; None if nothing is said.
-        """
 
 
 @dataclass(frozen=True, slots=True)

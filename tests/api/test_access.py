@@ -304,9 +304,12 @@ def test_a_cookie_that_came_by_https_goes_no_other_way(serve: Serve, bearer: Bea
         begun = server.client.post("/v1/session", json={"token": secret}, headers=headers)
         return str(begun.headers["Set-Cookie"]).lower()
 
-    # The server's own machine is a proxy that is believed, unless another one is named.
-    assert "secure" in cookie(**{"X-Forwarded-Proto": "https"})
     assert "secure" not in cookie()
+    # The server's own machine is trusted as a proxy, unless another one is named.
+    by_https = {"X-Forwarded-Proto": "https"}
+    assert "secure" in cookie(**by_https)
+    server = serve(api_access="token", api_trusted_proxies="192.0.2.1")
+    assert "secure" not in cookie(**by_https)
 
 
 def test_throttle_allows_a_burst_and_then_a_steady_rate(monkeypatch: pytest.MonkeyPatch) -> None:

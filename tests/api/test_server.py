@@ -7,6 +7,7 @@ import socket
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 import httpx2
@@ -111,6 +112,15 @@ def test_the_url_of_a_free_port_is_known_before_the_first_request(service: JobSe
     thread.join(timeout=10.0)
     assert answer.startswith(b"HTTP/1.1 200")
     assert not thread.is_alive()
+
+
+def test_requests_beyond_the_connection_limit_get_503(serve: Serve) -> None:
+    server = serve(api_max_connections=3)
+    with ExitStack() as stack:
+        clients = [stack.enter_context(httpx2.Client(base_url=server.url)) for _ in range(3)]
+        assert [c.get("/v1/healthz").status_code for c in clients] == [200, 200, 503]
+        clients[0].close()
+        eventually(lambda: clients[1].get("/v1/healthz").status_code == 200)
 
 
 def test_a_taken_port_is_an_error_at_once(service: JobService) -> None:

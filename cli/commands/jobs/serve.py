@@ -68,7 +68,6 @@ def serve(
     from dataclasses import asdict
 
     from gaitswarm.api.app import create_app
-    from gaitswarm.api.connections import ConnectionLimits
     from gaitswarm.api.page import is_built
     from gaitswarm.api.server import ApiServer
     from gaitswarm.cli.logs import log_to_stderr
@@ -98,12 +97,7 @@ def serve(
         )
         try:
             server = ApiServer(
-                app,
-                host=settings.api_host,
-                port=settings.api_port,
-                shutdown_seconds=settings.api_shutdown_seconds,
-                drain=lambda at_once: _drain(beside, settings, at_once),
-                limits=ConnectionLimits.of(settings),
+                app, settings, drain=lambda at_once: _drain(beside, settings, at_once)
             )
         except OSError as error:
             raise EvaluatorUnavailable(

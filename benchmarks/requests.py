@@ -3,8 +3,8 @@
     python -m benchmarks.requests [--seconds 60] [--rate 20] [--streams 50] [--jobs 200]
 
 Starts `gaitswarm serve` on a new SQLite database with finished jobs and one that runs in its
-process, opens the event streams, and sends requests at a fixed rate. The latency of a request counts
-from the time at which it was due.
+process, opens the event streams, and sends requests at a fixed rate. Latency counts from the
+time at which a request was due.
 """
 
 from __future__ import annotations

@@ -126,22 +126,25 @@ def test_a_start_that_does_not_walk_says_so(store: SqlStore, commit: Commit) -> 
 
 
 @pytest.mark.parametrize(
-    ("changes", "recorded", "reason"),
+    ("changes", "digest", "reason"),
     [
-        ({"controller": "pid"}, True, "no design was published"),
-        ({}, False, "other code"),
+        ({"controller": "pid"}, None, "no design was published"),
+        ({}, 32 * "0", "other code"),
     ],
 )
-def test_it_is_said_why_there_is_none(
+def test_reason_for_a_missing_reference(
     client: httpx2.Client,
     store: SqlStore,
     commit: Commit,
     changes: dict[str, object],
-    recorded: bool,
+    digest: str | None,
     reason: str,
 ) -> None:
     spec = tuning(**changes)
-    job, _ = store.create_job(spec, provenance=job_provenance(spec) if recorded else None)
+    provenance = job_provenance(spec)
+    if digest is not None:
+        provenance = provenance.model_copy(update={"optimizer_digest": digest})
+    job, _ = store.create_job(spec, provenance=provenance)
     commit(job, 1)
     found = client.get(f"/v1/jobs/{job.id}/reference").json()
     assert (found["reference"], found["gain"]) == (None, None)

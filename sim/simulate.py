@@ -112,7 +112,6 @@ def simulating(
     *,
     robot: RobotChoice = DEFAULT_ROBOT,
     backend: Backend = "auto",
-    physics_rate: int = PHYSICS_RATE,
     precision: Precision = "double",
     kernel: Kernel | None = None,
 ) -> Walking[Simulation]:
@@ -120,7 +119,6 @@ def simulating(
 
     Args:
         designs: (n, len(variables)), in the variables' units.
-        physics_rate: Physics steps a second [Hz].
     """
     return _simulating(
         scenario,
@@ -129,7 +127,6 @@ def simulating(
         designs,
         robot=robot,
         backend=backend,
-        physics_rate=physics_rate,
         precision=precision,
         kernel=kernel,
     )

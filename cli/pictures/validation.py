@@ -35,11 +35,11 @@ _LARGEST: Final = 1.0
 """RMAE at which bars are cut off."""
 
 
-def draw_leg(pair: Synchronised, quantity: Quantity, *, leg: int = 0) -> Figure:
-    """Time series of the three joints of a leg, measured and simulated."""
+def draw_leg(pair: Synchronised, quantity: Quantity) -> Figure:
+    """Time series of the first leg's three joints, measured and simulated."""
     from matplotlib.figure import Figure
 
-    joints = pair.measured.joints[leg * JOINTS_PER_LEG : (leg + 1) * JOINTS_PER_LEG]
+    joints = pair.measured.joints[:JOINTS_PER_LEG]
     figure = Figure(figsize=(9.0, 6.5), layout="constrained")
     drawn = figure.subplots(len(joints), 1, sharex=True)
     time = np.arange(len(pair.measured.time)) * CONTROL_PERIOD

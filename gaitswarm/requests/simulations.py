@@ -13,7 +13,7 @@ from gaitswarm.requests.design import DesignRequest, ScenariosRequest, resolved
 from gaitswarm.robots import DEFAULT_PREFERENCE
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice
-from gaitswarm.sim.assembly import Backend, check_precision
+from gaitswarm.sim.assembly import check_precision
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.gait.stability import static_stability
 from gaitswarm.sim.kernel.walk import Precision
@@ -55,7 +55,6 @@ class WorldRequest(DesignRequest):
         scenario: Scenario,
         *,
         log: bool,
-        backend: Backend = "auto",
         precision: Precision = "double",
     ) -> Simulation:
         """Let the design walk through a scenario of its world."""
@@ -71,7 +70,6 @@ class WorldRequest(DesignRequest):
             np.array([values], dtype=np.float64),
             robot=self.robot,
             log=log,
-            backend=backend,
             precision=precision,
         )
 
@@ -113,12 +111,12 @@ class SimulationRequest(WalksRequest, WorldRequest):
         return PREFERENCES[self.preference] if isinstance(self.preference, str) else self.preference
 
 
-def run_simulation(request: SimulationRequest, *, backend: Backend = "auto") -> SimulationView:
+def run_simulation(request: SimulationRequest) -> SimulationView:
     """Let the design walk in every scenario."""
     request.check_walks()
     scenarios = request.resolved_scenarios()
     walks = [
-        request.walk(scenario, log=request.log, backend=backend, precision=request.precision)
+        request.walk(scenario, log=request.log, precision=request.precision)
         for scenario in scenarios
     ]
     return SimulationView.from_walks(

@@ -119,7 +119,6 @@ def noise_on_links(
     robot: RobotChoice = DEFAULT_ROBOT,
     kind: NoiseKind = "angle",
     deviation: float | None = None,
-    seed: int = 1,
 ) -> tuple[Deviation, ...]:
     """Noise on link 1, 2 or 3 relative to the noiseless run of the same robot (table 2.9).
 
@@ -130,7 +129,7 @@ def noise_on_links(
     size = NOISE[kind] if deviation is None else deviation
     try:
         noises = [
-            LinkNoise.model_validate({"link": link, "kind": kind, "deviation": size, "seed": seed})
+            LinkNoise.model_validate({"link": link, "kind": kind, "deviation": size, "seed": 1})
             for link in (1, 2, 3)
         ]
     except ValidationError as error:

@@ -18,11 +18,12 @@ LOWEST: Final = -10
 HIGHEST: Final = 10
 
 
-def check_priority(priority: int, *, field: str = "priority") -> None:
+def check_priority(priority: int) -> None:
     """Refuse what is no priority."""
     if not LOWEST <= priority <= HIGHEST:
         raise InvalidRequest(
-            f"must be from {LOWEST} (last) to {HIGHEST} (first), it is {priority}", field=field
+            f"must be from {LOWEST} (last) to {HIGHEST} (first), it is {priority}",
+            field="priority",
         )
 
 

@@ -15,7 +15,6 @@ from gaitswarm.services.optimizer.jobs.job import Claim, Job, JobState
 from gaitswarm.services.optimizer.run.evaluator import EvaluationStopped, Evaluator
 from gaitswarm.services.optimizer.run.execution import OnCommit, OnRetry, Surroundings, run_claim
 from gaitswarm.services.optimizer.run.heartbeat import Heartbeat
-from gaitswarm.services.optimizer.run.outage import Backoff
 from gaitswarm.services.optimizer.run.runner import runner_name
 from gaitswarm.services.optimizer.store.port.base import Store
 
@@ -58,7 +57,6 @@ def run_embedded(
     on_follow: OnFollow | None = None,
     on_news: OnNews | None = None,
     stop: threading.Event | None = None,
-    backoff: Backoff | None = None,
     accepts_changes: bool = False,
     cache: bool = False,
     known: int | None = None,
@@ -79,7 +77,6 @@ def run_embedded(
         on_follow or (lambda _: None),
         on_news or (lambda _: None),
         stop or threading.Event(),
-        backoff or Backoff(),
         accepts_changes,
         cache,
         runner=runner_name() if claim is None else claim.runner,
@@ -100,7 +97,6 @@ class _EmbeddedRun:
     on_follow: OnFollow
     on_news: OnNews
     stop: threading.Event
-    backoff: Backoff
     accepts_changes: bool
     cache: bool
     runner: str
@@ -144,7 +140,6 @@ class _EmbeddedRun:
             self.store,
             evaluator,
             lease_seconds=EMBEDDED_LEASE_SECONDS,
-            backoff=self.backoff,
             on_commit=self._committed,
             on_retry=self.on_retry,
             accepts_changes=self.accepts_changes,

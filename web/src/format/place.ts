@@ -9,8 +9,8 @@ export function placeWord({ iteration, particle }: Place): string {
   return `${iteration}.${particle}`
 }
 
-/** Parse `8.12` or `8/12`; null for anything else. */
+/** Parse `8.12`; null for anything else. */
 export function placeOf(word: string | null): Place | null {
-  const match = /^(\d+)[./](\d+)$/.exec(word ?? '')
+  const match = /^(\d+)\.(\d+)$/.exec(word ?? '')
   return match && { iteration: Number(match[1]), particle: Number(match[2]) }
 }

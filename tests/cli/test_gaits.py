@@ -20,7 +20,6 @@ SCENARIO: dict[str, Any] = {
     "radius": 0.16,
     "hip_height": 0.15,
 }
-ORDERS: dict[str, Any] = {"name": "gait", "kind": "categorical", "choices": ["wave", "crawl"]}
 
 
 def test_all_gaits_are_listed_with_those_that_suit_the_robot(gaitswarm: Gaitswarm) -> None:

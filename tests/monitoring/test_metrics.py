@@ -35,8 +35,6 @@ LABELS = {
 }
 """Each has as many values as the code has words for it, whatever users do."""
 
-UNITS = ("_seconds", "_bytes", "_total", "_info")
-
 
 def test_names_say_what_is_counted_and_in_which_unit(walked: tuple[str, Scrape]) -> None:
     own = [f for f in walked[1].families if not f.name.startswith("process_")]

@@ -15,8 +15,8 @@ from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 from gaitswarm.services.optimizer.analysis.reference import note_reference
-from gaitswarm.services.optimizer.deletion import Housekeeping
 from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.housekeeping import Housekeeping
 from gaitswarm.services.optimizer.jobs.job import QUARANTINE_AFTER
 from gaitswarm.services.optimizer.run.embedded import run_embedded
 from gaitswarm.services.optimizer.run.evaluator import Evaluator, Watched

@@ -117,7 +117,7 @@ def _run(service: JobService, job: Job) -> _Run:
         documents[SUMMARY] = json.loads(certified.model_dump_json())
     files: dict[str, bytes] = {name: _json(document) for name, document in documents.items()}
     files[EVALUATIONS] = b"".join(encoded_table("parquet", spec, [columns]))
-    files[ASKS] = _asks(spec, service.asked(job))
+    files[ASKS] = _asks(spec, service.asked_positions(job))
     if anew is not None:
         parts = [anew] if len(anew) else []
         files[REEVALUATIONS] = b"".join(encoded_table("parquet", spec.in_double(), parts))

@@ -1,4 +1,4 @@
-"""Who may ask for what: tokens, and what their scopes allow."""
+"""Access tokens and their scopes"""
 
 from __future__ import annotations
 
@@ -10,37 +10,36 @@ from enum import StrEnum
 from typing import Final, Protocol
 
 _PREFIX: Final = "gaitswarm_"
-"""Of secrets, so that people and scanners of repositories know one when they see it."""
+"""Lets people and secret scanners recognize a token."""
 
 _BYTES: Final = 32
-"""Of randomness in a secret: nobody guesses it, so that a fast hash is enough to keep it."""
+"""Of randomness in a secret: it cannot be guessed, so a fast hash is enough to store it."""
 
 
 class Scope(StrEnum):
-    """What a token allows; each allows what those before it do."""
+    """Permissions of a token; each includes those before it."""
 
     READ = "read"
-    """To look at everything, and to ask questions that change nothing."""
+    """Read everything, and run queries that change nothing."""
     SUBMIT = "submit"
-    """To submit jobs, and to command those that were submitted with the same token."""
+    """Submit jobs, and control those submitted with the same token."""
     ADMIN = "admin"
-    """To command every job."""
+    """Control every job."""
 
     def allows(self, needed: Scope) -> bool:
-        """Whether a token of this scope may do what needs another one."""
+        """Return whether this scope includes another."""
         order = tuple(Scope)
         return order.index(self) >= order.index(needed)
 
 
 @dataclass(frozen=True, slots=True)
 class Token:
-    """A token as it is stored: everything but its secret.
+    """A token as stored, without its secret.
 
     Attributes:
-        name: chosen by whoever made it; the owner of what is submitted with it.
-        scope: what it allows.
-        created_at: when it was made, UTC.
-        revoked_at: when it was revoked, UTC; None while it is valid.
+        name: chosen by its creator; the owner of jobs submitted with it.
+        created_at: UTC.
+        revoked_at: UTC; None while the token is valid.
     """
 
     name: str
@@ -49,34 +48,31 @@ class Token:
     revoked_at: datetime | None = None
 
     def may_command(self, owner: str | None) -> bool:
-        """Whether jobs of an owner may be paused, resumed, extended or cancelled with it."""
+        """Return whether the token may control jobs of an owner."""
         return self.scope is Scope.ADMIN or (self.scope.allows(Scope.SUBMIT) and owner == self.name)
 
 
 def new_secret() -> str:
-    """Make the secret of a new token."""
     return _PREFIX + secrets.token_urlsafe(_BYTES)
 
 
 def secret_digest(secret: str) -> str:
-    """What is stored of a secret."""
+    """Return the digest under which a secret is stored."""
     return hashlib.sha256(secret.encode("utf-8", "surrogateescape")).hexdigest()
 
 
 class Tokens(Protocol):
-    """The port of the memory of tokens. Thread-safe; every method is one transaction."""
+    """The token store. Thread-safe; every method is one transaction."""
 
-    def create(self, name: str, scope: Scope) -> tuple[Token, str]:
-        """Make a token."""
+    def create(self, name: str, scope: Scope) -> tuple[Token, str]: ...
 
     def create_first(self) -> str | None:
-        """Make a token `first` that allows everything, if there has never been any token."""
+        """Create an admin token `first`, unless any token has ever been created."""
 
-    def all(self) -> tuple[Token, ...]:
-        """Read all tokens."""
+    def all(self) -> tuple[Token, ...]: ...
 
     def revoke(self, name: str) -> Token:
-        """Let a token allow nothing from now on. Repeated, it changes nothing."""
+        """Revoke a token. Idempotent."""
 
     def find(self, secret: str) -> Token | None:
-        """Find the valid token of a secret."""
+        """Return the valid token of a secret."""

@@ -1,23 +1,23 @@
 """Errors of the service.
 
 GaitswarmError
-├── InvalidRequest          what was asked makes no sense; names the field (HTTP 422)
-├── NotFound                no job or iteration of that id (HTTP 404)
-├── Conflict                not possible in the job's present state (HTTP 409)
-│   ├── BudgetChanged       the job was extended since it was claimed
-│   ├── ProvenanceChanged   its numbers would depend on something else than those it has
+├── InvalidRequest          invalid request; names the field (HTTP 422)
+├── NotFound                no job or iteration with that id (HTTP 404)
+├── Conflict                not possible in the job's current state (HTTP 409)
+│   ├── BudgetChanged       the job was extended after it was claimed
+│   ├── ProvenanceChanged   code or libraries differ from those of the job's earlier results
 │   ├── IdempotencyConflict the key was used before with another body
-│   ├── QuotaExceeded       its owner has as many jobs as they may have; names the field
-│   └── Unreadable          this version cannot read what is stored; it stays as it is
-├── Forbidden               not for whoever asks (HTTP 403)
-│   └── Unauthorized        the server knows nobody of that token, or asks for one (HTTP 401)
-├── LeaseLost               another runner, or a cancellation, has taken the job
-├── KilledWorker            a task ends the workers that run it
-└── Unavailable             not possible now, whatever was asked; try again later (HTTP 503)
-    ├── TooManyRequests     whoever asks does so too often; says when to try again (HTTP 429)
+│   ├── QuotaExceeded       the owner's quota is exhausted; names the field
+│   └── Unreadable          this version cannot read the stored document
+├── Forbidden               permission denied (HTTP 403)
+│   └── Unauthorized        authentication required, or unknown token (HTTP 401)
+├── LeaseLost               another runner or a cancellation took the job
+├── KilledWorker            a task crashes the workers that run it
+└── Unavailable             temporarily not possible; try again later (HTTP 503)
+    ├── TooManyRequests     too many requests; states when to try again (HTTP 429)
     ├── EvaluatorUnavailable    the workers cannot be reached
     └── StoreUnavailable        the database or server cannot be reached, or has another schema
-        └── StoreReplaced       the database's file was removed or replaced while it was open
+        └── StoreReplaced       the database file was removed or replaced while open
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from typing import ClassVar
 
 
 class GaitswarmError(Exception):
-    """Base of every error that gaitswarm raises on purpose."""
+    """Base of all errors that gaitswarm raises."""
 
 
 class InvalidRequest(GaitswarmError, ValueError):
-    """What was asked makes no sense.
+    """Invalid request.
 
-    field: dotted path of the offending field, "" when it is the request as a whole.
+    field: dotted path of the offending field, "" for the request as a whole.
     """
 
     def __init__(self, message: str, *, field: str = "") -> None:
@@ -41,19 +41,19 @@ class InvalidRequest(GaitswarmError, ValueError):
 
 
 class NotFound(GaitswarmError):
-    """No such job, or no such iteration of it."""
+    """No such job or iteration."""
 
 
 class Conflict(GaitswarmError):
-    """The job's present state does not allow it."""
+    """Not possible in the job's current state."""
 
 
 class BudgetChanged(Conflict):
-    """The job was extended since it was claimed: what follows is to be asked anew."""
+    """The job was extended after it was claimed: the next iteration must be asked for again."""
 
 
 class ProvenanceChanged(Conflict):
-    """The job's next numbers would depend on something else than those that it has."""
+    """Code or libraries differ from those of the job's earlier results."""
 
 
 class IdempotencyConflict(Conflict):
@@ -61,9 +61,9 @@ class IdempotencyConflict(Conflict):
 
 
 class QuotaExceeded(Conflict):
-    """The unfinished jobs of an owner would be more than they may be.
+    """The owner's unfinished jobs would exceed the quota.
 
-    field: field of the request that makes it too much, "" when it is the request as a whole.
+    field: field of the request that exceeds it, "" for the request as a whole.
     """
 
     def __init__(self, message: str, *, field: str = "") -> None:
@@ -72,21 +72,21 @@ class QuotaExceeded(Conflict):
 
 
 class Unreadable(Conflict):
-    """This version cannot read what is stored: it was written by another one, or damaged."""
+    """This version cannot read the stored document: another version wrote it, or it is damaged."""
 
 
 class Forbidden(GaitswarmError):
-    """Whoever asks may not do that."""
+    """Permission denied."""
 
 
 class Unauthorized(Forbidden):
-    """The token is unknown or was revoked, or there is none where one is needed."""
+    """The token is unknown, revoked or missing."""
 
 
 class LeaseLost(GaitswarmError):
-    """The job belongs to another runner now, or was cancelled.
+    """The job belongs to another runner, or was cancelled.
 
-    taken_over: another runner has claimed the job since.
+    taken_over: another runner has claimed the job.
     """
 
     def __init__(self, message: str, *, taken_over: bool = False) -> None:
@@ -95,17 +95,17 @@ class LeaseLost(GaitswarmError):
 
 
 class KilledWorker(GaitswarmError):
-    """A task was tried on several workers, and each of them died of it."""
+    """A task crashed each of several workers that ran it."""
 
 
 class Unavailable(GaitswarmError):
-    """Not possible now, whatever was asked."""
+    """Temporarily not possible, for any request."""
 
 
 class TooManyRequests(Unavailable):
-    """Whoever asks does so too often, or has too much open.
+    """Too many requests or open connections.
 
-    retry_after: time after which it is worth trying again [s].
+    retry_after: time after which to try again [s].
     """
 
     def __init__(self, message: str, *, retry_after: float = 1.0) -> None:
@@ -114,20 +114,20 @@ class TooManyRequests(Unavailable):
 
 
 class EvaluatorUnavailable(Unavailable):
-    """The workers cannot be reached now."""
+    """The workers cannot be reached."""
 
 
 class StoreUnavailable(Unavailable):
-    """The database or server cannot be reached, or holds another schema.
+    """The database or server cannot be reached, or has another schema.
 
-    for_clients: text for clients of a server; an error's own may quote the database's driver.
+    for_clients: text for clients of a server; the error's own text may quote the database driver.
     """
 
-    for_clients: ClassVar[str] = "the database is unavailable; the server's log says why"
+    for_clients: ClassVar[str] = "the database is unavailable; see the server's log"
 
 
 class StoreReplaced(StoreUnavailable):
-    """The database's file was removed or replaced while it was open; only a restart helps."""
+    """The database file was removed or replaced while it was open; restart the process."""
 
     for_clients: ClassVar[str] = (
         "the database file was removed or replaced while it was open; restart the server"

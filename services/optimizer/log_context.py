@@ -1,4 +1,4 @@
-"""What messages of the log belong to: a job, an iteration, a request."""
+"""Context of log messages: job, iteration, request"""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ _fields: ContextVar[Mapping[str, str | int]] = ContextVar("log_fields", default=
 
 @contextmanager
 def log_context(**fields: str | int | None) -> Iterator[None]:
-    """Let messages that are logged inside the block say what they belong to.
+    """Attach fields to messages logged inside the block.
 
-    It holds for the thread or the asynchronous task that enters the block, and for threads that
-    anyio runs for it; a thread that is started inside enters a block of its own.
+    They apply to the thread or asynchronous task that enters the block and to threads that anyio
+    runs for it; threads started inside enter a block of their own.
     """
-    known = {name: value for name, value in fields.items() if value is not None}
-    token = _fields.set({**_fields.get(), **known})
+    given = {name: value for name, value in fields.items() if value is not None}
+    token = _fields.set({**_fields.get(), **given})
     try:
         yield
     finally:
@@ -29,5 +29,5 @@ def log_context(**fields: str | int | None) -> Iterator[None]:
 
 
 def log_fields() -> Mapping[str, str | int]:
-    """What a message that is logged now belongs to."""
+    """Return the fields of the current context."""
     return _fields.get()

@@ -1,4 +1,4 @@
-"""URLs as messages show them, without passwords."""
+"""Masking of passwords in URLs"""
 
 from __future__ import annotations
 
@@ -12,24 +12,22 @@ HARMLESS: Final = frozenset(
         *("sslmode", "connect_timeout", "target_session_attrs"),
     }
 )
-"""Parameters of a database URL that are shown; the others may hold a secret or its place."""
+"""Query parameters of a database URL that are shown; others may contain a secret or its path."""
 
 _HIDDEN: Final = "***"
 
 _HOST: Final = r"(?:\[[\w.:%]+\]|[\w.%-]*)(?::\d+)?"
 
 _ADDRESS: Final = re.compile(rf"{_HOST}(?:,{_HOST})*(?:/[^:@]*)?")
-"""Hosts, ports and path."""
 
 
 def masked_url(url: str) -> str:
-    """Return a URL that messages can show."""
     scheme, separator, rest = url.partition("://")
     if not separator or scheme.startswith("sqlite"):
         return url
     head, _, query = rest.partition("?")
     user_info, at, address = head.rpartition("@")
-    # An @ behind the ? may be that of a password that holds a ?.
+    # An @ after the ? may belong to a password that contains a ?.
     if "@" in query or not _ADDRESS.fullmatch(address):
         return f"{scheme}://{_HIDDEN}"
     user, colon, _ = user_info.partition(":")

@@ -1,19 +1,37 @@
-"""What can be asked of the service, in the words of its users."""
+"""The service: every operation on jobs, independent of transport"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
+from gaitswarm.services.optimizer.analysis.distribution import (
+    Distribution,
+    distribution,
+    iteration_starts,
+)
 from gaitswarm.services.optimizer.analysis.fork import Parent, check_begun, forked, started
-from gaitswarm.services.optimizer.analysis.history import Questions
-from gaitswarm.services.optimizer.deletion import Deletion
+from gaitswarm.services.optimizer.analysis.history import (
+    PIECE,
+    HistoryCache,
+    read_columns,
+    read_history,
+)
+from gaitswarm.services.optimizer.analysis.identifiability import (
+    Identifiability,
+    check_comparable,
+    identifiability,
+)
+from gaitswarm.services.optimizer.analysis.ranking import RankedJob, rank, tuning_of
+from gaitswarm.services.optimizer.analysis.reference import with_reference
 from gaitswarm.services.optimizer.errors import ProvenanceChanged
 from gaitswarm.services.optimizer.jobs.audit import LOCAL
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.estimate import (
     Estimate,
     MeasuredRates,
@@ -21,9 +39,10 @@ from gaitswarm.services.optimizer.jobs.estimate import (
     estimate,
 )
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
-from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Iteration
+from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Iteration, Reevaluation
 from gaitswarm.services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState, refusal
 from gaitswarm.services.optimizer.jobs.labels import ANY_JOB, FacetCounts, JobFilter, LabelsChange
+from gaitswarm.services.optimizer.jobs.preference import Preference
 from gaitswarm.services.optimizer.jobs.priority import check_priority
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from gaitswarm.services.optimizer.jobs.quota import Quota
@@ -35,100 +54,32 @@ from gaitswarm.services.optimizer.store.port.reading import Page
 from gaitswarm.services.optimizer.store.port.recordings import RecordingEntry
 from gaitswarm.sim.identification.recorded_walk import RecordedWalk
 
-
-class Commands:
-    """Commands jobs. Thread-safe, as the store is."""
-
-    __slots__ = ()
-
-    store: Store
-
-    def command(
-        self,
-        job_id: str,
-        command: Command,
-        *,
-        accept_changes: bool = False,
-        actor: str = LOCAL,
-        quota: Quota | None = None,
-    ) -> Job:
-        """Pause, resume or cancel a job."""
-        return self.store.command(
-            job_id, command, accept_changes=accept_changes, actor=actor, quota=quota
-        )
-
-    def prioritize(self, job_id: str, priority: int, *, actor: str = LOCAL) -> Job:
-        """Change a job's priority; nothing of its results depends on it."""
-        check_priority(priority)
-        return self.store.prioritize(job_id, priority, actor=actor)
-
-
-class Labelling:
-    """Lists, labels and counts jobs. Thread-safe, as the store is."""
-
-    __slots__ = ()
-
-    store: Store
-
-    def jobs(
-        self,
-        *,
-        state: JobState | None = None,
-        kind: str | None = None,
-        parent: str | None = None,
-        search: str = "",
-        where: JobFilter = ANY_JOB,
-        order: JobOrder = JobOrder.CREATED,
-        after: str | None = None,
-        limit: int = 50,
-        reverse: bool = False,
-    ) -> Page[Job]:
-        """List jobs, page by page. Jobs submitted meanwhile do not shift later pages."""
-        return self.store.jobs(
-            state=state,
-            kind=kind,
-            parent=parent,
-            search=search,
-            where=where,
-            order=order,
-            after=after,
-            limit=limit,
-            reverse=reverse,
-        )
-
-    def facets(self, *, archived: bool | None = None) -> FacetCounts:
-        """Count jobs by what they are found by."""
-        return self.store.facets(archived=archived)
-
-    def label(self, job_id: str, change: LabelsChange, *, actor: str = LOCAL) -> Job:
-        """Change what is written on a job; nothing that determines results."""
-        return self.store.label(job_id, change, actor=actor)
-
-
-_EARLIER: Final = 50
-"""Newest jobs among which one like a new job is looked for."""
+_RECENT_JOBS: Final = 50
+"""Newest jobs among which the estimate looks for similar ones."""
 
 
 @dataclass(frozen=True, slots=True)
-class JobService(Questions, Commands, Deletion, Labelling):
-    """Jobs as their users see them. Thread-safe, as the store is.
+class JobService:
+    """Submit, control, read and analyze jobs. Thread-safe, as the store is.
 
     Attributes:
-        store: where jobs are kept; its owner's to close.
-        provenance: spec -> provenance of what is computed from here for it.
-        longest_job: simulated time of all walks of all designs that a job may have [s]; if it is
-            finite, the walks of an iteration are limited as well.
-        longest_fork: time that bringing a search to where it was may take, for a fork [s].
+        store: closed by its owner.
+        provenance: provenance of what this process computes for a spec.
+        longest_job: limit on the simulated time of all of a job's simulations [s]; if finite, the
+            simulations per iteration are limited as well.
+        longest_fork: limit on the time to restore a search for a fork [s].
     """
 
+    store: Store
     provenance: Callable[[Spec], JobProvenance] = job_provenance
     longest_job: float = math.inf
     longest_fork: float = math.inf
     _rates: MeasuredRates = field(init=False, repr=False, compare=False)
+    _histories: HistoryCache = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        Questions.__post_init__(self)
         object.__setattr__(self, "_rates", MeasuredRates())
+        object.__setattr__(self, "_histories", HistoryCache(self.store))
 
     def submit(
         self,
@@ -141,10 +92,7 @@ class JobService(Questions, Commands, Deletion, Labelling):
         quota: Quota | None = None,
         priority: int = 0,
     ) -> tuple[Job, bool]:
-        """Check that the job can be simulated and queue it.
-
-        Its numbers are to depend on what they would depend on if they were computed here.
-        """
+        """Validate a job, check that it can be simulated, and queue it."""
         check_priority(priority)
         seconds = self._check(spec)
         if request is None:
@@ -183,7 +131,7 @@ class JobService(Questions, Commands, Deletion, Labelling):
         parent = Parent(
             job,
             columns.rows(rows),
-            lambda: self.asked(job, request.from_iteration),
+            lambda: self.asked_positions(job, request.from_iteration),
             last.link.digest,
         )
         spec, fork = forked(parent, request, self.provenance, longest=self.longest_fork)
@@ -204,7 +152,7 @@ class JobService(Questions, Commands, Deletion, Labelling):
         )
 
     def submit_embedded(self, spec: Spec) -> Claim:
-        """Check that the job can be simulated and store it for this process alone to run."""
+        """Validate a job and store it claimed by this process."""
         self._check(spec)
         return self.store.create_claimed_job(
             started(spec, self.job, self.columns),
@@ -214,35 +162,33 @@ class JobService(Questions, Commands, Deletion, Labelling):
         )
 
     def record(self, walk: RecordedWalk, *, actor: str = LOCAL) -> str:
-        """Keep a recorded walk, to which jobs can fit."""
+        """Store a recorded walk for identification jobs."""
         return self.store.add_recording(walk, actor=actor)
 
     def recording(self, recording_id: str) -> RecordedWalk:
-        """Read a recorded walk."""
         return self.store.recordings([recording_id])[recording_id]
 
     def recordings(
         self, *, search: str = "", after: str | None = None, limit: int = 50
     ) -> Page[RecordingEntry]:
-        """Read a page of the list of recorded walks, the newest first."""
+        """Return a page of recorded walks, newest first."""
         return self.store.recording_list(search=search, after=after, limit=limit)
 
     def estimate(self, spec: Spec) -> Estimate:
-        """Say what a job would cost, by the rate of jobs like it or a walk that is measured here"""
+        """Estimate a job's cost from similar jobs or a measured simulation."""
         self._check(spec)
         cases = spec.cases(self.store.recordings(spec.recording_ids))
-        others = [job for job in self.store.jobs(limit=_EARLIER).items if job.readable]
+        others = [job for job in self.store.jobs(limit=_RECENT_JOBS).items if job.readable]
         return estimate(started(spec, self.job, self.columns), cases, others, self._rates)
 
     def job(self, job_id: str) -> Job:
-        """Read a job."""
         return self.store.job(job_id)
 
     def check_unchanged(self, job: Job) -> None:
-        """Check that a job's next numbers, computed here, depend on what those that it has do."""
+        """Check that results computed here have the provenance of the job's earlier ones."""
         refused = refusal(job, self.provenance(job.spec))
         if refused is not None:
-            raise ProvenanceChanged(f"job {job.id} cannot go on: {refused}")
+            raise ProvenanceChanged(f"job {job.id} cannot continue: {refused}")
 
     def extend(
         self,
@@ -252,20 +198,20 @@ class JobService(Questions, Commands, Deletion, Labelling):
         actor: str = LOCAL,
         quota: Quota | None = None,
     ) -> Job:
-        """Give a job another budget."""
+        """Change a job's budget."""
         job = self.job(job_id)
-        again = job.spec.with_budget(iterations) if job.readable else None
-        seconds = None if again is None else self._check_length(again)
+        extended = job.spec.with_budget(iterations) if job.readable else None
+        seconds = None if extended is None else self._check_length(extended)
         return self.store.extend(job_id, iterations, actor=actor, seconds=seconds, quota=quota)
 
     def _check(self, spec: Spec) -> float | None:
-        """Simulated time of all walks [s]. Raises InvalidRequest."""
+        """Return the simulated time of all simulations [s]. Raises InvalidRequest."""
         spec.check_can_be_simulated()
         spec.check_recordings(self.recording)
         return self._check_length(spec)
 
     def _check_length(self, spec: Spec) -> float | None:
-        """Simulated time of all walks [s], None where nothing limits it. Raises InvalidRequest."""
+        """Return the simulated time of all simulations [s], None if unlimited."""
         if math.isinf(self.longest_job):
             return None
         cases = spec.cases(self.store.recordings(spec.recording_ids))
@@ -274,13 +220,124 @@ class JobService(Questions, Commands, Deletion, Labelling):
     def iterations(
         self, job_id: str, *, after: int | None = None, limit: int = 100
     ) -> Page[Iteration]:
-        """List committed iterations, page by page."""
         return self.store.iterations(job_id, after=after, limit=limit)
 
     def evaluations(self, job_id: str, iteration: int) -> tuple[Evaluation, ...]:
-        """Read every design of a committed iteration."""
         return self.store.evaluations(job_id, iteration)
 
     def best(self, job_id: str) -> Evaluation | None:
-        """Read the best design so far."""
         return self.store.best(job_id)
+
+    def command(
+        self,
+        job_id: str,
+        command: Command,
+        *,
+        accept_changes: bool = False,
+        actor: str = LOCAL,
+        quota: Quota | None = None,
+    ) -> Job:
+        return self.store.command(
+            job_id, command, accept_changes=accept_changes, actor=actor, quota=quota
+        )
+
+    def prioritize(self, job_id: str, priority: int, *, actor: str = LOCAL) -> Job:
+        check_priority(priority)
+        return self.store.prioritize(job_id, priority, actor=actor)
+
+    def keep(self, job_id: str, kept: bool, *, actor: str = LOCAL) -> Job:
+        return self.store.keep(job_id, kept, actor=actor)
+
+    def delete(self, job_id: str, *, actor: str = LOCAL) -> None:
+        """Delete a job and its history.
+
+        The job is invisible once this returns; housekeeping removes the remaining rows.
+        """
+        self.store.delete_job(job_id, actor=actor)
+
+    def jobs(
+        self,
+        *,
+        state: JobState | None = None,
+        kind: str | None = None,
+        parent: str | None = None,
+        search: str = "",
+        where: JobFilter = ANY_JOB,
+        order: JobOrder = JobOrder.CREATED,
+        after: str | None = None,
+        limit: int = 50,
+        reverse: bool = False,
+    ) -> Page[Job]:
+        """Return a page of jobs. Jobs submitted meanwhile do not shift later pages."""
+        return self.store.jobs(
+            state=state,
+            kind=kind,
+            parent=parent,
+            search=search,
+            where=where,
+            order=order,
+            after=after,
+            limit=limit,
+            reverse=reverse,
+        )
+
+    def facets(self, *, archived: bool | None = None) -> FacetCounts:
+        return self.store.facets(archived=archived)
+
+    def label(self, job_id: str, change: LabelsChange, *, actor: str = LOCAL) -> Job:
+        """Change a job's labels; results do not depend on them."""
+        return self.store.label(job_id, change, actor=actor)
+
+    def columns(self, job: Job) -> EvaluationColumns:
+        """Return every committed evaluation."""
+        return self._histories.columns(job)
+
+    def column_pieces(self, job: Job, *, rows: int = PIECE) -> Iterator[EvaluationColumns]:
+        """Yield the columns piece by piece, for histories of any length."""
+        return read_columns(self.store, job, rows=rows)
+
+    def history(
+        self, job_id: str, *, after: int | None = None
+    ) -> Iterator[tuple[Iteration, tuple[Evaluation, ...]]]:
+        """Yield every committed iteration with its evaluations.
+
+        Read piece by piece: no transaction stays open, and iterations committed meanwhile are
+        included.
+        """
+        return read_history(self.store, job_id, after=after)
+
+    def reference(self, job_id: str) -> tuple[Job, str | None]:
+        """Return a job with its reference, simulated if needed, and why there is no gain."""
+        return with_reference(self.store, self.store.job(job_id))
+
+    def asked_positions(
+        self, job: Job, iterations: int | None = None
+    ) -> tuple[NDArray[np.float64], ...]:
+        """Return the (n, d) positions that the search asked for, by iteration."""
+        end = job.progress.iterations if iterations is None else iterations
+        return self.store.asked(job.id, 0, end)
+
+    def reevaluations(self, job: Job) -> tuple[tuple[int, Reevaluation], ...]:
+        """Return the reevaluations in double precision."""
+        return self.store.reevaluations(job.id)
+
+    def distribution(
+        self, job: Job, *, after: int | None = None, limit: int
+    ) -> tuple[Distribution, bool]:
+        """Return the spread of designs by iteration, and whether more iterations follow."""
+        columns = self.columns(job).after(after)
+        following = iteration_starts(columns)[limit:]
+        page = columns.rows(slice(int(following[0]) if len(following) else None))
+        return distribution(page, job.spec.design_space()), len(following) > 0
+
+    def rank(self, job: Job, preference: Preference, *, top: int) -> RankedJob:
+        """Rank all designs by another preference, from stored objectives."""
+        spec, columns = tuning_of(job), self.columns(job)
+        return RankedJob(spec, columns, rank(columns, preference, top=top, worlds=spec.worlds))
+
+    def identifiability(self, jobs: Sequence[Job]) -> Identifiability:
+        """Determine the parameters on which several runs of one problem agree."""
+        check_comparable(jobs)
+        runs = [self.columns(job) for job in jobs]
+        spec = jobs[0].spec
+        return identifiability(spec.design_space().variables, runs, spec.as_good_as)

@@ -10,8 +10,8 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from gaitswarm.services.optimizer.deletion import Housekeeping
 from gaitswarm.services.optimizer.errors import NotFound
+from gaitswarm.services.optimizer.housekeeping import Housekeeping
 from gaitswarm.services.optimizer.jobs.job import Command, Job
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.store.sql_store import SqlStore

@@ -1,0 +1,68 @@
+"""Removal of deleted jobs' rows, expired jobs and old audit entries"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from datetime import UTC, datetime, timedelta
+from typing import Final
+
+from gaitswarm.services.optimizer.errors import StoreUnavailable
+from gaitswarm.services.optimizer.store.port.base import Store
+
+_SECONDS_PER_ROUND: Final = 10.0
+_ROUNDS_PER_RETENTION: Final = 360
+
+_log = logging.getLogger(__name__)
+
+
+class Housekeeping:
+    """Removes rows of deleted jobs, expired jobs and old audit entries, in its own thread."""
+
+    def __init__(
+        self,
+        store: Store,
+        retention_days: float | None = None,
+        audit_days: float | None = None,
+    ) -> None:
+        self._store = store
+        self._retention = None if retention_days is None else timedelta(days=retention_days)
+        self._audit_retention = None if audit_days is None else timedelta(days=audit_days)
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._rounds, name="housekeeping", daemon=True)
+
+    def start(self) -> None:
+        """Start the thread with a first round. Returns immediately."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End after the current step. Idempotent."""
+        self._stop.set()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def round(self, *, retention: bool = True) -> None:
+        """Run one round."""
+        if retention and self._retention is not None:
+            deleted = self._store.delete_ended_before(datetime.now(UTC) - self._retention)
+            for job_id in deleted:
+                _log.info("job %s deleted: it ended more than %s ago", job_id, self._retention)
+        if retention and self._audit_retention is not None:
+            removed = self._store.forget_audit_before(datetime.now(UTC) - self._audit_retention)
+            if removed:
+                _log.info(
+                    "%d audit log entries removed: older than %s", removed, self._audit_retention
+                )
+        self._store.purge_deleted(self._stop.is_set)
+
+    def _rounds(self) -> None:
+        number = 0
+        while not self._stop.is_set():
+            try:
+                self.round(retention=number % _ROUNDS_PER_RETENTION == 0)
+            except StoreUnavailable as error:
+                _log.warning("cannot remove deleted jobs yet: %s", error)
+            except Exception:  # noqa: BLE001
+                _log.exception("cannot remove deleted jobs yet")
+            number += 1
+            self._stop.wait(_SECONDS_PER_ROUND)

@@ -82,12 +82,13 @@ def release_next(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[]
 
 
 FIRST = "0020"
-NEXT = "0021"
+NEWEST = head()
+NEXT = f"{int(NEWEST) + 1:04}"
 _NEXT_MIGRATION = f"""
 import sqlalchemy as sa
 from alembic import op
 
-revision, down_revision = "{NEXT}", "{FIRST}"
+revision, down_revision = "{NEXT}", "{NEWEST}"
 
 
 def upgrade():
@@ -118,16 +119,17 @@ def test_a_new_database_is_as_all_migrations_make_one(fresh_url: str) -> None:
             assert read_revision(connection) == revision == head()
 
 
-def test_a_database_of_the_first_revision_is_opened_as_it_is(fresh_url: str) -> None:
+def test_a_database_of_the_first_revision_is_adopted(fresh_url: str) -> None:
     with (
         closing(connect(parse_url(fresh_url), for_migration=True)) as database,
         database.transaction(write=True) as connection,
     ):
         command.upgrade(alembic(connection), FIRST)
+    assert upgrade(fresh_url) == FIRST
     with closing(open_store(fresh_url)) as store:
         job, _ = store.create_job(spec())
         assert store.jobs().items[0].id == job.id
-    assert revision(fresh_url) == FIRST
+    assert revision(fresh_url) == NEWEST
 
 
 @pytest.mark.parametrize("opened", [open_store, upgrade])
@@ -146,9 +148,9 @@ def test_an_older_database_is_refused_and_left_as_it_is(
 ) -> None:
     store_job(fresh_url)
     release_next()
-    with pytest.raises(StoreUnavailable, match=f"{FIRST}.* needs {NEXT}.*gaitswarm db upgrade"):
+    with pytest.raises(StoreUnavailable, match=f"{NEWEST}.* needs {NEXT}.*gaitswarm db upgrade"):
         open_store(fresh_url)
-    assert revision(fresh_url) == FIRST
+    assert revision(fresh_url) == NEWEST
 
 
 def test_an_upgrade_brings_an_older_database_to_the_newest_schema_with_its_jobs(
@@ -156,7 +158,7 @@ def test_an_upgrade_brings_an_older_database_to_the_newest_schema_with_its_jobs(
 ) -> None:
     job_id = store_job(fresh_url)
     release_next()
-    assert upgrade(fresh_url) == FIRST
+    assert upgrade(fresh_url) == NEWEST
     assert upgrade(fresh_url) == NEXT
     with closing(open_store(fresh_url)) as store:
         assert store.job(job_id).spec.iterations == 7
@@ -192,7 +194,7 @@ def test_a_database_that_an_idle_process_has_open_is_not_upgraded(
         output(process.stdin).write("end\n")
         output(process.stdin).flush()
         process.wait(timeout=30.0)
-    assert upgrade(fresh_url) == FIRST
+    assert upgrade(fresh_url) == NEWEST
 
 
 @pytest.mark.parametrize("year", ["2026", "2126"])
@@ -207,7 +209,7 @@ def test_a_database_with_a_job_under_way_is_not_upgraded(
     with pytest.raises(Conflict, match=f"job {job_id} is run by elsewhere:7"):
         upgrade(fresh_url)
     edit(fresh_url, f"{lease}'{year}-01-01 00:00:00'")
-    assert upgrade(fresh_url) == FIRST
+    assert upgrade(fresh_url) == NEWEST
 
 
 def test_a_process_that_outlived_an_upgrade_is_refused_when_it_connects_again(
@@ -243,6 +245,6 @@ def test_an_upgrade_that_fails_on_its_way_changes_nothing(
     release_next()
     with pytest.raises(StoreUnavailable, match=r"next.*already exists"):
         upgrade(fresh_url)
-    assert revision(fresh_url) == FIRST
+    assert revision(fresh_url) == NEWEST
     edit(fresh_url, "DROP TABLE next")
-    assert upgrade(fresh_url) == FIRST
+    assert upgrade(fresh_url) == NEWEST

@@ -1,24 +1,24 @@
 """Errors of the library; those of a database and of a server are the same.
 
 GaitswarmError              everything that gaitswarm raises on purpose
-├── InvalidRequest          what was asked makes no sense; `field` names the argument or field
-├── NotFound                no job, iteration, recording or result of that id
+├── InvalidRequest          an invalid request; `field` names the argument or field
+├── NotFound                no job, iteration, recording or result with that id
 ├── Conflict                not possible in the job's present state
-│   ├── ProvenanceChanged   its numbers would depend on something else than those it has
-│   ├── QuotaExceeded       the server lets whoever asks have no more unfinished jobs
-│   ├── Unreadable          this version cannot read what is stored of the job; it stays as it is
+│   ├── ProvenanceChanged   code, robot or libraries differ from those of its numbers
+│   ├── QuotaExceeded       too many unfinished jobs for this client
+│   ├── Unreadable          this version cannot read the stored job, which stays unchanged
 │   └── IdempotencyConflict the key was used before for another job
-├── Forbidden               the server does not let whoever asks do that
-│   └── Unauthorized        it asks for a token, or the one that was sent is not valid
-├── JobEnded                the job that was waited for did not succeed; `job` says why
+├── Forbidden               permission denied
+│   └── Unauthorized        authentication required, or the token is not valid
+├── JobEnded                the awaited job did not succeed; `job` says why
 ├── LeaseLost               another process, or a cancellation, has taken the job
-└── Unavailable             not possible now, whatever was asked; try again later
-    ├── TooManyRequests     the server is asked too often by whoever asks
+└── Unavailable             temporarily not possible; try again later
+    ├── TooManyRequests     too many requests from this client
     ├── EvaluatorUnavailable    the workers or the compiler cannot be used
     └── StoreUnavailable        the database or the server cannot be reached
 
 KeyboardInterrupt
-└── Interrupted             Ctrl-C while a job was run: it was given back, and can be gone on with
+└── Interrupted             Ctrl-C while running a job: it was queued again and can be resumed
 """
 
 from __future__ import annotations
@@ -54,10 +54,10 @@ if TYPE_CHECKING:
 
 
 class JobEnded(GaitswarmError):
-    """The job that was waited for did not succeed.
+    """The awaited job did not succeed.
 
     Attributes:
-        job: The job as it is: paused, cancelled or failed.
+        job: The job: paused, cancelled or failed.
     """
 
     def __init__(self, job: JobView) -> None:
@@ -66,9 +66,9 @@ class JobEnded(GaitswarmError):
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C while a job was run. What it had committed is stored, and it is queued again.
+    """Ctrl-C while running a job. Committed iterations are stored, and the job is queued again.
 
-    One that was only followed goes on in the process that runs it.
+    A job that was only followed continues in the process that runs it.
 
     Attributes:
         job: The job as it was then.
@@ -76,15 +76,15 @@ class Interrupted(KeyboardInterrupt):
 
     def __init__(self, job: JobView, db: str) -> None:
         self.job = job
-        left = "goes on elsewhere" if job.state == "running" else "was given back"
+        left = "continues in another process" if job.state == "running" else "was queued again"
         super().__init__(
             f"job {job.id} {left} after {job.spent};"
-            f" go on with gaitswarm.optimize(resume={job.id!r}, db={masked_url(db)!r})"
+            f" resume it with gaitswarm.optimize(resume={job.id!r}, db={masked_url(db)!r})"
         )
 
 
 def invalid_request(error: ValidationError, model: Any = None) -> InvalidRequest:
-    """What pydantic found wrong, in the words of the input."""
+    """Convert pydantic's errors to one InvalidRequest."""
     from gaitswarm.sim.input import with_known_keys
     from gaitswarm.views import field_errors
 
@@ -96,7 +96,7 @@ def invalid_request(error: ValidationError, model: Any = None) -> InvalidRequest
 
 @contextmanager
 def simulation_errors(field: str) -> Iterator[None]:
-    """Errors of the simulator as errors of the library."""
+    """Convert errors of the simulator to errors of the library."""
     try:
         yield
     except SimulationInputError as error:

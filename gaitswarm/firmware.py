@@ -1,4 +1,4 @@
-"""`gaitswarm.write_firmware`: a design as C for a microcontroller, in a folder of its own."""
+"""`gaitswarm.write_firmware`: a design as C code in a folder."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from gaitswarm.specs import RobotInput, ScenarioInput
 from gaitswarm.views.firmware import FirmwareView
 
 _BUILT: Final = "build"
-"""Where the folder's Makefile puts what it makes."""
+"""Build folder of the folder's Makefile."""
 
 
 def write_firmware(
@@ -36,8 +36,8 @@ def write_firmware(
 ) -> FirmwareView:
     """Write a design as C99 for a leg's microcontroller (thesis chapter 5), with a test of it.
 
-    The design walks in every scenario; the folder's `make test` gives its controller the readings
-    of these walks, and compares what it answers with what drove them, sample by sample.
+    The design is simulated in every scenario; the folder's `make test` gives its controller the
+    sensor readings and compares its outputs with the simulated ones, sample by sample.
 
     Args:
         design: Value of each of the controller's variables, and of any gait variable, in their
@@ -47,16 +47,16 @@ def write_firmware(
             whose walks are repeated.
         controller: Motor controller that drives the robot.
         robot: A shipped robot by name, a `RobotVariant`, or the folder of another.
-        label: What people call the design.
+        label: Display name of the design.
         table_bits: Of the indices of angle error and current in a fuzzy controller's table, in
-            place of 10 and 6, where there is less flash; the walks are by this table, and their
-            difference from those by the usual one is told.
+            place of 10 and 6, where there is less flash; simulations use this table, and their
+            difference from those with the default one is reported.
 
     Returns:
-        Files, their sizes, and what they take of the thesis's microcontroller.
+        Files, their sizes, and their memory on the thesis's microcontroller.
 
     Raises:
-        InvalidRequest: An argument makes no sense, a gait leaves the legs' reach, or the folder
+        InvalidRequest: An argument is invalid, a gait leaves the legs' reach, or the folder
             holds anything but firmware or cannot be written; names the argument.
         EvaluatorUnavailable: The compiler does not compile the robot's kernel.
     """
@@ -74,7 +74,7 @@ def write_firmware(
 
 
 def written_firmware(request: FirmwareRequest, output: str | os.PathLike[str]) -> FirmwareView:
-    """Write firmware that is asked for into a folder."""
+    """Write requested firmware into a folder."""
     check_replaceable(output)
     firmware = run_firmware(request)
     write_folder(output, firmware.files)
@@ -82,7 +82,7 @@ def written_firmware(request: FirmwareRequest, output: str | os.PathLike[str]) -
 
 
 def check_replaceable(output: str | os.PathLike[str]) -> None:
-    """Check that a folder is not there, is empty, or holds firmware and what was built of it."""
+    """Check that a folder is missing, empty, or holds firmware and its build output."""
     folder = Path(output)
     if not folder.exists():
         return
@@ -102,7 +102,7 @@ def check_replaceable(output: str | os.PathLike[str]) -> None:
 
 
 def write_folder(output: str | os.PathLike[str], files: Mapping[str, bytes]) -> None:
-    """Write files into a folder of their own, in place of what is there."""
+    """Write files into a folder, replacing its contents."""
     with _replacing(Path(output)) as new:
         for name, content in files.items():
             path = new / name
@@ -122,7 +122,7 @@ def _written_files(folder: Path) -> set[str]:
 
 @contextmanager
 def _replacing(folder: Path) -> Iterator[Path]:
-    """A folder that takes the other one's place when the block ends without an exception."""
+    """A temporary folder that replaces the other one unless an exception is raised."""
     try:
         target = folder.resolve()
         target.parent.mkdir(parents=True, exist_ok=True)

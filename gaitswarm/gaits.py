@@ -1,4 +1,4 @@
-"""Gaits by name, and what they plan for a robot's legs. No walk is run."""
+"""Named gaits as planned for a robot's legs, without simulation."""
 
 from __future__ import annotations
 
@@ -26,22 +26,22 @@ _OWN: Final = "of the scenario and the robot's description"
 
 
 class GaitView(View):
-    """A gait, and what it plans for the robot in the scenario."""
+    """A gait as planned for the robot in the scenario."""
 
     name: GaitName = Field(description="Name, as scenarios have it.", examples=["crawl"])
     description: str = Field(description="What it is, with its source.")
     legs: list[int] = Field(
         description="Numbers of legs that it is defined for; any if empty.", examples=[[4]]
     )
-    suits: bool = Field(description="Whether it is one for the robot's legs.")
+    suits: bool = Field(description="Whether it is defined for the robot's legs.")
     lags: dict[str, float] = Field(
         description="By leg the share of the cycle by which its foot comes down after the first"
-        " one's [1]; empty if the gait is none for the robot.",
+        " one's [1]; empty if the gait is not defined for the robot.",
         examples=[{"left_rear": 0.0, "left_front": 0.25}],
     )
     planned: PlannedGaitView | None = Field(
-        description="Duty factor and static stability in the scenario; null for a gait that is none"
-        " for the robot, or out of its legs' reach."
+        description="Duty factor and static stability in the scenario; null for a gait that"
+        " is not defined for the robot, or out of its legs' reach."
     )
     support: dict[str, str] = Field(
         description="Footfall diagram: by leg one cycle in 40 columns, # where the foot stands and"
@@ -54,7 +54,7 @@ class GaitsView(View):
 
     robot: str = Field(description="Name of the robot.", examples=["quadruped"])
     scenario: str = Field(
-        description="Name of the scenario that posture, stride and sway are of.", examples=["crawl"]
+        description="Scenario that provides posture, stride and sway.", examples=["crawl"]
     )
     items: list[GaitView] = Field(description="The robot's own gait first.")
 
@@ -66,7 +66,7 @@ def planned_gaits(
     name: str | None = None,
     duty_factor: float | None = None,
 ) -> GaitsView:
-    """Look at the gaits of a robot."""
+    """Plan all gaits of a robot."""
     with simulation_errors("robot"):
         robot = load_robot(source)
     if name not in (None, "own"):
@@ -110,7 +110,7 @@ def _view(robot: Robot, scenario: Scenario, name: GaitName, duty: float | None) 
 
 
 def _walked(scenario: Scenario, name: GaitName, duty: float | None) -> Scenario:
-    """The scenario in a gait; in a named one with nothing but its posture, stride and sway."""
+    """The scenario in a gait; a named gait keeps only its posture, stride and sway."""
     changes: dict[str, object] = {}
     if duty is not None:
         changes |= {"duty_factor": duty, "duty_phase": "support"}
@@ -120,7 +120,7 @@ def _walked(scenario: Scenario, name: GaitName, duty: float | None) -> Scenario:
 
 
 def _planned(robot: Robot, scenario: Scenario) -> PlannedGaitView | None:
-    """None where a leg does not reach its path."""
+    """Plan a gait; None where a leg does not reach its path."""
     try:
         return PlannedGaitView.from_stability(static_stability(robot, scenario))
     except (UnreachablePose, BeyondJointLimit):

@@ -1,4 +1,4 @@
-"""Where the meshes of a URDF are: beside it, or in packages as ROS finds them."""
+"""Meshes of a URDF: next to it, or in ROS packages."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from gaitswarm.sim.robot.bounds import LONGEST_URDF, check_urdf
 MeshFormat = Literal["stl", "obj", "dae"]
 
 LARGEST_MESH: Final = 32 * 1024 * 1024
-"""Of a file that is given out [B]; a link of a well-known quadruped has 0.1 to 10 MB."""
+"""Largest mesh that is served [B]; a link of a well-known quadruped has 0.1 to 10 MB."""
 
 FORMS: Final[Mapping[str, MeshFormat]] = {".stl": "stl", ".obj": "obj", ".dae": "dae"}
 """By a file's ending."""
 
 TOO_LARGE: Final = f"it has more than {LARGEST_MESH // 2**20} MiB; simplify it"
-"""Why a mesh is not given out."""
+"""Reasons why a mesh is not served."""
 
 NOT_A_MESH: Final = "it is none of STL, OBJ and DAE"
 
 NOT_FOUND: Final = "its file was not found"
 
 _MOST_ROBOTS: Final = 200
-"""Folders that are looked at."""
+"""Folders that are searched at most."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,9 +40,9 @@ class FoundMesh:
 
     Attributes:
         name: as the URDF has it.
-        path: of its file, without links; None if it is not given out.
+        path: of its file, without links; None if it is not served.
         form: of its file, by its ending.
-        problem: why it is not given out; None if it is.
+        problem: why it is not served; None if it is.
     """
 
     name: str
@@ -52,20 +52,20 @@ class FoundMesh:
 
 
 def urdf_digest(urdf: str) -> str:
-    """What a robot's meshes are asked for by."""
+    """Digest that identifies a robot's meshes."""
     text = urdf.replace("\r\n", "\n").replace("\r", "\n")
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 class MeshLibrary:
-    """Meshes of the robots in some folders. Whoever asks never names a file.
+    """Meshes of the robots in some folders. Clients never name a file.
 
-    Only files that a robot's own URDF names are found, with an ending of a mesh, in the robot's
-    folder or in that of the package that it names, wherever links may lead.
+    Only files that a robot's own URDF names are served, with a mesh's extension, in the robot's
+    folder or in that of the package that it names, with links resolved.
     """
 
     def __init__(self, folders: Sequence[Path]) -> None:
-        """Remember the folders; they are read when something is asked."""
+        """Store the folders; they are read on each request."""
         self._folders = tuple(folders)
 
     def of(self, digest: str) -> tuple[FoundMesh, ...]:
@@ -154,7 +154,7 @@ class MeshCopies:
 
 
 def copy_meshes(urdf: str, folder: Path, output: Path, packages: Sequence[Path] = ()) -> MeshCopies:
-    """Copy the meshes that a URDF names to where they are found beside its copy.
+    """Copy the meshes that a URDF names to a place next to its copy.
 
     No simulation needs them: one that is missing, no mesh or too large is left out.
     """
@@ -206,10 +206,10 @@ def _content(path: Path) -> bytes | str:
 _VARIABLE: Final = "ROS_PACKAGE_PATH"
 
 _PACKAGES: Final = ("package", "model")
-"""Schemes of names that begin with a package's."""
+"""URL schemes whose path begins with a package."""
 
 _LEAST_IN_PACKAGE: Final = 2
-"""Parts of a path that one `..` does not lead out of its package."""
+"""Parts of a path from which `..` cannot leave its package."""
 
 
 def mesh_names(urdf: str) -> list[str]:
@@ -223,8 +223,8 @@ def find_mesh(name: str, folder: Path, packages: Sequence[Path] = ()) -> Path | 
     """Look for a mesh.
 
     `package://NAME/PATH` is looked for in folders of that name: the URDF's own and those above it,
-    those given, those of ROS_PACKAGE_PATH, and what lies in any of them. Another path is relative
-    to the URDF's folder. What is found nowhere may be a copy at its `own_place`.
+    those given, those of ROS_PACKAGE_PATH, and their subfolders. Another path is relative
+    to the URDF's folder. A mesh found nowhere else may be a copy at its `own_place`.
     """
     scheme, _, rest = name.partition("://")
     if scheme == "file":
@@ -236,7 +236,7 @@ def find_mesh(name: str, folder: Path, packages: Sequence[Path] = ()) -> Path | 
 def mesh_places(
     name: str, folder: Path, packages: Sequence[Path] = ()
 ) -> Iterator[tuple[Path, Path]]:
-    """Where `find_mesh` looks for a mesh that is beside the URDF or in a package."""
+    """Places where `find_mesh` looks for a mesh next to the URDF or in a package."""
     scheme, separator, rest = name.partition("://")
     if not separator:
         yield folder, folder / name
@@ -248,7 +248,7 @@ def mesh_places(
 
 
 def own_place(name: str) -> Path | None:
-    """Where a mesh lies in the folder of a robot that needs nothing outside of it."""
+    """Path of a mesh in the folder of a self-contained robot."""
     scheme, separator, rest = name.partition("://")
     path = PurePosixPath(rest if separator else name)
     if path.is_absolute() or (separator and scheme not in _PACKAGES):
@@ -265,7 +265,7 @@ def own_place(name: str) -> Path | None:
 
 
 def _in_packages(rest: str, folder: Path, packages: Sequence[Path]) -> Iterator[tuple[Path, Path]]:
-    """Places of what `package://` is before, as `mesh_places` has them."""
+    """Places of the rest of a `package://` URL, as in `mesh_places`."""
     package, _, path = rest.partition("/")
     if package in ("", ".", ".."):
         return

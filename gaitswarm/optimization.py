@@ -1,4 +1,4 @@
-"""`gaitswarm.optimize`: one job, run here and now."""
+"""`gaitswarm.optimize`: one job, run in this process."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class OptimizationResult:
-    """A job that has succeeded, and what it found.
+    """A job that has succeeded, and its results.
 
     Attributes:
         job: The job: spec, state, rates.
@@ -42,10 +42,10 @@ class OptimizationResult:
     def best(self) -> BestView:
         """The design of least fitness in double precision, with its result in every scenario.
 
-        Raises NotFound if no design has walked in every scenario.
+        Raises NotFound if no design has succeeded in every scenario.
         """
         if self.job.best is None:
-            raise NotFound(f"job {self.job.id} has no design that walks in every scenario")
+            raise NotFound(f"job {self.job.id} has no design that succeeds in every scenario")
         return self.job.best
 
     def convergence(self) -> Table:
@@ -63,14 +63,14 @@ class OptimizationResult:
         return Table(columns)
 
     def evaluations(self) -> EvaluationTable:
-        """Every evaluation of the job, read from the database.
+        """All evaluations of the job, read from the database.
 
         Returns:
             One row an evaluation: design, fitness, and status, utility and objectives by scenario.
 
         Raises:
-            StoreUnavailable: The database cannot be opened any more.
-            NotFound: Its file is gone.
+            StoreUnavailable: The database can no longer be opened.
+            NotFound: Its file no longer exists.
         """
         with open_database(self.db, create=False) as jobs:
             return jobs.evaluations(self.job.id)
@@ -101,24 +101,24 @@ def optimize(
     on_iteration: Callable[[IterationView], None] | None = None,
     **options: Unpack[SpecOptions],
 ) -> OptimizationResult:
-    """Run a job here and now, without a server; every iteration is stored before the next begins.
+    """Run a job in this process; every iteration is stored before the next begins.
 
-    Ctrl-C, an exception of `on_iteration`, or the death of the process leave a job that is gone on
-    with by `optimize(resume=...)`, to the same bits as if it had never stopped.
+    Ctrl-C, an exception in `on_iteration`, or the death of the process leave a job that
+    `optimize(resume=...)` continues to the same bits as if it had never stopped.
 
     Args:
-        spec: What to do, as `JobSpec`, `IdentificationSpec`, or a document as in docs/api.md; None
+        spec: A `JobSpec`, `IdentificationSpec`, or a document as in docs/api.md; None
             for the defaults, those of the thesis's chapter 4.
-        resume: Identifier of an earlier job, to go on with that one. A spec or options that are
+        resume: Identifier of an earlier job to resume. A spec or options that are
             given as well must be the job's own.
-        accept_changes: Whether a resumed job goes on although what its numbers depend on (code,
-            robot, compiler) has changed, which is then recorded with it.
+        accept_changes: Whether to continue a job although its provenance (code,
+            robot, compiler) has changed; the change is recorded with it.
         db: Database to keep the job in: a file, or a URL as for `gaitswarm.open`. None: that of
             the environment (GAITSWARM_DB), else the user's own.
         evaluator: "in-process": threads of this process; "ray": the same, and Ray in long jobs
-            or at `ray_address`; or an evaluator that is open already and stays so.
-        cpus: Walks to compute at once on this machine; default all processors.
-        ray_address: A Ray cluster that runs already, for all walks.
+            or at `ray_address`; or an open evaluator, which stays open.
+        cpus: Simulations to run at once on this machine; default all processors.
+        ray_address: A running Ray cluster, for all simulations.
         on_iteration: Called after each iteration is committed, for progress.
         **options: Fields laid over the spec, see `SpecOptions`: name, robot, controller,
             scenarios, variables, fixed, preference, optimizer, particles, iterations, seed, start,
@@ -128,18 +128,18 @@ def optimize(
         The finished job with its best design and history.
 
     Raises:
-        InvalidRequest: The job makes no sense or cannot be simulated; names the field. Nothing is
+        InvalidRequest: The job is invalid or cannot be simulated; names the field. Nothing is
             stored then.
-        NotFound: There is no job to resume.
-        Conflict: The job to resume is another than asked for, or was cancelled.
-        ProvenanceChanged: What the numbers of the job to resume depend on has changed, and that is
+        NotFound: The job to resume does not exist.
+        Conflict: The job to resume has another spec, or was cancelled.
+        ProvenanceChanged: The provenance of the job to resume has changed, which is
             not accepted.
-        JobEnded: The job failed, or was paused or cancelled by somebody else.
-        Interrupted: Ctrl-C; a KeyboardInterrupt that says how to go on.
+        JobEnded: The job failed, or was paused or cancelled by another client.
+        Interrupted: Ctrl-C; a KeyboardInterrupt that says how to resume.
         Unavailable: The database or the workers cannot be used.
     """
     if accept_changes and resume is None:
-        raise InvalidRequest("a new job has nothing to go on from", field="accept_changes")
+        raise InvalidRequest("a new job has no changes to accept", field="accept_changes")
     asked = None
     if resume is None or spec is not None or options:
         asked = _checked(chosen_spec(spec, options))
@@ -170,7 +170,7 @@ def optimizers() -> list[OptimizerView]:
 
 
 def _checked(spec: AnySpec) -> AnySpec:
-    """The spec, if it can be simulated: before a database is made for it."""
+    """Check that a spec can be simulated, before a database is made for it."""
     with simulation_errors("spec"):
         spec.check_can_be_simulated()
     return spec

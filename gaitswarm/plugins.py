@@ -1,4 +1,4 @@
-"""What packages write controllers, cases and search methods with (docs/plugins.md)."""
+"""Building blocks of plug-ins: controllers, cases and search methods (docs/plugins.md)."""
 
 from __future__ import annotations
 

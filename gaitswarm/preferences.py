@@ -1,4 +1,4 @@
-"""`gaitswarm.robust_preferences`: a preference whose winner is robust, by walks in this process."""
+"""`gaitswarm.robust_preferences`: the preference whose winner is the most robust."""
 
 from __future__ import annotations
 
@@ -30,28 +30,28 @@ def robust_preferences(
 ) -> RobustPreferencesView:
     """Find the preference whose winner among a job's designs is the most robust.
 
-    The designs are ranked anew under A, B and C (table 4.5) and under preferences that are drawn at
-    random; of the winners, the robustness index (thesis 4.4.3) is estimated by walks here. Only
-    designs that the job has tried can win. `Jobs.preferences` lets them walk where the jobs are.
+    The designs are ranked under A, B and C (table 4.5) and under preferences that are drawn at
+    random; the robustness index (thesis 4.4.3) of the winners is estimated by simulation. Only
+    designs of the job can win. `Jobs.preferences` simulates them where the jobs are.
 
     Args:
-        jobs: Where the job is.
+        jobs: Database or server of the job.
         job_id: Identifier of a job that tunes a drive.
         drawn: How many preferences to draw.
-        candidates: Winners to let walk: those of A, B and C, and of the others those that win under
+        candidates: Winners to simulate: those of A, B and C, and of the others those that win under
             most preferences.
-        samples: Designs that walk beside each; 0 for no walk and no index.
+        samples: Designs to simulate around each; 0 for no simulation and no index.
         radius: How far they are from it at most, as a share of each variable's bounds.
         seed: Of preferences and samples.
         precision: Of the physics' numbers.
-        progress: Called with how many of how many walks are done.
+        progress: Called with the number of simulations done and their total.
 
     Returns:
-        The candidates, the most robust first, with what they lose under the job's own preference.
+        The candidates, the most robust first, with their loss under the job's own preference.
 
     Raises:
-        InvalidRequest: The job tunes no drive, or an argument makes no sense; names it.
-        Conflict: No design of the job walks in all scenarios.
+        InvalidRequest: The job tunes no drive, or an argument is invalid; names it.
+        Conflict: No design of the job succeeds in all scenarios.
     """
     request = arguments.preferences(
         drawn=drawn,

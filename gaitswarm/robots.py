@@ -325,7 +325,7 @@ def check_name(name: str) -> None:
 
 
 def own_name(urdf: str) -> str | None:
-    """Name that a URDF gives its robot."""
+    """Name of the robot in a URDF."""
     try:
         check_urdf(urdf)
     except RobotFileError:
@@ -347,7 +347,7 @@ def frame_of(up: Axis | None, forward: Axis | None) -> Frame:
 
 
 def _bounds(name: str, folder: Path, packages: Sequence[Path]) -> NDArray[np.float64] | None:
-    """Of a mesh that is found and not too large."""
+    """Bounds of a mesh that is found and not too large."""
     path = find_mesh(name, folder, packages)
     if path is None or path.suffix.lower() not in FORMS or path.stat().st_size > LARGEST_MESH:
         return None
@@ -356,7 +356,9 @@ def _bounds(name: str, folder: Path, packages: Sequence[Path]) -> NDArray[np.flo
 
 def _check_free(folder: Path) -> None:
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise InvalidRequest(f"{folder} is there and not empty; name another", field="output")
+        raise InvalidRequest(
+            f"{folder} exists and is not empty; name another folder", field="output"
+        )
 
 
 def _write(
@@ -365,7 +367,7 @@ def _write(
     source: Path | None,
     packages: Sequence[str | os.PathLike[str]],
 ) -> MeshCopies:
-    """With the meshes that are found from a source folder, if there is one."""
+    """Write a robot's folder, with the meshes of a source folder if there is one."""
     copies = MeshCopies()
     job = json.dumps(proposal.job, indent=2) + "\n"
     texts = {"robot.toml": proposal.toml, "robot.urdf": proposal.urdf, JOB_FILE: job}
@@ -390,7 +392,7 @@ def _write(
 
 
 class RobotDraftRequest(BaseModel):
-    """A URDF, of which a robot is to be made."""
+    """A URDF to make a robot from."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 

@@ -1,4 +1,4 @@
-"""Settings of every process of gaitswarm, from its environment."""
+"""Settings from environment variables, and places of designs as text."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from gaitswarm.sim.input import message_of
 
 
 def place_of(iteration: int, particle: int) -> str:
-    """The place of a design as texts have it."""
+    """Format the place of a design, such as 24.7."""
     return f"{iteration}.{particle}"
 
 
 def read_place(text: str, *, field: str) -> tuple[int, int]:
-    """Read what `place_of` wrote."""
+    """Parse the result of `place_of`."""
     found = re.fullmatch(r"(\d{1,9})\.(\d{1,9})", text, re.ASCII)
     if found is None:
         raise InvalidRequest(
@@ -44,7 +44,7 @@ def _network(text: str) -> str:
 
 
 def _paths(value: object) -> object:
-    """Of a list as PATH is one."""
+    """Split a list with colons."""
     return [part for part in value.split(os.pathsep) if part] if isinstance(value, str) else value
 
 
@@ -52,15 +52,15 @@ Network = Annotated[str, AfterValidator(_network)]
 
 
 def _parts(value: object) -> object:
-    """Of a list with commas, as an environment has it."""
+    """Split a list with commas."""
     return [part.strip() for part in value.split(",")] if isinstance(value, str) else value
 
 
 class Settings(BaseSettings):
-    """What a process reads when it starts; each variable is a field's name after `GAITSWARM_`.
+    """Settings of a process; each variable is a field's name after `GAITSWARM_`.
 
-    Whatever belongs to a job is in its spec instead. An empty variable counts as one that is not
-    set. Use `read_settings`, whose errors are for people.
+    Options of a job are in its spec instead. An empty variable counts as unset.
+    Use `read_settings`, whose errors name the variable.
     """
 
     model_config = SettingsConfigDict(
@@ -68,17 +68,17 @@ class Settings(BaseSettings):
     )
 
     server: str | None = Field(
-        default=None, description="URL of a server that commands about jobs are sent to."
+        default=None, description="URL of the server that commands about jobs use."
     )
     token: str | None = Field(
         default=None,
-        description="Token that is sent to the server, where it asks for one: to that of"
+        description="Token sent to the server if it requires one: to that of"
         " GAITSWARM_SERVER if it is set, and to no other.",
         repr=False,
     )
     token_over_http: bool = Field(
         default=False,
-        description="Whether a token may leave this machine over plain HTTP, where anybody on the"
+        description="Whether a token may leave this machine over plain HTTP, where others on the"
         " way can read it.",
     )
     db: str | None = Field(
@@ -90,53 +90,55 @@ class Settings(BaseSettings):
     )
     evaluator: EvaluatorKind = Field(
         default="ray",
-        description="Where walks run: `in-process` is threads of the process throughout.",
+        description="Where simulations run: `in-process` uses threads only.",
     )
     ray_address: str | None = Field(
         default=None,
-        description="Ray cluster for all walks: HOST:PORT of its head, of which the machine becomes"
-        " a node, or `auto` on a node. Without one, walks run in threads of the process, and long"
+        description="Ray cluster for all simulations: HOST:PORT of its head, which this machine"
+        " joins, or `auto` on a node. Without one, simulations run in threads, and long"
         " jobs on a Ray that it starts.",
     )
     cpus: int | None = Field(
-        default=None, ge=1, description="Walks to compute at once on this machine; default all."
+        default=None,
+        ge=1,
+        description="Simulations to run at once on this machine; default all processors.",
     )
     cache: bool = Field(
         default=True,
-        description="Whether a design is walked only if no job of the database has walked it"
+        description="Whether to reuse results of designs that a job of the database has simulated"
         " before.",
     )
     kernel_cache_bytes: int = Field(
         default=DEFAULT_SIZE,
         ge=0,
-        description="What compiled kernels may take together [B].",
+        description="Memory limit of compiled kernels together [B].",
     )
-    concurrent_jobs: int = Field(default=2, ge=1, le=256, description="Jobs to run at once.")
+    concurrent_jobs: int = Field(default=2, ge=1, le=256, description="Jobs that run at once.")
     lease_seconds: float = Field(
         default=30.0,
         ge=3.0,
         le=LONGEST_LEASE_SECONDS,
-        description="After so long without a word from its process a job is taken over [s].",
+        description="Time without a heartbeat after which another process takes a job over [s].",
     )
     quarantine_after: int = Field(
         default=QUARANTINE_AFTER,
         ge=1,
         le=1000,
-        description="A job with which so many runner processes in a row went down fails.",
+        description="Runner processes in a row that may die with a job before it fails.",
     )
     robots: Annotated[tuple[Path, ...], NoDecode, BeforeValidator(_paths)] = Field(
         default=(),
-        description="Folders of robots, or of such folders, with `:` between, whose meshes a server"
-        " gives out to whoever may read its jobs.",
+        description="Folders of robots, or of such folders, separated by `:`, whose meshes a server"
+        " serves to clients that may read its jobs.",
     )
     webhook_hosts: Annotated[tuple[HostName, ...], NoDecode, BeforeValidator(_parts)] = Field(
         default=(),
-        description="Hosts, each with or without port and with commas between, that may be told of"
-        " ended jobs; none: nobody is.",
+        description="Hosts, with or without port and separated by commas, that may be notified of"
+        " ended jobs; none: no notifications.",
     )
     webhook_secret: str | None = Field(
         default=None,
-        description="Signs what the hosts of GAITSWARM_WEBHOOK_HOSTS are told; any text, or"
+        description="Secret that signs notifications to GAITSWARM_WEBHOOK_HOSTS; any text, or"
         " `whsec_` and base64.",
         repr=False,
     )
@@ -144,19 +146,19 @@ class Settings(BaseSettings):
         default=60.0,
         ge=0.0,
         le=86_400.0,
-        description="How long iterations under way may take yet when a process is told to end [s].",
+        description="Time that running iterations have to finish on shutdown [s].",
     )
     retention_days: float | None = Field(
         default=None,
         gt=0.0,
         le=100_000.0,
-        description="Jobs that ended longer ago are deleted by `serve` [d]; default: none is.",
+        description="Age at which `serve` deletes ended jobs [d]; default: never.",
     )
     audit_days: float | None = Field(
         default=None,
         gt=0.0,
         le=100_000.0,
-        description="Older entries of the audit log are removed by `serve` [d]; default: none is.",
+        description="Age at which `serve` removes entries of the audit log [d]; default: never.",
     )
     log_level: LogLevel = Field(default="INFO", description="Least severe message that is logged.")
     log_format: Literal["console", "json"] = Field(
@@ -167,16 +169,16 @@ class Settings(BaseSettings):
         default=None,
         ge=0,
         le=65535,
-        description="Port on which `runner` serves metrics and /healthz; 0 takes a free one, which"
-        " the log names; none: it does not.",
+        description="Port on which `runner` serves metrics and /healthz; 0 chooses a free one, that"
+        " the log names; none: not served.",
     )
     metrics_host: str = Field(
         default="127.0.0.1",
-        description="Address of the port of metrics; beyond the machine itself, they need a token.",
+        description="Address of the metrics port; other than on loopback, metrics need a token.",
     )
     api_host: str = Field(default="127.0.0.1", description="Address to listen on.")
     api_port: int = Field(
-        default=8000, ge=0, le=65535, description="Port to listen on; 0 takes a free one."
+        default=8000, ge=0, le=65535, description="Port to listen on; 0 chooses a free one."
     )
     api_access: Literal["auto", "token"] = Field(
         default="auto",
@@ -185,13 +187,11 @@ class Settings(BaseSettings):
     )
     api_allowed_hosts: Annotated[tuple[HostName, ...], NoDecode, BeforeValidator(_parts)] = Field(
         default=(),
-        description="Names, each with or without port and with commas between, that the server, or"
-        " a runner's port of metrics, is reached by beside its addresses, `localhost`, its host and"
+        description="Host names, with or without port and separated by commas, of the server, or"
+        " a runner's metrics port, besides its addresses, `localhost`, its host and"
         " the machine's name.",
     )
-    api_max_body_bytes: int = Field(
-        default=1 << 20, ge=1, description="Largest request body that is read [B]."
-    )
+    api_max_body_bytes: int = Field(default=1 << 20, ge=1, description="Largest request body [B].")
     api_max_log_bytes: int = Field(
         default=1 << 24,
         ge=1,
@@ -223,21 +223,23 @@ class Settings(BaseSettings):
         " beyond it.",
     )
     api_max_simulated_seconds: float = Field(
-        default=300.0, gt=0.0, description="Longest walk of one request, all scenarios added [s]."
+        default=300.0,
+        gt=0.0,
+        description="Longest simulated time of one request, all scenarios added [s].",
     )
     api_max_logged_seconds: float = Field(
-        default=40.0, gt=0.0, description="Longest walk of a request that asks for logs [s]."
+        default=40.0, gt=0.0, description="Longest simulated time of a request with logs [s]."
     )
     api_max_sampled_seconds: float = Field(
         default=10_000.0,
         gt=0.0,
-        description="Longest walk of a request that walks a sample of designs, all designs added"
+        description="Longest simulated time of a request for a sample of designs, all designs added"
         " [s].",
     )
     api_max_job_seconds: float = Field(
         default=1e10,
         gt=0.0,
-        description="Longest job that is taken, all walks of all designs added [s]: by default"
+        description="Longest job that is accepted, in simulated time of all designs [s]: by default"
         " three months of one core at 1200 x real time.",
     )
     api_max_unfinished_jobs: int = Field(
@@ -249,42 +251,45 @@ class Settings(BaseSettings):
     api_max_unfinished_seconds: float = Field(
         default=1e11,
         gt=0.0,
-        description="Simulated time that unfinished jobs of one owner may come to, all walks of all"
+        description="Simulated time of the unfinished jobs of one owner, over all"
         " designs added [s].",
     )
     api_max_connections: int = Field(
         default=1000, ge=1, description="Connections and requests in progress; more get 503."
     )
     api_idle_seconds: int = Field(
-        default=15, ge=1, description="How long a connection stays open between requests [s]."
+        default=15, ge=1, description="Idle time after which a connection is closed [s]."
     )
     api_trusted_proxies: Annotated[tuple[Network, ...], NoDecode, BeforeValidator(_parts)] = Field(
         default=("127.0.0.1", "::1"),
-        description="Addresses or networks, with commas between, of proxies whose word is taken for"
-        " who asks and by which scheme.",
+        description="Addresses or networks, separated by commas, of proxies trusted to state"
+        " the client's address and scheme.",
     )
     api_shutdown_seconds: int = Field(
-        default=5, ge=1, le=600, description="How long open requests may finish on shutdown [s]."
+        default=5,
+        ge=1,
+        le=600,
+        description="Time that open requests have to finish on shutdown [s].",
     )
 
     @property
     def tokens_required(self) -> bool:
-        """Whether the server answers only those who send a token."""
+        """Whether the server requires tokens."""
         return self.api_access == "token" or not is_loopback(self.api_host)
 
     @property
     def metrics_need_token(self) -> bool:
-        """Whether a runner's metrics are only for those who send a token."""
+        """Whether a runner's metrics require a token."""
         return self.api_access == "token" or not is_loopback(self.metrics_host)
 
     @property
     def database(self) -> str:
-        """URL of the database of the jobs; the user's own unless another is named."""
+        """URL of the database; by default the user's own."""
         return self.db or str(default_database())
 
 
 def read_settings(**options: Any) -> Settings:
-    """The environment's settings with a command's options laid over them."""
+    """Read settings from the environment, overridden by options of a command."""
     given = {name: value for name, value in options.items() if value is not None}
     try:
         return Settings(**given)
@@ -299,18 +304,18 @@ def read_settings(**options: Any) -> Settings:
 
 
 def default_database() -> Path:
-    """The user's own database, the same for every process; its directory may not exist yet."""
+    """Path of the user's own database; its directory may not exist yet."""
     base = os.environ.get("XDG_DATA_HOME") or "~/.local/share"
     try:
         return Path(base).expanduser() / "gaitswarm" / "gaitswarm.db"
     except RuntimeError as error:
         raise StoreUnavailable(
-            "there is no home directory to keep a database in; name one with --db or GAITSWARM_DB"
+            "no home directory for a database; name one with --db or GAITSWARM_DB"
         ) from error
 
 
 def is_loopback(host: str) -> bool:
-    """Whether a host is this machine and nothing else."""
+    """Whether a host is a loopback address."""
     if host == "localhost":
         return True
     try:
@@ -320,5 +325,5 @@ def is_loopback(host: str) -> bool:
 
 
 def _source(field: str, given: dict[str, Any]) -> str:
-    """Where the user has set a field: an option of the command, or a variable."""
+    """Name of the option or variable that sets a field."""
     return field.removeprefix("api_") if field in given else f"GAITSWARM_{field.upper()}"

@@ -1,4 +1,4 @@
-"""`gaitswarm.simulate` and `robustness`: designs walking here and now, outside any job."""
+"""`gaitswarm.simulate` and `robustness`: simulations outside any job."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ ALL_SCENARIOS: Final = tuple(scenario.name for scenario in SCENARIOS)
 
 
 class Columns(Protocol):
-    """What has a column for every variable: a mapping of arrays, a data frame, a `Table`."""
+    """Columns by variable: a mapping of arrays, a data frame, a `Table`."""
 
     def keys(self) -> Iterable[str]:
         """Names of the columns."""
@@ -70,9 +70,9 @@ def simulate(
     backend: Backend = "auto",
     cpus: int | None = None,
 ) -> SimulationResult:
-    """Let one design or many walk, and say what they are worth.
+    """Simulate one design or many.
 
-    A walk that falls, diverges or leaves the legs' reach is a result with a status, not an error.
+    A design that falls, diverges or leaves the legs' reach has a status; it is not an error.
 
     Args:
         designs: Value of each of the controller's variables, and of any gait variable, which then
@@ -87,18 +87,18 @@ def simulate(
             `Preference`.
         precision: Of the physics' numbers: "double", or "single", which is about twice as fast and
             needs the compiled kernel.
-        world: What is different from the model, as `values` of a certificate's worlds: numbers by
+        world: Perturbations of the model, as `values` of a certificate's worlds: numbers by
             perturbation, nominal where there is none; None for the model itself.
-        log: Whether to record every walk at 500 Hz.
+        log: Whether to record every simulation at 500 Hz.
         backend: `native` is the compiled kernel, `reference` the CasADi interpreter, `auto` the
             first that works on this machine; `auto` alone in another world than the model's.
-        cpus: Walks to compute at once, for many designs without a log; default all processors.
+        cpus: Threads, for many designs without a log; default all processors.
 
     Returns:
         Statuses, objectives, utilities and fitness of every design.
 
     Raises:
-        InvalidRequest: An argument makes no sense; names it.
+        InvalidRequest: An argument is invalid; names it.
         EvaluatorUnavailable: The compiler does not compile the robot's kernel.
     """
     columns = _columns(designs, controller)
@@ -124,7 +124,7 @@ def simulate(
             f"{backend!r} is none of {', '.join(get_args(Backend))}", field="backend"
         )
     if request.world and backend != "auto":
-        raise InvalidRequest("walks of a world choose it themselves; leave it out", field="backend")
+        raise InvalidRequest("perturbed worlds choose it themselves; leave it out", field="backend")
     if cpus is not None and cpus < 1:
         raise InvalidRequest("must be at least 1", field="cpus")
     with simulation_errors("designs"):
@@ -148,15 +148,15 @@ def robustness(
     Args:
         design: Value of each of the controller's variables, and of any gait variable, in the
             variables' units.
-        cpus: Walks to compute at once; default all processors.
-        progress: Called now and then with how many of how many walks are done.
-        **options: Walks and sample, see `RobustnessOptions`.
+        cpus: Threads; default all processors.
+        progress: Called with the number of simulations done and their total.
+        **options: Scenarios and sample, see `RobustnessOptions`.
 
     Returns:
         The index with its interval, by scenario, objective and variable.
 
     Raises:
-        InvalidRequest: An argument makes no sense; names it.
+        InvalidRequest: An argument is invalid; names it.
         EvaluatorUnavailable: The compiler does not compile the robot's kernel.
     """
     request = design_arguments.robustness(design, options)
@@ -165,7 +165,7 @@ def robustness(
 
 
 def simulate_request(request: SimulationRequest) -> SimulationResult:
-    """Let one design walk, as a server does."""
+    """Simulate one design, as a server does."""
     request.check_walks()
     design = np.array([tuple(request.numbers.values())], dtype=np.float64)
     with simulation_errors("design"):
@@ -173,7 +173,7 @@ def simulate_request(request: SimulationRequest) -> SimulationResult:
 
 
 def _columns(designs: DesignInput, controller: ControllerName) -> dict[str, Floats]:
-    """(n,) values by variable. Raises InvalidRequest."""
+    """(n,) values by variable."""
     try:
         found = _indexed(_by_variable(designs), controller)
         arrays = [np.atleast_1d(np.asarray(values, np.float64)) for values in found.values()]
@@ -185,14 +185,14 @@ def _columns(designs: DesignInput, controller: ControllerName) -> dict[str, Floa
             field="designs",
         ) from error
     if not columns or not columns[0].size:
-        raise InvalidRequest("there is no design", field="designs")
+        raise InvalidRequest("must have at least one design", field="designs")
     if columns[0].ndim > 1:
         raise InvalidRequest("values of a variable must have one axis", field="designs")
     return dict(zip(found, columns, strict=True))
 
 
 def _indexed(columns: dict[str, ArrayLike], controller: ControllerName) -> dict[str, ArrayLike]:
-    """Indices in place of names of choices. Raises ValueError."""
+    """Replace names of choices by their indices."""
     known = design_catalogue(controller) if controller in CONTROLLERS else {}
     found = dict(columns)
     for name, values in columns.items():
@@ -218,7 +218,7 @@ def _simulated(
     backend: Backend,
     cpus: int | None,
 ) -> SimulationResult:
-    """request: of the first design."""
+    """Simulate all designs; `request` is that of the first."""
     scenarios = request.resolved_scenarios()
     logs: dict[str, tuple[WalkLog | None, ...]] = {}
     if len(designs) == 1 or request.log or backend != "auto":
@@ -260,7 +260,7 @@ def _walked(
     designs: Floats,
     backend: Backend,
 ) -> Simulation:
-    """All designs in one scenario, computed by this thread."""
+    """Simulate all designs in one scenario in this thread."""
     if request.world:
         return _in_world(request, scenario, variables).simulate(designs, log=request.log)
     return simulate_walk(
@@ -296,7 +296,7 @@ def _in_parallel(
     designs: Floats,
     cpus: int | None,
 ) -> Sequence[Outcome]:
-    """Objectives and measurements for every scenario, computed by threads of this process."""
+    """Objectives and measurements for every scenario, computed in threads."""
     cases: tuple[Case, ...]
     if request.world:
         cases = tuple(_in_world(request, scenario, variables) for scenario in scenarios)

@@ -1,4 +1,4 @@
-"""What designs are worth that walked outside any job: statuses and objectives as arrays."""
+"""Results of simulations outside any job, as arrays."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScenarioResult:
-    """How n designs did in one scenario.
+    """Results of n designs in one scenario.
 
     Attributes:
-        statuses: How each walk ended; everything but `Status.OK` is a failed walk.
+        statuses: How each simulation ended; everything but `Status.OK` is a failure.
         objectives: (n,) raw objectives by name, to be minimized, NaN where there is none;
             `gaitswarm.OBJECTIVES` has their units.
-        measurements: (n,) what the walks tell beside their objectives, by name, NaN where a walk
+        measurements: (n,) further quantities by name, NaN where a simulation
             ended early; `gaitswarm.MEASUREMENTS` has their units.
         utility: (n,) bias-weighted product (eq. 3.8, 4.1), to be minimized; NaN where the
-            walk failed.
-        logs: Every walk's log at 500 Hz, None for a gait out of reach; empty unless asked for.
+            simulation failed.
+        logs: Logs at 500 Hz, None for a gait out of reach; empty unless requested.
     """
 
     statuses: tuple[Status, ...]
@@ -48,26 +48,26 @@ class ScenarioResult:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SimulationResult:
-    """What n designs are worth in K scenarios; `result["normal-fast"]` is one scenario's part.
+    """Results of n designs in K scenarios; `result["normal-fast"]` is one scenario's part.
 
     Attributes:
-        robot: Robot that walked.
-        controller: Controller that drove it.
+        robot: The robot.
+        controller: The controller.
         preference: By which utilities and fitness were computed.
         precision: Of the physics' numbers.
         variables: Names of the v variables of the designs.
         designs: (n, v) their values, in the variables' units.
         scenarios: Names of the K scenarios.
-        statuses: (n, K) how each walk ended, values of `Status`.
+        statuses: (n, K) values of `Status`.
         objectives: (n, K, 6) raw objectives f1..f6 of table 4.1, to be minimized, in the units of
             `gaitswarm.OBJECTIVES`; NaN where there is none.
         measurements: (n, K, 5) peak and mean current, motor heat, power and speed, in the order and
-            units of `gaitswarm.MEASUREMENTS`; NaN for a walk that ended early.
+            units of `gaitswarm.MEASUREMENTS`; NaN for a simulation that ended early.
         utilities: (n, K) bias-weighted products (eq. 3.8, 4.1), to be minimized; NaN where
-            the walk failed.
+            the simulation failed.
         fitness: (n,) geometric means of the utilities (eq. 4.2), to be minimized; NaN where any
-            walk failed.
-        logs: Every walk's log by scenario, in the order of the designs; empty unless asked for.
+            simulation failed.
+        logs: Logs by scenario, in the order of the designs; empty unless requested.
     """
 
     robot: RobotSource
@@ -86,7 +86,7 @@ class SimulationResult:
 
     @classmethod
     def from_view(cls, view: SimulationView) -> Self:
-        """A server's answer as arrays.
+        """Convert a server's answer to arrays.
 
         Args:
             view: Result of one design.
@@ -124,7 +124,7 @@ class SimulationResult:
     def __getitem__(self, scenario: str) -> ScenarioResult:
         k = self.scenarios.index(scenario) if scenario in self.scenarios else None
         if k is None:
-            raise KeyError(f"{scenario!r}; walked were {', '.join(self.scenarios)}")
+            raise KeyError(f"{scenario!r}; simulated were {', '.join(self.scenarios)}")
         return ScenarioResult(
             statuses=tuple(Status(status) for status in self.statuses[:, k].tolist()),
             objectives=dict(zip(OBJECTIVE_NAMES, self.objectives[:, k].T, strict=True)),
@@ -134,7 +134,7 @@ class SimulationResult:
         )
 
     def table(self) -> Table:
-        """One row for every walk, designs in order and each one's scenarios in order.
+        """One row for every simulation, by design and scenario.
 
         Returns:
             A table with the columns design (index from 0), scenario, status, utility, the

@@ -1,4 +1,4 @@
-"""Jobs, robots and scenarios as a program names them: objects, names, folders, or documents."""
+"""Specs, robots and scenarios from objects, names, folders or documents."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ Document: TypeAlias = Mapping[str, Any]
 """A mapping as read from JSON."""
 
 RobotInput: TypeAlias = str | os.PathLike[str] | RobotVariant | RobotFiles | Document
-"""A shipped robot by name, a variant of one, or one's own by folder or by the text of its files."""
+"""A shipped robot by name, a variant of one, or a custom one by folder or text of its files."""
 
 ScenarioInput: TypeAlias = str | Scenario | Document
-"""A preset by name or number, or one's own."""
+"""A preset by name or number, or a custom scenario."""
 
 PreferenceInput: TypeAlias = PreferenceName | Preference | Document
-"""A, B or C of table 4.5, chapter-3 (eq. 3.1), or one's own."""
+"""A, B or C of table 4.5, chapter-3 (eq. 3.1), or a custom preference."""
 
 StartInput: TypeAlias = str | os.PathLike[str] | Sequence[Document] | EarlierJobs | Document
 """Designs by name; a CSV file of them; or earlier jobs, by their ids separated by commas or as the
@@ -48,15 +48,15 @@ SpecInput: TypeAlias = Spec | Document
 
 
 class SpecOptions(TypedDict, total=False):
-    """What a job is asked to do, by keyword. Each has a default: the job of the thesis's chapter 4.
+    """Fields of a job's spec as keywords; the defaults are the job of the thesis's chapter 4.
 
     Attributes:
         name: Name of the job, for people.
         robot: Robot to simulate: a shipped one by name, a `RobotVariant`, or the folder that holds
-            robot.toml and robot.urdf of another. What its job.json says is what is not given.
+            robot.toml and robot.urdf of another, whose job.json has further defaults.
         controller: Motor controller to tune.
-        scenarios: Walks in which every design is judged; one, or several.
-        variables: What may be searched: names, with the catalogue's bounds, or `Variable` with
+        scenarios: Scenarios in which every design is judged; one, or several.
+        variables: Variables to search: names, with the catalogue's bounds, or `Variable` with
             others. Default: all that the controller has, less `fixed`.
         fixed: Variables held at one value, by name, in their units; a categorical one at a choice's
             name.
@@ -67,15 +67,15 @@ class SpecOptions(TypedDict, total=False):
         particles: Designs of one iteration, at most, in place of `optimizer`'s.
         iterations: Budget, in iterations of `particles` designs each.
         seed: Source of all randomness; the same seed gives the same bits.
-        start: Designs that are judged first, and that the search begins with if its method can:
+        start: Designs to judge first, and to start the search from if its method can:
             values by name, a CSV file, or the ids of earlier jobs, separated by commas, for their
             five best; `{"jobs": [ID, ...], "count": N}` for another number.
-        precision: Of the numbers of the search's physics; what is reported as best is judged in
+        precision: Of the search's physics; the best design is always judged in
             double.
-        case: What evaluates designs in place of walks in gaitswarm's simulator: a plug-in's case by
+        case: Evaluation of designs in place of gaitswarm's simulator: a plug-in's case by
             name, or its settings, `{"name": "mujoco-walk", "rate": 2000}`.
-        worlds: `TuningWorlds`, or a document of it, for a search that judges every design in worlds
-            that differ from the model.
+        worlds: `TuningWorlds`, or a document of it, to judge every design in perturbed worlds.
+
     """
 
     name: str
@@ -96,7 +96,7 @@ class SpecOptions(TypedDict, total=False):
 
 
 class ForkOptions(TypedDict, total=False):
-    """What is to be different of a fork, by keyword; whatever is not given is the parent's.
+    """Fields in which a fork differs from its parent, as keywords.
 
     Attributes:
         name: Name of the job, for people.
@@ -104,12 +104,12 @@ class ForkOptions(TypedDict, total=False):
         optimizer: Search method, as in `SpecOptions`; what it does not set has the method's
             default.
         particles: Designs of one iteration, at most, in place of `optimizer`'s.
-        scenarios: Walks in which every design is judged; one, or several.
+        scenarios: Scenarios in which every design is judged; one, or several.
         robot: Robot to simulate.
         iterations: Budget in all, with the iterations that the fork begins with.
-        start_count: Where the search cannot be taken over: designs to start from, at most; 5.
-        accept_changes: Whether it goes on with the parent's iterations although what its numbers
-            depend on has changed since.
+        start_count: Designs to start from where the search's state cannot be continued; default 5.
+        accept_changes: Whether to continue the parent's iterations although its provenance
+            has changed since.
     """
 
     name: str
@@ -124,7 +124,7 @@ class ForkOptions(TypedDict, total=False):
 
 
 def laid_options(options: SpecOptions | ForkOptions) -> dict[str, Any]:
-    """Options by keyword as a document, with the files of a robot of one's own in it."""
+    """Convert keyword options to a document that includes a custom robot's files."""
     given: dict[str, Any] = dict(options)
     if "robot" in given:
         given["robot"] = robot_source(given["robot"])
@@ -134,7 +134,7 @@ def laid_options(options: SpecOptions | ForkOptions) -> dict[str, Any]:
 
 
 def chosen_spec(spec: SpecInput | None, options: SpecOptions) -> AnySpec:
-    """The spec that is meant by a spec and keywords laid over it."""
+    """Combine a spec with keyword options."""
     if isinstance(spec, Spec) and not options:
         return cast(AnySpec, spec)
     document = dict(spec.model_dump() if isinstance(spec, Spec) else spec or {})
@@ -157,7 +157,7 @@ def chosen_spec(spec: SpecInput | None, options: SpecOptions) -> AnySpec:
 
 
 def _folder_defaults(robot: RobotInput | None, document: Mapping[str, Any]) -> dict[str, Any]:
-    """What the folder of a robot says of jobs that tune a drive; nothing for other robots."""
+    """Defaults from the folder of a robot; none for other robots."""
     if not isinstance(robot, str | os.PathLike) or robot in SHIPPED:
         return {}
     if document.get("kind", "tuning") != "tuning":
@@ -168,14 +168,14 @@ def _folder_defaults(robot: RobotInput | None, document: Mapping[str, Any]) -> d
 def scenario_entries(
     scenarios: ScenarioInput | Iterable[ScenarioInput],
 ) -> tuple[ScenarioInput, ...]:
-    """One scenario or several, as the tuple that specs and requests have."""
+    """Convert one scenario or several to a tuple."""
     if isinstance(scenarios, str | Scenario | Mapping):
         return (scenarios,)
     return tuple(scenarios)
 
 
 def robot_source(robot: RobotInput) -> str | RobotVariant | RobotFiles | dict[str, Any]:
-    """What a spec has under `robot`."""
+    """Convert a robot to the `robot` field of a spec."""
     if isinstance(robot, str | os.PathLike):
         if robot in SHIPPED:
             return str(robot)

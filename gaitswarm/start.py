@@ -1,4 +1,4 @@
-"""Where a search begins: the best designs of earlier jobs, or designs from a CSV file."""
+"""Start designs of a search: from earlier jobs, or from a CSV file."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typing import Any, Final
 from gaitswarm.errors import InvalidRequest
 
 _DESIGN: Final = "design."
-"""What the names of variables begin with in a table of evaluations."""
+"""Prefix of variables in a table of evaluations."""
 
 _FITNESS: Final = "fitness"
 
@@ -32,7 +32,7 @@ class Row:
 
     Attributes:
         line: Where it ends in the file, from 1.
-        fitness: What the file says that it is worth, minimized; None if it says nothing.
+        fitness: Fitness in the file, minimized; None if there is none.
         design: Values by name.
     """
 
@@ -59,7 +59,7 @@ class StartFile:
         return tuple(row.design for row in self.rows)
 
     def located(self, error: InvalidRequest) -> InvalidRequest:
-        """Say where in the file the cause of an error is."""
+        """Add the place in the file to an error."""
         place = _PLACE.fullmatch(error.field)
         if place is None:
             return error
@@ -71,7 +71,7 @@ class StartFile:
 
 
 def start_from(source: str | os.PathLike[str], count: int | None = None) -> StartFile | Document:
-    """What is meant by a file, or by identifiers of jobs."""
+    """Start designs from a file or from identifiers of jobs."""
     if count is not None and count < 1:
         raise InvalidRequest("must be at least 1", field="start_count")
     if Path(source).suffix.lower() == ".csv":
@@ -88,7 +88,7 @@ def start_from(source: str | os.PathLike[str], count: int | None = None) -> Star
 def read_designs(path: Path, count: int | None = None) -> StartFile:
     """Read designs from a CSV file: one row a design, one column a variable.
 
-    A file of `gaitswarm export` will do: of its columns, those that begin with `design.` are the
+    A file of `gaitswarm export` works: its columns that begin with `design.` are the
     variables. Rows without a fitness, where there is such a column, have failed and are left out.
     """
     try:
@@ -97,7 +97,7 @@ def read_designs(path: Path, count: int | None = None) -> StartFile:
     except OSError as error:
         raise InvalidRequest(f"cannot read {path}: {error.strerror}", field="start") from error
     except (csv.Error, UnicodeDecodeError) as error:
-        raise InvalidRequest(f"{path} is no CSV file: {error}", field="start") from error
+        raise InvalidRequest(f"{path} is not a CSV file: {error}", field="start") from error
     rows.sort(key=lambda row: -math.inf if row.fitness is None else row.fitness)
     different: dict[tuple[Any, ...], Row] = {}
     for row in rows:

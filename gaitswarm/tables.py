@@ -36,7 +36,7 @@ Column = NDArray[Any]
 
 
 class Table:
-    """Columns of equal length, by name; as a data frame has them, `len` counts the rows.
+    """Columns of equal length, by name; `len` counts the rows.
 
     Polars, DuckDB and other libraries that know the Arrow PyCapsule interface take a table as it
     is: `polars.DataFrame(table)`.
@@ -75,7 +75,7 @@ class Table:
 
     def to_arrow(self) -> pa.Table:
         """The table as `pyarrow.Table`; NaN becomes null."""
-        # Loaded with the first table: arrow takes longer to import than a short one to write.
+        # Imported here: arrow takes longer to import than a short table to write.
         import pyarrow as pa
 
         return pa.table({name: _arrow(column) for name, column in self._columns.items()})
@@ -87,7 +87,7 @@ class Table:
             ImportError: pandas is not installed; gaitswarm does not need it otherwise.
         """
         try:
-            # By ourselves: whether Arrow would raise this depends on what it has imported before.
+            # Checked here: whether Arrow raises this depends on earlier imports.
             import pandas  # noqa: F401, ICN001
         except ImportError as error:
             raise ImportError(
@@ -117,13 +117,13 @@ class EvaluationTable(Table):
 
     @classmethod
     def from_pieces(cls, spec: Spec, pieces: Iterable[EvaluationColumns]) -> Self:
-        """A table of evaluations as the service reads them.
+        """Make a table of pieces of evaluations.
 
         Args:
             spec: Spec of their job.
             pieces: The evaluations by pieces, in order.
         """
-        # Without any piece the columns are there all the same.
+        # Without any piece the columns still exist.
         found = [_flat(spec, _no_rows(spec)), *(_flat(spec, piece) for piece in pieces)]
         return cls({name: np.concatenate([f[name] for f in found]) for name in found[0]}, spec)
 
@@ -170,12 +170,12 @@ class EvaluationTable(Table):
 
     @property
     def utilities(self) -> Floats:
-        """(r, K) what each design is worth in each case, to be minimized; NaN where it failed."""
+        """(r, K) utilities, to be minimized; NaN where a design failed."""
         return self._stacked([f"{case}.utility" for case in self.cases])
 
     @property
     def statuses(self) -> NDArray[np.str_]:
-        """(r, K) how each case ended: `ok`, or in which way it failed."""
+        """(r, K) statuses: `ok`, or the kind of failure."""
         return np.stack([self[f"{case}.status"] for case in self.cases], axis=1)
 
     def _numbers(self, variable: Variable) -> Floats:
@@ -191,7 +191,7 @@ class EvaluationTable(Table):
 def encoded_table(
     file_format: TableFormat, spec: Spec, pieces: Iterable[EvaluationColumns]
 ) -> Iterator[bytes]:
-    """Evaluations of a job as a file, written as they are read."""
+    """Encode evaluations of a job as a file, piece by piece."""
     import pyarrow as pa
 
     def batch(piece: EvaluationColumns) -> pa.RecordBatch:
@@ -204,7 +204,7 @@ def encoded_table(
 
 
 def _flat(spec: Spec, rows: EvaluationColumns) -> dict[str, Column]:
-    """The columns of the module's docstring; NaN for what is not finite."""
+    """The columns of the module's docstring; NaN for values that are not finite."""
     columns: dict[str, Column] = {
         "iteration": rows.iteration,
         "particle": rows.particle,
@@ -229,7 +229,7 @@ def _shown(variable: Variable, column: Floats) -> Column:
 
 
 _LABELS: Final = np.array([status.label for status in sorted(Status)])
-"""Text of every status, at its number."""
+"""Labels of statuses, by number."""
 
 
 def _no_rows(spec: Spec) -> EvaluationColumns:
@@ -290,7 +290,7 @@ def _parquet(schema: pa.Schema, batches: Iterable[pa.RecordBatch]) -> Iterator[b
 
 
 class _Sink(io.RawIOBase):
-    """A file that is read while it is written; what has been taken is forgotten."""
+    """A buffer that is read while it is written."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -298,22 +298,22 @@ class _Sink(io.RawIOBase):
         self._length = 0
 
     def writable(self) -> bool:
-        """It is for writing."""
+        """Return True."""
         return True
 
     def tell(self) -> int:
-        """Length of all that was written."""
+        """Return the number of bytes written so far."""
         return self._length
 
     def write(self, data: Any, /) -> int:
-        """Keep a part, bytes or a view of some, until it is taken."""
+        """Append bytes."""
         part = bytes(data)
         self._parts.append(part)
         self._length += len(part)
         return len(part)
 
     def take(self) -> bytes:
-        """What was written since the last time."""
+        """Return and drop what was written since the last call."""
         taken = b"".join(self._parts)
         self._parts.clear()
         return taken

@@ -16,12 +16,12 @@ from typing import Final
 MEDIA_TYPE: Final = "application/zip"
 
 LARGEST_ARCHIVE: Final = 1 << 30
-"""Of an archive that is read [B]."""
+"""Largest archive that is read [B]."""
 
 MOST_MEMBERS: Final = 10_000
 
 _TIME: Final = (1980, 1, 1, 0, 0, 0)
-"""The earliest that a zip archive can tell."""
+"""The earliest date that a zip archive can have."""
 
 _UNIX: Final = 3
 
@@ -29,7 +29,7 @@ _NEW: Final = stat.S_IFREG | 0o644
 
 
 class BadArchive(ValueError):
-    """A file is no such archive, or is damaged; says how."""
+    """A file is not such an archive, or is damaged."""
 
 
 def zipped(members: Mapping[str, bytes]) -> bytes:
@@ -45,7 +45,7 @@ def zipped(members: Mapping[str, bytes]) -> bytes:
 
 
 def unzipped(content: bytes) -> dict[str, bytes]:
-    """Read all members of an archive, after a look at whether that is safe; nothing is written."""
+    """Read all members of an archive after checking that this is safe."""
     if len(content) > LARGEST_ARCHIVE:
         raise BadArchive(f"it is larger than {LARGEST_ARCHIVE >> 30} GiB")
     try:
@@ -64,7 +64,7 @@ def unzipped(content: bytes) -> dict[str, bytes]:
         RuntimeError,
         ValueError,
     ) as error:
-        raise BadArchive(f"it is no whole zip archive: {error}") from error
+        raise BadArchive(f"it is not a complete zip archive: {error}") from error
 
 
 def _check_entries(entries: list[zipfile.ZipInfo], length: int) -> None:
@@ -81,7 +81,7 @@ def _check_entries(entries: list[zipfile.ZipInfo], length: int) -> None:
             raise BadArchive(f"{name[:80]!r} is compressed, which no evidence is")
         if entry.flag_bits & 0x1:
             raise BadArchive(f"{name[:80]!r} is encrypted")
-    # Members that overlap would be read as often as they are named.
+    # Overlapping members would be read several times.
     if sum(entry.file_size for entry in entries) > length:
         raise BadArchive("its members claim to be longer than it is")
 

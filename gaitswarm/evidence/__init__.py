@@ -1,1 +1,1 @@
-"""Evidence: one file that proves a run, written from what is stored and checked without it."""
+"""Evidence: a file that proves a run and can be checked without its database."""

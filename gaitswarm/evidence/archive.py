@@ -1,4 +1,4 @@
-"""The file itself: a zip archive of stored members, with a manifest of their hashes."""
+"""The evidence archive: stored members with a manifest of their hashes."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from gaitswarm.zip_archive import BadArchive, zipped
 FORMAT: Final = "gaitswarm-evidence"
 
 VERSION: Final = 1
-"""Of the layout; a file of another one is refused."""
+"""Version of the layout; other versions are refused."""
 
 MANIFEST: Final = "manifest.json"
 
 LARGEST_TEXT: Final = 64 << 20
-"""Of a member that is a JSON document [B]."""
+"""Largest JSON member [B]."""
 
 
 def archived(members: Mapping[str, bytes]) -> bytes:
@@ -60,8 +60,8 @@ def check_hashes(members: Mapping[str, bytes]) -> list[str]:
 def parsed_json(content: bytes, name: str) -> Any:
     """Read a JSON document as the standard has it: no NaN, no infinities, no endless nesting.
 
-    The parser takes none of Python's stack. The standard library's goes to its end before it
-    refuses deep nesting, and finalizers that run at that moment fail.
+    pydantic's parser does not use Python's stack. The standard library's exhausts it before it
+    refuses deep nesting, and finalizers running at that moment fail.
     """
     if len(content) > LARGEST_TEXT:
         raise BadArchive(f"{name} is larger than {LARGEST_TEXT >> 20} MiB")

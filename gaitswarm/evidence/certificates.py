@@ -1,4 +1,4 @@
-"""Certificates beside a job in its evidence: which belong to it, and what they say."""
+"""Certificates of a job's designs in its evidence."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.views.certificate import CertificateView
 
 FOLDER: Final = "certificates"
-"""Of an archive: a folder in it for each certificate, by its id."""
+"""Folder of an archive with a subfolder for each certificate, named by its id."""
 
 SUMMARY: Final = "certificate.json"
 
@@ -29,16 +29,16 @@ WORST: Final = 20
 """Worst worlds that a summary names."""
 
 _TOLERANCE: Final = 1e-9
-"""Relative, of numbers that libraries of statistics compute."""
+"""Relative tolerance for numbers computed by statistics libraries."""
 
 
 @dataclass(frozen=True, slots=True)
 class Certified:
-    """A certificate of a design that a job tried.
+    """A certificate of one of a job's designs.
 
     Attributes:
         job: The certificate.
-        iteration: Of the job that tried the design.
+        iteration: Iteration of the design in that job.
         particle: The design's place in it.
         of_best: Whether the design is that job's best.
     """
@@ -66,7 +66,7 @@ def certificates_of(
 def certified_at(
     spec: JobSpec, columns: EvaluationColumns, certificate_spec: AnySpec
 ) -> tuple[int, int] | None:
-    """Say which design of a job a certificate is of."""
+    """Find the design of a job that a certificate is of."""
     if not isinstance(certificate_spec, CertificateSpec):
         return None
     space, numbers = spec.design_space(), certificate_spec.numbers
@@ -80,12 +80,12 @@ def certified_at(
 
 
 def how_to_make_one(job_id: str) -> str:
-    """Say how a job comes to have a certificate in its evidence."""
-    return f"`gaitswarm certify {job_id}` makes one, and evidence written after that holds it"
+    """Explain how to add a certificate to a job's evidence."""
+    return f"`gaitswarm certify {job_id}` makes one, and evidence written afterwards includes it"
 
 
 def summary(job_id: str, spec: CertificateSpec, columns: EvaluationColumns) -> CertificateView:
-    """Say what a certificate comes to."""
+    """Summarize a certificate."""
     found = certificate(spec, columns, most=WORST)
     return CertificateView.from_certificate(job_id, spec, found)
 
@@ -120,7 +120,7 @@ def _finished(service: JobService) -> Iterator[Job]:
 
 
 def _differences(here: Any, there: Any, path: str) -> Iterator[str]:
-    """Where two documents of JSON are not the same."""
+    """Yield the paths at which two JSON documents differ."""
     if isinstance(here, dict) and isinstance(there, dict) and here.keys() == there.keys():
         for name in here:
             yield from _differences(here[name], there[name], f"{path}.{name}" if path else name)

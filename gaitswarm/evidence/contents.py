@@ -1,4 +1,4 @@
-"""What is in a file of evidence, made from what is stored of a job."""
+"""Contents of an evidence file."""
 
 from __future__ import annotations
 
@@ -70,15 +70,15 @@ def evidence(service: JobService, job_id: str) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class _Run:
-    """What is stored of one job.
+    """The stored data of one job.
 
     Attributes:
-        files: Members by name, those for people left out.
+        files: Members by name, without the page and figures.
         columns: Evaluations.
-        iterations: At a glance.
+        iterations: Summaries.
         provenance: As `provenance_document` has it.
         best: The best design, with its `place`: iteration and particle.
-        summary: Of a certificate in which a drawn world has walked.
+        summary: Of a certificate with at least one drawn world.
     """
 
     files: Mapping[str, bytes]
@@ -95,11 +95,11 @@ class _Run:
 
 def _run(service: JobService, job: Job) -> _Run:
     spec, columns = job.spec, _committed(service.columns(job), job)
-    anew = None
+    reevaluated = None
     if spec.precision != "double":
-        anew = _reevaluated(service, job, columns)
-    # Not the store's: of a job that is running it may be of an iteration that is not in the file.
-    best = best_of(columns, anew)
+        reevaluated = _reevaluated(service, job, columns)
+    # Not the store's best: a running job's may be in an iteration that is not in the file.
+    best = best_of(columns, reevaluated)
     iterations = list(_iterations(service, job))
     view = None if best is None else BestView.from_evaluation(best, spec)
     provenance = provenance_document(job)
@@ -118,8 +118,8 @@ def _run(service: JobService, job: Job) -> _Run:
     files: dict[str, bytes] = {name: _json(document) for name, document in documents.items()}
     files[EVALUATIONS] = b"".join(encoded_table("parquet", spec, [columns]))
     files[ASKS] = _asks(spec, service.asked_positions(job))
-    if anew is not None:
-        parts = [anew] if len(anew) else []
+    if reevaluated is not None:
+        parts = [reevaluated] if len(reevaluated) else []
         files[REEVALUATIONS] = b"".join(encoded_table("parquet", spec.in_double(), parts))
     for name in spec.recording_ids:
         files[f"recordings/{name}.json"] = service.recording(name).model_dump_json().encode()
@@ -129,7 +129,7 @@ def _run(service: JobService, job: Job) -> _Run:
 
 
 def provenance_document(job: Job) -> dict[str, Any]:
-    """What a job's numbers depend on, and by what this file was written."""
+    """Provenance of a job's numbers and of this file."""
     here = job_provenance(job.spec)
     kernels = [
         kernel_identity(load_robot(robot), job.spec.precision).hex() for robot in job.spec.described
@@ -142,7 +142,7 @@ def provenance_document(job: Job) -> dict[str, Any]:
 
 
 def chain_document(service: JobService, job: Job) -> dict[str, Any]:
-    """What the chain of a job's history depends on beside its tables, as it is stored."""
+    """Stored documents that the chain of a job's history covers besides its tables."""
     stored = service.store.chain_documents(job.id)
     links = [link for piece in _links(service, job) for link in piece]
     return {
@@ -162,15 +162,15 @@ def _links(service: JobService, job: Job) -> Iterator[list[Link]]:
         yield [stored.link for stored in found]
 
 
-def best_of(columns: EvaluationColumns, anew: EvaluationColumns | None) -> Evaluation | None:
+def best_of(columns: EvaluationColumns, reevaluated: EvaluationColumns | None) -> Evaluation | None:
     """Find the best design, as the store would."""
-    judged = columns if anew is None else anew
+    judged = columns if reevaluated is None else reevaluated
     row = best_particle(judged.fitness)
     if row is None:
         return None
-    if anew is None:
+    if reevaluated is None:
         return _evaluation(columns, row)
-    best = _evaluation(anew, row)
+    best = _evaluation(reevaluated, row)
     searched = _evaluation(columns, row_of(columns, best.iteration, best.particle))
     in_double = Reevaluation(best.particle, best.objectives, best.statuses, best.fitness)
     return replace(searched, reevaluation=in_double)
@@ -194,7 +194,7 @@ def _evaluation(columns: EvaluationColumns, row: int) -> Evaluation:
 
 
 def _committed(columns: EvaluationColumns, job: Job) -> EvaluationColumns:
-    """Without what was committed after the job was read."""
+    """Evaluations without those committed after the job was read."""
     end = int(np.searchsorted(columns.iteration, job.progress.iterations))
     return columns.rows(slice(end))
 
@@ -233,7 +233,7 @@ def _iterations(service: JobService, job: Job) -> Iterator[IterationView]:
 
 
 def _asks(spec: AnySpec, asked: Sequence[NDArray[np.float64]]) -> bytes:
-    """What the search asked for, one row a position, in the variables' units."""
+    """Positions that the search asked for, one per row, in the variables' units."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -251,21 +251,22 @@ def _asks(spec: AnySpec, asked: Sequence[NDArray[np.float64]]) -> bytes:
 
 
 def _reevaluated(service: JobService, job: Job, columns: EvaluationColumns) -> EvaluationColumns:
-    """The designs that were evaluated anew in double, by what they came to there."""
-    found = [(k, anew) for k, anew in service.reevaluations(job) if k < job.progress.iterations]
+    """Designs that were reevaluated in double precision."""
+    committed = job.progress.iterations
+    found = [(k, again) for k, again in service.reevaluations(job) if k < committed]
     if not found:
         return columns.rows(slice(0))
     starts = np.searchsorted(columns.iteration, [k for k, _ in found])
     return replace(
-        columns.rows(starts + np.array([anew.particle for _, anew in found])),
-        objectives=np.stack([anew.objectives for _, anew in found]),
-        statuses=np.stack([anew.statuses for _, anew in found]),
-        fitness=np.array([anew.fitness for _, anew in found]),
+        columns.rows(starts + np.array([again.particle for _, again in found])),
+        objectives=np.stack([again.objectives for _, again in found]),
+        statuses=np.stack([again.statuses for _, again in found]),
+        fitness=np.array([again.fitness for _, again in found]),
     )
 
 
 def _robot(folder: str, source: RobotSource) -> dict[str, bytes]:
-    """The robot as it was resolved, and the files that it was read from."""
+    """The resolved robot and its source files."""
     robot = load_robot(source)
     files = {
         f"{folder}/description.json": robot.description.model_dump_json().encode(),
@@ -293,7 +294,7 @@ def _pictures(
             list(results),
             [result.utility for result in results.values()],
             label="utility, minimized",
-            title="What the best design is worth in each case",
+            title="Best design: utility in each case",
         ),
     )
     if isinstance(spec, JobSpec):

@@ -1,4 +1,4 @@
-"""Whether what is stored of a job is what was committed."""
+"""Verification of a job's stored history."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from gaitswarm.services.optimizer.analysis.verification import HistoryCheck
 
 SHOWN: Final = 100
-"""Differences that are listed."""
+"""Differences that are listed at most."""
 
 
 def run_verification(
@@ -44,8 +44,8 @@ def run_verification(
     *,
     check: Callable[[float], None] = lambda _seconds: None,
 ) -> HistoryVerificationView:
-    """Compute a job's chain again from what is stored, and simulate some evaluations anew."""
-    # It brings in the database.
+    """Recompute a job's chain from the store and repeat some evaluations."""
+    # Slow to import: it needs the database.
     from gaitswarm.services.optimizer.analysis.verification import check_history
 
     job = service.job(job_id)
@@ -79,7 +79,7 @@ def _chain(history: HistoryCheck) -> CheckView:
 
 
 def chain_check(iterations: int, head: str | None) -> CheckView:
-    """Say that a chain is whole."""
+    """Report an intact chain."""
     if head is None:
         return CheckView(name="chain", passed=None, detail="no iteration is committed yet")
     detail = f"{iterations} iterations chained, head {head}"
@@ -87,9 +87,9 @@ def chain_check(iterations: int, head: str | None) -> CheckView:
 
 
 def head_check(head: str, at: int | None, iterations: int) -> CheckView:
-    """Say whether a history is the one of which a digest was noted down."""
+    """Check a history against a digest noted earlier."""
     if at is None:
-        detail = f"no iteration has the digest {head}: this is another history"
+        detail = f"no iteration has the digest {head}: this is a different history"
     elif at == iterations - 1:
         detail = f"iteration {at}, the last, has the digest {head}"
     else:
@@ -99,7 +99,7 @@ def head_check(head: str, at: int | None, iterations: int) -> CheckView:
 
 
 def _provenance(job: Job) -> Iterator[str]:
-    """What numbers depend on here that is not as it was."""
+    """Changes of provenance on this machine."""
     if job.readable:
         here = job_provenance(job.spec)
         for record in job.provenance:
@@ -115,7 +115,7 @@ def _replayed(
     found: HistoryVerificationView,
     check: Callable[[float], None],
 ) -> HistoryVerificationView:
-    """The same with a replay. Raises Conflict."""
+    """Add a replay to the verification."""
     spec = job.spec
     refused = why_no_replay(spec)
     if refused is not None:
@@ -142,7 +142,7 @@ Place = tuple[int, int]
 def _drawn(
     job: Job, history: HistoryCheck, drawn: np.random.Generator, count: int
 ) -> tuple[list[Place], Place]:
-    """Evaluations to simulate, and the best of the job, which is one of them if there is one."""
+    """Evaluations to simulate, the job's best among them."""
     ends = np.cumsum(history.sizes)
     rows = np.sort(drawn.permutation(int(ends[-1]))[:count])
     at = np.searchsorted(ends, rows, side="right")
@@ -155,7 +155,7 @@ def _drawn(
 
 
 def _rows(service: JobService, job_id: str, places: Sequence[Place]) -> EvaluationColumns:
-    """Evaluations as they are stored, in order."""
+    """Stored evaluations, in order."""
     pieces = []
     for iteration, found in groupby(places, key=itemgetter(0)):
         columns = service.store.evaluation_columns(job_id, iteration, iteration + 1)
@@ -167,15 +167,15 @@ def _rows(service: JobService, job_id: str, places: Sequence[Place]) -> Evaluati
 
 
 def _in_double(service: JobService, job_id: str, best: EvaluationColumns) -> EvaluationColumns:
-    """The best evaluation as it was judged in double."""
+    """The best evaluation in double precision."""
     iteration = int(best.iteration[0])
     found = service.store.reevaluations_between(job_id, iteration, iteration + 1)
-    anew = next(one for _, one in found)
+    reevaluated = next(one for _, one in found)
     return replace(
         best,
-        objectives=anew.objectives[np.newaxis],
-        statuses=anew.statuses[np.newaxis],
-        fitness=np.array([anew.fitness]),
+        objectives=reevaluated.objectives[np.newaxis],
+        statuses=reevaluated.statuses[np.newaxis],
+        fitness=np.array([reevaluated.fitness]),
     )
 
 

@@ -1,4 +1,4 @@
-"""The page in a file of evidence: needs no network, and nothing beside it."""
+"""The self-contained HTML page in an evidence file."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ _TOP: Final = 30.0
 _BOTTOM: Final = 46.0
 _BLUE: Final = "#3a6ea5"
 _RED: Final = "#d1495b"
-"""Significant ones of numbers at axes."""
+"""Significant digits of numbers."""
 
 Scale = Callable[[float], float]
-"""A value to its place in the picture."""
+"""Maps a value to a coordinate of the picture."""
 
 
 def convergence(iterations: Sequence[IterationView]) -> str:
@@ -40,7 +40,7 @@ def convergence(iterations: Sequence[IterationView]) -> str:
     height, index = 340.0, [float(i.index) for i in iterations]
     drawn = [v for i in iterations for v in (i.best_so_far, i.best, i.median) if v is not None]
     if not drawn:
-        return _figure(height, "Convergence: no design has walked in every scenario", [])
+        return _figure(height, "Convergence: no design has succeeded in every scenario", [])
     across = _linear(index[0], max(index[-1], index[0] + 1.0), _LEFT, _WIDTH - _RIGHT)
     up, ticks = _up(drawn, height)
     bottom = height - _BOTTOM
@@ -126,7 +126,7 @@ def _linear(low: float, high: float, first: float, last: float) -> Scale:
 
 
 def _up(values: Sequence[float], height: float) -> tuple[Scale, list[float]]:
-    """From the bottom to the top, by logarithms where values differ by much; and its ticks."""
+    """Vertical scale, logarithmic where values differ by much, and its ticks."""
     low, high = min(values), max(values)
     if high == low:
         low, high = low - 0.5 * (abs(low) or 1.0), high + 0.5 * (abs(high) or 1.0)
@@ -216,7 +216,7 @@ code { font-size: 0.9em; overflow-wrap: anywhere; } .failed { color: #d1495b; }
 _DIGITS: Final = 6
 
 _SHOWN: Final = 10
-"""Worst worlds of a certificate; its member names more."""
+"""Worst worlds of a certificate that the page lists."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,8 +224,8 @@ class CertificateOnPage:
     """A certificate as the page shows it.
 
     Attributes:
-        view: What it comes to.
-        certified: Which design of the job it is of; None for the job that the page is of.
+        view: Its results.
+        certified: The certified design of the job; None for the job's own page.
     """
 
     view: CertificateView
@@ -278,7 +278,7 @@ def _result(job: Job, best: BestView | None) -> Iterator[str]:
         facts["Fork of"] = f"{lineage.parent}, before its iteration {lineage.from_iteration}"
     yield "<h2>Result</h2>"
     if best is None:
-        facts["Best"] = "no design has walked in every scenario"
+        facts["Best"] = "no design has succeeded in every scenario"
         yield from _table(["", ""], facts.items())
         return
     facts["Best fitness"] = (
@@ -312,7 +312,7 @@ def _certificates(job: Job, certificates: Sequence[CertificateOnPage]) -> Iterat
             yield from _certificate(certificate)
     elif isinstance(job.spec, JobSpec):
         yield "<h2>Certificates</h2>"
-        yield f"<p>There is none of a design of this job. {_code(how_to_make_one(job.id))}.</p>"
+        yield f"<p>No design of this job has a certificate. {_code(how_to_make_one(job.id))}.</p>"
 
 
 def _certificate(certificate: CertificateOnPage) -> Iterator[str]:
@@ -323,14 +323,14 @@ def _certificate(certificate: CertificateOnPage) -> Iterator[str]:
         place = f"design {place_of(certified.iteration, certified.particle)}"
         facts["Design"] = f"the best, {place}" if certified.of_best else f"{place}, not the best"
     facts["Robot"] = _robot_name(view)
-    facts["A walk failed in"] = _chance(view.failed)
-    facts["The robot fell in"] = _chance(view.fell)
+    facts["Worlds with a failure"] = _chance(view.failed)
+    facts["Worlds with a fall"] = _chance(view.fell)
     yield from _table(["", ""], facts.items())
     yield (
-        "<p>Utility by scenario, minimized; a failed walk is worse than any other. The probability"
-        " of one is at most so much, at 95 %. CVaR is the mean of the worst 5 %, a lower bound"
-        " where some failed. Scenarios with a star are held out: the design was not tuned in"
-        " them.</p>"
+        "<p>Utility by scenario, minimized; a failure is worse than any value. The probability"
+        " of a failure is at most the given one, at 95 %. CVaR is the mean of the worst 5 %, a"
+        " lower bound where some failed. Scenarios with a star are held out: the design was not"
+        " tuned in them.</p>"
     )
     heads = ["scenario", "failed", "at most", "nominal", "median", "95 %", "CVaR 95 %", "worst"]
     rows = [
@@ -339,7 +339,7 @@ def _certificate(certificate: CertificateOnPage) -> Iterator[str]:
     ]
     yield from _table(heads, [*rows, ["all", *_spread(view.failed, view.fitness)]])
     yield "<h3>Worst worlds</h3>"
-    heads = ["world", "fitness", "failed in, or worst in", "walks again by"]
+    heads = ["world", "fitness", "failed in, or worst in", "command to repeat"]
     worst = view.worst[:_SHOWN]
     yield from _table(heads, map(_world, worst))
     if worst:
@@ -391,7 +391,7 @@ def _code(text: str) -> str:
 
 
 def _provenance(document: Mapping[str, Any]) -> Iterator[str]:
-    yield "<h2>What the numbers depend on</h2>"
+    yield "<h2>Provenance</h2>"
     rows = []
     for record in document["records"]:
         found, walks = record["provenance"], record["provenance"]["simulation"]
@@ -408,7 +408,7 @@ def _provenance(document: Mapping[str, Any]) -> Iterator[str]:
         )
     heads = ["from", "gaitswarm", "backend", "robot", "simulation code", "search and judgement"]
     yield from _table([*heads, "libraries"], rows)
-    yield "<p>Identity of the kernel that these walks are compiled to, by robot:</p>"
+    yield "<p>Identity of the compiled kernel, by robot:</p>"
     yield from _table(
         ["robot", "kernel"],
         [(f"robots/{k}", digest) for k, digest in enumerate(document["kernels"])],
@@ -416,11 +416,11 @@ def _provenance(document: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _contents(files: Sequence[str]) -> Iterator[str]:
-    yield "<h2>What is in this file</h2>"
+    yield "<h2>Contents of this file</h2>"
     yield (
         f"<p>{FORMAT}, version {VERSION}. <code>{MANIFEST}</code> has the SHA-256 of every file."
-        " <code>gaitswarm verify FILE --replay 20</code> compares them, judges all designs anew,"
-        " lets the search go its way again, and simulates twenty designs and the best one to"
+        " <code>gaitswarm verify FILE --replay 20</code> compares them, judges all designs again,"
+        " repeats the search, and simulates twenty designs and the best one to"
         " compare their bits.</p>"
     )
     yield "<ul>"

@@ -1,4 +1,4 @@
-"""A file of evidence as it is read back: every member checked before anything is made of it."""
+"""Reading evidence files; every member is checked before use."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 _LARGEST_TABLE: Final = 1 << 30
-"""Of a table's numbers in memory [B]."""
+"""Largest table in memory [B]."""
 
 _THRIFT: Final = 1 << 22
-"""Of strings and lists in a Parquet file's own description."""
+"""Limit on strings and lists in a Parquet file's metadata."""
 
 _WITH_ROBOTS: Final = (SPEC, CHAIN)
 """Documents that hold specs."""
@@ -56,7 +56,7 @@ class _Read(BaseModel):
 
 
 class BestFound(_Read):
-    """Where the best design is, and what it is worth in double precision."""
+    """The best design's place and fitness in double precision."""
 
     iteration: int = Field(ge=0)
     particle: int = Field(ge=0)
@@ -64,7 +64,7 @@ class BestFound(_Read):
 
 
 class JobDocument(_Read):
-    """What is said of the job as a whole."""
+    """The job's metadata."""
 
     id: str = Field(max_length=64)
     iterations: int = Field(ge=1)
@@ -75,7 +75,7 @@ class JobDocument(_Read):
 
 
 class ProvenanceDocument(_Read):
-    """What the numbers depend on, and by what the file was written."""
+    """Provenance of the numbers and of the file."""
 
     records: tuple[ProvenanceRecord, ...] = Field(min_length=1)
     written_by: JobProvenance
@@ -83,7 +83,7 @@ class ProvenanceDocument(_Read):
 
 
 class ChainDocument(_Read):
-    """What the chain of the history depends on beside the tables, as it was stored."""
+    """Stored documents that the chain covers besides the tables."""
 
     version: int
     spec: dict[str, Any]
@@ -95,16 +95,16 @@ class ChainDocument(_Read):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evidence:
-    """What a file of evidence says.
+    """The contents of an evidence file.
 
     Attributes:
-        job: As a whole.
-        spec: What the job was asked to do.
-        provenance: What its numbers depend on.
+        job: Metadata.
+        spec: The job's spec.
+        provenance: Of its numbers.
         columns: All evaluations.
         asked: (n, d) positions that the search asked for, by iteration.
-        reevaluated: Designs that were evaluated anew in double; None of a search in double.
-        recordings: Recorded walks that its cases need.
+        reevaluated: Designs reevaluated in double precision; None for a search in double.
+        recordings: Recordings that its cases need.
         chain: Of its history.
     """
 
@@ -123,16 +123,16 @@ def read_evidence(members: Mapping[str, bytes]) -> Evidence:
     spec = _spec(_member(members, SPEC))
     job = _parsed(JobDocument, members, JOB)
     columns = _evaluations(members, EVALUATIONS, spec)
-    anew = None
+    reevaluated = None
     if spec.precision != "double":
-        anew = _evaluations(members, REEVALUATIONS, spec.in_double())
+        reevaluated = _evaluations(members, REEVALUATIONS, spec.in_double())
     evidence = Evidence(
         job,
         spec,
         _parsed(ProvenanceDocument, members, PROVENANCE),
         columns,
         _asks(_member(members, ASKS), spec),
-        anew,
+        reevaluated,
         {
             name: _parsed(RecordedWalk, members, f"recordings/{name}.json")
             for name in spec.recording_ids
@@ -144,7 +144,7 @@ def read_evidence(members: Mapping[str, bytes]) -> Evidence:
 
 
 def check_robots(members: Mapping[str, bytes]) -> None:
-    """Check the robots of all documents of an archive, in a process that may be ended."""
+    """Check the robots of all documents of an archive in a limited process."""
     robots: dict[tuple[str, str], str] = {}
     for name, content in members.items():
         if name.endswith(_WITH_ROBOTS):
@@ -162,7 +162,7 @@ def check_robots(members: Mapping[str, bytes]) -> None:
 
 
 def _check_order(evidence: Evidence) -> None:
-    """Whole iterations, in order, of as many designs as were asked for."""
+    """Check that iterations are whole, in order, and as large as the asks."""
     job, columns = evidence.job, evidence.columns
     sizes = [len(positions) for positions in evidence.asked]
     expected = np.repeat(np.arange(len(sizes)), sizes)
@@ -228,10 +228,10 @@ def _evaluations(members: Mapping[str, bytes], name: str, spec: AnySpec) -> Eval
             fitness=np.where(np.isnan(fitness), np.inf, fitness),
         )
     except (KeyError, ValueError, TypeError, ArithmeticError, IndexError, OSError) as error:
-        raise BadArchive(f"{name} is no table of this job: {type(error).__name__}") from error
+        raise BadArchive(f"{name} is not a table of this job: {type(error).__name__}") from error
     space = spec.design_space()
     if not np.isfinite(columns.designs).all() or columns.designs.shape[1] != len(space.names):
-        raise BadArchive(f"{name} has designs with numbers that are none")
+        raise BadArchive(f"{name} has designs with values that are not finite")
     return columns
 
 
@@ -242,11 +242,11 @@ def _asks(content: bytes, spec: AnySpec) -> tuple[Floats, ...]:
         iteration = _whole(table.column("iteration").to_numpy())
         columns = [np.asarray(table.column(name).to_numpy(), dtype=np.float64) for name in names]
     except (KeyError, ValueError, TypeError) as error:
-        raise BadArchive(f"{ASKS} is no table of this job: {type(error).__name__}") from error
+        raise BadArchive(f"{ASKS} is not a table of this job: {type(error).__name__}") from error
     positions = np.stack(columns, axis=1)
     steps = np.diff(iteration, prepend=0)
     if not len(positions) or not np.isfinite(positions).all() or iteration[0] != 0:
-        raise BadArchive(f"{ASKS} has positions with numbers that are none")
+        raise BadArchive(f"{ASKS} has positions that are not finite")
     if not np.isin(steps, (0, 1)).all():
         raise BadArchive(f"{ASKS} is not in the order of its iterations")
     return tuple(np.split(positions, np.flatnonzero(steps)))
@@ -254,12 +254,12 @@ def _asks(content: bytes, spec: AnySpec) -> tuple[Floats, ...]:
 
 def _whole(column: NDArray[Any]) -> NDArray[np.int64]:
     if column.dtype.kind != "i":
-        raise ValueError("no column of whole numbers")
+        raise ValueError("not a column of integers")
     return column.astype(np.int64)
 
 
 def _checked_table(content: bytes, name: str) -> pa.Table:
-    """A Parquet table that is not larger in memory than it may be."""
+    """Read a Parquet table within the limit on its size in memory."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -272,14 +272,14 @@ def _checked_table(content: bytes, name: str) -> pa.Table:
             described.row_group(k).total_byte_size for k in range(described.num_row_groups)
         )
         if described.num_rows < 0 or max(8 * cells, claimed) > _LARGEST_TABLE:
-            raise BadArchive(f"{name} claims more numbers than are read")
+            raise BadArchive(f"{name} claims more values than are allowed")
         return file.read()
     except (pa.ArrowException, OSError, ValueError, MemoryError) as error:
         if isinstance(error, BadArchive):
             raise
-        raise BadArchive(f"{name} is no whole Parquet file") from error
+        raise BadArchive(f"{name} is not a complete Parquet file") from error
 
 
 def by_iteration(evidence: Evidence, column: Floats) -> Sequence[Floats]:
-    """Cut a column."""
+    """Split a column by iteration."""
     return np.split(column, np.cumsum([len(positions) for positions in evidence.asked])[:-1])

@@ -1,4 +1,4 @@
-"""Stored evaluations, simulated anew and compared bit by bit."""
+"""Replay of stored evaluations, compared bit by bit."""
 
 from __future__ import annotations
 
@@ -20,23 +20,26 @@ from gaitswarm.sim.provenance import provenance_of
 from gaitswarm.views.verification import DifferenceView
 
 Table = tuple[AnySpec, EvaluationColumns]
-"""Evaluations, with a spec that says in which cases and precision they were made."""
+"""Evaluations with the spec that they belong to."""
 
 
 def why_no_replay(spec: AnySpec) -> tuple[bool | None, str] | None:
-    """Say whether evaluations of a job can be compared here."""
+    """Explain why evaluations of a job cannot be replayed here; None if they can."""
     if isinstance(spec, JobSpec) and spec.case is not None:
-        return None, f"designs were put to {spec.case.name}, a plug-in's, which may have other bits"
+        return (
+            None,
+            f"designs were evaluated by the plug-in {spec.case.name}, which may give other bits",
+        )
     if provenance_of(*spec.described, precision=spec.precision).backend == "reference":
         return False, (
-            "there is no C compiler here: interpreted walks have other bits, and take some hundred"
+            "there is no C compiler here: the interpreter gives other bits, and takes some hundred"
             " times as long"
         )
     return None
 
 
 def has_same_bits_anywhere(spec: AnySpec, columns: EvaluationColumns) -> NDArray[np.bool_]:
-    """Say which evaluations have the same bits on any machine."""
+    """Select evaluations that have the same bits on any machine."""
     if not isinstance(spec, CertificateSpec) or not spec.engines:
         return np.ones(len(columns), dtype=np.bool_)
     return np.asarray(columns.designs[:, spec.design_space().names.index(ENGINE)] == 0.0)
@@ -47,9 +50,9 @@ def simulated_differences(
     recordings: Recordings,
     certificate: str | None = None,
 ) -> list[DifferenceView]:
-    """Simulate evaluations, and list what is not the same to the bit."""
+    """Simulate evaluations and list differences of any bit."""
     found: list[DifferenceView] = []
-    # What only reads need not wait for a database's packages.
+    # Slow to import, and not needed to read evidence.
     from gaitswarm.services.runtime import open_evaluator
 
     with closing(open_evaluator("in-process")) as evaluator:
@@ -69,7 +72,7 @@ def simulated_differences(
 def replay_answer(
     count: int, with_best: bool, spec: AnySpec, differences: Sequence[DifferenceView]
 ) -> tuple[bool, str]:
-    """Say what came of a replay."""
+    """Summarize a replay."""
     among = ", the best among them," if with_best else ""
     what = f"{count} evaluations{among} in {len(spec.case_names)} cases"
     if not differences:

@@ -1,4 +1,4 @@
-"""Checks evidence: what it says of itself, what follows from what, and what walks come to here."""
+"""Verification of evidence: consistency, derived values and replays."""
 
 from __future__ import annotations
 
@@ -57,11 +57,11 @@ Floats = NDArray[np.float64]
 _DIGITS: Final = 32
 
 Answer = tuple[bool | None, str]
-"""Whether a check passed, None where the job rules it out; and what was found."""
+"""Whether a check passed, None where it does not apply; and the details."""
 
 
 def checks_of(evidence: Evidence, members: Mapping[str, bytes]) -> dict[str, Callable[[], Answer]]:
-    """List what can be checked of a run without a walk."""
+    """List the checks that need no simulation."""
     found: dict[str, Callable[[], Answer]] = {
         "robot": lambda: _robot(evidence, members),
         "fitness": lambda: _fitness(evidence),
@@ -82,7 +82,7 @@ def _tables(evidence: Evidence) -> Iterator[tuple[AnySpec, EvaluationColumns]]:
 
 
 def _robot(evidence: Evidence, members: Mapping[str, bytes]) -> Answer:
-    """The robots' files are those of which the provenance has the digest."""
+    """Check the robots' files against the digests of the provenance."""
     content = b""
     for number in range(len(evidence.spec.described)):
         folder = f"robots/{number}"
@@ -97,7 +97,7 @@ def _robot(evidence: Evidence, members: Mapping[str, bytes]) -> Answer:
 
 
 def _fitness(evidence: Evidence) -> Answer:
-    """Fitness follows from raw objectives."""
+    """Check that fitness follows from the raw objectives."""
     wrong, count = 0, 0
     for spec, columns in _tables(evidence):
         again = judged(spec, columns)
@@ -109,16 +109,14 @@ def _fitness(evidence: Evidence) -> Answer:
 
 
 def _best(evidence: Evidence, members: Mapping[str, bytes]) -> Answer:
-    """The best is the earliest of least fitness, in double precision, and is shown as it is."""
+    """Check that the best design is the earliest of least fitness in double precision."""
     best, said = best_of(evidence.columns, evidence.reevaluated), evidence.job.best
     if best is None or said is None:
-        return best is None and said is None, "no design has walked in every case"
+        return best is None and said is None, "no design has succeeded in every case"
     where = (best.iteration, best.particle)
     fitness = best.fitness if best.reevaluation is None else best.reevaluation.fitness
     if (said.iteration, said.particle, said.fitness) != (*where, fitness):
-        return False, (
-            f"design {place_of(*where)} is the best with {fitness!r}, not the one that is named"
-        )
+        return False, (f"design {place_of(*where)} is the best with {fitness!r}, not the named one")
     shown = json.loads(BestView.from_evaluation(best, evidence.spec).model_dump_json())
     if parsed_json(members.get(BEST, b""), BEST) != shown:
         return False, f"{BEST} does not show design {place_of(*where)}"
@@ -132,7 +130,7 @@ def best_row(evidence: Evidence) -> tuple[int | None, EvaluationColumns]:
 
 
 def _designs(evidence: Evidence) -> Answer:
-    """Designs are those that the asks stand for."""
+    """Check that designs correspond to the asks."""
     space = evidence.spec.design_space()
     designs = space.designs(np.concatenate(evidence.asked))
     wrong = int((designs != evidence.columns.designs).any(axis=1).sum())
@@ -142,24 +140,25 @@ def _designs(evidence: Evidence) -> Answer:
 
 
 def _search(evidence: Evidence) -> Answer:
-    """The search, told the same, asks for the same."""
+    """Check that the search proposes the same designs again."""
     spec, lineage = evidence.spec, evidence.job.lineage
     method = METHODS[spec.search.name]
     if method.missing:
         return None, f"{spec.search.name} needs {', '.join(method.missing)}, not installed here"
     columns = evidence.columns
-    told = by_iteration(evidence, spec.told(columns.objectives, columns.failed, columns.fitness))
+    results = spec.told(columns.objectives, columns.failed, columns.fitness)
+    feedback = by_iteration(evidence, results)
     try:
-        retraced(spec, evidence.job.budgets, evidence.asked, told)
+        retraced(spec, evidence.job.budgets, evidence.asked, feedback)
     except ValueError as error:
         if lineage is not None and lineage.carried == "search" and "preference" in lineage.changed:
-            return None, "its memory was judged anew by another preference when it was forked"
-        return False, f"{error}: other code, another seed, or numbers that it was never told"
-    return True, f"{spec.search.name} asks for the same designs in {len(told)} iterations"
+            return None, "its state was judged by another preference when it was forked"
+        return False, f"{error}: other code, another seed, or other results"
+    return True, f"{spec.search.name} proposes the same designs in {len(feedback)} iterations"
 
 
 def _chain(evidence: Evidence) -> Answer:
-    """The history is the one that its digests are of."""
+    """Check the history against its digests."""
     said = evidence.chain
     if said.version != CHAIN_VERSION:
         return None, f"it is of version {said.version}, which this gaitswarm does not compute"
@@ -168,13 +167,13 @@ def _chain(evidence: Evidence) -> Answer:
         return False, f"{CHAIN} has another spec, lineage or provenance than the rest of the file"
     documents = ChainDocuments(said.spec, said.lineage, said.provenance)
     found = Chain(documents, evidence.spec)
-    anew = _anew(evidence)
+    reevaluated = _reevaluations(evidence)
     links = zip(evidence.asked, said.asks, said.digests, strict=True)
     try:
         for index, (positions, ask, digest) in enumerate(links):
             columns = evidence.columns.of_iteration(index)
             link = Link(index, positions, ask, digest)
-            found.extend(link, Outcomes.read(columns, anew.get(index)))
+            found.extend(link, Outcomes.read(columns, reevaluated.get(index)))
     except BrokenChain as error:
         return False, str(error)
     check = chain_check(found.iterations, found.head)
@@ -182,7 +181,7 @@ def _chain(evidence: Evidence) -> Answer:
 
 
 def _belongs(evidence: Evidence, spec: AnySpec, lineage: Any, provenance: Any) -> bool:
-    """Whether documents, as they were stored, are those of the rest of the file."""
+    """Whether stored documents agree with the rest of the file."""
     own = evidence.job.lineage
     return (
         evidence.spec in (spec, spec.with_budget(evidence.spec.iterations))
@@ -191,7 +190,7 @@ def _belongs(evidence: Evidence, spec: AnySpec, lineage: Any, provenance: Any) -
     )
 
 
-def _anew(evidence: Evidence) -> dict[int, Reevaluation]:
+def _reevaluations(evidence: Evidence) -> dict[int, Reevaluation]:
     """Reevaluations by iteration."""
     columns = evidence.reevaluated
     if columns is None:
@@ -208,18 +207,18 @@ def _anew(evidence: Evidence) -> dict[int, Reevaluation]:
 
 
 def _summary(evidence: Evidence, members: Mapping[str, bytes]) -> Answer:
-    """What a certificate says follows from its walks."""
+    """Check that a certificate's summary follows from its evaluations."""
     spec = evidence.spec
     if not isinstance(spec, CertificateSpec):
         return False, f"a job of kind {spec.kind} has no {SUMMARY}"
     where = summary_differs(evidence.job.id, spec, evidence.columns, members[SUMMARY])
     if where is not None:
-        return False, f"{SUMMARY} says another {where} than follows from the evaluations"
+        return False, f"{SUMMARY} has another {where} than follows from the evaluations"
     return True, f"{SUMMARY} follows from {len(evidence.columns)} evaluations"
 
 
 def changes_of_provenance(evidence: Evidence) -> Iterator[str]:
-    """Say what numbers depend on that is different here, and what that means."""
+    """Yield changes of provenance on this machine, and what they mean."""
     spec, here = evidence.spec, job_provenance(evidence.spec)
     found: list[str] = []
     for record in evidence.provenance.records:
@@ -233,16 +232,16 @@ def changes_of_provenance(evidence: Evidence) -> Iterator[str]:
     kernels = tuple(kernel_identity(load_robot(r), spec.precision).hex() for r in spec.described)
     if kernels == evidence.provenance.kernels:
         yield (
-            "the kernels have the source that they had when the file was written: physics and"
-            " control loop are the same, and what differs lies around them"
+            "the kernels' source is the same as when the file was written: physics and"
+            " control loop are the same, and the changes are outside of them"
         )
     else:
-        yield "kernels have another source than when the file was written: walks may differ"
-    yield "equal bits in the replay show that none of this matters for what was replayed"
+        yield "the kernels' source differs from when the file was written: results may differ"
+    yield "equal bits in the replay show that these changes do not matter for what was replayed"
 
 
 _SHOWN: Final = 100
-"""Differences that are listed."""
+"""Differences that are listed at most."""
 
 
 @dataclass(slots=True)
@@ -268,26 +267,26 @@ def verify(
     seed: int | None = None,
     head: str | None = None,
 ) -> VerificationView:
-    """Check evidence of a job, by itself: no database is needed.
+    """Check evidence of a job; no database is needed.
 
-    Whatever is wrong with the file is a finding, not an error.
+    Defects of the file are findings, not errors.
 
     Args:
         evidence: The file's name, or its content as `Jobs.evidence` writes it.
-        replay: Evaluations to draw and simulate anew, besides the best one, of the job and of each
-            certificate in its evidence; 0 for no walk at all.
-        seed: By which they are drawn; None for one that nobody can foresee.
-        head: Digest of an iteration of the job that was noted down earlier, as `JobView.head`, to
-            be looked for; None to look for none.
+        replay: Evaluations to draw and repeat, besides the best one, of the job and of each
+            certificate in its evidence; 0 for no simulation.
+        seed: Seed of the draw; None for a random one.
+        head: Digest of an iteration of the job noted earlier, as `JobView.head`, that the
+            history must contain; None for no check.
 
     Returns:
-        What was checked, and what differs.
+        The checks and the differences.
 
     Raises:
-        NotFound: There is no such file.
+        NotFound: The file does not exist.
         InvalidRequest: The file cannot be opened, `replay` or `seed` is negative, or `head` is no
             digest.
-        EvaluatorUnavailable: Walks cannot be run here.
+        EvaluatorUnavailable: Simulations cannot be run here.
     """
     for name, value in (("replay", replay), ("seed", seed or 0)):
         if value < 0:
@@ -318,7 +317,7 @@ def _content(path: Path) -> bytes:
         with path.open("rb") as file:
             return file.read(LARGEST_ARCHIVE + 1)
     except FileNotFoundError as error:
-        raise NotFound(f"there is no file {path}") from error
+        raise NotFound(f"no such file: {path}") from error
     except OSError as error:
         raise InvalidRequest(f"cannot read {path}: {error.strerror}", field="evidence") from error
 
@@ -358,7 +357,7 @@ def _check_certificate(
     replay: int,
     drawn: np.random.Generator,
 ) -> None:
-    """evidence: of the job that tried the design. Raises BadArchive."""
+    """Check a certificate of a design of the job that the evidence is of."""
     if SUMMARY not in members:
         raise BadArchive(f"it has no {SUMMARY}")
     certificate = _check_run(members, found, replay, drawn, job_id)
@@ -369,12 +368,12 @@ def _check_certificate(
 
 
 def _design(evidence: Evidence, certificate: Evidence) -> Answer:
-    """The design that is certified is one of those that the job tried."""
+    """Check that the certified design is one of the job's."""
     best, spec, place = evidence.job.best, evidence.spec, None
     if isinstance(spec, JobSpec):
         place = certified_at(spec, evidence.columns, certificate.spec)
     if place is None:
-        return False, "it is of no design that this job tried"
+        return False, "its design is not one of this job"
     is_best = best is not None and place == (best.iteration, best.particle)
     what = "the best" if is_best else "not the best"
     return True, f"it is of design {place_of(*place)}, {what}"
@@ -387,10 +386,10 @@ def _check_run(
     drawn: np.random.Generator,
     certificate: str | None = None,
 ) -> Evidence:
-    """certificate: id of the one that the members are of. Raises BadArchive."""
+    """Check one run; `certificate` is its id, None for the job itself."""
     evidence = read_evidence(members)
     rows = f"{len(evidence.columns)} evaluations in {len(evidence.asked)} iterations"
-    found.add("contents", True, f"{rows}, all as the spec has them", certificate)
+    found.add("contents", True, f"{rows}, as in the spec", certificate)
     for name, check in checks_of(evidence, members).items():
         passed, detail = _tried(check)
         found.add(name, passed, detail, certificate)
@@ -407,7 +406,7 @@ def _tried(check: Callable[[], Answer]) -> Answer:
         return check()
     except Unavailable:
         raise
-    except Exception as error:  # noqa: BLE001 - whatever comes of numbers that no gaitswarm wrote
+    except Exception as error:  # noqa: BLE001 - the numbers may not be gaitswarm's
         return False, f"cannot be computed: {type(error).__name__}: {str(error)[:200]}"
 
 
@@ -418,7 +417,7 @@ def _replay(
     drawn: np.random.Generator,
     certificate: str | None,
 ) -> Answer:
-    """Evaluations that are drawn, and the best one, come to the same bits here."""
+    """Check that drawn evaluations and the best one have the same bits here."""
     spec, columns = evidence.spec, evidence.columns
     refused = why_no_replay(spec)
     if refused is not None:

@@ -58,7 +58,7 @@ from gaitswarm.views.trade_offs import FrontView, PreferenceForView
 def run_certificate(
     histories: Histories, job_id: str, *, worlds: int | None = None, most: int = 5
 ) -> CertificateView:
-    """Say what a certificate comes to."""
+    """Summarize a certificate."""
     job = histories.job(job_id)
     spec = job.spec
     if not isinstance(spec, CertificateSpec):
@@ -76,7 +76,7 @@ TOLERANCE: Final = 0.01
 def run_scenario_families(
     histories: Histories, job_id: str, tolerance: float
 ) -> ScenarioFamiliesView:
-    """Judge a job's designs by fewer scenarios, from what is stored."""
+    """Judge a job's designs by fewer scenarios."""
     if not 0.0 <= tolerance < np.inf:
         raise InvalidRequest("must be at least 0", field="tolerance")
     job = histories.job(job_id)
@@ -91,7 +91,7 @@ def run_scenario_families(
     if spec.worlds is not None:
         judged = spec.worlds.aggregated(judged)
     if not np.isfinite(judged).all(axis=1).any():
-        raise Conflict(f"job {job_id} has no design yet that walks in all scenarios")
+        raise Conflict(f"job {job_id} has no design yet that succeeds in all scenarios")
     found = scenario_families(judged, tolerance=tolerance)
     return ScenarioFamiliesView.from_families(found, names, columns)
 
@@ -109,7 +109,7 @@ Indices = Sequence[Interval | None]
 
 
 def run_importance(histories: Histories, job_id: str) -> ImportanceView:
-    """Say which variables of a job matter, from what is stored."""
+    """Estimate which variables of a job matter."""
     job = histories.job(job_id)
     if job.spec.kind not in _KINDS:
         raise InvalidRequest(
@@ -119,7 +119,7 @@ def run_importance(histories: Histories, job_id: str) -> ImportanceView:
         )
     columns = histories.columns(job)
     if not len(columns):
-        raise Conflict(f"job {job_id} has no design yet; ask again after its first iteration")
+        raise Conflict(f"job {job_id} has no design yet; try again after its first iteration")
     walks = int(np.isfinite(columns.fitness).sum())
     sampled = columns.rows(thinned(columns, MOST_DESIGNS))
     best = histories.best(job_id)
@@ -180,7 +180,7 @@ def _view(interval: Interval | None) -> IndexIntervalView | None:
 
 
 def _bound_at(variable: Variable, value: float) -> Literal["low", "high"] | None:
-    # All that a categorical variable, or one of two whole numbers, can be is at an end.
+    # Every value of a categorical variable, or of one of two integers, is at an end.
     if variable.kind == "categorical" or (variable.kind == "integer" and _range(variable) < 2):
         return None
     near = NEAR * _range(variable)
@@ -194,7 +194,7 @@ def _range(variable: Variable) -> float:
 
 
 def _widened(spec: Spec, variable: Variable, at: Literal["low", "high"]) -> WidenedView | None:
-    """The widest of some bounds that the job could be simulated with; None for none of them."""
+    """The widest bounds that can be simulated; None if none can."""
     if not isinstance(spec, JobSpec):
         return None
     for low, high in _wider(variable, at):
@@ -216,7 +216,7 @@ def _wider(variable: Variable, at: Literal["low", "high"]) -> Iterator[tuple[flo
             further = max(1.0, round(further))
         if at == "high":
             yield low, _shown(variable, high + further)
-        # What is above zero by its bounds stays so.
+        # Positive variables stay positive.
         elif low <= 0.0 or low - further > 0.0:
             yield _shown(variable, low - further), high
     if at == "low" and low > 0.0 and variable.kind != "integer":
@@ -224,7 +224,7 @@ def _wider(variable: Variable, at: Literal["low", "high"]) -> Iterator[tuple[flo
 
 
 def _shown(variable: Variable, bound: float) -> float:
-    """Without digits that nobody would type."""
+    """Round a bound to six digits."""
     return bound if variable.kind == "integer" else float(f"{bound:.6g}")
 
 
@@ -236,13 +236,13 @@ MOST_FRONT_DESIGNS: Final = 10_000
 
 
 def run_front(histories: Histories, job_id: str, *, most: int) -> FrontView:
-    """Find the Pareto front of a job, from what is stored."""
+    """Find the Pareto front of a job."""
     if not 1 <= most <= MOST_FRONT_DESIGNS:
         raise InvalidRequest(f"must be 1 to {MOST_FRONT_DESIGNS}", field="most")
     spec, columns = _tuning(histories, job_id)
     vectors = objective_vectors(columns, worlds=spec.worlds)
     if not np.isfinite(vectors).any():
-        raise Conflict(f"job {job_id} has no design yet that walks in all scenarios")
+        raise Conflict(f"job {job_id} has no design yet that succeeds in all scenarios")
     front = pareto_front(columns, vectors, worlds=spec.worlds)
     return FrontView.from_front(front, columns, spec, most=most)
 
@@ -250,7 +250,7 @@ def run_front(histories: Histories, job_id: str, *, most: int) -> FrontView:
 def run_preference_for(
     histories: Histories, job_id: str, iteration: int, particle: int
 ) -> PreferenceForView:
-    """Find the preference under which a design wins its job, from what is stored."""
+    """Find preferences under which a design wins its job."""
     for field, number in (("iteration", iteration), ("particle", particle)):
         if number < 0:
             raise InvalidRequest("must be at least 0", field=field)
@@ -261,7 +261,7 @@ def run_preference_for(
     row = int(rows[0])
     if not np.isfinite(objective_vectors(columns.rows(rows), worlds=spec.worlds)).all():
         raise Conflict(
-            f"design {place_of(iteration, particle)} fails in a scenario, so that it wins under no"
+            f"design {place_of(iteration, particle)} fails in a scenario, so it wins under no"
             " preference"
         )
     fits = preference_fits(columns, row, spec.resolved_preference(), worlds=spec.worlds)
@@ -280,16 +280,16 @@ def _tuning(histories: Histories, job_id: str) -> tuple[JobSpec, EvaluationColum
 
 
 MOST: Final = 100_000
-"""Preferences and candidates of a request."""
+"""Most preferences and candidates of a request."""
 
 
 class PreferencesRequest(BaseModel):
-    """Under which preferences a job's designs are ranked, and how their winners are compared."""
+    """Preferences to rank a job's designs by, and how to compare their winners."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     drawn: int = Field(
-        default=512, ge=1, le=MOST, description="Preferences to draw beside A, B and C."
+        default=512, ge=1, le=MOST, description="Preferences to draw in addition to A, B and C."
     )
     candidates: int = Field(
         default=8,
@@ -302,17 +302,17 @@ class PreferencesRequest(BaseModel):
         default=0,
         ge=0,
         le=4096,
-        description="Designs that walk around each of them, by which its robustness index is"
-        " estimated; 0 for no walk and no index.",
+        description="Designs to simulate around each of them, to estimate its robustness index;"
+        " 0 for no simulation and no index.",
     )
     radius: float = Field(
         default=0.02,
         gt=0.0,
         le=0.5,
-        description="How far they are from it at most, as a share of each variable's bounds [1].",
+        description="Largest distance from it, as a share of each variable's bounds [1].",
     )
     seed: int = Field(default=1, ge=0, lt=2**63, description="Of preferences and samples.")
-    precision: Precision = Field(default="double", description="Of the walks' physics.")
+    precision: Precision = Field(default="double", description="Of the physics.")
 
 
 def run_preferences(
@@ -347,10 +347,10 @@ def ranked_preferences(
     progress: Callable[[int, int], None] | None = None,
     check: Callable[[float], None] = lambda _seconds: None,
 ) -> RobustPreferencesView:
-    """Rank a job's designs under many preferences, and compare the winners."""
+    """Rank a job's designs under many preferences and compare the winners."""
     tuning = tuning_spec(job_id, spec)
     if not np.isfinite(columns.fitness).any():
-        raise Conflict(f"job {job_id} has no design yet that walks in all scenarios")
+        raise Conflict(f"job {job_id} has no design yet that succeeds in all scenarios")
     drawn = drawn_preferences(columns, count=request.drawn, seed=request.seed)
     found = winners(columns, drawn, worlds=tuning.worlds)
     chosen = found[: max(request.candidates, sum(bool(winner.named) for winner in found))]
@@ -390,13 +390,13 @@ def _indices(
     progress: Callable[[int, int], None] | None,
     check: Callable[[float], None],
 ) -> list[IndexView | None]:
-    """Robustness index of every winner, None without walks."""
+    """Robustness index of every winner, None without simulations."""
     if not request.samples:
         return [None for _ in chosen]
     if spec.case is not None:
         raise InvalidRequest(
-            f"the job's designs were put to {spec.case.name}, and samples would walk in gaitswarm's"
-            " simulator; give 0",
+            f"the job's designs were evaluated by {spec.case.name}, and samples would use"
+            " gaitswarm's simulator; give 0",
             field="samples",
         )
     asked = [_robustness_request(spec, columns, winner, request) for winner in chosen]
@@ -405,7 +405,7 @@ def _indices(
     found = []
     for number, one in enumerate(asked):
         with simulation_errors("job_id"):
-            view = run_robustness(one, progress=_told(progress, number, len(asked)))
+            view = run_robustness(one, progress=_overall_progress(progress, number, len(asked)))
         found.append(view.index)
     return found
 
@@ -431,10 +431,10 @@ def _robustness_request(
         raise invalid_request(error) from error
 
 
-def _told(
+def _overall_progress(
     progress: Callable[[int, int], None] | None, number: int, of: int
 ) -> Callable[[int, int], None] | None:
-    """Progress of one of several estimates, as that of all."""
+    """Convert the progress of one estimate to that of all."""
     if progress is None:
         return None
     return lambda done, planned: progress(number * planned + done, of * planned)

@@ -1,6 +1,6 @@
-"""Arguments about jobs as a program gives them, made into checked values and requests.
+"""Arguments about jobs, converted to checked values and requests.
 
-They raise InvalidRequest that names the argument, before anything is asked of a database or server;
+Functions raise InvalidRequest that names the argument, before a database or server is used;
 a controller that does not exist is NotFound, as its path on a server is.
 """
 
@@ -60,7 +60,7 @@ def priority(value: int) -> int:
 
 
 def notify_url(url: str) -> str:
-    """Where the end of a job is told."""
+    """URL that is notified of the end of a job."""
     reason = unusable_url(url)
     if reason is not None:
         raise InvalidRequest(reason, field="notify_url")
@@ -90,7 +90,7 @@ def runs(job_ids: Sequence[str]) -> Sequence[str]:
 
 
 def leave_out(text: str | None) -> LeaveOut | None:
-    """What a calibration leaves out, by name."""
+    """Targets that a calibration leaves out, by name."""
     if text is not None and text not in get_args(LeaveOut):
         known = ", ".join(get_args(LeaveOut))
         raise InvalidRequest(f"{text!r} is none of {known}", field="leave_out")
@@ -98,7 +98,7 @@ def leave_out(text: str | None) -> LeaveOut | None:
 
 
 def certificate(worlds: int | None, most: int) -> None:
-    """Check what is asked of a certificate."""
+    """Check arguments of a certificate's summary."""
     if worlds is not None and worlds < 1:
         raise InvalidRequest("must be at least 1", field="worlds")
     if not 0 <= most <= MOST_WORST:
@@ -106,14 +106,14 @@ def certificate(worlds: int | None, most: int) -> None:
 
 
 def ranking(preference: PreferenceInput, top: int) -> RankingRequest:
-    """By what to judge the designs of a job anew."""
+    """Request to rank the designs of a job."""
     return checked(RankingRequest, {"preference": preference, "top": top})
 
 
 def labels(
     name: str | None, note: str | None, tags: Iterable[str] | None, archived: bool | None
 ) -> LabelsChange:
-    """What to write on a job."""
+    """Labels of a job."""
     words = None if tags is None else tuple(tags)
     return checked(LabelsChange, {"name": name, "note": note, "tags": words, "archived": archived})
 
@@ -127,7 +127,7 @@ def preferences(
     seed: int,
     precision: Precision,
 ) -> PreferencesRequest:
-    """Under which preferences to rank the designs of a job, and how to compare the winners."""
+    """Request to rank the designs of a job under many preferences."""
     document = {
         "drawn": drawn,
         "candidates": candidates,
@@ -140,12 +140,12 @@ def preferences(
 
 
 def verification(replay: int, seed: int | None, head: str | None) -> VerificationRequest:
-    """How thoroughly to verify the history of a job."""
+    """Request to verify the history of a job."""
     return checked(VerificationRequest, {"replay": replay, "seed": seed, "head": head})
 
 
 def fork(from_iteration: int, options: ForkOptions) -> ForkRequest:
-    """From where to fork a job, and what is to be different."""
+    """Request to fork a job."""
     return checked(ForkRequest, {"from_iteration": from_iteration, **laid_options(options)})
 
 

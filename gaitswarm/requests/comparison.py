@@ -1,4 +1,4 @@
-"""Jobs beside each other, from what is stored. Knows nothing of HTTP."""
+"""Comparison of jobs."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ from gaitswarm.views.comparison import (
 )
 
 MOST_JOBS: Final = 12
-"""Jobs that are compared at once."""
+"""Jobs that can be compared at once."""
 
 POINTS: Final = 400
-"""Iterations of a job that are listed; of more, so many."""
+"""Iterations of a job that are listed at most."""
 
 _SHARES: Final = np.linspace(0.0, 1.0, 101)
 _PAGE: Final = 5000
 
 _MEASURE: Final = ("kind", "robot", "scenarios", "preference", "worlds", "recordings", "targets")
-"""Fields of a spec that say what fitness is."""
+"""Fields of a spec that define fitness."""
 
 
 def run_comparison(service: JobService, job_ids: Sequence[str]) -> JobComparisonView:
-    """Set jobs beside each other."""
+    """Compare jobs."""
     if len(set(job_ids)) < len(job_ids) or len(job_ids) > MOST_JOBS:
         raise InvalidRequest(f"must be at most {MOST_JOBS} jobs, each once", field="job_ids")
     jobs = [service.job(job_id) for job_id in job_ids]
@@ -53,7 +53,7 @@ def run_comparison(service: JobService, job_ids: Sequence[str]) -> JobComparison
 
 
 def run_convergences(service: JobService, job_ids: Sequence[str], points: int) -> ConvergencesView:
-    """List how jobs came to their best, shortly."""
+    """List the convergence of jobs, thinned to some points."""
     found = []
     for job_id in job_ids:
         try:
@@ -112,7 +112,7 @@ def _differences(documents: Sequence[dict[str, Any]]) -> Iterator[SpecDifference
     lacked = items[0].union(*items) - items[0].intersection(*items)
     flat = [dict(_leaves(document, "", lacked)) for document in documents]
     fields = dict.fromkeys(field for document in flat for field in document)
-    # Names are those of the jobs, which stand beside.
+    # Names are shown with the jobs.
     fields.pop("name", None)
     rooms = list(dict.fromkeys(field.split(".")[0] for field in fields))
     for field in sorted(fields, key=lambda field: rooms.index(field.split(".")[0])):
@@ -130,7 +130,7 @@ def _items(value: Any, path: str) -> Iterator[str]:
 
 
 def _leaves(value: Any, path: str, lacked: set[str]) -> Iterator[tuple[str, str]]:
-    """Fields by their paths; variables, and items at the paths that are lacked, in one piece."""
+    """Fields by path; variables, and items that some specs lack, as one value."""
     parts = list(_parts(value, path))
     for inner, item, named in parts:
         if named and path == "variables":
@@ -154,14 +154,14 @@ def _parts(value: Any, path: str) -> Iterator[tuple[str, Any, bool]]:
 
 
 def _said(item: dict[str, Any], path: str) -> dict[str, Any]:
-    """What an item of a list says: of a scenario what is not as it is by default."""
+    """Content of a list's item; of a scenario its values that are not defaults."""
     if path == "scenarios":
         item = Scenario.model_validate(item).model_dump(mode="json", exclude_defaults=True)
     return _rest(item)
 
 
 def _rest(item: dict[str, Any]) -> dict[str, Any]:
-    """Of an item of a list what its path does not say."""
+    """Fields of a list's item other than its name."""
     return {name: part for name, part in item.items() if name != "name"} or item
 
 

@@ -1,4 +1,4 @@
-"""One design and its scenarios, as every request for walks has them. Knows nothing of HTTP."""
+"""Designs and scenarios in requests."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PUBLISHED_DESIGN = dict(CONTROLLERS["fuzzy-pi"].published["A"])
 
 
 class DesignRequest(BaseModel):
-    """One design, and the robot that it drives."""
+    """A design and the robot that it drives."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -50,11 +50,11 @@ class DesignRequest(BaseModel):
 
     @property
     def numbers(self) -> dict[str, float]:
-        """The design as the simulator takes it: of categorical variables the index of a choice."""
+        """The design as numbers: of categorical variables the index of a choice."""
         return design_numbers(self.controller, self.design)
 
     def simulated_seconds(self, scenarios: Sequence[Scenario]) -> float:
-        """How long the robot walks, the measure of what the request costs."""
+        """Simulated time, the measure of the request's cost."""
         cycle_time = self.numbers.get("cycle_time")
         return sum(
             scenario.cycles * (scenario.cycle_time if cycle_time is None else cycle_time)
@@ -62,7 +62,7 @@ class DesignRequest(BaseModel):
         )
 
     def check_design(self) -> None:
-        """Check that the controller can have the design's values, and drives the robot."""
+        """Check that the design suits the controller, and the controller the robot."""
         try:
             law = CONTROLLERS[self.controller].compile(self.numbers)
         except SimulationInputError as error:
@@ -71,7 +71,7 @@ class DesignRequest(BaseModel):
             check_drives(law, self.robot)
 
     def walked(self, scenario: Scenario) -> Scenario:
-        """A scenario as the design walks through it."""
+        """A scenario with the design's gait parameters."""
         gait = {name: value for name, value in self.numbers.items() if name in GAIT_CATALOGUE}
         return with_gait(scenario, gait)
 
@@ -85,13 +85,13 @@ class DesignRequest(BaseModel):
 
 
 class ScenariosRequest(DesignRequest):
-    """One design and the scenarios in which it walks."""
+    """A design and its scenarios."""
 
     scenarios: tuple[ScenarioChoice, ...] = Field(
         default=tuple(scenario.name for scenario in SCENARIOS),
         min_length=1,
         max_length=32,
-        description="Walks: names or numbers of presets (see /v1/scenarios), or your own.",
+        description="Scenarios: names or numbers of presets (see /v1/scenarios), or your own.",
         examples=[["normal-fast", "2"]],
     )
 

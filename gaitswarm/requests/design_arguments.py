@@ -1,6 +1,6 @@
-"""Arguments about single designs as a program gives them, made into checked requests.
+"""Arguments about single designs, converted to checked requests.
 
-They raise InvalidRequest that names the argument, before anything walks or is asked of a server.
+Functions raise InvalidRequest that names the argument, before anything is simulated.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def simulation(
     world: Mapping[str, float] | None,
     log: bool,
 ) -> SimulationRequest:
-    """One design and the walks in which to try it."""
+    """A design and the scenarios in which to simulate it."""
     document: dict[str, Any] = {
         "robot": robot_source(robot),
         "controller": controller,
@@ -58,19 +58,19 @@ def simulation(
 
 
 def robustness(design: Mapping[str, float | str], options: RobustnessOptions) -> RobustnessRequest:
-    """One design, its walks, and the sample around it."""
+    """A design, its scenarios, and the sample around it."""
     return checked(RobustnessRequest, {**_laid(options), "design": _design(design)})
 
 
 def firmware(design: Mapping[str, float | str], options: FirmwareOptions) -> FirmwareRequest:
-    """One design, and the scenarios that are written with it."""
+    """A design and the scenarios of its firmware."""
     return checked(FirmwareRequest, {**_laid(options), "design": _design(design)})
 
 
 def firmware_of_best(
     job_id: str, spec: AnySpec, best: BestView, options: FirmwareOptions
 ) -> FirmwareRequest:
-    """A job's best design, and the scenarios that are written with it."""
+    """A job's best design and the scenarios of its firmware."""
     return firmware_request_of_best(job_id, spec, best, _laid(options))
 
 
@@ -83,7 +83,7 @@ def replay(
     world: Mapping[str, float] | None,
     rate: float,
 ) -> ReplayRequest:
-    """One design and the walk in which to look at it."""
+    """A design and the scenario to replay."""
     document: dict[str, Any] = {
         "robot": robot_source(robot),
         "controller": controller,
@@ -102,7 +102,7 @@ def surface(
     current_points: int,
     velocity_error: float,
 ) -> SurfaceRequest:
-    """One design of a fuzzy controller, and how finely to look at it."""
+    """A design of a fuzzy controller and the grid of its surfaces."""
     document: dict[str, Any] = {
         "design": _design(design),
         "error_points": error_points,

@@ -1,4 +1,4 @@
-"""A design as firmware: what is asked, and how it is done. Knows nothing of HTTP."""
+"""Firmware of a design."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from gaitswarm.views.firmware import FirmwareView
 
 
 class FirmwareOptions(TypedDict, total=False):
-    """Fields of a `FirmwareRequest` as keywords; what is left out has its default.
+    """Fields of a `FirmwareRequest` as keywords.
 
     Attributes:
         scenarios: One scenario or several, whose trajectories are written and whose walks are
@@ -30,7 +30,7 @@ class FirmwareOptions(TypedDict, total=False):
         controller: Motor controller that drives the robot; default that of the job, or fuzzy-pi.
         robot: A shipped robot by name, a `RobotVariant`, or the folder of another; default that of
             the job, or the default robot.
-        label: What people call the design.
+        label: Display name of the design.
         table_bits: Of the indices of angle error and current in a fuzzy controller's table, in
             place of 10 and 6, where there is less flash.
     """
@@ -43,24 +43,24 @@ class FirmwareOptions(TypedDict, total=False):
 
 
 class FirmwareRequest(ScenariosRequest):
-    """One design, and the scenarios whose trajectories and walks are written with it."""
+    """A design and the scenarios whose trajectories and simulations its firmware includes."""
 
-    label: str = Field(default="design", max_length=200, description="What people call the design.")
+    label: str = Field(default="design", max_length=200, description="Display name of the design.")
     table_bits: tuple[int, int] | None = Field(
         default=None,
         description="Of the indices of angle error and current in a fuzzy controller's table, in"
-        " place of 10 and 6; the walks are by this table.",
+        " place of 10 and 6; simulations use this table.",
         examples=[[8, 6]],
     )
 
     @property
     def walked_seconds(self) -> float:
-        """Length of all walks together [s]; with other tables each is compared with the usual's."""
+        """Length of all simulations [s]; with another table each is compared with the default's."""
         seconds = self.simulated_seconds(self.resolved_scenarios())
         return seconds if self.table_bits is None else 2.0 * seconds
 
     def check(self) -> None:
-        """Check the design, its gaits and its table before anything walks."""
+        """Check the design, its gaits and its table before anything is simulated."""
         with simulation_errors("robot"):
             check_drives_by_pwm(self.robot)
         self.check_design()
@@ -73,7 +73,7 @@ class FirmwareRequest(ScenariosRequest):
 def firmware_request_of_best(
     job_id: str, spec: AnySpec, best: BestView | None, options: dict[str, Any]
 ) -> FirmwareRequest:
-    """Ask for firmware of a job's best design, by default with its robot and in its scenarios."""
+    """Request firmware of a job's best design, by default for its robot and scenarios."""
     if not isinstance(spec, JobSpec):
         raise InvalidRequest(
             f"job {job_id} is of kind {spec.kind}, which tunes no drive", field="job_id"
@@ -99,7 +99,7 @@ def firmware_request_of_best(
 
 
 def run_firmware(request: FirmwareRequest) -> Firmware:
-    """Write a design as C, and let it walk for the test of it."""
+    """Write a design as C code, with simulations to test it."""
     request.check()
     with simulation_errors("scenarios"):
         return firmware_of(
@@ -115,7 +115,7 @@ def run_firmware(request: FirmwareRequest) -> Firmware:
 def firmware_view(
     request: FirmwareRequest, firmware: Firmware, folder: str | None = None
 ) -> FirmwareView:
-    """Say what firmware holds and takes."""
+    """Describe firmware."""
     return FirmwareView.from_firmware(
         firmware,
         folder=folder,

@@ -28,7 +28,7 @@ from gaitswarm.views.calibration import TargetsView
 
 
 class MeasuredWalkRequest(DesignRequest):
-    """A measured log, and which design walked where when it was measured."""
+    """A measured log, and the design and scenario that it was measured with."""
 
     scenario: ScenarioChoice = Field(
         description="The walk: name or number of a preset (see /v1/scenarios), or your own, with as"
@@ -49,11 +49,11 @@ class MeasuredWalkRequest(DesignRequest):
 
 @dataclass(frozen=True, slots=True)
 class ReadWalk:
-    """What was read of a measured log.
+    """The contents of a measured log.
 
     Attributes:
         log: all of it.
-        pair: its whole cycles beside those of the simulated walk.
+        pair: its whole cycles, synchronised with the simulated ones.
         walk: the recording.
     """
 
@@ -63,13 +63,13 @@ class ReadWalk:
 
 
 def read_measured_walk(request: MeasuredWalkRequest) -> ReadWalk:
-    """Read a log, let the design walk, and find the lag between the two."""
+    """Read a log, simulate the design, and find the lag between the two."""
     request.check_design()
     scenario, design = request.walk_scenario, request.numbers
     robot = load_robot(request.robot)
     with simulation_errors("scenario"):
         walk = MeasuredWalk.of(robot, scenario, request.controller, design)
-    # Before the walk is simulated, which takes longer.
+    # Before the simulation, which takes longer.
     try:
         log = parse_measured_log(request.log, robot)
         with simulation_errors("scenario"):
@@ -81,7 +81,7 @@ def read_measured_walk(request: MeasuredWalkRequest) -> ReadWalk:
 
 
 class Histories(Protocol):
-    """Where jobs and their evaluations are."""
+    """Source of jobs and their evaluations."""
 
     def job(self, job_id: str) -> Job:
         """A job."""
@@ -96,7 +96,7 @@ class Histories(Protocol):
 def run_targets(
     histories: Histories, job_ids: Sequence[str], leave_out: LeaveOut | None
 ) -> TargetsView:
-    """Compare the best design of several runs with their targets, from what is stored."""
+    """Compare the best design of several runs with their targets."""
     jobs = [histories.job(job_id) for job_id in job_ids]
     first, spec = jobs[0], jobs[0].spec
     if not isinstance(spec, CalibrationSpec):

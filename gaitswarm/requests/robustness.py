@@ -1,4 +1,4 @@
-"""How robust a design is: what is asked, and the walks around the design. Knows nothing of HTTP."""
+"""Robustness index of a design, estimated from a sample around it."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ from gaitswarm.specs import RobotInput, ScenarioInput
 from gaitswarm.views.robustness import RobustnessView
 
 _BLOCK: Final = 64
-"""Designs between two reports of progress; a multiple of every kernel's lanes."""
+"""Designs between two progress reports; a multiple of every kernel's lanes."""
 
 Progress = Callable[[int, int], None]
-"""Told how many of how many walks are done."""
+"""Called with the number of simulations done and their total."""
 
 
 class RobustnessOptions(TypedDict, total=False):
-    """Fields of a `RobustnessRequest` as keywords; what is left out has its default.
+    """Fields of a `RobustnessRequest` as keywords.
 
     Attributes:
         scenarios: One scenario or several: names or numbers of presets, or `Scenario`; default the
@@ -44,10 +44,10 @@ class RobustnessOptions(TypedDict, total=False):
         controller: Motor controller that drives the robot; default fuzzy-pi.
         robot: A shipped robot by name, a `RobotVariant`, or the folder of another.
         precision: Of the physics' numbers; default double.
-        variables: What varies, and by which bounds it is normalised: names, or `Variable` with
+        variables: Variables to vary, normalised by their bounds: names, or `Variable` with
             bounds of your own; default all of the controller's.
-        samples: Designs that walk beside the given one; default 256.
-        radius: How far they are from it at most, as a share of each variable's bounds; default
+        samples: Designs to sample around the given one; default 256.
+        radius: Largest distance from it, as a share of each variable's bounds; default
             0.02.
         seed: Of the sample; default 1.
     """
@@ -63,28 +63,28 @@ class RobustnessOptions(TypedDict, total=False):
 
 
 class RobustnessRequest(WalksRequest):
-    """One design, the walks in which it is tried, and the sample around it."""
+    """A design, its scenarios, and the sample around it."""
 
     variables: tuple[VariableChoice, ...] | None = Field(
         default=None,
         max_length=64,
-        description="What varies, and by which bounds it is normalised: names of variables, whose"
+        description="Variables to vary, normalised by their bounds: names, whose"
         " bounds are then those of /v1/controllers, or variables with bounds of your own. Null:"
         " all of the controller's.",
     )
     samples: int = Field(
-        default=256, ge=8, le=4096, description="Designs that walk beside the given one."
+        default=256, ge=8, le=4096, description="Designs to sample around the given one."
     )
     radius: float = Field(
         default=0.02,
         gt=0.0,
         le=0.5,
-        description="How far they are from it at most, as a share of each variable's bounds [1].",
+        description="Largest distance from it, as a share of each variable's bounds [1].",
     )
     seed: int = Field(default=1, ge=0, lt=2**63, description="Of the sample.")
 
     def sample(self) -> LocalSample:
-        """The designs that walk."""
+        """The sampled designs."""
         try:
             return local_sample(
                 self.numbers,
@@ -118,7 +118,7 @@ class RobustnessRequest(WalksRequest):
 def run_robustness(
     request: RobustnessRequest, *, cpus: int | None = None, progress: Progress | None = None
 ) -> RobustnessView:
-    """Let a design and others around it walk, and estimate how robust it is."""
+    """Simulate a design and a sample around it, and estimate its robustness."""
     request.check_walks()
     sample = request.sample()
     outcomes = _walked(request, sample, cpus, progress)
@@ -138,7 +138,7 @@ def run_robustness(
 def _walked(
     request: RobustnessRequest, sample: LocalSample, cpus: int | None, progress: Progress | None
 ) -> list[Outcome]:
-    """One outcome a scenario."""
+    """Simulate the sample; one outcome per scenario."""
     from gaitswarm.services.runtime import open_evaluator
 
     cases = tuple(

@@ -29,11 +29,11 @@ from gaitswarm.views.replay import encoded_replay
 
 
 class WorldRequest(DesignRequest):
-    """One design in a world, by default that of the model."""
+    """A design in a perturbed world, by default the nominal one."""
 
     world: dict[VariableName, FiniteFloat] = Field(
         default_factory=dict,
-        description="What is different from the model, as in a world of a certificate: values of"
+        description="Perturbations of the model, as in a world of a certificate: values of"
         " perturbations by name; those that are not named are nominal.",
         examples=[{}, {"friction_factor": 0.75}],
     )
@@ -57,7 +57,7 @@ class WorldRequest(DesignRequest):
         log: bool,
         precision: Precision = "double",
     ) -> Simulation:
-        """Let the design walk through a scenario of its world."""
+        """Simulate the design in a scenario of its world."""
         names, values = tuple(self.design), tuple(self.numbers.values())
         if self.world:
             design, known = tuple(self.numbers.items()), tuple(self.world)
@@ -75,7 +75,7 @@ class WorldRequest(DesignRequest):
 
 
 class WalksRequest(ScenariosRequest):
-    """One design and the walks in which to try it."""
+    """A design and the scenarios in which to simulate it."""
 
     precision: Precision = Field(
         default="double",
@@ -84,7 +84,7 @@ class WalksRequest(ScenariosRequest):
     )
 
     def check_walks(self) -> None:
-        """Check every walk before the first is run."""
+        """Check every scenario before the first simulation."""
         self.check_design()
         try:
             check_precision(load_robot(self.robot), self.precision)
@@ -95,7 +95,7 @@ class WalksRequest(ScenariosRequest):
 
 
 class SimulationRequest(WalksRequest, WorldRequest):
-    """One design, the walks in which to try it, and how they are judged."""
+    """A design, its scenarios, and how to judge it."""
 
     preference: PreferenceChoice = Field(
         default=DEFAULT_PREFERENCE,
@@ -103,7 +103,8 @@ class SimulationRequest(WalksRequest, WorldRequest):
         " your own.",
     )
     log: bool = Field(
-        default=False, description="Whether to return the 500 Hz log of every walk; it is large."
+        default=False,
+        description="Whether to return the 500 Hz log of every scenario; logs are large.",
     )
 
     def resolved_preference(self) -> Preference:
@@ -112,7 +113,7 @@ class SimulationRequest(WalksRequest, WorldRequest):
 
 
 def run_simulation(request: SimulationRequest) -> SimulationView:
-    """Let the design walk in every scenario."""
+    """Simulate the design in every scenario."""
     request.check_walks()
     scenarios = request.resolved_scenarios()
     walks = [
@@ -142,7 +143,7 @@ MOST_POSES: Final = 1_000_000
 
 
 class ReplayRequest(WorldRequest):
-    """One design and the walk in which to look at it."""
+    """A design and the scenario to replay."""
 
     scenario: ScenarioChoice = Field(
         default="normal-fast",
@@ -158,7 +159,7 @@ class ReplayRequest(WorldRequest):
 
 
 def run_replay(request: ReplayRequest) -> bytes:
-    """Let the design walk, to be looked at."""
+    """Simulate the design and encode its replay."""
     scenario = resolved(request.scenario)
     request.check_design()
     request.check_reach(scenario, field="scenario")
@@ -173,7 +174,7 @@ def run_replay(request: ReplayRequest) -> bytes:
     walk = request.walk(scenario, log=True)
     (log,) = walk.logs
     if log is None:
-        raise AssertionError("a gait within reach is walked")
+        raise AssertionError("a gait within reach was not simulated")
     return encoded_replay(
         replay(robot, log, rate=request.rate, load=scenario.load),
         robot,

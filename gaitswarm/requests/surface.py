@@ -1,4 +1,4 @@
-"""A fuzzy controller's surfaces on request. Knows nothing of HTTP."""
+"""Control surfaces of fuzzy controllers."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from gaitswarm.views.analysis import SurfaceView
 
 
 class SurfaceRequest(BaseModel):
-    """One design of a fuzzy controller, and how finely to look at it."""
+    """A design of a fuzzy controller and the grid of its surfaces."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     design: dict[VariableName, VariableValue] = Field(
-        description="Value of each of the controller's variables; gait variables do not matter.",
+        description="Value of each of the controller's variables; gait variables are ignored.",
         examples=[PUBLISHED_DESIGN],
     )
     error_points: int = Field(
@@ -34,7 +34,7 @@ class SurfaceRequest(BaseModel):
         default=0.0,
         ge=-1e7,
         le=1e7,
-        description="At which the surfaces of fuzzy-pi-3 are drawn [counts/s].",
+        description="Velocity error at which the surfaces of fuzzy-pi-3 are drawn [counts/s].",
     )
 
 

@@ -1,7 +1,7 @@
 """Contract suites that a plug-in's own tests subclass.
 
-They are plain classes of `test_` methods, for pytest or any runner that knows those; nothing of a
-test runner is imported. What is tested is looked up by its name, so that its entry point is, too.
+They are plain classes of `test_` methods, for pytest or any compatible runner; no test runner is
+imported. The subject is looked up by name, so that its entry point is tested, too.
 """
 
 from gaitswarm.testing.cases import CaseContract

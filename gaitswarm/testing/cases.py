@@ -1,4 +1,4 @@
-"""What every case keeps to that evaluates designs in place of a walk."""
+"""Contract tests of cases."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from gaitswarm.testing.refusals import refused
 
 
 class CaseContract:
-    """Tests of a case that is registered. They evaluate two designs several times.
+    """Tests of a registered case. They evaluate two designs several times.
 
     Attributes:
         name: Of the case.
-        settings: That are not its defaults: fast ones.
-        scenario: Of the walk, of which one cycle is taken.
+        settings: Settings other than the defaults, fast ones.
+        scenario: The scenario, of which one cycle is simulated.
         controller: Of the walk.
-        designs: Values of the controller's variables, by name, of designs that walk.
+        designs: Values of the controller's variables, by name, of designs that succeed.
     """
 
     name: str
@@ -45,24 +45,24 @@ class CaseContract:
 
     @property
     def read_settings(self) -> CaseSettings:
-        """As a job has them."""
+        """Return the settings as in a job."""
         return CASES[self.name].settings.model_validate({"name": self.name, **self.settings})
 
     @property
     def walk(self) -> Walk:
-        """What the case stands for."""
+        """The walk that the case replaces."""
         names = tuple(variable.name for variable in CONTROLLERS[self.controller].variables)
         scenario = find_scenario(self.scenario).model_copy(update={"cycles": 1.0})
         return Walk(DEFAULT_ROBOT, self.controller, scenario, names)
 
     @property
     def case(self) -> Case:
-        """In place of the walk."""
+        """The case."""
         return create_case(self.read_settings, self.walk)
 
     @property
     def rows(self) -> NDArray[np.float64]:
-        """The designs, as the case takes them."""
+        """The designs as an array."""
         return np.array([[design[n] for n in self.walk.variables] for design in self.designs])
 
     def test_settings_come_back_from_their_document(self) -> None:
@@ -87,7 +87,7 @@ class CaseContract:
 
     @property
     def outcome(self) -> Outcome:
-        """Of the designs; a case may take long, so it evaluates them once for all tests."""
+        """Outcome of the designs, evaluated once for all tests."""
         contract = type(self)
         if "evaluated" not in vars(contract):
             contract.evaluated = self.checked(self.case.run(self.rows), len(self.rows))
@@ -108,10 +108,10 @@ class CaseContract:
     def test_no_designs_are_no_outcomes(self) -> None:
         self.checked(self.case.run(self.rows[:0]), 0)
 
-    def test_beside_other_cases_it_has_the_same_bits(self) -> None:
+    def test_together_with_other_cases_it_has_the_same_bits(self) -> None:
         case, rows = self.case, self.rows
-        beside, _ = run_together([case, self.walk], [rows, rows])
-        assert beside.objectives.tobytes() == self.outcome.objectives.tobytes()
+        together, _ = run_together([case, self.walk], [rows, rows])
+        assert together.objectives.tobytes() == self.outcome.objectives.tobytes()
 
     def test_the_controller_is_what_drives_it(self) -> None:
         objectives = self.outcome.objectives
@@ -137,10 +137,10 @@ class CaseContract:
                 case.run_until(self.rows, lambda: True)
             except Exception:  # noqa: BLE001 - of any kind, says the protocol
                 return
-            raise AssertionError("run_until went on although it was told to stop")
+            raise AssertionError("run_until ignored should_stop")
 
     def checked(self, outcome: Outcome, count: int) -> Outcome:
-        """An outcome that has the shape, the statuses and the numbers that it should have."""
+        """Check the shape, statuses and numbers of an outcome."""
         assert outcome.objectives.shape == (count, len(self.case.objectives))
         assert outcome.objectives.dtype == np.float64 and outcome.statuses.dtype == np.uint8
         assert set(outcome.statuses.tolist()) <= set(Status)

@@ -1,4 +1,4 @@
-"""What every controller keeps to."""
+"""Contract tests of controllers."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from gaitswarm.testing.refusals import refused
 
 
 class ControllerContract:
-    """Tests of a controller that is registered.
+    """Tests of a registered controller.
 
     Attributes:
         name: Of the controller.
-        design: That walks; the middle of all bounds where it gives nothing.
-        scenario: That it walks through.
-        robot: That walks.
+        design: A design that succeeds; the middle of the bounds for missing variables.
+        scenario: The scenario.
+        robot: The robot.
     """
 
     name: str
@@ -37,7 +37,7 @@ class ControllerContract:
 
     @property
     def controller(self) -> Controller:
-        """As it is registered."""
+        """The registered controller."""
         return CONTROLLERS[self.name]
 
     @property
@@ -105,7 +105,7 @@ class ControllerContract:
 
 
 def _content(law: ControlLaw) -> list[object]:
-    """Its integers, and its tables to the bit."""
+    """The integers and tables of a control law."""
     found: list[object] = [law.proportional_gain, law.integral_gain, law.derivative_gain]
     for table in (law.direct, law.integrated):
         if isinstance(table, LookupTable):

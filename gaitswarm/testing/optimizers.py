@@ -1,4 +1,4 @@
-"""What every search method keeps to."""
+"""Contract tests of search methods."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ SPACES: Final[Mapping[str, Space]] = MappingProxyType(
 PARTICLES: Final = 6
 BUDGET: Final = 90
 BUDGETS: Final = MappingProxyType({"mixed": BUDGET, "one variable": 60, "integers only": 20})
-"""By space, evaluations: enough for local searches to begin anew, and for all of the 8 designs."""
+"""Evaluations by space: enough for local searches to restart, and for all of the 8 designs."""
 SEED: Final = 3
 
 
@@ -52,7 +52,7 @@ def search(name: str, space: str = "mixed", *, seed: int = SEED) -> Optimizer:
 
 
 def fitness_of(positions: Floats, space: str = "mixed") -> Floats:
-    """A bowl in designs, of which a part cannot be judged."""
+    """A quadratic bowl with a region that fails."""
     box = SPACES[space]
     unit = box.to_unit(box.designs(positions))
     fitness: Floats = np.square(unit - 0.3).sum(axis=1) + 0.1
@@ -61,7 +61,7 @@ def fitness_of(positions: Floats, space: str = "mixed") -> Floats:
 
 
 def answer(name: str, positions: Floats, space: str = "mixed") -> Floats:
-    """What a method is told: fitness, or two bowls that are in each other's way."""
+    """Results for a method: fitness, or two conflicting objectives."""
     fitness = fitness_of(positions, space)
     if not METHODS[name].multi_objective:
         return fitness
@@ -71,7 +71,7 @@ def answer(name: str, positions: Floats, space: str = "mixed") -> Floats:
 
 
 def alike(name: str, values: Floats) -> Floats:
-    """Given values, as a method is told them."""
+    """Results of the given values for a method."""
     return np.column_stack([values] * 2) if METHODS[name].multi_objective else values
 
 
@@ -83,7 +83,7 @@ def path(
     evaluations: int | None = None,
     most: int | None = None,
 ) -> Iterator[Floats]:
-    """Every position that is asked for, one by one; of the whole budget by default."""
+    """All positions that a search asks for, one by one; of the whole budget by default."""
     evaluations = BUDGETS[space] if evaluations is None else evaluations
     while optimizer.evaluations < evaluations:
         left = evaluations - optimizer.evaluations
@@ -94,30 +94,30 @@ def path(
 
 @cache
 def whole_path(name: str, space: str = "mixed", seed: int = SEED) -> Floats:
-    """Of a search that nothing interrupts; walked once for all tests."""
+    """The path of an uninterrupted search, computed once for all tests."""
     found = np.array(list(path(search(name, space, seed=seed), name, space)))
     found.flags.writeable = False
     return found
 
 
 def best(name: str, seed: int) -> float:
-    """The least fitness that a search finds."""
+    """Return the least fitness that a search finds."""
     return float(min(fitness_of(whole_path(name, seed=seed))))
 
 
 def bits(positions: Iterable[Floats]) -> list[bytes]:
-    """Positions to the last bit."""
+    """Positions as bytes."""
     return [position.tobytes() for position in positions]
 
 
 def through_json(optimizer: Optimizer) -> dict[str, Any]:
-    """Its state, as it comes back from a database."""
+    """State after a round trip through JSON."""
     state: dict[str, Any] = json.loads(json.dumps(optimizer.dump(), allow_nan=False))
     return state
 
 
 def paths_of_another_process(states: Mapping[str, Mapping[str, Any]]) -> dict[str, list[bytes]]:
-    """How a new process goes on from states, by method."""
+    """Paths of a new process continued from states, by method."""
     done = subprocess.run(
         [sys.executable, "-m", __name__],
         input=json.dumps(states),
@@ -144,12 +144,12 @@ if __name__ == "__main__":
 
 
 class SearchContract:
-    """Tests of a search method that is registered, within one process.
+    """Tests of a registered search method, within one process.
 
     Attributes:
         name: Of the method.
-        reloaded: Evaluations until which it is loaded anew, where a load repeats what takes long.
-        seeds: Searches that are compared with random ones.
+        reloaded: Evaluations up to which it is reloaded, where loading repeats slow work.
+        seeds: Searches to compare with random search.
         better_than_random: Whether its median search of a bowl is.
     """
 
@@ -180,7 +180,7 @@ class SearchContract:
             reloaded, found = search(self.name, space), list[bytes]()
             while reloaded.evaluations < min(BUDGETS[space], self.reloaded):
                 state = through_json(reloaded)
-                # The first copy may go on with what the process has; the second cannot.
+                # The first copy may share the process's caches; the second cannot.
                 for _ in range(2):
                     reloaded = search(self.name, space)
                     reloaded.load(state)
@@ -261,8 +261,8 @@ class SearchContract:
 
     def test_a_fitness_that_is_none_is_refused(self) -> None:
         optimizer = search(self.name)
-        told = alike(self.name, np.zeros(PARTICLES))
-        refused(ValueError, "before ask", partial(optimizer.tell, told))
+        feedback = alike(self.name, np.zeros(PARTICLES))
+        refused(ValueError, "before ask", partial(optimizer.tell, feedback))
         asked = len(optimizer.ask())
         one, two = np.zeros(asked), np.zeros((asked, 1))
         wrong = one if alike(self.name, one).ndim == 2 else two
@@ -302,7 +302,7 @@ class SearchContract:
 
 
 class OptimizerContract(SearchContract):
-    """Tests of a search method that is registered; attributes are those of `SearchContract`."""
+    """Tests of a registered search method; attributes are those of `SearchContract`."""
 
     def test_another_process_goes_on_with_the_same_bits(self) -> None:
         stopped = search(self.name)

@@ -1,4 +1,4 @@
-"""What has to be refused."""
+"""Assertions about errors."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ def refused(error: type[Exception], word: str, call: Callable[[], object]) -> No
     """Check that a call raises an error whose message has a word in it.
 
     Args:
-        error: Its type.
-        word: Of its message.
-        call: What is to be refused.
+        error: Type of the error.
+        word: Word in its message.
+        call: Call that must raise it.
 
     Raises:
-        AssertionError: It is not.
+        AssertionError: The call did not raise it.
     """
     try:
         call()

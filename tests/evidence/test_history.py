@@ -149,7 +149,7 @@ def test_a_digest_that_was_noted_down_says_whether_it_is_the_same_history(proved
     for head, said in (
         (last, (True, f"iteration 2, the last, has the digest {last}")),
         (first, (True, f"iteration 0 has the digest {first}; 2 more were committed since")),
-        ("0" * 64, (False, f"no iteration has the digest {'0' * 64}: this is another history")),
+        ("0" * 64, (False, f"no iteration has the digest {'0' * 64}: this is a different history")),
     ):
         in_database = verified(proved.db, proved.id, head=head)
         in_file = gaitswarm.verify(proved.content, replay=0, head=head)

@@ -65,7 +65,7 @@ def changed(name: str, document: dict[str, Any]) -> dict[str, Change]:
 
 
 def test_what_is_no_file_is_an_error_that_names_it(tmp_path: Path) -> None:
-    with pytest.raises(gaitswarm.NotFound, match=r"there is no file .*nowhere\.zip"):
+    with pytest.raises(gaitswarm.NotFound, match=r"no such file: .*nowhere\.zip"):
         gaitswarm.verify(tmp_path / "nowhere.zip")
     with pytest.raises(gaitswarm.InvalidRequest, match=r"cannot read .*: Is a directory"):
         gaitswarm.verify(tmp_path)
@@ -234,7 +234,7 @@ def test_a_fork_that_was_judged_anew_is_verified_but_for_the_way_of_its_search(
         found = [gaitswarm.verify(jobs.evidence(job.id), replay=4) for job in (fork, same)]
     assert [one.verified for one in found] == [True, True]
     (search,) = [check for check in found[0].checks if check.name == "search"]
-    assert search.passed is None and "judged anew" in search.detail
+    assert search.passed is None and "judged by another preference" in search.detail
 
 
 def test_a_fuzzy_design_and_a_robot_of_ones_own_can_be_proved(tmp_path: Path) -> None:

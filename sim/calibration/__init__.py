@@ -1,1 +1,1 @@
-"""Fitting a robot and conventions to a table of what walks came to."""
+"""Fitting of a robot and conventions to a table of measured or published results."""

@@ -1,4 +1,4 @@
-"""What walks came to, measured or published: the targets of a calibration, as typed data."""
+"""Targets of a calibration: measured or published results of walks, as typed data."""
 
 from __future__ import annotations
 
@@ -43,13 +43,11 @@ QuantityName = Literal[
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """One thing that a walk comes to.
+    """A result of a walk that can be a target.
 
     Attributes:
-        unit: of its values.
-        description: for people.
-        positive: whether every value is greater than 0, so that tolerances are relative; else
-            they are in the unit.
+        positive: whether all values are positive, so that tolerances are relative; else they are in
+            the unit.
         scenarios: whether it is one number over all scenarios of a walk.
     """
 
@@ -75,26 +73,25 @@ QUANTITIES: Final[dict[QuantityName, Quantity]] = {
     "fitness:B": Quantity("1", "fitness under preference B, eq. 4.2", scenarios=True),
     "fitness:C": Quantity("1", "fitness under preference C, eq. 4.2", scenarios=True),
 }
-"""What targets may be of."""
 
 
 class TargetWalk(BaseModel):
-    """A walk that was measured or published: what drove it, and where it went."""
+    """A measured or published walk: its drive and its scenarios."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     name: WalkName
     controller: ControllerName = Field(description="Controller that drove it.")
     design: dict[VariableName, VariableValue] = Field(
-        description="Value of each of the controller's variables, and of whatever else is known of"
-        " it: gait variables, conventions. A calibration does not replace what is given here.",
+        description="Value of each of the controller's variables, and of other known ones: gait"
+        " variables, conventions. A calibration does not vary these values.",
         examples=[{"P": 0.454, "I": 0.147, "stride": 0.168}],
     )
     scenarios: tuple[ScenarioChoice, ...] = Field(
         min_length=1,
         max_length=32,
-        description="Names or numbers of presets, or scenarios of your own; several for a fitness"
-        " over all of them.",
+        description="Names or numbers of presets, or custom scenarios; several for a fitness over"
+        " all of them.",
         examples=[["normal-fast"]],
     )
 
@@ -113,12 +110,12 @@ class TargetWalk(BaseModel):
 
     @property
     def numbers(self) -> tuple[tuple[str, float], ...]:
-        """Names and numbers of the design, in the order of names."""
+        """Names and numbers of the design, sorted by name."""
         return tuple(sorted(design_numbers(self.controller, self.design).items()))
 
 
 class Target(BaseModel):
-    """One number that a walk came to, and how near a simulation should come to it."""
+    """One result of a walk, and the tolerance of its simulation."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
@@ -131,16 +128,15 @@ class Target(BaseModel):
     tolerance: float = Field(
         gt=0.0,
         le=1e6,
-        description="How far off counts as one. Relative, 0.2 for a fifth, except for height_loss,"
-        " which may have either sign: in metres.",
+        description="Deviation that counts as one. Relative, 0.2 for a fifth, except for"
+        " height_loss, which may have either sign: in metres.",
         examples=[0.2],
     )
     relative_to: WalkName | None = Field(
         default=None, description="Another walk, if the value is the ratio to its quantity."
     )
     use: Literal["fit", "predict"] = Field(
-        default="fit",
-        description="Whether it is fitted; what is only predicted is reported beside it.",
+        default="fit", description="Whether it is fitted, or only predicted and reported."
     )
 
     @model_validator(mode="after")
@@ -162,5 +158,4 @@ class Target(BaseModel):
 
     @property
     def unit(self) -> str:
-        """Unit of the value."""
         return QUANTITIES[self.quantity].unit if self.relative_to is None else "1"

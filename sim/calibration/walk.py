@@ -1,4 +1,4 @@
-"""Robots and conventions put to one of the walks that a calibration is fitted to."""
+"""Cases of a calibration: robots and conventions in one of the walks that it is fitted to."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ ROBOT: Final = "robot"
 """The variable that chooses between robots."""
 
 _PLANNED: Final = "planned_soles"
-"""The one convention of the robot that its gait is planned by."""
+"""The robot's only convention that its gait is planned with."""
 
 
 def robot_variables(robots: Sequence[RobotSource]) -> tuple[Variable, ...]:
-    """Everything of the robot that may be varied."""
+    """Variables of the robot that a calibration may vary."""
     first, *others = map(load_robot, robots)
     parameters = identifiable_variables(first)
     for other in others:
@@ -56,29 +56,29 @@ def robot_variables(robots: Sequence[RobotSource]) -> tuple[Variable, ...]:
 
 
 def walk_variables(controllers: Iterable[ControllerName]) -> tuple[Variable, ...]:
-    """Everything of walks that may be varied beside the robot."""
-    found: dict[str, Variable] = {}
+    """Further variables that a calibration may vary: gait and conventions."""
+    variables: dict[str, Variable] = {}
     for controller in dict.fromkeys(controllers):
         fixed = {variable.name for variable in CONTROLLERS[controller].variables}
         for name, variable in design_catalogue(controller).items():
-            # Controllers may have defaults of their own for the same thing.
+            # Controllers may have different defaults for the same variable.
             same = variable.model_copy(update={"default": None})
-            if name not in fixed and found.setdefault(name, same) != same:
-                raise SimulationInputError(f"{name}: means different things to two controllers")
-    return tuple(found.values())
+            if name not in fixed and variables.setdefault(name, same) != same:
+                raise SimulationInputError(f"{name}: has different meanings for two controllers")
+    return tuple(variables.values())
 
 
 def varied_robot(robots: Sequence[RobotSource], values: Mapping[str, float]) -> tuple[Robot, Robot]:
-    """The robot that a design stands for."""
+    """Return the robot that plans and the robot that walks, for a design."""
     parameters = dict(values)
     source = robots[round(parameters.pop(ROBOT, 0.0))]
     planner = _planner(source, parameters.get(_PLANNED))
     return planner, with_parameters(planner, parameters)
 
 
+# Cached: one object per robot, so that cached plans are found.
 @lru_cache(maxsize=32)
 def _planner(source: RobotSource, planned_soles: float | None) -> Robot:
-    """One object for one robot, so that whoever keeps a plan finds it."""
     described = load_robot(source)
     if planned_soles is None:
         return described
@@ -88,24 +88,21 @@ def _planner(source: RobotSource, planned_soles: float | None) -> Robot:
 Floats = NDArray[np.float64]
 
 RESULTS: Final = (*OBJECTIVES, *(Objective(m.name, m.unit, m.description) for m in MEASUREMENTS))
-"""All that a walk tells, f1 to f6 first: columns of what these walks come to."""
+"""All results of a walk, f1 to f6 first."""
 
 
 @dataclass(frozen=True, slots=True)
 class CalibrationWalk:
-    """Designs are robots and conventions; all walk with the same drive through the same scenario.
+    """A case whose designs are robots and conventions, with one drive in one scenario.
 
-    Desired angles are those of the robot as described: its controller knows nothing of the
-    parameters that are varied. What the drive itself gives is not varied.
+    Desired angles are those of the robot as described: its controller does not know the varied
+    parameters. Variables that the drive gives are not varied.
 
     Attributes:
         name: unique in its job.
         robots: one, or those that the variable `robot` chooses among.
-        controller: name of the motor controller.
-        design: names and numbers of the drive, in the order of names.
-        scenario: that is walked through.
+        design: names and numbers of the drive, sorted by name.
         variables: columns of the designs, of `robot_variables` and `walk_variables`.
-        precision: of the physics' numbers.
     """
 
     name: str
@@ -124,20 +121,18 @@ class CalibrationWalk:
 
     @property
     def objectives(self) -> tuple[Objective, ...]:
-        """All that a walk tells."""
         return RESULTS
 
     def run(self, designs: Floats) -> Outcome:
-        """Let every robot walk; those that share a kernel walk together."""
         (outcome,) = walk_together([self.walking(designs)])
         return outcome
 
     def walking(self, designs: Floats) -> Walking[Outcome]:
-        """Let every robot walk, beside walks of other cases."""
+        """Simulate every robot; robots that share a kernel share its calls."""
         objectives = np.full((len(designs), len(RESULTS)), np.nan)
         statuses = np.full(len(designs), Status.UNREACHABLE, dtype=np.uint8)
         timesteps: dict[int, float] = {}
-        wanted: list[WalkRequest] = []
+        requests: list[WalkRequest] = []
         of_robot = {variable.name for variable in robot_variables(self.robots)}
         for index, row in enumerate(designs.tolist()):
             values = dict(zip(self.variables, row, strict=True))
@@ -149,25 +144,26 @@ class CalibrationWalk:
             if setup is not None:
                 timesteps[index] = timestep
                 kernel = kernel_of(robot, precision=self.precision)
-                wanted.append(WalkRequest(kernel, coding, setup))
-        results = yield wanted
-        for (index, timestep), walk, result in zip(timesteps.items(), wanted, results, strict=True):
-            substeps = walk.coding.substeps
-            judged = judge(walk.setup, result, substeps, timestep)
+                requests.append(WalkRequest(kernel, coding, setup))
+        results = yield requests
+        walks = zip(timesteps.items(), requests, results, strict=True)
+        for (index, timestep), request, result in walks:
+            substeps = request.coding.substeps
+            judged = judge(request.setup, result, substeps, timestep)
             statuses[index], objectives[index, :N_OBJECTIVES] = judged
-            objectives[index, N_OBJECTIVES:] = measure(walk.setup, result, substeps)
+            objectives[index, N_OBJECTIVES:] = measure(request.setup, result, substeps)
         return Outcome(objectives, statuses)
 
     def drive(self, values: Mapping[str, float]) -> dict[str, float]:
-        """The drive with what is varied of it."""
-        known = design_catalogue(self.controller)
-        own = dict(self.design)
-        return {name: value for name, value in values.items() if name in known} | own
+        """The drive and its varied variables."""
+        catalogue = design_catalogue(self.controller)
+        varied = {name: value for name, value in values.items() if name in catalogue}
+        return varied | dict(self.design)
 
     def _setup(
         self, described: Robot, robot: Robot, drive: Mapping[str, float], timestep: float
     ) -> WalkSetup | None:
-        """None for a gait out of the legs' reach."""
+        """None for an unreachable gait."""
         gait = {name: value for name, value in drive.items() if name in GAIT_CATALOGUE}
         gains = tuple((name, v) for name, v in drive.items() if name not in GAIT_CATALOGUE)
         scenario = with_gait(self.scenario, gait)

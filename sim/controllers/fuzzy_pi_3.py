@@ -52,50 +52,30 @@ _CONVENTIONS: Final = (
     UNIVERSE.model_copy(update={"default": 2.0}),
 )
 
+_COLUMNS: Final = (
+    *("A_ERR", "I_MA", "V_ERR", "FzzP", "FzzI", "FzzP_MF", "FzzI_MF", "W1", "W2", "W34", "W56"),
+    *("W78", "cycle_time", "stride", "height", "duty_factor", "fir_ms"),
+)
+
 _PUBLISHED: Final[Mapping[str, Mapping[str, float]]] = MappingProxyType(
     {
-        "fuzzy-pso-ps": MappingProxyType(
-            {
-                "A_ERR": 5126.0,
-                "I_MA": 4.4,
-                "V_ERR": 11682.0,
-                "FzzP": 2227.0,
-                "FzzI": 2176.0,
-                "FzzP_MF": 2.0,
-                "FzzI_MF": 1.0,
-                "W1": 0.066,
-                "W2": 0.996,
-                "W34": 0.215,
-                "W56": 0.385,
-                "W78": 0.783,
-                "cycle_time": 1.740,
-                "stride": 0.163,
-                "height": 0.0364,
-                "duty_factor": 0.564,
-                "fir_ms": 12.0,
-            }
-        ),
-        "fuzzy-pso": MappingProxyType(
-            {
-                "A_ERR": 6369.0,
-                "I_MA": 1.465,
-                "V_ERR": 12103.0,
-                "FzzP": 2620.0,
-                "FzzI": 6362.0,
-                "FzzP_MF": 2.0,
-                "FzzI_MF": 2.0,
-                "W1": 0.234,
-                "W2": 0.281,
-                "W34": 0.496,
-                "W56": 0.258,
-                "W78": 0.502,
-                "cycle_time": 1.733,
-                "stride": 0.161,
-                "height": 0.0329,
-                "duty_factor": 0.544,
-                "fir_ms": 33.0,
-            }
-        ),
+        name: MappingProxyType(dict(zip(_COLUMNS, row, strict=True)))
+        for name, row in (
+            (
+                "fuzzy-pso-ps",
+                (
+                    *(5126.0, 4.4, 11682.0, 2227.0, 2176.0, 2.0, 1.0, 0.066, 0.996, 0.215, 0.385),
+                    *(0.783, 1.740, 0.163, 0.0364, 0.564, 12.0),
+                ),
+            ),
+            (
+                "fuzzy-pso",
+                (
+                    *(6369.0, 1.465, 12103.0, 2620.0, 6362.0, 2.0, 2.0, 0.234, 0.281, 0.496, 0.258),
+                    *(0.502, 1.733, 0.161, 0.0329, 0.544, 33.0),
+                ),
+            ),
+        )
     }
 )
 """Optima of table 3.5, each with the gait tuned together with it."""

@@ -64,6 +64,14 @@ P: Final = LinearController(
     (),
     MappingProxyType({"2011": MappingProxyType({"P": 0.25})}),
 )
+_GAIT: Final = ("P", "I", "cycle_time", "stride", "height", "duty_factor", "fir_ms")
+
+# Optima of table 3.5, each with the gait tuned together with it.
+_TUNED: Final = {
+    "pi-pso-ps": (0.454, 0.147, 1.808, 0.168, 0.0397, 0.574, 93.0),
+    "pi-pso": (0.340, 0.534, 1.696, 0.142, 0.0366, 0.577, 9.0),
+}
+
 PI: Final = LinearController(
     "pi",
     "PI on the angle error, in coded units (thesis 2.2.2, 3.4).",
@@ -71,29 +79,7 @@ PI: Final = LinearController(
     (INTEGRATOR_UNIT,),
     MappingProxyType(
         {
-            # Optima of table 3.5, each with the gait tuned together with it.
-            "pi-pso-ps": MappingProxyType(
-                {
-                    "P": 0.454,
-                    "I": 0.147,
-                    "cycle_time": 1.808,
-                    "stride": 0.168,
-                    "height": 0.0397,
-                    "duty_factor": 0.574,
-                    "fir_ms": 93.0,
-                }
-            ),
-            "pi-pso": MappingProxyType(
-                {
-                    "P": 0.340,
-                    "I": 0.534,
-                    "cycle_time": 1.696,
-                    "stride": 0.142,
-                    "height": 0.0366,
-                    "duty_factor": 0.577,
-                    "fir_ms": 9.0,
-                }
-            ),
+            **{k: MappingProxyType(dict(zip(_GAIT, v, strict=True))) for k, v in _TUNED.items()},
             "validation": MappingProxyType({"P": 0.25, "I": 0.0}),
         }
     ),

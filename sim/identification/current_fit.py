@@ -1,4 +1,4 @@
-"""How well a robot with other parameters draws the currents that were measured (eq. 2.21)."""
+"""Fit of a robot's parameters to measured motor currents (eq. 2.21)."""
 
 from __future__ import annotations
 
@@ -36,17 +36,15 @@ LINK_CURRENTS: Final = tuple(
 
 @dataclass(frozen=True, slots=True)
 class CurrentFit:
-    """Designs are parameters of the robot; each walks as the recorded one did.
+    """A case whose designs are parameters of the robot; each repeats the recorded walk.
 
-    Desired angles are those of the robot as described: its controller knows nothing of the true
+    Desired angles are those of the robot as described: its controller does not know the true
     parameters.
 
     Attributes:
         name: of the recorded walk, unique in its job.
         robot: as described.
-        walk: that was recorded.
         variables: columns of the designs, names of `identifiable_variables`.
-        precision: of the physics' numbers.
     """
 
     name: str
@@ -57,7 +55,6 @@ class CurrentFit:
 
     @property
     def robots(self) -> tuple[RobotSource, ...]:
-        """The robot as described."""
         return (self.robot,)
 
     @property
@@ -67,16 +64,13 @@ class CurrentFit:
 
     @property
     def objectives(self) -> tuple[Objective, ...]:
-        """One mean absolute error by link."""
         return LINK_CURRENTS
 
     def run(self, designs: Floats) -> Outcome:
-        """Let robots with these parameters walk; one that does not walk to the end has failed."""
+        """Simulate robots with these parameters; a walk that ends early has failed."""
         described = load_robot(self.robot)
         if self.walk.joints != described.joint_names:
-            raise SimulationInputError(
-                f"{self.name}: recorded on other joints than those of the robot"
-            )
+            raise SimulationInputError(f"{self.name}: recorded with other joints than the robot's")
         scenario = with_gait(self.walk.scenario, self.walk.gait)
         control_law = CONTROLLERS[self.walk.controller].compile(self.walk.gains)
         kernel = kernel_of(described, precision=self.precision)
@@ -90,7 +84,7 @@ class CurrentFit:
         for robot in robots:
             plan = plan_walk(robot, scenario, timestep, trajectory=trajectory)
             if plan is None:
-                raise SimulationInputError(f"{self.name}: the gait leaves the legs' reach")
+                raise SimulationInputError(f"{self.name}: the gait exceeds the legs' reach")
             setups.append(plan(control_law))
         results = kernel.walk(setups, coding, log=True)
         errors = np.full((len(designs), JOINTS_PER_LEG), np.nan)
@@ -110,16 +104,15 @@ class CurrentFit:
 
 
 def recorded_currents(robot: Robot, states: Floats) -> Floats:
-    """What a walk's log has as its motor currents, by the kernel's formula on whole columns.
+    """Logged motor currents of a walk, by the kernel's formula on whole columns.
 
-    Returns:
-        Absolute, behind the current sensors' low-pass, at every control tick, (T, J) [A].
+    Absolute, behind the current sensors' low-pass, at every control tick, (T, J) [A].
     """
-    kept, n = split_states(robot, states), robot.n_joints
-    duty, rates = kept.duty, kept.joint_velocity
+    parts, n = split_states(robot, states), robot.n_joints
+    duty, rates = parts.duty, parts.joint_velocity
     if robot.has_backlash:
-        # The motors have angles and rates of their own, first in the internal state.
-        rates = kept.internal_state[:, n : 2 * n]
+        # The motors' angles and rates are first in the internal state.
+        rates = parts.internal_state[:, n : 2 * n]
     actuators, supply = robot.actuators(), robot.description.supply
     conductance = 1.0 / actuators.resistance
     battery = supply_voltage(

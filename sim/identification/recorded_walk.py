@@ -1,4 +1,4 @@
-"""A measured walk as a fit needs it: what walked where, and the motor currents that it drew."""
+"""A measured walk as input of a fit: robot, scenario, design, and motor currents."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from gaitswarm.sim.measurement.synchronise import Synchronised
 
 _DECIMALS: Final = 5
-"""Of a stored current [A]: far below the converter's step, and a third of the text."""
+"""Of a stored current [A]: far below the converter's resolution, and a third of the text."""
 
 Amperes = Annotated[float, Field(ge=0.0, le=1000.0, allow_inf_nan=False)]
 Currents = Annotated[tuple[Amperes, ...], Field(fail_fast=True)]
@@ -33,7 +33,7 @@ Currents = Annotated[tuple[Amperes, ...], Field(fail_fast=True)]
 class RecordedWalk(BaseModel):
     """Absolute motor currents of one walk, on the time axis of the simulated one.
 
-    Made of a measured log by `record`, which synchronises the two and keeps whole cycles.
+    Created from a measured log by `record`, which synchronises the two and keeps whole cycles.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -79,8 +79,8 @@ class RecordedWalk(BaseModel):
         last, walked = self.first_tick + len(self.current), self.walked_seconds
         if last > round(walked / CONTROL_PERIOD):
             raise ValueError(
-                f"current: row {last - self.first_tick - 1} lies behind the walk's end after"
-                f" {walked:g} s; let the scenario have as many cycles as were measured"
+                f"current: row {last - self.first_tick - 1} is after the end of the walk at"
+                f" {walked:g} s; give the scenario as many cycles as were measured"
             )
         return self
 
@@ -92,12 +92,12 @@ class RecordedWalk(BaseModel):
 
     @property
     def gait(self) -> dict[str, float]:
-        """The gait variables of the design."""
+        """The design's gait variables."""
         return {name: v for name, v in self.design.items() if name in GAIT_CATALOGUE}
 
     @property
     def gains(self) -> dict[str, float]:
-        """The controller's variables of the design."""
+        """The design's controller variables."""
         return {name: v for name, v in self.design.items() if name not in GAIT_CATALOGUE}
 
     def check_reach(self, robot: RobotSource) -> None:
@@ -112,8 +112,8 @@ class RecordedWalk(BaseModel):
         """
         if load_robot(robot).is_torque_controlled:
             raise SimulationInputError(
-                "identification fits DC motors to their currents; those of torque-controlled"
-                " actuators follow from what was commanded"
+                "identification fits the currents of DC motors; those of torque-controlled"
+                " actuators follow from the command"
             )
         check_reach(self.scenario, tuple(self.design), tuple(self.design.values()), robot=robot)
 
@@ -126,13 +126,13 @@ class RecordedWalk(BaseModel):
 
 
 Recordings = Mapping[str, RecordedWalk]
-"""Recorded walks by their id."""
+"""By id."""
 
 
 def record(
     pair: Synchronised, scenario: Scenario, controller: str, design: Mapping[str, float]
 ) -> RecordedWalk:
-    """The measured currents of two synchronised logs, on the simulated one's time axis."""
+    """Return the measured currents of two synchronised logs, on the simulated one's time axis."""
     try:
         return RecordedWalk(
             scenario=scenario,
@@ -147,5 +147,5 @@ def record(
         first = error.errors(include_url=False)[0]
         field = ".".join(map(str, first["loc"]))
         raise MeasuredLogError(
-            f"the compared cycles make no recording: {field}: {message_of(first)}"
+            f"the compared cycles are not a valid recording: {field}: {message_of(first)}"
         ) from error

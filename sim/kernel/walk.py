@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 import operator
 import time
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from dataclasses import astuple, dataclass, field
 from itertools import islice
-from typing import Any, Final, Literal, Protocol, TypeVar, overload
+from typing import Any, Final, Literal, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -282,29 +282,20 @@ class LaneUse:
         return LaneUse(*map(operator.sub, astuple(self), astuple(other)))
 
 
-class WalkResults(Sequence[WalkResult]):
+class WalkResults(tuple[WalkResult, ...]):  # noqa: SLOT001 - with attributes
     """Results of all walks of one call, in order.
 
-    Args:
-        waited: Time that the thread waited for walks taken over by other threads [s].
+    Attributes:
+        waited: time that the thread waited for walks taken over by other threads [s].
     """
 
-    def __init__(
-        self, results: tuple[WalkResult, ...], lane_use: LaneUse, waited: float = 0.0
-    ) -> None:
-        self._results = results
-        self.lane_use = lane_use
-        self.waited = waited
+    lane_use: LaneUse
+    waited: float
 
-    def __len__(self) -> int:
-        return len(self._results)
-
-    @overload
-    def __getitem__(self, index: int) -> WalkResult: ...
-    @overload
-    def __getitem__(self, index: slice) -> tuple[WalkResult, ...]: ...
-    def __getitem__(self, index: int | slice) -> WalkResult | tuple[WalkResult, ...]:
-        return self._results[index]
+    def __new__(cls, results: Iterable[WalkResult], lane_use: LaneUse, waited: float = 0.0) -> Self:
+        walks = super().__new__(cls, results)
+        walks.lane_use, walks.waited = lane_use, waited
+        return walks
 
 
 class Kernel(Protocol):

@@ -1,13 +1,13 @@
-"""Measured logs as text: CSV with the unit in every heading.
+"""Measured logs as CSV with the unit in every heading.
 
     # gaitswarm measured log 1
     # robot: szabadka2
     time [s],q_D.right_front_coxa [rad],...,U_S.right_front [V],...,a_BODY.z [g]
     0.0,0.3217,...
 
-Lines before the headings that begin with `#` are remarks; `# key: value` is kept as metadata.
-Columns may stand in any order. q_POT may be there for any joints, a_BODY for all axes or none; all
-else is needed for every joint and leg of the robot.
+Lines before the headings that begin with `#` are comments; `# key: value` is kept as metadata.
+Columns may have any order. q_POT is optional for any joint, a_BODY for all axes together; all other
+quantities are required for every joint and leg of the robot.
 """
 
 from __future__ import annotations
@@ -34,26 +34,24 @@ TITLE: Final = "gaitswarm measured log 1"
 
 TIME: Final = "time [s]"
 
-SHORTEST: Final = 100
+MIN_ROWS: Final = 100
 """Rows; no walking cycle is shorter than 0.2 s."""
 
 _JITTER: Final = 2e-5
-"""Deviation from 2 ms that a row may have [s]."""
+"""Tolerated deviation of a row from the period of 2 ms [s]."""
 
 _HEADING: Final = re.compile(r"^(?P<name>[^\[\]]*?)\s*(?:\[(?P<unit>[^\[\]]*)\])?$")
 
 
 def parse_measured_log(text: str, robot: Robot) -> MeasuredLog:
-    """The log of a robot from the text of its file."""
     lines = enumerate(text.removeprefix("\ufeff").splitlines(), start=1)
     metadata, head_line, headings = _head(lines)
     expected = _expected(robot)
     places = _places(headings, expected, head_line)
     values, line_of = _values(lines, headings, head_line)
-    if len(values) < SHORTEST:
+    if len(values) < MIN_ROWS:
         raise MeasuredLogError(
-            f"{len(values)} rows are too short a log: at least {SHORTEST} are needed, of"
-            f" {CONTROL_PERIOD:g} s each",
+            f"{len(values)} rows; at least {MIN_ROWS} are required, of {CONTROL_PERIOD:g} s each",
             line=line_of[-1] if line_of else head_line,
         )
     time = values[:, headings.index(TIME)]
@@ -82,10 +80,10 @@ def parse_measured_log(text: str, robot: Robot) -> MeasuredLog:
 
 
 def format_measured_log(log: MeasuredLog) -> str:
-    """The text of a log; parsing it gives the same numbers to the bit."""
+    """Format a log; parsing the text gives bit-identical numbers."""
     for key, value in log.metadata.items():
         if not _is_remark(key, value):
-            raise MeasuredLogError(f"metadata {key!r}: {value!r} does not fit on a line of its own")
+            raise MeasuredLogError(f"metadata {key!r}: {value!r} is not one printable line")
     headings = [TIME]
     columns = [log.time[:, None]]
     for quantity in Quantity:
@@ -104,7 +102,7 @@ def format_measured_log(log: MeasuredLog) -> str:
 
 
 def heading(quantity: Quantity, channel: str) -> str:
-    """A column's heading as in the file: `I_M.left_rear_tibia [A]`."""
+    """A column's heading in the file: `I_M.left_rear_tibia [A]`."""
     return f"{quantity}.{channel} [{quantity.unit}]"
 
 
@@ -120,7 +118,7 @@ def _is_remark(key: str, value: str) -> bool:
 
 
 def _head(lines: Iterator[tuple[int, str]]) -> tuple[dict[str, str], int, list[str]]:
-    """Metadata, and the line that holds the headings with its number."""
+    """Return the metadata, the line number of the headings, and the headings."""
     metadata: dict[str, str] = {}
     for number, line in lines:
         if line.startswith("#"):
@@ -129,7 +127,8 @@ def _head(lines: Iterator[tuple[int, str]]) -> tuple[dict[str, str], int, list[s
                 metadata[key.strip()] = value.strip()
         elif line.strip():
             return metadata, number, _cells(line, number)
-    raise MeasuredLogError(f"no headings: a line like '{TIME},{Quantity.DESIRED_ANGLE}....' is due")
+    example = f"{TIME},{Quantity.DESIRED_ANGLE}..."
+    raise MeasuredLogError(f"no headings: a line like '{example}' is missing")
 
 
 def _cells(line: str, number: int) -> list[str]:
@@ -140,7 +139,7 @@ def _cells(line: str, number: int) -> list[str]:
 
 
 def _expected(robot: Robot) -> dict[Quantity, tuple[str, ...]]:
-    """Channels that each quantity may have."""
+    """Possible channels of each quantity."""
     channels = {
         "joint": robot.joint_names,
         "leg": tuple(leg.name for leg in robot.legs),
@@ -152,45 +151,46 @@ def _expected(robot: Robot) -> dict[Quantity, tuple[str, ...]]:
 def _places(
     headings: list[str], expected: dict[Quantity, tuple[str, ...]], line: int
 ) -> dict[Quantity, dict[str, int]]:
-    """Column of every channel that is there, in the robot's order."""
+    """Column of every channel present, in the robot's order."""
     units = {"time": "s"} | {
         f"{quantity}.{channel}": quantity.unit
         for quantity, channels in expected.items()
         for channel in channels
     }
-    found: dict[str, int] = {}
+    column_of: dict[str, int] = {}
     for index, text in enumerate(headings):
         match = _HEADING.match(text)
         name, unit = (match["name"], match["unit"]) if match else (text, None)
         if name not in units:
             example = heading(Quantity.JOINT_ANGLE, expected[Quantity.JOINT_ANGLE][0])
             raise MeasuredLogError(
-                f"unknown; known are '{TIME}' and {', '.join(expected)} with a joint, leg or axis"
-                f" of this robot, such as '{example}'",
+                f"unknown; expected '{TIME}' or one of {', '.join(expected)} with a joint, leg or"
+                f" axis of this robot, such as '{example}'",
                 line=line,
                 column=text,
             )
         column = f"{name} [{units[name]}]"
         if unit != units[name]:
-            has = "there is no unit" if unit is None else f"the unit is {unit!r}"
-            raise MeasuredLogError(f"{has}, but must be {units[name]!r}", line=line, column=column)
-        if name in found:
-            raise MeasuredLogError("is there twice", line=line, column=column)
-        found[name] = index
+            given = "no unit" if unit is None else f"unit {unit!r}"
+            raise MeasuredLogError(f"{given}; it must be {units[name]!r}", line=line, column=column)
+        if name in column_of:
+            raise MeasuredLogError("occurs twice", line=line, column=column)
+        column_of[name] = index
         headings[index] = column
-    if "time" not in found:
+    if "time" not in column_of:
         raise MeasuredLogError("is missing", line=line, column=TIME)
     places = {}
     for quantity, channels in expected.items():
-        there = {c: found[f"{quantity}.{c}"] for c in channels if f"{quantity}.{c}" in found}
-        partly = quantity is Quantity.BODY_ACCELERATION and there
+        names = {channel: f"{quantity}.{channel}" for channel in channels}
+        present = {c: column_of[name] for c, name in names.items() if name in column_of}
+        partly = quantity is Quantity.BODY_ACCELERATION and present
         if partly or not quantity.optional:
             for channel in channels:
-                if channel not in there:
+                if channel not in present:
                     raise MeasuredLogError(
                         "is missing", line=line, column=heading(quantity, channel)
                     )
-        places[quantity] = there
+        places[quantity] = present
     return places
 
 
@@ -209,7 +209,7 @@ def _values(
                 f"{len(cells)} values for the {len(headings)} columns of line {head_line}",
                 line=number,
             )
-        if "_" in line:  # Python reads 1_0 as ten
+        if "_" in line:  # Python parses 1_0 as ten
             raise _not_a_number(cells, headings, number)
         try:
             numbers.extend(map(float, cells))
@@ -244,7 +244,7 @@ def _check_time(time: Floats, line_of: list[int]) -> None:
     if wrong.size:
         row = int(wrong[0])
         raise MeasuredLogError(
-            f"{steps[row]:g} s after the row before, but rows must be {CONTROL_PERIOD:g} s apart",
+            f"{steps[row]:g} s after the previous row; rows must be {CONTROL_PERIOD:g} s apart",
             line=line_of[row + 1],
             column=TIME,
         )
@@ -257,7 +257,7 @@ def _check_currents(
         negative = np.flatnonzero(values[:, column] < 0.0)
         if negative.size:
             raise MeasuredLogError(
-                f"{values[negative[0], column]:g} A is negative, but currents are absolute values",
+                f"{values[negative[0], column]:g} A is negative; currents must be absolute values",
                 line=line_of[negative[0]],
                 column=heading(Quantity.CURRENT, channel),
             )

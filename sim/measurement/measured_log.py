@@ -1,11 +1,11 @@
-"""What is measured on a walking robot (thesis table 2.2), 500 rows a second."""
+"""Quantities measured on a walking robot (thesis table 2.2), 500 rows per second, and the walk."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import Final, Literal
+from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ AXES: Final = ("x", "y", "z")
 
 ORIGIN: Final = "origin"
 SYNTHETIC: Final = "synthetic"
-"""A log whose metadata has origin: synthetic was computed, not measured."""
+"""Value of `ORIGIN` in the metadata of a log that was computed instead of measured."""
 
 
 class Quantity(StrEnum):
@@ -43,18 +43,17 @@ class Quantity(StrEnum):
 
     @property
     def unit(self) -> str:
-        """The only one in which it is written."""
-        return _FACTS[self][0]
+        return _FACTS[self].unit
 
     @property
     def per(self) -> Literal["joint", "leg", "axis"]:
-        """What there is one channel of."""
-        return _FACTS[self][1]
+        """Each of these has one channel."""
+        return _FACTS[self].per
 
     @property
     def meaning(self) -> str:
         """For headings and documentation."""
-        return _FACTS[self][2]
+        return _FACTS[self].meaning
 
     @property
     def optional(self) -> bool:
@@ -62,36 +61,51 @@ class Quantity(StrEnum):
         return self in (Quantity.POTENTIOMETER, Quantity.BODY_ACCELERATION)
 
 
-_FACTS: Final[dict[Quantity, tuple[str, Literal["joint", "leg", "axis"], str]]] = {
-    Quantity.DESIRED_ANGLE: ("rad", "joint", "desired joint angle"),
-    Quantity.CONTROL_VOLTAGE: ("V", "joint", "control signal of the PWM amplifier"),
-    Quantity.JOINT_ANGLE: ("rad", "joint", "joint angle by the motor encoder"),
-    Quantity.CURRENT: ("A", "joint", "absolute motor current"),
-    Quantity.SUPPLY: ("V", "leg", "supply voltage at the leg's board"),
-    Quantity.POTENTIOMETER: ("rad", "joint", "joint angle behind the backlash"),
-    Quantity.BODY_ACCELERATION: ("g", "axis", "acceleration of the body, without gravity"),
+class _Facts(NamedTuple):
+    unit: str
+    per: Literal["joint", "leg", "axis"]
+    column: str
+    meaning: str
+
+
+_FACTS: Final = {
+    Quantity.DESIRED_ANGLE: _Facts("rad", "joint", "desired_angle", "desired joint angle"),
+    Quantity.CONTROL_VOLTAGE: _Facts(
+        "V", "joint", "control_voltage", "control signal of the PWM amplifier"
+    ),
+    Quantity.JOINT_ANGLE: _Facts("rad", "joint", "joint_angle", "joint angle by the motor encoder"),
+    Quantity.CURRENT: _Facts("A", "joint", "current", "absolute motor current"),
+    Quantity.SUPPLY: _Facts("V", "leg", "supply", "supply voltage at the leg's board"),
+    Quantity.POTENTIOMETER: _Facts(
+        "rad", "joint", "potentiometer", "joint angle behind the backlash"
+    ),
+    Quantity.BODY_ACCELERATION: _Facts(
+        "g", "axis", "body_acceleration", "acceleration of the body, without gravity"
+    ),
 }
+
+_COLUMNS: Final = tuple(facts.column for facts in _FACTS.values())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasuredLog:
     """A log with the quantities of table 2.2, measured, simulated or synthetic; T rows.
 
-    Raises SimulationInputError if shapes do not fit.
+    Raises SimulationInputError if shapes do not match.
 
     Attributes:
-        joints: J names, in the robot's order, three joints a leg.
-        legs: L names, in the robot's order.
-        time: from any start, a row each 2 ms, (T,) [s].
+        joints: J names in the robot's order, three joints per leg.
+        legs: L names in the robot's order.
+        time: from any start, one row per 2 ms, (T,) [s].
         desired_angle: (T, J) [rad].
         control_voltage: (T, J) [V].
         joint_angle: (T, J) [rad].
         current: absolute, (T, J) [A].
         supply: (T, L) [V].
-        potentiometer_joints: names of the K joints that have a potentiometer.
+        potentiometer_joints: names of the K joints with a potentiometer.
         potentiometer: (T, K) [rad]; None if K is 0.
         body_acceleration: in the body's frame, without gravity, (T, 3) [g]; None if not measured.
-        metadata: what the file says of itself, by name.
+        metadata: of the file, by name.
     """
 
     joints: tuple[str, ...]
@@ -116,8 +130,8 @@ class MeasuredLog:
                 )
         if len(self.joints) != JOINTS_PER_LEG * len(self.legs):
             raise SimulationInputError(
-                f"joints: {len(self.joints)} are not {JOINTS_PER_LEG} for each of"
-                f" {len(self.legs)} legs"
+                f"joints: {len(self.joints)} for {len(self.legs)} legs, each of which must have"
+                f" {JOINTS_PER_LEG}"
             )
         for joint in self.potentiometer_joints:
             if joint not in self.joints:
@@ -125,11 +139,10 @@ class MeasuredLog:
 
     @property
     def synthetic(self) -> bool:
-        """Whether the log says that it was computed: such a one validates nothing but tools."""
+        """Whether the log was computed: such a log validates nothing but the tools."""
         return self.metadata.get(ORIGIN) == SYNTHETIC
 
     def channels(self, quantity: Quantity) -> tuple[str, ...]:
-        """Names of a quantity's columns."""
         if quantity is Quantity.POTENTIOMETER:
             return self.potentiometer_joints
         if quantity is Quantity.BODY_ACCELERATION and self.body_acceleration is None:
@@ -137,49 +150,32 @@ class MeasuredLog:
         return {"joint": self.joints, "leg": self.legs, "axis": AXES}[quantity.per]
 
     def values(self, quantity: Quantity) -> Floats:
-        """A quantity's columns.
-
-        Returns:
-            (T, channels), in the quantity's unit.
-        """
-        columns = {
-            Quantity.DESIRED_ANGLE: self.desired_angle,
-            Quantity.CONTROL_VOLTAGE: self.control_voltage,
-            Quantity.JOINT_ANGLE: self.joint_angle,
-            Quantity.CURRENT: self.current,
-            Quantity.SUPPLY: self.supply,
-            Quantity.POTENTIOMETER: self.potentiometer,
-            Quantity.BODY_ACCELERATION: self.body_acceleration,
-        }[quantity]
+        """A quantity's columns (T, channels), in its unit."""
+        columns: Floats | None = getattr(self, _FACTS[quantity].column)
         return np.empty((len(self.time), 0)) if columns is None else columns
 
     def link_of(self, joint: str) -> int:
-        """Which link of its leg a joint moves."""
+        """Number of the leg's link that a joint moves."""
         return self.joints.index(joint) % JOINTS_PER_LEG + 1
 
+    def mapped(self, function: Callable[[Floats], Floats]) -> MeasuredLog:
+        """Return the log with other columns."""
+        columns: dict[str, Any] = {
+            name: function(column)
+            for name in _COLUMNS
+            if (column := getattr(self, name)) is not None
+        }
+        return replace(self, time=function(self.time), **columns)
+
     def rows(self, start: int, stop: int) -> MeasuredLog:
-        """A part of the log."""
-        part = slice(start, stop)
-        return replace(
-            self,
-            time=self.time[part],
-            desired_angle=self.desired_angle[part],
-            control_voltage=self.control_voltage[part],
-            joint_angle=self.joint_angle[part],
-            current=self.current[part],
-            supply=self.supply[part],
-            potentiometer=None if self.potentiometer is None else self.potentiometer[part],
-            body_acceleration=(
-                None if self.body_acceleration is None else self.body_acceleration[part]
-            ),
-        )
+        return self.mapped(lambda column: column[start:stop])
 
 
 def simulated_log(robot: Robot, walk: WalkLog) -> MeasuredLog:
-    """A simulated walk as the robot's own instruments would have logged it, without their errors.
+    """A simulated walk as logged by the robot's instruments, without their errors.
 
-    Encoders see the motors' angles, potentiometers, which every joint has, the links'; currents are
-    those of `sensed_currents`; every leg's board sees the one battery.
+    Encoders see the motors' angles, potentiometers, here on every joint, those of the links;
+    currents are those of `sensed_currents`; the boards of all legs see the one battery.
     """
     if not np.isfinite(walk.current).all():
         raise SimulationInputError("a walk that ended early cannot be compared")
@@ -202,12 +198,9 @@ def simulated_log(robot: Robot, walk: WalkLog) -> MeasuredLog:
 
 @dataclass(frozen=True, slots=True)
 class MeasuredWalk:
-    """One design in one scenario of one robot, within the reach of its legs.
+    """The walk of a measured log: one design in one scenario of one robot, within its legs' reach.
 
     Attributes:
-        robot: that walked.
-        scenario: that it walked through.
-        controller: name of the motor controller that drove it.
         design: of the controller and the gait, by variable.
         cycle_time: the design's, if it has one, else the scenario's [s].
     """
@@ -222,14 +215,14 @@ class MeasuredWalk:
     def of(
         cls, robot: Robot, scenario: Scenario, controller: str, design: Mapping[str, float]
     ) -> MeasuredWalk:
-        """The walk, once it is known that the legs reach all of it."""
+        """Create the walk after checking that the legs reach all of it."""
         gait = {name: value for name, value in design.items() if name in GAIT_CATALOGUE}
         walked = with_gait(scenario, gait)
         check_reach(walked, [], [], robot=robot)
         return cls(robot, scenario, controller, design, walked.cycle_time)
 
     def simulated(self) -> MeasuredLog:
-        """What the robot's instruments would have logged of it, without their errors."""
+        """Simulate the walk as logged by the robot's instruments, without their errors."""
         designs = np.array([list(self.design.values())], dtype=np.float64)
         result = simulate(
             self.scenario, self.controller, list(self.design), designs, robot=self.robot, log=True

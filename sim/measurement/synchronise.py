@@ -1,4 +1,4 @@
-"""Two logs of one walk on a common time axis, trimmed to whole walking cycles (thesis 2.3)."""
+"""Synchronisation of two logs of one walk, trimmed to whole walking cycles (thesis 2.3)."""
 
 from __future__ import annotations
 
@@ -16,20 +16,19 @@ from gaitswarm.sim.memory import require_room_for_scipy
 Floats = NDArray[np.float64]
 
 _TIE: Final = 1e-6
-"""Share by which correlations of equally good lags may differ."""
+"""Relative difference of correlations up to which lags count as equally good."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Synchronised:
-    """The same whole cycles of a walk, measured and simulated; both logs have the same rows.
+    """The same whole cycles of a walk, measured and simulated, with the same rows.
 
     Attributes:
-        measured: log.
-        simulated: log.
         lag: rows by which the walk begins later in the measured log than in the simulated one.
-        cycles: whole walking cycles kept, the last of the common part, as a walk starts at rest.
-        cycle_time: of a walking cycle [s].
-        correlation: of the desired angles over the common part, 1 for the same gait.
+        cycles: number of whole walking cycles, the last of the common part, as a walk starts at
+            rest.
+        cycle_time: [s].
+        correlation: of the desired angles over the common part, 1 for equal gaits.
     """
 
     measured: MeasuredLog
@@ -46,23 +45,22 @@ class Synchronised:
 
 
 def synchronise(measured: MeasuredLog, simulated: MeasuredLog, cycle_time: float) -> Synchronised:
-    """Find the lag between two logs and trim both to the whole cycles that they share.
+    """Find the lag between two logs and trim both to their common whole cycles.
 
     Args:
         cycle_time: Of a walking cycle [s].
     """
     if measured.joints != simulated.joints:
-        raise MeasuredLogError("the two logs are not of the same joints")
+        raise MeasuredLogError("the two logs have different joints")
     cycle = round(cycle_time / CONTROL_PERIOD)
     shortest = min(len(measured.time), len(simulated.time))
     if shortest < cycle:
         raise MeasuredLogError(
-            f"{shortest * CONTROL_PERIOD:g} s are too short: one walking cycle takes"
-            f" {cycle_time:g} s"
+            f"{shortest * CONTROL_PERIOD:g} s are shorter than a walking cycle of {cycle_time:g} s"
         )
     lag, correlation = find_lag(measured.desired_angle, simulated.desired_angle, cycle)
     first, common = _common(lag, len(measured.time), len(simulated.time))
-    # Whole cycles that need not be a whole number of rows each.
+    # A cycle need not be a whole number of rows.
     cycles = int((common + 0.5) * CONTROL_PERIOD / cycle_time + 1e-9)
     kept = min(common, round(cycles * cycle_time / CONTROL_PERIOD))
     end = first + common
@@ -77,23 +75,23 @@ def synchronise(measured: MeasuredLog, simulated: MeasuredLog, cycle_time: float
 
 
 def find_lag(measured: Floats, simulated: Floats, cycle: int) -> tuple[int, float]:
-    """Lag at which the desired angles of two logs agree.
+    """Return the lag at which the desired angles of two logs agree, and their correlation there.
 
-    The cross-correlation over all that overlaps tells which cycle is which; but it favours long
-    overlaps, and so is off by some rows. Within a quarter of a cycle of it the mean square
-    difference decides, to the row.
+    The cross-correlation over the overlap identifies the cycle, but it favours long overlaps and is
+    off by some rows. Within a quarter of a cycle, the mean square difference determines the exact
+    row.
 
     Args:
         measured: Desired angles, (T1, J).
         simulated: Desired angles of the same joints, (T2, J).
 
     Returns:
-        Lag k [rows] at which measured[t + k] is simulated[t], and their correlation there.
+        Lag k [rows], with measured[t + k] = simulated[t], and the correlation.
     """
     mean = simulated.mean(axis=0)
     x, y = measured - mean, simulated - mean
     if not (np.ptp(x, axis=0).any() and np.ptp(y, axis=0).any()):
-        raise MeasuredLogError("the desired angles stand still, so there is nothing to align")
+        raise MeasuredLogError("the desired angles are constant and cannot be aligned")
     lags = np.arange(-(len(y) - 1), len(x))
     # Rows of x in the overlap are [start, stop), those of y [start - k, stop - k).
     start, stop = np.maximum(lags, 0), np.minimum(len(x), len(y) + lags)
@@ -114,7 +112,7 @@ def find_lag(measured: Floats, simulated: Floats, cycle: int) -> tuple[int, floa
 
 def _cross_correlation(x: Floats, y: Floats) -> Floats:
     """sum over rows and columns of x[t + k] y[t], for k from -(len(y) - 1) to len(x) - 1."""
-    # Slow to import, and what only shows recordings needs none of it.
+    # Slow to import, and not needed to show recordings.
     require_room_for_scipy()
     from scipy.signal import fftconvolve  # noqa: PLC0415
 

@@ -1,7 +1,7 @@
-"""SYNTHETIC logs: what a perturbed twin of a robot would have measured. Not measurements.
+"""Synthetic logs: what the instruments of a perturbed twin of a robot would have measured.
 
-No log of a real robot is public. These stand in for one to test the toolkit and the identification
-of parameters, whose true values are known here; they say nothing about how true the model is.
+No log of a real robot is public. Synthetic ones serve to test the toolkit and the identification of
+parameters, whose true values are known here; they say nothing about the accuracy of the model.
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ ADC_BITS: Final = 12
 """Of the converter of the motor currents (thesis 5.2)."""
 
 WARNING: Final = "computed by a perturbed simulation, NOT measured on a robot"
-"""Said in the metadata of every synthetic log."""
+"""In the metadata of every synthetic log."""
 
 _STREAMS: Final = {quantity: index for index, quantity in enumerate(Quantity)}
 
 
 class Perturbation(BaseModel):
-    """How the twin differs from the robot as described. Factors multiply the described value."""
+    """Differences of the twin from the robot as described. Factors multiply the described value."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
@@ -66,7 +66,7 @@ class Perturbation(BaseModel):
 
     @classmethod
     def of(cls, parameters: Mapping[str, float]) -> Perturbation:
-        """A twin that differs in single parameters alone, and has no backlash."""
+        """A twin that differs only in single parameters, and has no backlash."""
         return cls(
             supply_voltage=1.0,
             supply_resistance=1.0,
@@ -81,7 +81,7 @@ class Perturbation(BaseModel):
 
 
 class Instruments(BaseModel):
-    """Errors of the instruments. Noise is Gaussian and given by its standard deviation."""
+    """Errors of the instruments. Noise is Gaussian, given by its standard deviation."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
@@ -108,21 +108,21 @@ def synthetic_log(
     perturbation: Perturbation | None = None,
     instruments: Instruments | None = None,
 ) -> MeasuredLog:
-    """A log of the perturbed twin of a robot, marked as synthetic in its metadata.
+    """Simulate a log of the perturbed twin of a robot, marked as synthetic in its metadata.
 
-    The same arguments give the same bits; each quantity has a random stream of its own, by seed.
+    Equal arguments give equal bits; each quantity has its nominal random stream, by seed.
     """
     if not 0 <= seed < 1 << 64:
-        raise SimulationInputError(f"seed: {seed} is not a whole number from 0 of 64 bits")
+        raise SimulationInputError(f"seed: {seed} must be 0 to 2^64 - 1")
     errors = instruments or Instruments()
     change = perturbation or Perturbation()
     twin = perturbed(robot, change)
     values = np.array([list(design.values())], dtype=np.float64)
-    # Its controller plans for the robot as described: it knows nothing of the truth.
+    # Its controller plans for the robot as described, without knowing the true parameters.
     walk = simulate(scenario, controller, list(design), values, robot=twin, planner=robot, log=True)
     status, log = Status(int(walk.outcome.statuses[0])), walk.logs[0]
     if status not in (Status.OK, Status.STALLED) or log is None:
-        raise SimulationInputError(f"the perturbed twin did not walk to the end: {status.phrase}")
+        raise SimulationInputError(f"the perturbed twin did not finish the walk: {status.phrase}")
     standing = round(errors.lead / CONTROL_PERIOD)
     return replace(
         _measured(robot, _after_standing(simulated_log(twin, log), standing), errors, seed),
@@ -143,12 +143,12 @@ def perturbed(robot: Robot, change: Perturbation) -> Robot:
     """The twin: the same robot with other friction, losses, backlash, battery and soles."""
     d = robot.description
 
-    def contact(own: Contact) -> Contact:
-        return own.model_copy(
+    def contact(nominal: Contact) -> Contact:
+        return nominal.model_copy(
             update={
-                "friction": own.friction * change.ground_friction,
-                "stiffness": own.stiffness * change.stiffness,
-                "damping": own.damping * change.damping,
+                "friction": nominal.friction * change.ground_friction,
+                "stiffness": nominal.stiffness * change.stiffness,
+                "damping": nominal.damping * change.damping,
             }
         )
 
@@ -175,7 +175,7 @@ def perturbed(robot: Robot, change: Perturbation) -> Robot:
             },
             "actuators": {
                 name: actuator.model_copy(
-                    update={"backlash": change.backlash} | _rubbing(actuator, change)
+                    update={"backlash": change.backlash} | _actuator_friction(actuator, change)
                 )
                 for name, actuator in d.actuators.items()
             },
@@ -189,8 +189,8 @@ def perturbed(robot: Robot, change: Perturbation) -> Robot:
     return with_parameters(replace(robot, description=description), change.parameters)
 
 
-def _rubbing(actuator: AnyActuator, change: Perturbation) -> dict[str, float]:
-    """Friction of an actuator that is not its motor's."""
+def _actuator_friction(actuator: AnyActuator, change: Perturbation) -> dict[str, float]:
+    """Friction of an actuator in addition to its motor's."""
     if not isinstance(actuator, TorqueActuator):
         return {}
     return {"viscous_friction": actuator.viscous_friction * change.motor_friction}
@@ -201,32 +201,18 @@ def _listed(values: BaseModel) -> str:
 
 
 def _after_standing(log: MeasuredLog, rows: int) -> MeasuredLog:
-    """The log preceded by rows like its first: the walk starts at rest."""
-
-    def held(values: Floats) -> Floats:
-        return np.concatenate([np.repeat(values[:1], rows, axis=0), values])
-
-    if log.potentiometer is None or log.body_acceleration is None:
-        raise TypeError("a simulated log has all quantities")
-    return replace(
-        log,
-        time=np.arange(rows + len(log.time), dtype=np.float64) * CONTROL_PERIOD,
-        desired_angle=held(log.desired_angle),
-        control_voltage=held(log.control_voltage),
-        joint_angle=held(log.joint_angle),
-        current=held(log.current),
-        supply=held(log.supply),
-        potentiometer=held(log.potentiometer),
-        body_acceleration=held(log.body_acceleration),
-    )
+    """Prepend rows like the first: the walk starts at rest."""
+    time = np.arange(rows + len(log.time), dtype=np.float64) * CONTROL_PERIOD
+    held = log.mapped(lambda column: np.concatenate([np.repeat(column[:1], rows, axis=0), column]))
+    return replace(held, time=time)
 
 
 def _measured(robot: Robot, log: MeasuredLog, errors: Instruments, seed: int) -> MeasuredLog:
-    """The log through instruments: noise, then the converters' steps. Digital signals are exact."""
+    """Apply the instruments: noise, then the converters' resolution. Digital signals are exact."""
     sensors = robot.description.sensors
 
     def noisy(quantity: Quantity, deviation: float) -> Floats:
-        # Keyed by quantity: another noise of one leaves the others' bits as they are.
+        # Keyed by quantity: changing the noise of one leaves the others' bits unchanged.
         key = np.array([seed, _STREAMS[quantity]], dtype=np.uint64)
         stream = np.random.Generator(np.random.Philox(key=key))
         exact = log.values(quantity)
@@ -256,13 +242,9 @@ def _measured(robot: Robot, log: MeasuredLog, errors: Instruments, seed: int) ->
 
 
 def converted(amperes: Floats, step: float) -> Floats:
-    """What a 12-bit converter makes of absolute currents: whole steps from 0 to 4095.
+    """Quantise absolute currents of any shape [A] like a 12-bit converter: steps 0 to 4095.
 
     Args:
-        amperes: Of any shape [A].
         step: Of the converter [A].
-
-    Returns:
-        Of the same shape [A].
     """
     return np.clip(np.rint(amperes / step), 0, (1 << ADC_BITS) - 1) * step

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,21 +31,6 @@ class Drive:
     current: Floats
     torque: Floats
     damping: Floats
-
-
-class Motors(Protocol):
-    """Motors with the friction behind them."""
-
-    def __call__(self, duty: Floats, rates: Floats) -> Drive:
-        """Return the state at an instant.
-
-        Args:
-            duty: Motor voltage per supply voltage, or torque per torque limit, (J,) [1].
-            rates: Of the motors at the joints, (J,) [rad/s].
-        """
-
-    def current_after(self, drive: Drive, faster: Floats) -> Floats:
-        """Currents (J,) [A] for the same command and rates higher by `faster` (J,) [rad/s]."""
 
 
 class _Friction:
@@ -137,40 +121,9 @@ class Actuation:
     torque: Floats
 
 
-class Gears(Protocol):
-    """Motors and their coupling to the links.
-
-    Attributes:
-        armature: rotor inertia that turns with the links, (J,) [kg m2].
-    """
-
-    motors: Motors
-    armature: Floats
-
-    @property
-    def memory(self) -> tuple[Floats, ...]:
-        """Angles [rad] and rates [rad/s] of separate rotors, (J,) each; else empty."""
-
-    def encoders(self, angles: Floats) -> Floats:
-        """Angles seen by the encoders (J,) [rad] at these angles of the links (J,) [rad]."""
-
-    def actuate(
-        self, duty: Floats, angles: Floats, rates: Floats, ahead: Floats | float = 0.0
-    ) -> Actuation:
-        """Return the action of motors and gears at an instant.
-
-        Args:
-            duty: Motor voltage per supply voltage, (J,) [1].
-            angles: Of the links, (J,) [rad].
-            rates: Of the links, (J,) [rad/s].
-            ahead: Additional angle of the gearheads, (J,) [rad].
-        """
-
-    def kick(self, actuation: Actuation, timestep: float, implicit: float = 0.0) -> Floats | None:
-        """Step the rates of separate rotors; return their accelerations (J,) [rad/s2], or None."""
-
-    def drift(self, time: float) -> None:
-        """Turn separate rotors for a time [s]."""
+Motors = TorqueMotors | DcMotors
+"""Called with the duty, (J,) [1], and the rates at the joints, (J,) [rad/s]; `current_after` are
+the currents (J,) [A] for the same command and rates higher by `faster` (J,) [rad/s]."""
 
 
 class FirmGears:
@@ -255,6 +208,12 @@ class LooseGears:
         push = self._stiffness * np.abs(beyond) + self._damping * side * faster
         torque: Floats = side * np.maximum(push, 0.0)
         return torque
+
+
+Gears = FirmGears | LooseGears
+"""Motors and their coupling to the links: `armature` is the rotor inertia that turns with the links
+(J,) [kg m2], `memory` angles [rad] and rates [rad/s] of separate rotors, which `kick` accelerates,
+returning their accelerations [rad/s2], and `drift` turns for a time [s]."""
 
 
 def gears_of(robot: Robot, numbers: Mapping[str, Floats], angles: Floats) -> Gears:

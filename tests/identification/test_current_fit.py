@@ -99,7 +99,7 @@ def test_a_design_that_does_not_walk_to_the_end_has_failed(twin: Twin) -> None:
 
 def test_a_recording_of_other_joints_is_refused(twin: Twin) -> None:
     other = twin.recording.model_copy(update={"joints": twin.recording.joints[::-1]})
-    with pytest.raises(SimulationInputError, match="a walk: recorded on other joints"):
+    with pytest.raises(SimulationInputError, match="a walk: recorded with other joints"):
         CurrentFit("a walk", "szabadka2", other, ("body_mass",)).run(np.array([[4.0]]))
 
 

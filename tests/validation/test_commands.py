@@ -106,9 +106,9 @@ def test_another_scenario_than_the_measured_one_is_noticed(measured: Path) -> No
 @pytest.mark.parametrize(
     ("old", "new", "problem"),
     [
-        ("q.right_front_femur [rad]", "q.right_front_femur [deg]", "'deg', but must be 'rad'"),
+        ("q.right_front_femur [rad]", "q.right_front_femur [deg]", "unit 'deg'; it must be 'rad'"),
         ("I_M.left_rear_tibia [A],", "", "line 10, column 'I_M.left_rear_tibia [A]': is missing"),
-        ("time [s]", "time", "there is no unit"),
+        ("time [s]", "time", "no unit; it must be 's'"),
     ],
 )
 def test_a_bad_log_is_exit_code_2_and_names_line_column_and_unit(
@@ -130,7 +130,7 @@ def test_other_bad_input_is_exit_code_2_too(measured: Path, tmp_path: Path) -> N
     binary = tmp_path / "binary.csv"
     binary.write_bytes(b"# fine\n\xff\xfe")
     for path, problem in (
-        (short, "too short: one walking cycle takes 1.5 s"),
+        (short, "shorter than a walking cycle of 1.5 s"),
         (binary, "line 2: not UTF-8"),
         (tmp_path / "absent.csv", "cannot read"),
     ):

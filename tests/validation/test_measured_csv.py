@@ -124,8 +124,8 @@ CURRENT = "I_M.left_rear_tibia [A]"
         (replace_cell(9, CURRENT, "0.1,0.2"), 9, None, "89 values for the 88 columns"),
         (replace_cell(9, "time [s]", "0.7"), 9, "time [s]", "0.002 s apart"),
         (drop_lines(9, 9), 9, "time [s]", "0.004 s after"),
-        (drop_lines(50, ROWS + 3), 49, None, "46 rows are too short"),
-        (drop_lines(4, ROWS + 3), 3, None, "0 rows are too short"),
+        (drop_lines(50, ROWS + 3), 49, None, "46 rows; at least 100"),
+        (drop_lines(4, ROWS + 3), 3, None, "0 rows; at least 100"),
         (drop_lines(3, ROWS + 3), None, None, "no headings"),
     ],
 )

@@ -174,7 +174,7 @@ def test_currents_pass_a_converter_of_12_bits(walks: TwoWalks) -> None:
 
 def test_a_twin_that_falls_has_no_log(walks: TwoWalks) -> None:
     crushed = walks.scenario.model_copy(update={"load": 50.0})
-    with pytest.raises(SimulationInputError, match="did not walk to the end"):
+    with pytest.raises(SimulationInputError, match="did not finish the walk"):
         synthetic_log(walks.robot, crushed, "fuzzy-pi", PUBLISHED_A, seed=1)
     with pytest.raises(SimulationInputError, match="seed"):
         synthetic_log(walks.robot, walks.scenario, "fuzzy-pi", PUBLISHED_A, seed=-1)

@@ -43,18 +43,13 @@ QuantityName = Literal[
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """A result of a walk that can be a target.
-
-    Attributes:
-        positive: whether all values are positive, so that tolerances are relative; else they are in
-            the unit.
-        scenarios: whether it is one number over all scenarios of a walk.
-    """
+    """A result of a walk that can be a target."""
 
     unit: str
     description: str
+    # whether all values are positive, so that tolerances are relative; else they are in the unit
     positive: bool = True
-    scenarios: bool = False
+    scenarios: bool = False  # whether it is one number over all scenarios of a walk
 
 
 QUANTITIES: Final[dict[QuantityName, Quantity]] = {

@@ -97,20 +97,14 @@ class CalibrationWalk:
 
     Desired angles are those of the robot as described: its controller does not know the varied
     parameters. Variables that the drive gives are not varied.
-
-    Attributes:
-        name: unique in its job.
-        robots: one, or those that the variable `robot` chooses among.
-        design: names and numbers of the drive, sorted by name.
-        variables: columns of the designs, of `robot_variables` and `walk_variables`.
     """
 
-    name: str
-    robots: tuple[RobotSource, ...]
+    name: str  # unique in its job
+    robots: tuple[RobotSource, ...]  # one, or those that the variable `robot` chooses among
     controller: ControllerName
-    design: tuple[tuple[str, float], ...]
+    design: tuple[tuple[str, float], ...]  # names and numbers of the drive, sorted by name
     scenario: Scenario
-    variables: tuple[str, ...]
+    variables: tuple[str, ...]  # columns of the designs, of `robot_variables` and `walk_variables`
     precision: Precision = "double"
 
     @property

@@ -44,17 +44,12 @@ def host_architecture() -> str:
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """Target of a compilation.
+    """Target of a compilation."""
 
-    Attributes:
-        lanes: doubles in a vector register.
-        level: micro-architecture level of the x86-64 ABI as GCC names it; empty for the baseline.
-        architecture: spelled as by `host_architecture`; empty for this machine's.
-    """
-
-    lanes: int
+    lanes: int  # doubles in a vector register
+    # micro-architecture level of the x86-64 ABI as GCC names it; empty for the baseline
     level: str = ""
-    architecture: str = ""
+    architecture: str = ""  # spelled as by `host_architecture`; empty for this machine's
 
     def resolved(self) -> Target:
         """Return this target with the architecture filled in."""

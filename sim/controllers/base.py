@@ -49,15 +49,12 @@ class LookupTable:
             )
 
     def respond(self, error: Ints, current: Ints, change: Ints) -> Ints:
-        """Look up the outputs.
+        """Look up the outputs (J,), with the fraction bits of `output_gain`.
 
         Args:
             error: Coded angle errors, (J,) [counts].
             current: Coded absolute currents, (J,) [counts].
             change: Of the errors over one tick, (J,) [counts].
-
-        Returns:
-            Outputs (J,), with the fraction bits of `output_gain`.
         """
         rows, columns, layers = self.values.shape
         row = np.clip(descale(error * self.error_gain, FRACTION_BITS) + rows // 2, 0, rows - 1)
@@ -72,15 +69,12 @@ class Response(Protocol):
     """A function used by a control law: a table, or for comparison the inference behind it."""
 
     def respond(self, error: Ints, current: Ints, change: Ints) -> Ints:
-        """Output of every joint.
+        """Return the outputs (J,) in fixed point.
 
         Args:
             error: Coded angle errors, (J,) [counts].
             current: Coded absolute currents, (J,) [counts].
             change: Of the errors over one tick, (J,) [counts].
-
-        Returns:
-            (J,) fixed-point numbers.
         """
 
 
@@ -199,21 +193,15 @@ class Controller(Protocol):
         Args:
             design: Value of every variable by name.
 
-        Returns:
-            Integers for the kernel.
-
         Raises:
             SimulationInputError: A value is missing or cannot be represented; names the variable.
         """
 
     def inferences(self, design: Mapping[str, float]) -> tuple[Inference, ...]:
-        """Return the fuzzy inferences behind a design's tables.
+        """Return the fuzzy inferences behind a design's tables, by output.
 
         Args:
             design: Value of every variable by name.
-
-        Returns:
-            By output; empty if the controller is not fuzzy.
 
         Raises:
             SimulationInputError: A value is missing or cannot be represented; names the variable.

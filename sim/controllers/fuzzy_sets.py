@@ -73,17 +73,13 @@ _LIMITS: Final[Mapping[str, tuple[float, float]]] = MappingProxyType(
 
 @dataclass(frozen=True, slots=True)
 class MembershipSets:
-    """Sets of a current's absolute value and of an output, for the conventions above.
-
-    Attributes:
-        extreme_peak: None for an output without extremes.
-    """
+    """Sets of a current's absolute value and of an output, for the conventions above."""
 
     large_begins: float
     small_ends: float
     positive_peak: float
     universe: float
-    extreme_peak: float | None = None
+    extreme_peak: float | None = None  # None for an output without extremes
 
     @classmethod
     def of(cls, design: Mapping[str, float], conventions: Iterable[Variable]) -> MembershipSets:

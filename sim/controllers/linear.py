@@ -31,18 +31,13 @@ _D: Final = Variable(
 
 @dataclass(frozen=True, slots=True)
 class LinearController:
-    """PWM = P error + I integral of error dt + D derivative of error; missing terms are zero.
-
-    Attributes:
-        conventions: the unit of the integrator, if it has one.
-        published: designs from the literature, by study.
-    """
+    """PWM = P error + I integral of error dt + D derivative of error; missing terms are zero."""
 
     name: str
     description: str
     variables: tuple[Variable, ...]
-    conventions: tuple[Variable, ...]
-    published: Mapping[str, Mapping[str, float]]
+    conventions: tuple[Variable, ...]  # the unit of the integrator, if it has one
+    published: Mapping[str, Mapping[str, float]]  # designs from the literature, by study
 
     def compile(self, design: Mapping[str, float]) -> ControlLaw:
         gains = {v.name: required(design, v.name, low=0.0, high=100.0) for v in self.variables}

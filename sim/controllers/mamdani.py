@@ -33,22 +33,13 @@ class Shape(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class FuzzySet:
-    """A symmetric membership function.
+    """A symmetric membership function."""
 
-    Attributes:
-        peak: position of membership one.
-        half_width: the triangle's distance from peak to foot.
-    """
-
-    peak: float
-    half_width: float
+    peak: float  # position of membership one
+    half_width: float  # the triangle's distance from peak to foot
 
     def membership(self, x: Floats, shape: Shape = Shape.TRIANGLE) -> Floats:
-        """Degrees of membership, (n,) in [0, 1].
-
-        Args:
-            x: Points of the universe, (n,).
-        """
+        """Degrees of membership of points (n,) of the universe, (n,) in [0, 1]."""
         distance = np.abs(x - self.peak) / self.half_width
         if shape is Shape.TRIANGLE:
             return np.maximum(0.0, 1.0 - distance)
@@ -62,43 +53,25 @@ class FuzzySet:
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """IF every antecedent holds THEN consequent.
+    """IF every antecedent holds THEN consequent."""
 
-    Attributes:
-        antecedents: name of the set, by input; inputs left out do not matter.
-        weight: in [0, 1].
-    """
-
-    antecedents: Mapping[str, str]
+    antecedents: Mapping[str, str]  # name of the set, by input; inputs left out do not matter
     consequent: str
-    weight: float
+    weight: float  # in [0, 1]
 
 
 @dataclass(frozen=True, slots=True)
 class Mamdani:
-    """A fuzzy inference system with one output.
+    """A fuzzy inference system with one output."""
 
-    Attributes:
-        inputs: sets by input and name.
-        outputs: the output's sets by name, all of `output_shape`.
-        universe: limit of the output's universe on either side.
-    """
-
-    inputs: Mapping[str, Mapping[str, FuzzySet]]
-    outputs: Mapping[str, FuzzySet]
+    inputs: Mapping[str, Mapping[str, FuzzySet]]  # sets by input and name
+    outputs: Mapping[str, FuzzySet]  # the output's sets by name, all of `output_shape`
     rules: Sequence[Rule]
     output_shape: Shape = Shape.TRIANGLE
-    universe: float = 1.0
+    universe: float = 1.0  # limit of the output's universe on either side
 
     def degrees(self, grid: Mapping[str, Floats]) -> list[Floats]:
-        """Degree to which each rule's antecedents hold.
-
-        Args:
-            grid: Values by input, (n_i,).
-
-        Returns:
-            By input (n_rules, n_i), 1 where a rule omits the input.
-        """
+        """How far rules hold (n_rules, n_i), by input of the grid (n_i,); 1 if left out."""
         degrees = []
         for name, values in grid.items():
             grades: dict[str | None, Floats] = {None: np.ones(len(values))}
@@ -121,11 +94,7 @@ class Mamdani:
         return _points(self.universe)
 
     def infer(self, grid: Mapping[str, Floats]) -> Floats:
-        """Crisp output over the product of the inputs' values, (n_1, n_2, ...).
-
-        Args:
-            grid: By input in the order of `inputs`, values inside the range, (n_i,).
-        """
+        """Crisp output over the product (n_1, n_2, ...) of values (n_i,) of the inputs."""
         degrees = self.degrees(grid)
         along = [
             degree.reshape([len(degree), *(-1 if i == axis else 1 for i in range(len(degrees)))])
@@ -134,11 +103,7 @@ class Mamdani:
         return self._crisp(along, tuple(degree.shape[1] for degree in degrees))
 
     def infer_at(self, points: Mapping[str, Floats]) -> Floats:
-        """Crisp output at points, (n,).
-
-        Args:
-            points: By input in the order of `inputs`, coordinates inside the range, (n,).
-        """
+        """Crisp output at points, given by the inputs' coordinates (n,) in their order."""
         degrees = self.degrees(points)
         return self._crisp(degrees, degrees[0].shape[1:])
 
@@ -170,14 +135,10 @@ def _memberships(sets: tuple[FuzzySet, ...], shape: Shape, universe: float) -> F
 
 
 def centroid(levels: Floats, memberships: Floats, points: Floats) -> Floats:
-    """Centre of area of the union of clipped sets.
+    """Centre of area of the union of sets clipped at levels (n_sets, ...).
 
-    Sums run over the points in order, so that the compiled version gives the same bits.
-
-    Args:
-        levels: At which the sets are clipped, (n_sets, ...).
-        memberships: Of the points of the output universe, (n_sets, n_points).
-        points: Of the output universe, (n_points,).
+    Sums run over the points in order, so that the compiled version gives the same bits. Memberships
+    are (n_sets, n_points).
     """
     flat = levels.reshape(len(levels), -1)
     moment = np.zeros(flat.shape[1])

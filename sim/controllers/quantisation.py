@@ -26,15 +26,10 @@ OUTPUT_SCALE: Final = 127
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """One input of a table.
+    """One input of a table."""
 
-    Attributes:
-        bits: of the index.
-        centred: symmetric about zero, like errors; otherwise from zero up, like currents.
-    """
-
-    bits: int
-    centred: bool
+    bits: int  # of the index
+    centred: bool  # symmetric about zero, like errors; otherwise from zero up, like currents
 
     def grid(self) -> NDArray[np.float64]:
         """Shares of the input's range at the indices, (2 ** bits,).
@@ -54,18 +49,12 @@ class Axis:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ExactInference:
-    """Response by the inference itself in 64-bit numbers, without a table; reference kernel only.
-
-    Attributes:
-        error_range: coded counts of share 1.
-        current_range: coded counts of share 1.
-        output_range: PWM counts of share 1.
-    """
+    """Response by the inference in 64-bit numbers, without a table; reference kernel only."""
 
     system: Mamdani
-    error_range: float
-    current_range: float
-    output_range: float
+    error_range: float  # coded counts of share 1
+    current_range: float  # coded counts of share 1
+    output_range: float  # PWM counts of share 1
 
     def respond(
         self, error: NDArray[np.int64], current: NDArray[np.int64], change: NDArray[np.int64]
@@ -87,15 +76,11 @@ def table_bytes(input_bits: tuple[int, ...], output_bits: int, outputs: int = 1)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Quantised:
-    """An inference in 8 bits.
+    """An inference in 8 bits."""
 
-    Attributes:
-        values: (2 ** bits of each axis) in 1/127ths of the largest output, read-only.
-        largest: output in the table, as a share of the output's range.
-    """
-
+    # (2 ** bits of each axis) in 1/127ths of the largest output, read-only
     values: NDArray[np.int8]
-    largest: float
+    largest: float  # output in the table, as a share of the output's range
 
     @property
     def step(self) -> float:
@@ -105,15 +90,10 @@ class Quantised:
 
 @dataclass(slots=True)
 class TableTime:
-    """Accumulated cost of building tables.
+    """Accumulated cost of building tables."""
 
-    Attributes:
-        seconds: wall time [s].
-        made: number of tables.
-    """
-
-    seconds: float = 0.0
-    made: int = 0
+    seconds: float = 0.0  # wall time [s]
+    made: int = 0  # number of tables
 
 
 _table_time: Final[ContextVar[TableTime | None]] = ContextVar("table_time", default=None)
@@ -152,11 +132,8 @@ def reference_table(
 ) -> tuple[NDArray[np.int8], float]:
     """Oracle of the compiled table, and its replacement without a compiler.
 
-    Args:
-        grid: Values by input in the system's order, inside the range, (n_i,).
-
-    Returns:
-        Values in 1/127ths of the largest output, (n_1, n_2, ...), and that output, absolute.
+    The grid has the values (n_i,) of the inputs, in order. Returns values in 1/127ths of the
+    largest output, (n_1, n_2, ...), and that output, absolute.
     """
     crisp = system.infer(grid)
     largest = float(np.abs(crisp).max())
@@ -166,15 +143,10 @@ def reference_table(
 def compiled_table(
     system: Mamdani, grid: Mapping[str, NDArray[np.float64]], *, library: ctypes.CDLL | None = None
 ) -> tuple[NDArray[np.int8], float] | None:
-    """Tabulate an inference in a fraction of a millisecond, with the bits of `reference_table`.
+    """`reference_table` in a fraction of a millisecond, with the same bits.
 
-    Args:
-        grid: Values by input in the system's order, inside the range, (n_i,).
-
-    Returns:
-        Values in 1/127ths of the largest output over the product of the inputs' values, (n_1, n_2,
-        ...), and that output, absolute, as a share of the output's range. None for a system that is
-        too large, a grid that does not consist of whole blocks, or without a C compiler.
+    None without a C compiler, for a system that is too large, and for a grid that does not consist
+    of whole blocks.
     """
     *firsts, inner = system.degrees(grid)
     memberships, points = system.output_memberships(), system.output_points()

@@ -21,36 +21,25 @@ SURFACE_AXES: Final = ("error", "current")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Memberships:
-    """Range and sets of an input or output.
-
-    Attributes:
-        limits: of the universe, in its unit; an output's may lie beyond its range.
-        values: (n,), in its unit.
-        degrees: by set, (n,) [1].
-    """
+    """Range and sets of an input or output."""
 
     universe: Universe
+    # of the universe, in its unit; an output's may lie beyond its range
     limits: tuple[float, float]
-    values: Floats
-    degrees: Mapping[str, Floats]
+    values: Floats  # (n,), in its unit
+    degrees: Mapping[str, Floats]  # by set, (n,) [1]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surface:
-    """One output over (error, current), in its unit.
-
-    Attributes:
-        held: constant value of each other input, in its unit.
-        inference: (n_error, n_current), at the inputs' `values`.
-        table: (n_error, n_current), at the inputs' `values`.
-    """
+    """One output over (error, current), in its unit."""
 
     source: Inference
     inputs: Mapping[str, Memberships]
     output: Memberships
-    held: Mapping[str, float]
-    inference: Floats
-    table: Floats
+    held: Mapping[str, float]  # constant value of each other input, in its unit
+    inference: Floats  # (n_error, n_current), at the inputs' `values`
+    table: Floats  # (n_error, n_current), at the inputs' `values`
 
     @property
     def bytes(self) -> int:
@@ -71,12 +60,7 @@ class Surface:
 def surface(
     source: Inference, *, error_points: int, current_points: int, velocity: float = 0.0
 ) -> Surface:
-    """Compute an output on an even grid of whole counts.
-
-    Args:
-        velocity: Constant value of an input of that name, rounded to whole counts per tick
-            [counts/s].
-    """
+    """Compute an output on an even grid of whole counts, at a velocity error [counts/s]."""
     points = {"error": error_points, "current": current_points, "velocity": error_points}
     inputs = {
         name: _input(universe, source.axes[name], points[name], source.system.inputs[name])

@@ -50,24 +50,15 @@ Codes = NDArray[np.int16]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ControlLog:
-    """Coded inputs and outputs of a walk's controllers; T ticks, J joints.
+    """Coded inputs and outputs of a walk's controllers; T ticks, J joints."""
 
-    Attributes:
-        scenario: in the gait of the design.
-        desired: (T, J) [counts of angle].
-        angle: of the motors, (T, J) [counts of angle].
-        current: absolute, (T, J) [counts of current].
-        pwm: output of the controllers, (T, J) [PWM counts].
-        objectives: f1 to f6, (6,), NaN where undefined.
-    """
-
-    scenario: Scenario
+    scenario: Scenario  # in the gait of the design
     status: Status
-    desired: Codes
-    angle: Codes
-    current: NDArray[np.uint16]
-    pwm: Codes
-    objectives: NDArray[np.float64]
+    desired: Codes  # (T, J) [counts of angle]
+    angle: Codes  # of the motors, (T, J) [counts of angle]
+    current: NDArray[np.uint16]  # absolute, (T, J) [counts of current]
+    pwm: Codes  # output of the controllers, (T, J) [PWM counts]
+    objectives: NDArray[np.float64]  # f1 to f6, (6,), NaN where undefined
 
     @property
     def ticks(self) -> int:
@@ -151,21 +142,15 @@ _MAGIC: Final = b"GSWALK1\0"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Firmware:
-    """A design for a microcontroller.
+    """A design for a microcontroller."""
 
-    Attributes:
-        files: content by path; the manifest is the last.
-        trajectories: desired angles, by scenario.
-        logs: simulated walks that a test of the files repeats.
-        table_difference: by objective, largest relative difference from walks with the default
-            table [1]; None with the default table.
-    """
-
-    files: Mapping[str, bytes]
+    files: Mapping[str, bytes]  # content by path; the manifest is the last
     law: LawIntegers
-    trajectories: tuple[TrajectoryTable, ...]
-    logs: tuple[ControlLog, ...]
+    trajectories: tuple[TrajectoryTable, ...]  # desired angles, by scenario
+    logs: tuple[ControlLog, ...]  # simulated walks that a test of the files repeats
     memory: Memory
+    # by objective, largest relative difference from walks with the default table [1]; None with the
+    # default table
     table_difference: Mapping[str, float] | None = None
 
     @property

@@ -24,34 +24,22 @@ _WIDE: Final = 64
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """Largest value of a number in the control tick.
+    """Largest value of a number in the control tick."""
 
-    Attributes:
-        name: in tick.c.
-        meaning: with its unit.
-        largest: absolute.
-        bits: of the integer that holds it, sign included.
-    """
-
-    name: str
-    meaning: str
-    largest: int
-    bits: int
+    name: str  # in tick.c
+    meaning: str  # with its unit
+    largest: int  # absolute
+    bits: int  # of the integer that holds it, sign included
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LawIntegers:
-    """A control law in the integers of a microcontroller.
-
-    Attributes:
-        full_scale: of the PWM [counts].
-        pwm_step: resolution of the PWM [counts].
-        fine_bits: width of numbers with 16 fraction bits, 32 or 64: the smaller one that suffices.
-    """
+    """A control law in the integers of a microcontroller."""
 
     law: ControlLaw
-    full_scale: int
-    pwm_step: int
+    full_scale: int  # of the PWM [counts]
+    pwm_step: int  # resolution of the PWM [counts]
+    # width of numbers with 16 fraction bits, 32 or 64: the smaller one that suffices
     fine_bits: int
     ranges: tuple[Range, ...]
 

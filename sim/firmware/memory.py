@@ -25,18 +25,12 @@ class TrajectoryTable:
     """Desired angles of a walk as a table, played at the control rate.
 
     Row 0 is the pose at the start of a walk; row `repeats_from` follows the last one.
-
-    Attributes:
-        name: of the scenario.
-        rows: (N, C) [counts of angle].
-        repeats_from: a row; N for a walk that does not repeat.
-        columns: column by joint, (J,).
     """
 
-    name: str
-    rows: NDArray[np.int16]
-    repeats_from: int
-    columns: NDArray[np.intp]
+    name: str  # of the scenario
+    rows: NDArray[np.int16]  # (N, C) [counts of angle]
+    repeats_from: int  # a row; N for a walk that does not repeat
+    columns: NDArray[np.intp]  # column by joint, (J,)
 
     @property
     def repeats(self) -> bool:
@@ -90,18 +84,12 @@ def _table(name: str, codes: NDArray[np.int16], repeats_from: int) -> Trajectory
 
 @dataclass(frozen=True, slots=True)
 class Budget:
-    """A microcontroller.
-
-    Attributes:
-        flash: [B].
-        ram: [B].
-        cycles: per control tick.
-    """
+    """A microcontroller."""
 
     name: str
-    flash: int
-    ram: int
-    cycles: int
+    flash: int  # [B]
+    ram: int  # [B]
+    cycles: int  # per control tick
 
 
 BUDGET: Final = Budget("MSP430F2618", flash=116 << 10, ram=8 << 10, cycles=32_000)
@@ -113,20 +101,12 @@ CODE_BYTES: Final = 2048
 
 @dataclass(frozen=True, slots=True)
 class Memory:
-    """Memory of firmware; trajectories are played by the robot's central ARM, or stored on the
-    legs.
+    """Memory of firmware; trajectories are on the robot's central ARM, or on the legs."""
 
-    Attributes:
-        tables: of the fuzzy tables, eq. 5.1 [B].
-        trajectories: of all joints of all scenarios [B].
-        trajectories_of_a_leg: of one leg's joints [B].
-        ram: state of the controller between ticks [B].
-    """
-
-    tables: int
-    trajectories: int
-    trajectories_of_a_leg: int
-    ram: int
+    tables: int  # of the fuzzy tables, eq. 5.1 [B].
+    trajectories: int  # of all joints of all scenarios [B]
+    trajectories_of_a_leg: int  # of one leg's joints [B]
+    ram: int  # state of the controller between ticks [B]
 
     @classmethod
     def of(cls, law: LawIntegers, trajectories: Sequence[TrajectoryTable]) -> Memory:

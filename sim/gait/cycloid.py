@@ -15,16 +15,7 @@ Floats = NDArray[np.float64]
 def cycloid(
     phase: Floats, *, stride: float, height: float, duty_factor: float
 ) -> tuple[Floats, Floats]:
-    """Foot position in its leg's frame.
-
-    Args:
-        stride: Length of the support [m].
-        height: Of the swing [m].
-        duty_factor: Support's share of the cycle [1].
-
-    Returns:
-        Forward (...) from +stride/2 to -stride/2 and back, and lift (...) >= 0 [m].
-    """
+    """Foot position, see `half_ellipse`."""
     supporting = phase < duty_factor
     support = phase / duty_factor
     swing = np.clip((phase - duty_factor) / (1.0 - duty_factor), 0.0, 1.0)

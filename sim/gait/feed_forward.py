@@ -26,18 +26,12 @@ _DECIMALS: Final = 9
 
 
 def carrying_torques(robot: Robot, trajectory: Trajectory, gravity: float) -> Floats:
-    """Feed-forward of a walk: the feet on the ground share the robot's weight evenly.
+    """Feed-forward of a walk (T, J) [N m]: the feet on the ground share the robot's weight evenly.
 
     tau = -J^T (0, 0, f), with f the weight per foot on the ground and J the Jacobian at the desired
     angles: the static part of the feed-forward of Di Carlo et al. (Dynamic locomotion in the MIT
     Cheetah 3 through convex model-predictive control, 2018), without its optimization. The body is
     taken as level; loads, unknown to the robot, are ignored.
-
-    Args:
-        gravity: [m/s2].
-
-    Returns:
-        (T, J) [N m].
     """
     angles = trajectory.angles
     height, slopes = np.empty((len(angles), len(robot.legs))), np.empty_like(angles)

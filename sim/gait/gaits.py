@@ -30,20 +30,16 @@ Rows = tuple[Sequence[int], Sequence[int]]
 
 @dataclass(frozen=True, slots=True)
 class Gait:
-    """An order of footfalls.
-
-    Attributes:
-        description: with its source.
-        legs: numbers of legs that it is defined for, half of them on each side; any if empty.
-        lags: from the legs' rows to the lag of each leg, by its index.
-        duty_factor: from the number of legs to the share of support at which a foot lifts off when
-            another one has touched down [1].
-    """
+    """An order of footfalls."""
 
     name: GaitName
-    description: str
+    description: str  # with its source
+    # numbers of legs that it is defined for, half of them on each side; any if empty
     legs: tuple[int, ...]
+    # from the legs' rows to the lag of each leg, by its index
     lags: Callable[[Rows], Mapping[int, float]]
+    # from the number of legs to the share of support at which a foot lifts off when another one has
+    # touched down [1]
     duty_factor: Callable[[int], float]
 
     @property
@@ -204,36 +200,23 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class LegGait:
-    """One leg's part of a gait.
+    """One leg's part of a gait."""
 
-    Attributes:
-        phase: share of the cycle since the start of its support when the walk begins, 0 or more.
-        support_share: support's share of the cycle [1].
-        stride: length of the support, with the scenario's turn [m].
-        height: of the swing [m].
-        radius: lateral distance of the foot from the body's long axis [m].
-    """
-
+    # share of the cycle since the start of its support when the walk begins, 0 or more
     phase: float
-    support_share: float
-    stride: float
-    height: float
-    radius: float
+    support_share: float  # support's share of the cycle [1]
+    stride: float  # length of the support, with the scenario's turn [m]
+    height: float  # of the swing [m]
+    radius: float  # lateral distance of the foot from the body's long axis [m]
 
 
 @dataclass(frozen=True, slots=True)
 class Sway:
-    """Motion of the body relative to its course, while the feet keep their places on the ground.
+    """Motion of the body relative to its course, while the feet keep their places on the ground."""
 
-    Attributes:
-        lateral: amplitude to the left and right, once per cycle [m].
-        longitudinal: amplitude along the course, twice per cycle [m].
-        begin: share of the cycle at the start of the walk since the body was furthest left.
-    """
-
-    lateral: float
-    longitudinal: float
-    begin: float
+    lateral: float  # amplitude to the left and right, once per cycle [m]
+    longitudinal: float  # amplitude along the course, twice per cycle [m]
+    begin: float  # share of the cycle at the start of the walk since the body was furthest left
 
     @classmethod
     def of(cls, scenario: Scenario) -> Sway | None:
@@ -243,11 +226,7 @@ class Sway:
         return cls(scenario.sway_lateral, scenario.sway_longitudinal, begin)
 
     def body(self, cycles: Floats) -> tuple[Floats, Floats]:
-        """Displacement of the body along the course and to the left, (T,) each [m].
-
-        Args:
-            cycles: Time in cycles, (T,).
-        """
+        """Displacement of the body along the course and to the left [m] at times in cycles (T,)."""
         angle = 2.0 * np.pi * (cycles + self.begin)
         # Forward while a left hind leg steps, back while the left front leg does: a lying eight.
         return -self.longitudinal * np.sin(2.0 * angle), self.lateral * np.cos(angle)
@@ -285,11 +264,7 @@ def _by_parameter(robot: Robot, scenario: Scenario) -> dict[str, dict[int, float
 
 
 def supporting(gaits: Sequence[LegGait], cycles: Floats) -> NDArray[np.bool_]:
-    """Return which feet are planned to be on the ground, (T, L).
-
-    Args:
-        cycles: Time since the start in cycles, (T,).
-    """
+    """Which feet are planned to be on the ground (T, L) at times since the start in cycles (T,)."""
     phases = np.array([gait.phase for gait in gaits])
     shares = np.array([gait.support_share for gait in gaits])
     return np.asarray(np.mod(cycles[:, None] + phases, 1.0) < shares)

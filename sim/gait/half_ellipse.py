@@ -11,15 +11,10 @@ Floats = NDArray[np.float64]
 def half_ellipse(
     phase: Floats, *, stride: float, height: float, duty_factor: float
 ) -> tuple[Floats, Floats]:
-    """Foot position in its leg's frame.
+    """Foot position in its leg's frame [m] at phases (...) of the cycle.
 
-    Args:
-        stride: Length of the support [m].
-        height: Of the swing [m].
-        duty_factor: Support's share of the cycle [1].
-
-    Returns:
-        Forward (...) from +stride/2 to -stride/2 and back, and lift (...) >= 0 [m].
+    It is forward, from +stride/2 to -stride/2 and back, and lift >= 0. duty_factor: support's share
+    of the cycle [1].
     """
     supporting = phase < duty_factor
     support = phase / duty_factor

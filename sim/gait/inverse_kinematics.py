@@ -32,13 +32,7 @@ _EXACT: Final = 1e-14
 def leg_angles(
     lengths: tuple[float, float, float], forward: Floats, lateral: Floats, vertical: Floats
 ) -> tuple[Floats, Floats]:
-    """Knee-up solution for a tibia end relative to the coxa axis.
-
-    Args:
-        lengths: Of coxa, femur and tibia [m].
-        forward: (T,) [m].
-        lateral: Outward, (T,) [m].
-        vertical: Upward, (T,) [m].
+    """Knee-up solution for a tibia end (T,) relative to the coxa axis [m].
 
     Returns:
         Angles (T, 3) [rad] (coxa forward, femur up, tibia up), and the miss (T,) [m] by which the
@@ -60,17 +54,13 @@ def leg_angles(
 
 
 def chain_angles(leg: ChainLeg, targets: Floats) -> tuple[Floats, Floats]:
-    """Angles of a leg of any mounting, on the branch of its stance.
+    """Angles of any other leg, on the branch of its stance, for feet (T, 3) in the body's frame.
 
     Levenberg-Marquardt steps from the stance, first half of the way to the targets, so that a knee
     does not flip.
 
-    Args:
-        targets: Of its foot in the body's frame, (T, 3) [m].
-
     Returns:
-        Angles (T, 3) [rad]; and the miss (T,) [m] by which the target lies outside the leg's reach,
-        0 inside; the angles of a missed target are the closest ones.
+        Angles (T, 3) [rad], of a missed target the closest ones, and the miss as in `leg_angles`.
     """
     # Equal targets are solved once. However, numpy rounds a single row differently than several, so
     # equal rows of a constant target stay together.

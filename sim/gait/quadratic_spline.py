@@ -21,17 +21,9 @@ UPDATES_PER_CYCLE: Final = 42
 def quadratic_spline(
     phase: Floats, *, stride: float, height: float, duty_factor: float
 ) -> tuple[Floats, Floats]:
-    """Foot position in its leg's frame.
+    """Foot position, see `half_ellipse`.
 
     The spline's middle point lies at twice the height, so that the foot reaches the height.
-
-    Args:
-        stride: Length of the support [m].
-        height: Of the swing [m].
-        duty_factor: Support's share of the cycle [1].
-
-    Returns:
-        Forward (...) from +stride/2 to -stride/2 and back, and lift (...) >= 0 [m].
     """
     supporting = phase < duty_factor
     support = phase / duty_factor

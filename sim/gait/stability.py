@@ -25,20 +25,15 @@ _SAMPLES: Final = 240
 
 @dataclass(frozen=True, slots=True)
 class Stability:
-    """Static stability of a gait.
+    """Static stability of a gait."""
 
-    Attributes:
-        margin: smallest distance of the centre of mass, projected along gravity, from the edge of
-            the polygon of the supporting feet [m]; negative outside of it, as with fewer than three
-            feet. The static stability margin of McGhee and Frank (1968), Mathematical Biosciences
-            3. None if at some time no foot is on the ground.
-        fewest_feet: minimum of feet on the ground.
-        duty_factor: mean of the legs' shares of support [1].
-    """
-
+    # smallest distance of the centre of mass, projected along gravity, from the edge of the polygon
+    # of the supporting feet [m]; negative outside of it, as with fewer than three feet. The static
+    # stability margin of McGhee and Frank (1968), Mathematical Biosciences 3. None if at some time
+    # no foot is on the ground.
     margin: float | None
-    fewest_feet: int
-    duty_factor: float
+    fewest_feet: int  # minimum of feet on the ground
+    duty_factor: float  # mean of the legs' shares of support [1]
 
     @property
     def stable(self) -> bool:
@@ -72,13 +67,9 @@ def static_stability(robot: Robot, scenario: Scenario) -> Stability:
 
 
 def support_margin(feet: Floats, point: Floats) -> float:
-    """Distance of a point from the edge of the feet's convex hull [m].
+    """Distance of a point (2,) from the edge of the convex hull of feet (n, 2) [m].
 
     Positive inside the hull; negative outside, or if the feet are collinear.
-
-    Args:
-        feet: (n, 2) [m], n >= 1.
-        point: (2,) [m].
     """
     hull = _convex_hull([(x, y) for x, y in feet.tolist()])
     x, y = point.tolist()

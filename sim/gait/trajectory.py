@@ -35,12 +35,10 @@ fir1: a windowed sinc."""
 def fir_gains(fir_ms: int, window: FirWindow) -> Floats:
     """Coefficients of the filter at the control rate, (n,), oldest angle first; the sum is 1.
 
-    Args:
-        fir_ms: Length of the filter [ms].
-        window: `moving_average`: equal coefficients, one per control period. `hamming`: fir1(order,
-            cut-off) with the number of control periods as order, so that the delay is half of the
-            length. The cut-off is one over the number of coefficients times the control period: the
-            main lobe of the ideal low-pass then just fills the filter.
+    `moving_average` has equal coefficients, one per control period. `hamming` is fir1(order,
+    cut-off) with the number of control periods as order, so that the delay is half of the length.
+    The cut-off is one over the number of coefficients times the control period: the main lobe of
+    the ideal low-pass then just fills the filter.
     """
     order = round(fir_ms * 1e-3 / CONTROL_PERIOD)
     taps = max(1, order) if window == "moving_average" else order + 1
@@ -55,12 +53,7 @@ def fir_gains(fir_ms: int, window: FirWindow) -> Floats:
 
 
 def low_pass(angles: Floats, fir_ms: int, window: FirWindow = "moving_average") -> Floats:
-    """Filtered angles (T, J), at rest before t = 0.
-
-    Args:
-        angles: At the control rate, (T, J).
-        fir_ms: Length of the filter [ms].
-    """
+    """Filter angles (T, J) at the control rate, at rest before t = 0."""
     gains = fir_gains(fir_ms, window)
     taps, ticks = len(gains), len(angles)
     padded = np.concatenate([np.repeat(angles[:1], taps - 1, axis=0), angles])
@@ -108,18 +101,12 @@ class Trajectory:
     """Desired angles at the control rate; arrays are read-only.
 
     Legs that move alike share their columns.
-
-    Attributes:
-        columns: (T, C) [rad]; row 0 is the pose at rest.
-        joints: column by joint, (J,).
-        miss: largest distance by which a leg's target lies outside its reach, (L,) [m].
-        excess: largest angle by which a joint would leave its limits, (J,) [rad].
     """
 
-    columns: Floats
-    joints: NDArray[np.intp]
-    miss: Floats
-    excess: Floats
+    columns: Floats  # (T, C) [rad]; row 0 is the pose at rest
+    joints: NDArray[np.intp]  # column by joint, (J,)
+    miss: Floats  # largest distance by which a leg's target lies outside its reach, (L,) [m]
+    excess: Floats  # largest angle by which a joint would leave its limits, (J,) [rad]
 
     @property
     def angles(self) -> Floats:
@@ -136,11 +123,7 @@ class Trajectory:
         return not (self.miss.any() or self.excess.any())
 
     def codes(self, angle_counts: float) -> NDArray[np.int32]:
-        """Encode for the controller, (T, J) [counts].
-
-        Args:
-            angle_counts: [counts/rad].
-        """
+        """Encode for the controller, (T, J) [counts]."""
         coded = np.rint(self.columns * angle_counts).astype(np.int32)
         return np.asarray(coded.take(self.joints, axis=1))
 

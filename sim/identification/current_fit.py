@@ -40,17 +40,12 @@ class CurrentFit:
 
     Desired angles are those of the robot as described: its controller does not know the true
     parameters.
-
-    Attributes:
-        name: of the recorded walk, unique in its job.
-        robot: as described.
-        variables: columns of the designs, names of `identifiable_variables`.
     """
 
-    name: str
-    robot: RobotSource
+    name: str  # of the recorded walk, unique in its job
+    robot: RobotSource  # as described
     walk: RecordedWalk
-    variables: tuple[str, ...]
+    variables: tuple[str, ...]  # columns of the designs, names of `identifiable_variables`
     precision: Precision = "double"
 
     @property

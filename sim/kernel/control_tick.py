@@ -22,15 +22,10 @@ Ints = NDArray[np.int64]
 
 @dataclass(slots=True)
 class Past:
-    """State of the controllers between ticks, (J,) each.
+    """State of the controllers between ticks, (J,) each."""
 
-    Attributes:
-        integral: integrators [counts, with `INTEGRAL_BITS` fraction bits].
-        error: of the previous tick [counts]; None before the first.
-    """
-
-    integral: Ints
-    error: Ints | None = None
+    integral: Ints  # integrators [counts, with `INTEGRAL_BITS` fraction bits]
+    error: Ints | None = None  # of the previous tick [counts]; None before the first
 
     @classmethod
     def of(cls, n_joints: int) -> Past:
@@ -38,15 +33,9 @@ class Past:
 
 
 def low_pass(sensed: Floats, current: Floats, smoothing: float) -> Floats:
-    """Advance the current sensors' analog filter by one physics step.
+    """Advance the filtered absolute currents (J,) [A] by one physics step.
 
-    Args:
-        sensed: Filter output before the step, (J,) [A].
-        current: Absolute, (J,) [A].
-        smoothing: Share of the distance to `current` covered in the step [1]; 1 for no filter.
-
-    Returns:
-        Filter output after the step, (J,) [A].
+    smoothing is the share of the distance to `current` covered in the step [1]; 1 for no filter.
     """
     return current.copy() if smoothing >= 1.0 else sensed + smoothing * (current - sensed)
 
@@ -54,30 +43,13 @@ def low_pass(sensed: Floats, current: Floats, smoothing: float) -> Floats:
 def coded(
     angles: Floats, current: Floats, desired: NDArray[np.int32], coding: Coding
 ) -> tuple[Ints, Ints]:
-    """Encode the sensor readings.
-
-    Args:
-        angles: Seen by the encoders, (J,) [rad].
-        current: Absolute, behind the filter, (J,) [A].
-        desired: Coded angles, (J,) [counts].
-
-    Returns:
-        Angle error and absolute current, (J,) [counts].
-    """
+    """Return angle error and absolute current, (J,) [counts], of readings in [rad] and [A]."""
     error = desired.astype(np.int64) - coding.angle_codes(angles)
     return np.clip(error, -CODE_LIMIT, CODE_LIMIT), coding.current_codes(current)
 
 
 def control(law: ControlLaw, coding: Coding, error: Ints, load: Ints, past: Past) -> Ints:
-    """Run one tick of all joints' controllers (thesis 5.3).
-
-    Args:
-        error: Of the angles, (J,) [counts].
-        load: Absolute currents, (J,) [counts].
-
-    Returns:
-        PWM counts, (J,).
-    """
+    """Run a tick of all controllers (thesis 5.3): error and load to PWM, (J,) [counts]."""
     change = np.zeros_like(error) if past.error is None else error - past.error
     direct = error * law.proportional_gain + change * law.derivative_gain
     grown = past.integral + error * law.integral_gain
@@ -128,11 +100,7 @@ class InnerLoop:
         self._commanded: Floats = self._target
 
     def begin(self, tick: int, output: NDArray[np.int64]) -> None:
-        """Begin a control tick.
-
-        Args:
-            output: Of the controllers, (J,) [counts].
-        """
+        """Begin a control tick with the controllers' output (J,) [counts]."""
         self._commanded = output.astype(np.float64) * self._coding.duty_per_count
         if self._limit is None:
             return
@@ -147,15 +115,7 @@ class InnerLoop:
             self._commanded = self._commanded + share
 
     def command(self, angles: Floats, rates: Floats) -> Floats:
-        """Return the command until the next inner tick.
-
-        Args:
-            angles: Seen by the encoders, (J,) [rad].
-            rates: Seen by the encoders, (J,) [rad/s].
-
-        Returns:
-            Motor voltage per supply voltage, or torque per torque limit, (J,) [1].
-        """
+        """Return the duty (J,) for angles [rad] and rates [rad/s] that the encoders see."""
         if self._limit is None:
             return self._commanded
         torque = self._pd.stiffness * (self._target - angles)

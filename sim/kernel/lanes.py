@@ -17,17 +17,11 @@ _EXCHANGES_PER_LANE: Final = 4
 
 @dataclass(frozen=True, slots=True)
 class LanePlan:
-    """Assignment of walks to lanes; a lane starts its next walk when one ends.
+    """Assignment of walks to lanes; a lane starts its next walk when one ends."""
 
-    Attributes:
-        order: indices of the walks in the order of their start.
-        end: time at which the last lane finishes, in the unit of the durations.
-        use: share of the lanes' time until then that is spent on walks [1].
-    """
-
-    order: tuple[int, ...]
-    end: float
-    use: float
+    order: tuple[int, ...]  # indices of the walks in the order of their start
+    end: float  # time at which the last lane finishes, in the unit of the durations
+    use: float  # share of the lanes' time until then that is spent on walks [1]
 
 
 def plan_lanes(durations: Sequence[float], lanes: int) -> LanePlan:

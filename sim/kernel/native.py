@@ -195,12 +195,7 @@ class Pool:
     def walk(
         self, walkers: ctypes.Array[Any], coding: ctypes.Structure, memory: object
     ) -> tuple[LaneCounts, float]:
-        """Compute the walks, and possibly some of other calls.
-
-        Returns:
-            Use of this thread's lanes, and how long it then waited for walks that other threads had
-            taken over [s].
-        """
+        """Compute the walks, maybe also some of other calls; return lane use and wait time [s]."""
         call = _Call(walkers=ctypes.addressof(walkers), n=len(walkers), left=len(walkers))
         use = LaneCounts()
         with self._walked:

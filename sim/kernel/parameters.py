@@ -37,15 +37,11 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class ContactData:
-    """Kernel inputs of a contact law.
+    """Kernel inputs of a contact law."""
 
-    Attributes:
-        parameters: read for each foot, fields of `gaitswarm.sim.robot.description.Contact`.
-        internal_state_size: numbers carried for each foot from step to step.
-    """
-
+    # read for each foot, fields of `gaitswarm.sim.robot.description.Contact`
     parameters: tuple[str, ...]
-    internal_state_size: int = 0
+    internal_state_size: int = 0  # numbers carried for each foot from step to step
 
 
 _NORMAL: Final = ("stiffness", "damping", "sole", "friction")
@@ -151,12 +147,7 @@ def _towards(direction: float) -> Floats:
 
 
 def gravity_on(slope: float, direction: float = 0.0) -> Floats:
-    """Return gravity (3,) [m/s2] in a world whose z axis is normal to the ground.
-
-    Args:
-        slope: Inclination of the ground [deg].
-        direction: Uphill direction, counted from x to y [deg].
-    """
+    """Gravity (3,) [m/s2] for ground that rises by a slope [deg] towards a direction [deg]."""
     angle, towards = math.radians(slope), math.radians(direction)
     along = -GRAVITY * math.sin(angle)
     return np.array(
@@ -174,14 +165,8 @@ def pack_parameters(
 ) -> Floats:
     """Return the kernel's parameters for one robot in one scenario.
 
-    A load is a point mass at `load_height` over the body's centre.
-
-    Args:
-        timestep: Of the physics [s].
-        start: Joint angles at the start, at which a jammed leg is held, (J,) [rad]; zero by
-            default.
-        displaced: Whether disturbances are angles between gearheads and links [rad] instead of
-            torques.
+    A load is a point mass at `load_height` over the body's centre. A jammed leg is held at its
+    angles in `start` (J,) [rad]. `displaced`: disturbances are angles [rad] instead of torques.
     """
     if displaced and not robot.has_backlash:
         raise SimulationInputError(

@@ -38,21 +38,13 @@ _WEYL: Final = 0x9E3779B9, 0xBB67AE85
 
 @dataclass(frozen=True, slots=True)
 class SensorErrors:
-    """Errors of all joints' encoders and current sensors in one walk.
+    """Errors of all joints' encoders and current sensors in one walk."""
 
-    Attributes:
-        angle_noise: standard deviation [rad].
-        current_noise: standard deviation of an absolute current [A].
-        angle_delay: [control ticks].
-        current_delay: [control ticks].
-        seed: of the noise, which depends on seed, tick and joint only.
-    """
-
-    angle_noise: float = 0.0
-    current_noise: float = 0.0
-    angle_delay: int = 0
-    current_delay: int = 0
-    seed: int = 0
+    angle_noise: float = 0.0  # standard deviation [rad]
+    current_noise: float = 0.0  # standard deviation of an absolute current [A]
+    angle_delay: int = 0  # [control ticks]
+    current_delay: int = 0  # [control ticks]
+    seed: int = 0  # of the noise, which depends on seed, tick and joint only
 
     def __post_init__(self) -> None:
         for name in ("angle_noise", "current_noise"):
@@ -81,14 +73,7 @@ NO_ERRORS: Final = SensorErrors()
 
 
 def philox(counter: Words, key: tuple[Words, Words]) -> Words:
-    """Philox4x32-10 (Salmon et al., Parallel random numbers: as easy as 1, 2, 3, 2011).
-
-    Args:
-        counter: (..., 4) words of 32 bits.
-
-    Returns:
-        (..., 4) words of 32 bits.
-    """
+    """Philox4x32-10 (Salmon et al., Parallel random numbers: as easy as 1, 2, 3, 2011)."""
     c = [counter[..., k] for k in range(4)]
     shift = np.uint64(32)
     for number in range(10):
@@ -99,13 +84,9 @@ def philox(counter: Words, key: tuple[Words, Words]) -> Words:
 
 
 def byte_sums(seeds: Words, tick: int, joints: int, stream: int = 0) -> Integers:
-    """Return nearly normal integers, two for every joint.
+    """Return nearly normal integers (n, J, 2), two for every joint, from 64-bit seeds (n,).
 
-    Args:
-        seeds: (n,), of 64 bits.
-
-    Returns:
-        (n, J, 2) sums of eight bytes minus their mean; the standard deviation is `DEVIATION`.
+    They are sums of eight bytes minus their mean; the standard deviation is `DEVIATION`.
     """
     counter = np.zeros((len(seeds), joints, 4), dtype=np.uint64)
     counter[..., 0], counter[..., 1], counter[..., 2] = tick, np.arange(joints), stream
@@ -124,14 +105,9 @@ class Sensors:
         self._tick = 0
 
     def read(self, angle: Floats, current: Floats) -> tuple[Floats, Floats]:
-        """Return the readings of the next tick.
+        """Return the next tick's readings of angles (J,) [rad] and absolute currents (J,) [A].
 
-        Args:
-            angle: Of all encoders, (J,) [rad].
-            current: Absolute, (J,) [A].
-
-        Returns:
-            Angles and currents, (J,) each. Readings from before the walk equal the first one.
+        Readings from before the walk equal the first one.
         """
         noise = self._noise(len(angle))
         self._tick += 1

@@ -52,33 +52,20 @@ LARGEST_PWM = LARGEST_OUTPUT
 
 @dataclass(frozen=True, slots=True)
 class Coding:
-    """Resolutions of sensors and PWM, and physics steps per control tick.
+    """Resolutions of sensors and PWM, and physics steps per control tick."""
 
-    Attributes:
-        angle_counts: [counts/rad].
-        current_counts: [counts/A].
-        duty_per_count: motor voltage per supply voltage, or torque per torque limit, of one count
-            of a controller's output [1].
-        angle_step: encoder resolution [counts].
-        current_step: resolution of the current's converter [counts].
-        pwm_step: resolution of the PWM [counts].
-        pwm_counts: full scale of the PWM [counts].
-        substeps: physics steps per control tick.
-        refinement: factor by which steps are shorter in control ticks in which a foot may touch
-            down.
-        inner_ticks: ticks of the actuators' joint PD per control tick; divides `substeps`.
-    """
-
-    angle_counts: float
-    current_counts: float
+    angle_counts: float  # [counts/rad]
+    current_counts: float  # [counts/A]
+    # motor voltage per supply voltage [1], or torque per torque limit, per count of the output
     duty_per_count: float
-    angle_step: int
-    current_step: int
-    pwm_step: int
-    pwm_counts: int
-    substeps: int
+    angle_step: int  # encoder resolution [counts]
+    current_step: int  # resolution of the current's converter [counts]
+    pwm_step: int  # resolution of the PWM [counts]
+    pwm_counts: int  # full scale of the PWM [counts]
+    substeps: int  # physics steps per control tick
+    # factor by which steps are shorter in control ticks in which a foot may touch down
     refinement: int = 1
-    inner_ticks: int = 1
+    inner_ticks: int = 1  # ticks of the actuators' joint PD per control tick; divides `substeps`
 
     def __post_init__(self) -> None:
         for name in (
@@ -147,55 +134,34 @@ def _rounded(value: Floats, low: int, high: int) -> Ints:
 
 
 def current_smoothing(time_constant: float, timestep: float) -> float:
-    """Return the coefficient of the analog low-pass of the current for a physics step.
-
-    It is the share of its distance from the absolute current that the low-pass covers [1].
-
-    Args:
-        time_constant: Of the low-pass [s]; 0 for none.
-        timestep: Of the physics [s].
-    """
+    """Share of its distance to the absolute current that the low-pass covers in a step [1]."""
     return -math.expm1(-timestep / time_constant) if time_constant > 0.0 else 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WalkSetup:
-    """Input of one walk.
+    """Input of one walk."""
 
-    Attributes:
-        start: initial q, at rest, (7+J,).
-        internal_state: initial, (I,), see `parameters.internal_state_size`.
-        parameters: (P,), see `parameters.Layout`.
-        desired: coded angles, (T, J) int32.
-        control_law: of every joint.
-        fall_height: height of the body below which the robot has fallen [m].
-        fall_cosine: cosine of the tilt below which the robot has fallen.
-        disturbance: torques on the links, (T, J) [N m], or, with the parameter `displaced`, angles
-            between gearheads and links [rad]; or None.
-        energy: which part of a motor's electrical power counts as spent.
-        direction: of travel along the heading, 1 forward and -1 backward.
-        drop: height of the start above the stance at which the soles carry the weight [m].
-        current_smoothing: see the function of this name; 1 for no low-pass [1].
-        shove_ticks: first control tick of the shove by the parameter `push`, and the tick after its
-            last.
-        feed_forward: torques with which the joints carry the robot, of which torque-controlled
-            actuators receive the control law's share, (T, J) [N m]; or None.
-    """
-
-    start: Floats
-    internal_state: Floats
-    parameters: Floats
-    desired: NDArray[np.int32]
-    control_law: ControlLaw
-    fall_height: float
-    fall_cosine: float = 0.5**0.5
+    start: Floats  # initial q, at rest, (7+J,)
+    internal_state: Floats  # initial, (I,), see `parameters.internal_state_size`
+    parameters: Floats  # (P,), see `parameters.Layout`
+    desired: NDArray[np.int32]  # coded angles, (T, J) int32
+    control_law: ControlLaw  # of every joint
+    fall_height: float  # height of the body below which the robot has fallen [m]
+    fall_cosine: float = 0.5**0.5  # cosine of the tilt below which the robot has fallen
+    # torques on the links, (T, J) [N m], or, with the parameter `displaced`, angles between
+    # gearheads and links [rad]; or None
     disturbance: Floats | None = None
-    energy: EnergyConvention = "signed"
-    direction: int = 1
+    energy: EnergyConvention = "signed"  # which part of a motor's electrical power counts as spent
+    direction: int = 1  # of travel along the heading, 1 forward and -1 backward
+    # height of the start above the stance at which the soles carry the weight [m]
     drop: float = 0.0
-    current_smoothing: float = 1.0
+    current_smoothing: float = 1.0  # see the function of this name; 1 for no low-pass [1]
     sensors: SensorErrors = NO_ERRORS
+    # first control tick of the shove by the parameter `push`, and the tick after its last
     shove_ticks: tuple[int, int] = (0, 0)
+    # torques with which the joints carry the robot, of which torque-controlled actuators receive
+    # the control law's share, (T, J) [N m]; or None
     feed_forward: Floats | None = None
 
     def smoothing(self, refinement: int) -> float:
@@ -231,39 +197,27 @@ class WalkSetup:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WalkResult:
-    """Result of one walk.
-
-    Attributes:
-        sums: `INTEGRANDS` summed over physics steps, shorter steps by their share, (8,).
-        end: final q, (7+J,).
-        peak_current: largest |I| of any motor at any physics step [A].
-        states: q, v, internal state, absolute current before the converters [A] and duty at every
-            control tick after its control, (T, 7+J + 6+J + I + J + J), NaN after an early end; None
-            without a log. See `observation.walk_log`.
-    """
+    """Result of one walk."""
 
     status: Status
-    sums: Floats
-    end: Floats
-    peak_current: float
+    sums: Floats  # `INTEGRANDS` summed over physics steps, shorter steps by their share, (8,)
+    end: Floats  # final q, (7+J,)
+    peak_current: float  # largest |I| of any motor at any physics step [A]
+    # q, v, internal state, absolute current before the converters [A] and duty at every control
+    # tick after its control, (T, 7+J + 6+J + I + J + J), NaN after an early end; None without a
+    # log. See `observation.walk_log`.
     states: Floats | None = field(default=None, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
 class LaneUse:
-    """Utilization of a kernel's lanes.
+    """Utilization of a kernel's lanes."""
 
-    Attributes:
-        walked: rounds of physics steps that belonged to a walk, summed over lanes.
-        computed: all rounds of physics steps, summed over lanes.
-        timed: time of a sample of the rounds, control ticks included [ns].
-        control: time of the control ticks in that sample [ns].
-    """
-
-    walked: int = 0
-    computed: int = 0
+    walked: int = 0  # rounds of physics steps that belonged to a walk, summed over lanes
+    computed: int = 0  # all rounds of physics steps, summed over lanes
+    # time of a sample of the rounds, control ticks included [ns]
     timed: int = field(default=0, compare=False)
-    control: int = field(default=0, compare=False)
+    control: int = field(default=0, compare=False)  # time of the control ticks in that sample [ns]
 
     @property
     def share(self) -> float:
@@ -283,14 +237,10 @@ class LaneUse:
 
 
 class WalkResults(tuple[WalkResult, ...]):  # noqa: SLOT001 - with attributes
-    """Results of all walks of one call, in order.
-
-    Attributes:
-        waited: time that the thread waited for walks taken over by other threads [s].
-    """
+    """Results of all walks of one call, in order."""
 
     lane_use: LaneUse
-    waited: float
+    waited: float  # time that the thread waited for walks taken over by other threads [s]
 
     def __new__(cls, results: Iterable[WalkResult], lane_use: LaneUse, waited: float = 0.0) -> Self:
         walks = super().__new__(cls, results)
@@ -358,16 +308,12 @@ def check_gains(law: ControlLaw, *, torque: bool) -> None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WalkRequest:
-    """One walk and the kernel that computes it.
-
-    Attributes:
-        log: whether to keep its states.
-    """
+    """One walk and the kernel that computes it."""
 
     kernel: Kernel
     coding: Coding
     setup: WalkSetup
-    log: bool = False
+    log: bool = False  # whether to keep its states
 
 
 Walking = Generator[Sequence[WalkRequest], Sequence[WalkResult], T]
@@ -377,14 +323,10 @@ order, and returns its own result. It may yield any number of times."""
 
 @dataclass(slots=True)
 class KernelTime:
-    """Accumulated time of kernel calls.
+    """Accumulated time of kernel calls."""
 
-    Attributes:
-        seconds: wall time in the calls, without `waited` [s].
-        waited: time in the calls spent waiting for walks that other threads had taken over [s].
-    """
-
-    seconds: float = 0.0
+    seconds: float = 0.0  # wall time in the calls, without `waited` [s]
+    # time in the calls spent waiting for walks that other threads had taken over [s]
     waited: float = 0.0
     lane_use: LaneUse = field(default_factory=LaneUse)
 

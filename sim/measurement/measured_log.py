@@ -198,18 +198,13 @@ def simulated_log(robot: Robot, walk: WalkLog) -> MeasuredLog:
 
 @dataclass(frozen=True, slots=True)
 class MeasuredWalk:
-    """The walk of a measured log: one design in one scenario of one robot, within its legs' reach.
-
-    Attributes:
-        design: of the controller and the gait, by variable.
-        cycle_time: the design's, if it has one, else the scenario's [s].
-    """
+    """The walk of a measured log: a design in a scenario of a robot, within its legs' reach."""
 
     robot: Robot
     scenario: Scenario
     controller: str
-    design: Mapping[str, float]
-    cycle_time: float
+    design: Mapping[str, float]  # of the controller and the gait, by variable
+    cycle_time: float  # the design's, if it has one, else the scenario's [s]
 
     @classmethod
     def of(

@@ -21,22 +21,15 @@ _TIE: Final = 1e-6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Synchronised:
-    """The same whole cycles of a walk, measured and simulated, with the same rows.
-
-    Attributes:
-        lag: rows by which the walk begins later in the measured log than in the simulated one.
-        cycles: number of whole walking cycles, the last of the common part, as a walk starts at
-            rest.
-        cycle_time: [s].
-        correlation: of the desired angles over the common part, 1 for equal gaits.
-    """
+    """The same whole cycles of a walk, measured and simulated, with the same rows."""
 
     measured: MeasuredLog
     simulated: MeasuredLog
-    lag: int
+    lag: int  # rows by which the walk begins later in the measured log than in the simulated one
+    # number of whole walking cycles, the last of the common part, as a walk starts at rest
     cycles: int
-    cycle_time: float
-    correlation: float
+    cycle_time: float  # [s]
+    correlation: float  # of the desired angles over the common part, 1 for equal gaits
 
     @property
     def lag_seconds(self) -> float:
@@ -45,11 +38,7 @@ class Synchronised:
 
 
 def synchronise(measured: MeasuredLog, simulated: MeasuredLog, cycle_time: float) -> Synchronised:
-    """Find the lag between two logs and trim both to their common whole cycles.
-
-    Args:
-        cycle_time: Of a walking cycle [s].
-    """
+    """Find the lag between two logs and trim both to their common whole cycles."""
     if measured.joints != simulated.joints:
         raise MeasuredLogError("the two logs have different joints")
     cycle = round(cycle_time / CONTROL_PERIOD)
@@ -75,18 +64,11 @@ def synchronise(measured: MeasuredLog, simulated: MeasuredLog, cycle_time: float
 
 
 def find_lag(measured: Floats, simulated: Floats, cycle: int) -> tuple[int, float]:
-    """Return the lag at which the desired angles of two logs agree, and their correlation there.
+    """Return the lag k [rows] with measured[t + k] = simulated[t], and the correlation there.
 
-    The cross-correlation over the overlap identifies the cycle, but it favours long overlaps and is
-    off by some rows. Within a quarter of a cycle, the mean square difference determines the exact
-    row.
-
-    Args:
-        measured: Desired angles, (T1, J).
-        simulated: Desired angles of the same joints, (T2, J).
-
-    Returns:
-        Lag k [rows], with measured[t + k] = simulated[t], and the correlation.
+    Desired angles are (T1, J) and (T2, J). The cross-correlation over the overlap identifies the
+    cycle, but it favours long overlaps and is off by some rows. Within a quarter of a cycle, the
+    mean square difference determines the exact row.
     """
     mean = simulated.mean(axis=0)
     x, y = measured - mean, simulated - mean

@@ -242,9 +242,5 @@ def _measured(robot: Robot, log: MeasuredLog, errors: Instruments, seed: int) ->
 
 
 def converted(amperes: Floats, step: float) -> Floats:
-    """Quantise absolute currents of any shape [A] like a 12-bit converter: steps 0 to 4095.
-
-    Args:
-        step: Of the converter [A].
-    """
+    """Quantise absolute currents [A] like a 12-bit converter: steps 0 to 4095."""
     return np.clip(np.rint(amperes / step), 0, (1 << ADC_BITS) - 1) * step

@@ -18,19 +18,12 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drive:
-    """State of the motors at an instant, (J,) each.
+    """State of the motors at an instant, (J,) each."""
 
-    Attributes:
-        voltage: [V].
-        current: [A].
-        torque: at the gearheads' outputs, after friction [N m].
-        damping: decrease of the torque per rate, without static friction [N m s/rad].
-    """
-
-    voltage: Floats
-    current: Floats
-    torque: Floats
-    damping: Floats
+    voltage: Floats  # [V]
+    current: Floats  # [A]
+    torque: Floats  # at the gearheads' outputs, after friction [N m]
+    damping: Floats  # decrease of the torque per rate, without static friction [N m s/rad]
 
 
 class _Friction:
@@ -80,9 +73,8 @@ class TorqueMotors:
 class DcMotors:
     """Quasi-static currents on a battery of finite resistance (thesis 2.2.5).
 
-    Args:
-        numbers: `viscous` and optionally `static_friction` (J,), `supply_voltage` and
-            `supply_resistance` (1,), as in `sim.kernel.parameters.Layout`.
+    numbers: `viscous`, optionally `static_friction`, `supply_voltage` and `supply_resistance`, as
+    in `sim.kernel.parameters.Layout`.
     """
 
     def __init__(self, actuators: JointActuators, numbers: Mapping[str, Floats]) -> None:
@@ -111,14 +103,10 @@ class DcMotors:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Actuation:
-    """State of motors and gears at an instant.
-
-    Attributes:
-        torque: on the links, (J,) [N m].
-    """
+    """State of motors and gears at an instant."""
 
     drive: Drive
-    torque: Floats
+    torque: Floats  # on the links, (J,) [N m]
 
 
 Motors = TorqueMotors | DcMotors
@@ -155,16 +143,7 @@ class FirmGears:
 
 
 class LooseGears:
-    """Separate rotors that touch the links at either end of a play, through damped shafts.
-
-    Args:
-        play: Of all joints, end to end, (J,) [rad].
-        angles: Initial angles of rotors and links at rest, (J,) [rad].
-
-    Attributes:
-        angles: of the rotors at the gearheads' outputs, (J,) [rad].
-        rates: of the same, (J,) [rad/s].
-    """
+    """Separate rotors that touch the links at either end of a play through damped shafts."""
 
     def __init__(self, robot: Robot, motors: Motors, play: Floats, angles: Floats) -> None:
         actuators = robot.actuators()
@@ -217,11 +196,7 @@ returning their accelerations [rad/s2], and `drift` turns for a time [s]."""
 
 
 def gears_of(robot: Robot, numbers: Mapping[str, Floats], angles: Floats) -> Gears:
-    """Return the gears of a robot, motors and links at the same angles (J,) [rad] and at rest.
-
-    Args:
-        numbers: See `DcMotors`; with backlash also `backlash` (J,).
-    """
+    """Gears at rest, motors and links at the same angles. For numbers see `DcMotors`."""
     kind = TorqueMotors if robot.is_torque_controlled else DcMotors
     motors = kind(robot.actuators(), numbers)
     if robot.has_backlash:

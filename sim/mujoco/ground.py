@@ -18,12 +18,8 @@ Floats = NDArray[np.float64]
 class Ground(ABC):
     """A clamped spring and damper along the ground's normal, and a friction law.
 
-    Args:
-        numbers: (L,) each, by the names of `gaitswarm.sim.robot.description.Contact` listed in
-            `gaitswarm.sim.kernel.parameters.CONTACT_LAWS`.
-
-    Attributes:
-        memory: internal state of the law, (L, m).
+    Positions and velocities of feet are (L, 3), in [m] and [m/s]; `numbers` (L,) each, by the names
+    of `gaitswarm.sim.robot.description.Contact`; `memory` (L, m) is the law's internal state.
     """
 
     def __init__(self, numbers: Mapping[str, Floats]) -> None:
@@ -33,39 +29,19 @@ class Ground(ABC):
         self.memory: Floats = np.zeros((len(self._mu), 0))
 
     def press(self, position: Floats, velocity: Floats) -> tuple[NDArray[np.bool_], Floats]:
-        """F_z = k p - c dz/dt while the sole touches, never pulling.
-
-        Args:
-            position: Of the feet, (L, 3) [m].
-            velocity: Of the feet, (L, 3) [m/s].
-
-        Returns:
-            Which feet touch, (L,), and the force on them, (L,) [N].
-        """
+        """Which feet touch (L,), and F_z = k p - c dz/dt (L,) [N] on these, never pulling."""
         depth = self._sole - position[:, 2]
         touching = depth > 0.0
         elastic = self._k * depth - self._c * velocity[:, 2]
         return touching, np.where(touching, np.maximum(elastic, 0.0), 0.0)
 
     def landing(self, position: Floats, velocity: Floats, time: float) -> bool:
-        """Whether a foot in the air, at this speed, is on the ground after a time.
-
-        Args:
-            position: Of the feet, (L, 3) [m].
-            velocity: Of the feet, (L, 3) [m/s].
-            time: [s].
-        """
+        """Whether a foot in the air, at this speed, is on the ground after a time [s]."""
         depth = self._sole - position[:, 2]
         return bool(((depth <= 0.0) & (depth > velocity[:, 2] * time)).any())
 
     def forces(self, position: Floats, velocity: Floats, timestep: float) -> tuple[Floats, Floats]:
-        """Return forces on the feet, (L, 3) [N], and the memory after the step.
-
-        Args:
-            position: Of the feet, (L, 3) [m].
-            velocity: Of the feet, (L, 3) [m/s].
-            timestep: [s].
-        """
+        """Return forces on the feet (L, 3) [N], and the memory after the step."""
         touching, normal = self.press(position, velocity)
         rub, memory = self.friction(touching, self._mu * normal, velocity[:, :2], timestep)
         return np.concatenate([rub, normal[:, None]], axis=1), memory
@@ -74,12 +50,9 @@ class Ground(ABC):
     def friction(
         self, touching: NDArray[np.bool_], limit: Floats, slip: Floats, timestep: float
     ) -> tuple[Floats, Floats]:
-        """Return forces along the ground, (L, 2) [N], and the memory after the step.
+        """Return forces along the ground (L, 2) [N], and the memory after the step.
 
-        Args:
-            limit: mu F_z, (L,) [N].
-            slip: Velocities along the ground, (L, 2) [m/s].
-            timestep: [s].
+        limit: mu F_z (L,) [N]. slip: velocities along the ground (L, 2) [m/s].
         """
 
 

@@ -79,9 +79,8 @@ class WalkStopped(Exception):
 class MujocoKernel:
     """Walks in MuJoCo.
 
-    Args:
-        rate: Steps per second [Hz], constant, a multiple of the control rate; None for `RATE` or
-            `BACKLASH_RATE`, and shorter steps if a foot may touch down.
+    A constant rate of steps [Hz] can be given, a multiple of the control rate; by default it is
+    `RATE` or `BACKLASH_RATE`, and higher if a foot may touch down.
     """
 
     backend: Final = "mujoco"

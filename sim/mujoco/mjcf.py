@@ -51,17 +51,11 @@ _COLOURS: Final[Mapping[str, str]] = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surroundings:
-    """Properties of a robot's model that depend on the walk.
+    """Properties of a robot's model that depend on the walk."""
 
-    Attributes:
-        body: inertia of the body with its load, in its own frame.
-        gravity: in a world whose z axis is normal to the ground, (3,) [m/s2].
-        contacts: of the feet, in the order of the legs.
-    """
-
-    body: BodyInertia
-    gravity: Floats
-    contacts: tuple[Contact, ...]
+    body: BodyInertia  # inertia of the body with its load, in its own frame
+    gravity: Floats  # in a world whose z axis is normal to the ground, (3,) [m/s2]
+    contacts: tuple[Contact, ...]  # of the feet, in the order of the legs
 
     @classmethod
     def of(cls, robot: Robot, scenario: Scenario | None = None) -> Surroundings:
@@ -77,28 +71,20 @@ class Surroundings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rig:
-    """Optional parts of a model besides its rigid bodies.
+    """Optional parts of a model besides its rigid bodies."""
 
-    Attributes:
-        timestep: of MuJoCo's steps [s].
-        contacts: attributes of each foot's contact pair, in the order of the legs; empty for
-            MuJoCo's defaults.
-        friction_impedance: MuJoCo's impratio, stiffness of a contact's tangential constraint
-            relative to the normal one [1].
-        voltage_motors: whether joints have actuators that turn a motor's voltage [V] into its
-            torque, quasi-static, friction included (torque-controlled joints: that take the torque
-            [N m]); else torques are external.
-        looks: links with visible shapes; soles are drawn as they are.
-        start: qpos of a keyframe `start`; None for no keyframe.
-    """
-
-    timestep: float = TIMESTEP
+    timestep: float = TIMESTEP  # of MuJoCo's steps [s]
     soles: Soles = "none"
+    # attributes of each foot's contact pair, in the order of the legs; empty for MuJoCo's defaults
     contacts: Sequence[Mapping[str, str]] = ()
+    # MuJoCo's impratio: stiffness [1] of a contact's tangential constraint over the normal one
     friction_impedance: float = 1.0
+    # whether joints have actuators that turn a motor's voltage [V] into its torque, quasi-static,
+    # friction included (torque-controlled joints: that take the torque [N m]); else torques are
+    # external
     voltage_motors: bool = False
-    looks: Sequence[VisibleLink] = ()
-    start: Floats | None = None
+    looks: Sequence[VisibleLink] = ()  # links with visible shapes; soles are drawn as they are
+    start: Floats | None = None  # qpos of a keyframe `start`; None for no keyframe
 
 
 def mjcf(robot: Robot, surroundings: Surroundings, rig: Rig) -> str:

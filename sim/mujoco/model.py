@@ -28,23 +28,18 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Feet:
-    """MuJoCo's own contact of soles on a plane, in place of applied forces.
+    """MuJoCo's own contact of soles on a plane, in place of applied forces."""
 
-    Attributes:
-        drags: tangential force per slip velocity below the friction limit, by leg [N s/m].
-        points: whether the ground is raised by the sole's length and touched by the tibias' ends,
-            so that its forces act there, as in the kernel, and not at the bottom of a sphere.
-        impedance: MuJoCo's d, the share of a contact's effect that the constraint may force. The
-            smaller, the closer the soft constraint is to a spring and damper; the default is
-            MuJoCo's minimum.
-        friction_impedance: impratio, stiffness of the tangential constraint relative to the normal
-            one. At 1 a sliding foot would also be lifted; the tangential impedance is this times
-            `impedance`.
-    """
-
+    # tangential force per slip velocity below the friction limit, by leg [N s/m]
     drags: tuple[float, ...]
+    # whether the ground is raised by the sole's length and touched by the tibias' ends, so that its
+    # forces act there, as in the kernel, and not at the bottom of a sphere
     points: bool = False
+    # MuJoCo's d, the share of a contact's effect that the constraint may force. The smaller, the
+    # closer the soft constraint is to a spring and damper; the default is MuJoCo's minimum.
     impedance: float = 1e-4
+    # impratio, stiffness of the tangential constraint relative to the normal one. At 1 a sliding
+    # foot would also be lifted; the tangential impedance is this times `impedance`.
     friction_impedance: float = 100.0
 
 
@@ -56,11 +51,7 @@ def model(
     feet: Feet | None = None,
     voltage_motors: bool = False,
 ) -> mujoco.MjModel:
-    """Return the compiled model of a robot in a scenario.
-
-    Args:
-        timestep: Of MuJoCo's steps [s].
-    """
+    """Return the compiled model of a robot in a scenario."""
     rig = Rig(timestep, voltage_motors=voltage_motors)
     surroundings = Surroundings.of(robot, scenario)
     if feet is not None:
@@ -89,10 +80,8 @@ def even_drags(
 ) -> tuple[float, ...]:
     """Drags, by leg [N s/m], with which friction is full at the same slip as in the robot's law.
 
-    A law's drag follows the normal force; MuJoCo's is constant.
-
-    Args:
-        standing: Feet that carry the weight evenly [1]; None for half of them.
+    A law's drag follows the normal force; MuJoCo's is constant. The weight is carried evenly by
+    `standing` feet, by default half of them.
     """
     mass = robot.urdf.total_mass - robot.urdf.body.mass + surroundings.body.mass
     share = -float(surroundings.gravity[2]) * mass / (standing or 0.5 * len(robot.legs))

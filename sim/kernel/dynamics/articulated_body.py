@@ -38,43 +38,27 @@ from gaitswarm.sim.kernel.dynamics.spatial import (
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """One link of a chain and the revolute joint before it.
+    """One link of a chain and the revolute joint before it."""
 
-    Attributes:
-        axis: unit axis in the link's frame.
-        rotation: to the preceding frame, at the joint's angle.
-        offset: of the joint in the preceding frame [m].
-        rate: of the joint [rad/s].
-    """
-
-    axis: Vector
-    rotation: Rotation
-    offset: Vector
+    axis: Vector  # unit axis in the link's frame
+    rotation: Rotation  # to the preceding frame, at the joint's angle
+    offset: Vector  # of the joint in the preceding frame [m]
     body: RigidBody
-    rate: Scalar
+    rate: Scalar  # of the joint [rad/s]
 
 
 @dataclass(frozen=True, slots=True)
 class LinkState:
-    """Pose and motion of a link, on which external forces may depend; in the link's frame.
-
-    Attributes:
-        up: the ground's normal.
-        ahead: the world's x axis.
-        gravity: free-fall acceleration [m/s2].
-        height: of the link's origin over ground [m].
-        bias: acceleration of the link's origin, and alpha, while neither the body nor a joint
-            accelerates.
-        tensor: [alpha]x + [omega]x^2 of the bias [1/s2].
-    """
+    """Pose and motion of a link, on which external forces may depend; in the link's frame."""
 
     velocity: Motion
-    up: Vector
-    ahead: Vector
-    gravity: Vector
-    height: Scalar
+    up: Vector  # the ground's normal
+    ahead: Vector  # the world's x axis
+    gravity: Vector  # free-fall acceleration [m/s2]
+    height: Scalar  # of the link's origin over ground [m]
+    # acceleration of the link's origin, and alpha, while neither the body nor a joint accelerates
     bias: Motion
-    tensor: Matrix
+    tensor: Matrix  # [alpha]x + [omega]x^2 of the bias [1/s2]
 
     def carries(self, link: Link) -> LinkState:
         """State of a link attached to this one."""
@@ -94,11 +78,7 @@ class LinkState:
         )
 
     def gain_at(self, point: Vector) -> Vector:
-        """Rate of a point's velocity due to the bias, in the link's rotating axes [m/s2].
-
-        Args:
-            point: In the link's frame [m].
-        """
+        """Rate of a point's velocity due to the bias, in the link's rotating axes [m/s2]."""
         v, w = self.velocity.linear, self.velocity.angular
         return subtract(add(self.bias.linear, cross(self.bias.angular, point)), cross(w, v))
 
@@ -108,17 +88,11 @@ class LinkState:
 
 @dataclass(frozen=True, slots=True)
 class Passed:
-    """Dependence of a joint's acceleration on that of the preceding frame.
+    """Dependence of a joint's acceleration on that of the preceding frame."""
 
-    Attributes:
-        column: articulated inertia times the joint's axis, in the preceding frame.
-        pivot: inverse of the inertia about the joint [1/(kg m2)].
-        free: acceleration of the joint while the preceding frame has only its bias [rad/s2].
-    """
-
-    column: Force
-    pivot: Scalar
-    free: Scalar
+    column: Force  # articulated inertia times the joint's axis, in the preceding frame
+    pivot: Scalar  # inverse of the inertia about the joint [1/(kg m2)]
+    free: Scalar  # acceleration of the joint while the preceding frame has only its bias [rad/s2]
 
 
 def inward(
@@ -129,12 +103,7 @@ def inward(
     resistance: Inertia,
     external: Force,
 ) -> tuple[Inertia, Force, tuple[Passed, ...]]:
-    """Second pass: from a chain's last link to the frame that carries it.
-
-    Args:
-        torques: At the joints [N m].
-        armature: Further resistance to each joint's acceleration [kg m2].
-    """
+    """Second pass: from a chain's last link to the frame that carries it."""
     inertia, force, passed = resistance, Force((0.0,) * 3, (0.0,) * 3).less(external), []
     for link, state, torque, rotor in reversed(
         list(zip(links, states, torques, armature, strict=True))

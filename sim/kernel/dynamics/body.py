@@ -29,11 +29,7 @@ Scalars = tuple[Scalar, ...]
 
 
 def body_state(q: Sequence[Scalar], v: Sequence[Scalar], gravity: Sequence[Scalar]) -> LinkState:
-    """State of the body.
-
-    Args:
-        gravity: In the world [m/s2].
-    """
+    """State of the body; gravity is in the world [m/s2]."""
     attitude = rotation_of(q[3:7])
     w, nothing = _triple(v[3:6]), (0.0, 0.0, 0.0)
     return LinkState(
@@ -55,11 +51,7 @@ def body_of(p: Mapping[str, Sequence[Scalar]]) -> RigidBody:
 
 
 def pushed(state: LinkState, push: Sequence[Scalar]) -> Vector:
-    """Contribution of a push to the force of the bias, in the body's frame [N].
-
-    Args:
-        push: At the body's origin, along the world's axes [N].
-    """
+    """Contribution to the bias force, in the body's frame, of a push along the world's axes [N]."""
     force = add(
         add(scale(push[0], state.ahead), scale(push[1], cross(state.up, state.ahead))),
         scale(push[2], state.up),

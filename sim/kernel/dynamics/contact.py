@@ -34,56 +34,37 @@ InternalState = tuple[Scalar, ...]
 
 @dataclass(frozen=True, slots=True)
 class Foot:
-    """A foot in its link's frame.
+    """A foot in its link's frame."""
 
-    Attributes:
-        at: the tibia's end [m].
-        up: the ground's normal.
-        ahead: the world's x axis.
-        left: the world's y axis.
-        velocity: of the tibia's end [m/s].
-        rising: part of the velocity along `up` [m/s].
-        normal: force of the ground's spring [N].
-        touching: 1 on the ground, 0 in the air.
-        damping: of the normal force, while it is not clamped at zero [N s/m].
-        penetration: of the sole into the ground, negative in the air [m].
-        mobility: upper bound of the foot's acceleration under a force [1/kg].
-    """
-
-    at: Vector
-    up: Vector
-    ahead: Vector
-    left: Vector
-    velocity: Vector
-    rising: Scalar
-    normal: Scalar
-    touching: Scalar
-    damping: Scalar
-    penetration: Scalar
-    mobility: Scalar
+    at: Vector  # the tibia's end [m]
+    up: Vector  # the ground's normal
+    ahead: Vector  # the world's x axis
+    left: Vector  # the world's y axis
+    velocity: Vector  # of the tibia's end [m/s]
+    rising: Scalar  # part of the velocity along `up` [m/s]
+    normal: Scalar  # force of the ground's spring [N]
+    touching: Scalar  # 1 on the ground, 0 in the air
+    damping: Scalar  # of the normal force, while it is not clamped at zero [N s/m]
+    penetration: Scalar  # of the sole into the ground, negative in the air [m]
+    mobility: Scalar  # upper bound of the foot's acceleration under a force [1/kg]
 
     def lands_within(self, time: float) -> Scalar:
         """Whether the foot may touch down within a time [s]."""
         return (1.0 - self.touching) * (self.penetration > self.rising * time)
 
     def sliding(self, drag: Scalar, timestep: Scalar) -> Scalar:
-        """Confidence that a sliding foot still slides after a step [1].
+        """Confidence that a foot with this friction per speed still slides after a step [1].
 
         Friction that does not depend on the speed must not be taken as constant over a step that
         may stop the foot: the step would reverse its motion.
-
-        Args:
-            drag: The whole friction per speed [N s/m].
-            timestep: [s].
         """
         return ca.fmax(1.0 - drag * (timestep * self.mobility), 0.0)
 
     def resisting(self, sideways: Scalar, further: Scalar = 0.0) -> Matrix:
         """-dF/dv in the link's frame, with the damping along `up`, symmetric [N s/m].
 
-        Args:
-            sideways: Along the ground, in every direction [N s/m].
-            further: Added along the slip, over the slip's square [N s3/m3].
+        `sideways` [N s/m] acts along the ground, `further` along the slip, per its square [N
+        s3/m3].
         """
         resistance = outer(scale(self.damping - sideways, self.up), self.up)
         even = ((sideways, 0.0, 0.0), (0.0, sideways, 0.0), (0.0, 0.0, sideways))
@@ -96,17 +77,11 @@ class Foot:
 
 @dataclass(frozen=True, slots=True)
 class Reaction:
-    """Reaction of the ground on a foot, in the link's frame.
+    """Reaction of the ground on a foot, in the link's frame."""
 
-    Attributes:
-        force: on the foot [N].
-        resistance: -dF/dv, symmetric [N s/m].
-        internal_state: after the step.
-    """
-
-    force: Vector
-    resistance: Matrix
-    internal_state: InternalState = ()
+    force: Vector  # on the foot [N]
+    resistance: Matrix  # -dF/dv, symmetric [N s/m]
+    internal_state: InternalState = ()  # after the step
 
 
 Friction = Callable[[Foot, Mapping[str, Scalar], InternalState, Scalar], Reaction]
@@ -119,11 +94,8 @@ def foot_on_ground(
 ) -> Foot:
     """F_z = k p - c dz/dt while the sole touches (eq. 2.13), never pulling.
 
-    The sole's spring extends from the tibia's end along the ground's normal.
-
-    Args:
-        at: The tibia's end in its frame [m].
-        mobility: Upper bound of the acceleration of the tibia's end under a force [1/kg].
+    The sole's spring extends from the tibia's end, `at` in its frame [m], along the ground's
+    normal.
     """
     velocity = add(link.velocity.linear, cross(link.velocity.angular, at))
     penetration = ground["sole"] - (link.height + dot(link.up, at))
@@ -181,8 +153,7 @@ def stick(
 ) -> Reaction:
     """Spring and damper along the ground from the touchdown point, saturated at mu F_z.
 
-    Args:
-        internal_state: The spring's elongation along the world's x and y [m].
+    The internal state is the spring's elongation along the world's x and y [m].
     """
     k, c = ground["stick_stiffness"], ground["stick_damping"]
     stretched, pull = [], []

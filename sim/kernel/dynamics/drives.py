@@ -22,12 +22,7 @@ def shaft_torque(
 ) -> Scalar:
     """Torque of a stiff, damped shaft on the link [N m]; it pushes, but never pulls into the play.
 
-    Args:
-        ahead: Motor side's angle minus the link's [rad].
-        rate: Derivative of `ahead` [rad/s].
-        play: End to end [rad].
-        stiffness: Of the closed play [N m/rad].
-        damping: Of the closed play [N m s/rad].
+    `ahead` is the motor side's angle minus the link's [rad], `play` is from end to end [rad].
     """
     half = 0.5 * play
     drag = damping * rate
@@ -37,14 +32,7 @@ def shaft_torque(
 
 
 def static_friction(rate: Scalar, friction: Scalar) -> Scalar:
-    """Torque against the motion, independent of its speed [N m].
-
-    It is linear in a narrow zone, so it never drives.
-
-    Args:
-        rate: Of the gearhead's output, at the joint [rad/s].
-        friction: From `STATIC_FRICTION_RATE` on [N m].
-    """
+    """Torque against the motion [N m]; linear in a narrow zone, so it never drives."""
     return -friction * ca.fmin(ca.fmax(rate * (1.0 / STATIC_FRICTION_RATE), -1.0), 1.0)
 
 
@@ -55,44 +43,28 @@ def static_friction_slope(rate: Scalar, friction: Scalar) -> Scalar:
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """A motor with its gearhead in a step.
+    """A motor with its gearhead in a step."""
 
-    Attributes:
-        voltage: [V].
-        current: before the step [A].
-        torque: behind the gearhead's friction, before the step [N m].
-        damping: -d torque / d rate [N m s/rad].
-    """
-
-    voltage: Scalar
-    current: Scalar
-    torque: Scalar
-    damping: Scalar
+    voltage: Scalar  # [V]
+    current: Scalar  # before the step [A]
+    torque: Scalar  # behind the gearhead's friction, before the step [N m]
+    damping: Scalar  # -d torque / d rate [N m s/rad]
 
 
 @dataclass(frozen=True, slots=True)
 class TorqueDrive(Drive):
-    """The drive of a torque-controlled actuator.
+    """The drive of a torque-controlled actuator."""
 
-    Attributes:
-        drop: by which its torque falls as its rate grows, where the speed limits it; else 0 [N m
-            s/rad].
-    """
-
+    # by which its torque falls as its rate grows, where the speed limits it; else 0 [N m s/rad]
     drop: Scalar
 
 
 @dataclass(frozen=True, slots=True)
 class Friction:
-    """Friction of a joint and its gears.
+    """Friction of a joint and its gears."""
 
-    Attributes:
-        viscous: [N m s/rad].
-        static: [N m]; None for none.
-    """
-
-    viscous: Scalar
-    static: Scalar | None
+    viscous: Scalar  # [N m s/rad]
+    static: Scalar | None  # [N m]; None for none
 
 
 def friction_of(joint: int, p: Mapping[str, Sequence[Scalar]]) -> Friction:
@@ -103,13 +75,7 @@ def friction_of(joint: int, p: Mapping[str, Sequence[Scalar]]) -> Friction:
 def drive_of(
     joint: LimbJoint, duty: Scalar, rate: Scalar, supply: Scalar, friction: Friction
 ) -> Drive:
-    """The drive of a joint at the beginning of a step.
-
-    Args:
-        duty: Motor voltage per supply voltage, or commanded torque per torque limit [1].
-        rate: Of the motor at the joint [rad/s].
-        supply: Voltage of the battery under load [V].
-    """
+    """The drive of a joint at the beginning of a step, with the motor's rate at the joint."""
     if is_torque_controlled(joint):
         return _torque_drive(joint, duty, rate, supply, friction)
     voltage = duty * supply
@@ -148,11 +114,7 @@ def _with_friction(
 
 
 def at_middle(joint: LimbJoint, drive: Drive, faster: Scalar) -> tuple[Scalar, Scalar]:
-    """Voltage [V] and current [A] of a motor later in a step.
-
-    Args:
-        faster: Increase of the motor's rate at the joint since [rad/s].
-    """
+    """Voltage [V] and current [A] after an increase of the motor's rate at the joint [rad/s]."""
     if isinstance(drive, TorqueDrive):
         # From I = tau / k and U = R I + k omega.
         less = (joint.inverse_torque * drive.drop) * faster
@@ -174,14 +136,8 @@ def battery_voltage(
 
     The power of torque-controlled actuators, P = sum(R / k^2 tau^2 + tau omega) of the commanded
     torques, does not depend on the voltage; of the solutions of U (V - U) / R_i = P the higher one
-    is taken. A battery that cannot deliver P delivers its maximum, at half its own voltage.
-
-    Args:
-        constants: See `gaitswarm.sim.robot.limbs.electrical_constants`, (2 J,).
-        duty: Motor voltage per supply voltage, or commanded torque per torque limit, (J,) [1].
-        rates: Of the motors at the joints, (J,) [rad/s].
-        source: Open-circuit voltage of the battery [V].
-        internal: Resistance of the battery [ohm].
+    is taken. A battery that cannot deliver P delivers its maximum, at half its own voltage. For the
+    constants see `gaitswarm.sim.robot.limbs.electrical_constants`.
     """
     n = len(duty)
     if not torque:

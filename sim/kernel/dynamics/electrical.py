@@ -19,15 +19,8 @@ def supply_voltage(
 
     The bridges conserve power, so the battery's current is sum(duty_j I_j); with I_j = (duty_j U_S
     - k_j omega_j) / R_j, U_S = V - R_i sum(duty_j I_j) is linear in U_S (thesis 2.2.5). The
-    electrical pole (L/R = 44 us) is faster than a physics step, hence quasi-static.
-
-    Args:
-        duty: Motor voltage per supply voltage, (J,) [1].
-        rates: Motor velocities at the gearheads' outputs, (J,) [rad/s].
-        torque: r K_M, (J,) [N m/A].
-        conductance: Of the motors, (J,) [1/ohm].
-        source: Open-circuit voltage of the battery [V].
-        internal: Resistance of the battery [ohm].
+    electrical pole (L/R = 44 us) is faster than a physics step, hence quasi-static. Rates are those
+    at the gearheads' outputs [rad/s], torque is r K_M [N m/A].
     """
     back, load = 0.0, 0.0
     for share, rate, k, g in zip(duty, rates, torque, conductance, strict=True):

@@ -34,14 +34,10 @@ _DATA: Final = tuple(f.name for f in fields(LimbJoint) if f.name not in ("axis",
 
 @dataclass(frozen=True, slots=True)
 class LimbKind:
-    """Limbs that share a function: same axes, and the same constants are 0 or 1.
-
-    Attributes:
-        trivial: by constant, 0 or 1 where all limbs have it, else None.
-    """
+    """Limbs that share a function: same axes, and the same constants are 0 or 1."""
 
     axes: tuple[tuple[float, ...], ...]
-    trivial: tuple[float | None, ...]
+    trivial: tuple[float | None, ...]  # by constant, 0 or 1 where all limbs have it, else None
 
     def numbers_of(self, limb: Limb) -> list[float]:
         """Constants in which limbs of this kind differ."""

@@ -47,110 +47,70 @@ from gaitswarm.sim.robot.limbs import Limb, LimbJoint
 Scalars = tuple[Scalar, ...]
 
 LANDING_HORIZON: Final = 1.25 * CONTROL_PERIOD
-"""Look-ahead for touchdowns [s]: from the last step of a control tick to the end of the next one.
-"""
+"""Look-ahead for touchdowns [s]: from a control tick's last step to the end of the next one."""
 
 
 @dataclass(frozen=True, slots=True)
 class Environment:
-    """State common to all limbs in a step.
+    """State common to all limbs in a step."""
 
-    Attributes:
-        timestep: [s].
-        supply: voltage of the battery under load [V].
-        displaced: 1 if disturbances are angles, else 0; with backlash only.
-    """
-
-    timestep: Scalar
-    supply: Scalar
-    displaced: Scalar = 0.0
+    timestep: Scalar  # [s]
+    supply: Scalar  # voltage of the battery under load [V]
+    displaced: Scalar = 0.0  # 1 if disturbances are angles, else 0; with backlash only
 
 
 @dataclass(frozen=True, slots=True)
 class LimbState:
-    """Joints and motors of a limb before a step, by joint.
+    """Joints and motors of a limb before a step, by joint."""
 
-    Attributes:
-        angles: of the links [rad].
-        rates: of the links [rad/s].
-        duty: motor voltage per supply voltage, or commanded torque per torque limit [1].
-        disturbance: torque on the link [N m], or angle [rad].
-        motor_angles: with backlash [rad].
-        motor_rates: with backlash [rad/s].
-        carried: internal state of the foot's contact law.
-    """
-
-    angles: Scalars
-    rates: Scalars
-    duty: Scalars
-    disturbance: Scalars
-    motor_angles: Scalars = ()
-    motor_rates: Scalars = ()
-    carried: Scalars = ()
+    angles: Scalars  # of the links [rad]
+    rates: Scalars  # of the links [rad/s]
+    duty: Scalars  # motor voltage per supply voltage, or commanded torque per torque limit [1]
+    disturbance: Scalars  # torque on the link [N m], or angle [rad]
+    motor_angles: Scalars = ()  # with backlash [rad]
+    motor_rates: Scalars = ()  # with backlash [rad/s]
+    carried: Scalars = ()  # internal state of the foot's contact law
 
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """Values of a limb that are kept between `before` and `after`.
+    """Values of a limb that are kept between `before` and `after`."""
 
-    Attributes:
-        sines: of the rotations about the joints' axes.
-        cosines: of the same.
-        armature: of the rotors, with half a step's damping [kg m2].
-        landing: 1 if the foot may touch down within `LANDING_HORIZON`, else 0.
-        torques: passed by the gearheads to the links, before the step; without backlash including
-            the torque that accelerates the rotors [N m].
-        spins: accelerations of rotors behind backlash [rad/s2].
-    """
-
-    sines: Scalars
-    cosines: Scalars
+    sines: Scalars  # of the rotations about the joints' axes
+    cosines: Scalars  # of the same
     passed: tuple[Passed, ...]
     drives: tuple[Drive, ...]
-    armature: Scalars
-    landing: Scalar
+    armature: Scalars  # of the rotors, with half a step's damping [kg m2]
+    landing: Scalar  # 1 if the foot may touch down within `LANDING_HORIZON`, else 0
+    # passed by the gearheads to the links, before the step; without backlash including the torque
+    # that accelerates the rotors [N m]
     torques: Scalars
-    spins: Scalars = ()
+    spins: Scalars = ()  # accelerations of rotors behind backlash [rad/s2]
 
 
 @dataclass(frozen=True, slots=True)
 class Before:
-    """Results for a limb before the body's acceleration is known.
+    """Results for a limb before the body's acceleration is known."""
 
-    Attributes:
-        inertia: articulated, in the body's frame.
-        force: of the bias, in the body's frame.
-        motor_rates: after the step, with backlash.
-        carried: after the step.
-        foot_force: before the step, along the world's x, y, z [N].
-    """
-
-    inertia: Inertia
-    force: Force
+    inertia: Inertia  # articulated, in the body's frame
+    force: Force  # of the bias, in the body's frame
     held: Held
-    motor_rates: Scalars
-    carried: Scalars
-    foot_force: Vector
+    motor_rates: Scalars  # after the step, with backlash
+    carried: Scalars  # after the step
+    foot_force: Vector  # before the step, along the world's x, y, z [N]
 
 
 @dataclass(frozen=True, slots=True)
 class After:
-    """Results for a limb after the body's acceleration is known.
+    """Results for a limb after the body's acceleration is known."""
 
-    Attributes:
-        accelerations: of the joints [rad/s2].
-        rates: of the joints after the step [rad/s].
-        currents: of the motors, at the step's middle [A].
-        loads: torques passed by the gearheads to the links, at the step's middle [N m].
-        tallies: sums over the limb's motors at the step's middle: |load| [N m], electrical power
-            [W], its absolute value [W], |current| [A], heat [W]; then the largest |current| [A],
-            and 1 if the foot may touch down within `LANDING_HORIZON`, else 0.
-    """
-
-    accelerations: Scalars
-    rates: Scalars
-    currents: Scalars
-    loads: Scalars
+    accelerations: Scalars  # of the joints [rad/s2]
+    rates: Scalars  # of the joints after the step [rad/s]
+    currents: Scalars  # of the motors, at the step's middle [A]
+    loads: Scalars  # torques passed by the gearheads to the links, at the step's middle [N m]
+    # sums over the limb's motors at the step's middle: |load| [N m], electrical power [W], its
+    # absolute value [W], |current| [A], heat [W]; then the largest |current| [A], and 1 if the foot
+    # may touch down within `LANDING_HORIZON`, else 0
     tallies: Scalars
 
 
@@ -226,12 +186,7 @@ def before(
 
 
 def after(limb: Limb, held: Held, carrier: Motion, rates: Scalars, timestep: Scalar) -> After:
-    """Compute the limb's accelerations from the body's.
-
-    Args:
-        rates: Of the joints before the step [rad/s].
-        timestep: [s].
-    """
+    """Compute the limb's accelerations from the body's; rates are those before the step."""
     half = 0.5 * timestep
     links = _links(limb, held.sines, held.cosines, rates)
     turned = outward(links, held.passed, carrier)

@@ -171,14 +171,10 @@ class Rotation:
 
     A rotation about one of the frame's own axes mixes only two components; most joints have such
     axes.
-
-    Attributes:
-        rest: rotation at angle zero.
-        axis: constant unit axis in the link's frame.
     """
 
-    rest: Matrix
-    axis: Vector
+    rest: Matrix  # rotation at angle zero
+    axis: Vector  # constant unit axis in the link's frame
     sine: Scalar
     cosine: Scalar
 
@@ -228,16 +224,11 @@ def _from(i: int) -> tuple[int, int, int]:
 class Inertia:
     """Articulated inertia in a link's frame: force = linear a + coupling alpha, moment = coupling^T
     a + angular alpha.
-
-    Attributes:
-        linear: [kg].
-        coupling: [kg m].
-        angular: [kg m2].
     """
 
-    linear: Matrix
-    coupling: Matrix
-    angular: Matrix
+    linear: Matrix  # [kg]
+    coupling: Matrix  # [kg m]
+    angular: Matrix  # [kg m2]
 
     def plus(self, other: Inertia) -> Inertia:
         return Inertia(
@@ -248,12 +239,7 @@ class Inertia:
 
     @classmethod
     def at_point(cls, at: Vector, resistance: Matrix) -> Inertia:
-        """Resistance to the acceleration of one point of a link.
-
-        Args:
-            at: The point [m].
-            resistance: Force per acceleration of the point, symmetric [kg].
-        """
+        """Resistance [kg], symmetric, to the acceleration of one point of a link."""
         lever = skew(at)
         coupling = minus(((0.0,) * 3,) * 3, multiply(resistance, lever))
         return cls(resistance, coupling, mirrored(multiply(lever, coupling)))
@@ -267,11 +253,7 @@ class Inertia:
         )
 
     def in_parent(self, rotation: Rotation, offset: Vector) -> Inertia:
-        """Express in the parent's frame.
-
-        Args:
-            offset: Of this frame's origin in the parent's [m].
-        """
+        """Express in the parent's frame; offset is this frame's origin there [m]."""
         angular = mirrored(rotation.tensor_inwards(self.angular))
         linear = mirrored(rotation.tensor_inwards(self.linear))
         coupling = rotation.tensor_inwards(self.coupling)
@@ -283,17 +265,11 @@ class Inertia:
 
 @dataclass(frozen=True, slots=True)
 class RigidBody:
-    """Inertial parameters of a body in its own frame.
+    """Inertial parameters of a body in its own frame."""
 
-    Attributes:
-        mass: [kg].
-        moment: first moment m c [kg m].
-        angular: rotational inertia about the frame's origin [kg m2].
-    """
-
-    mass: Scalar
-    moment: Vector
-    angular: Matrix
+    mass: Scalar  # [kg]
+    moment: Vector  # first moment m c [kg m]
+    angular: Matrix  # rotational inertia about the frame's origin [kg m2]
 
     def inertia(self) -> Inertia:
         mass = self.mass
@@ -301,12 +277,7 @@ class RigidBody:
         return Inertia(diagonal, transpose(skew(self.moment)), self.angular)
 
     def force(self, angular_velocity: Vector, acceleration: Motion, tensor: Matrix) -> Force:
-        """Force that gives the body this motion (Newton-Euler equations).
-
-        Args:
-            angular_velocity: omega [rad/s].
-            tensor: [alpha]x + [omega]x^2, by `angular_acceleration_tensor`.
-        """
+        """Force that gives the body this motion (Newton-Euler equations)."""
         linear = add(scale(self.mass, acceleration.linear), apply(tensor, self.moment))
         w, alpha, inertia = angular_velocity, acceleration.angular, self.angular
         turning = []
@@ -328,10 +299,6 @@ def angular_acceleration_tensor(velocity: Vector, acceleration: Vector) -> Matri
 
     Times the offset of one point of a body from another, it is the difference of their
     accelerations.
-
-    Args:
-        velocity: omega of the body [rad/s].
-        acceleration: alpha [rad/s2].
     """
     x, y, z = velocity
     a, b, c = acceleration
@@ -345,28 +312,18 @@ def angular_acceleration_tensor(velocity: Vector, acceleration: Vector) -> Matri
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """Spatial velocity or acceleration.
+    """Spatial velocity or acceleration."""
 
-    Attributes:
-        linear: [m/s] or [m/s2].
-        angular: [rad/s] or [rad/s2].
-    """
-
-    linear: Vector
-    angular: Vector
+    linear: Vector  # [m/s] or [m/s2]
+    angular: Vector  # [rad/s] or [rad/s2]
 
 
 @dataclass(frozen=True, slots=True)
 class Force:
-    """Spatial force or momentum.
+    """Spatial force or momentum."""
 
-    Attributes:
-        linear: [N] or [N s].
-        angular: about the frame's origin [N m] or [N m s].
-    """
-
-    linear: Vector
-    angular: Vector
+    linear: Vector  # [N] or [N s]
+    angular: Vector  # about the frame's origin [N m] or [N m s]
 
     def plus(self, other: Force) -> Force:
         return Force(add(self.linear, other.linear), add(self.angular, other.angular))
@@ -375,10 +332,6 @@ class Force:
         return Force(subtract(self.linear, other.linear), subtract(self.angular, other.angular))
 
     def in_parent(self, rotation: Rotation, offset: Vector) -> Force:
-        """Express in the parent's frame.
-
-        Args:
-            offset: Of this frame's origin in the parent's [m].
-        """
+        """Express in the parent's frame; offset is this frame's origin there [m]."""
         linear = rotation.inwards(self.linear)
         return Force(linear, add(rotation.inwards(self.angular), cross(offset, linear)))

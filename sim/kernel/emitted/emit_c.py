@@ -29,21 +29,15 @@ PATIENCE: Final = 16
 
 @dataclass(frozen=True, slots=True)
 class Statement:
-    """Lines of C.
-
-    Attributes:
-        defines: names of the defined values.
-        reads: names of values of other statements.
-        operations: number of one-operation statements that it counts as; 0 for an operand in
-            memory, a constant or an input, which takes no register until used.
-        latency: operations that could be executed until its values are available.
-    """
+    """Lines of C."""
 
     text: str
-    defines: tuple[str, ...] = ()
-    reads: tuple[str, ...] = ()
+    defines: tuple[str, ...] = ()  # names of the defined values
+    reads: tuple[str, ...] = ()  # names of values of other statements
+    # number of one-operation statements that it counts as; 0 for an operand in memory, a constant
+    # or an input, which takes no register until used
     operations: int = 1
-    latency: int = 4
+    latency: int = 4  # operations that could be executed until its values are available
 
 
 def ordered(statements: Sequence[Statement]) -> Iterator[Statement]:

@@ -109,7 +109,7 @@ def test_a_recording_of_other_joints_is_refused(twin: Twin) -> None:
         ({"current": [[0.1] * 17]}, "current.0: 17 numbers for 18 joints"),
         ({"current": [[-0.1] * 18]}, "greater than or equal to 0"),
         ({"design": {"I": 0.1}}, "design: .*FI1R.* missing"),
-        ({"first_tick": 10}, "behind the walk's end after 2 s"),
+        ({"first_tick": 10}, "after the end of the walk at 2 s"),
     ],
 )
 def test_a_recording_that_makes_no_sense_is_refused(

@@ -307,28 +307,28 @@ static int end_round(Lanes *s)
 
 /* A lane whose walk has ended takes the next one; or, if there is none, one of the thread's own call
    whose results are discarded: the memory of another call may already be freed. */
-static void fill(Lanes *s, int k, Pool *pool, Call *own, int64_t bound)
+static void fill(Lanes *s, int k, Pool *pool, Call *thread_call, int64_t bound)
 {
-  Walker *w = own->walkers;
-  Call *call = begin_walk(pool, own, bound, &w);
-  if (!call && s->call[k] == own) return;
-  enter(s, k, call ? call : own, w);
+  Walker *w = thread_call->walkers;
+  Call *call = begin_walk(pool, thread_call, bound, &w);
+  if (!call && s->call[k] == thread_call) return;
+  enter(s, k, call ? call : thread_call, w);
   s->walking[k] = call != NULL;
 }
 
 /* Computes all walks of a call in order; when a walk ends, the next one enters its lane. When all
    have begun, lanes take walks of the pool's other calls that came before this call ended. Returns
    how many of the call's walks are still in other threads' lanes. */
-int64_t gaitswarm_walk(Pool *pool, Call *own, const Coding *coding, LaneUse *use)
+int64_t gaitswarm_walk(Pool *pool, Call *thread_call, const Coding *coding, LaneUse *use)
 {
   Lanes s;
   int64_t bound = INT64_MAX;
   int walking = 1;
   memset(use, 0, sizeof *use);
-  if (!own->n) return 0;
+  if (!thread_call->n) return 0;
   memset(&s, 0, sizeof s);
-  offer(pool, own);
-  for (int k = 0; k < LANES; k++) fill(&s, k, pool, own, bound);
+  offer(pool, thread_call);
+  for (int k = 0; k < LANES; k++) fill(&s, k, pool, thread_call, bound);
   for (int64_t n = 0; walking; n++) {
     const int timed = n % TIMED_EACH == 0;
     const int64_t begun = timed ? nanoseconds() : 0;
@@ -341,15 +341,15 @@ int64_t gaitswarm_walk(Pool *pool, Call *own, const Coding *coding, LaneUse *use
     use->walked += end_round(&s);
     use->computed += LANES;
     if (timed) use->timed += nanoseconds() - begun;
-    if (bound == INT64_MAX && !gaitswarm_left(own))
+    if (bound == INT64_MAX && !gaitswarm_left(thread_call))
       bound = __atomic_load_n(&pool->calls, __ATOMIC_RELAXED);
     walking = 0;
     for (int k = 0; k < LANES; k++) {
-      if (!s.walking[k]) fill(&s, k, pool, own, bound);
+      if (!s.walking[k]) fill(&s, k, pool, thread_call, bound);
       walking |= s.walking[k];
     }
   }
-  return gaitswarm_left(own);
+  return gaitswarm_left(thread_call);
 }
 
 int64_t gaitswarm_lanes(void) { return LANES; }

@@ -73,13 +73,13 @@ static void offer(Pool *p, Call *call)
 
 /* Takes the next walk of the thread's own call, then of the first call numbered below the bound;
    returns the call, or NULL if there is none. */
-static Call *begin_walk(Pool *p, Call *own, int64_t bound, Walker **w)
+static Call *begin_walk(Pool *p, Call *thread_call, int64_t bound, Walker **w)
 {
   Call **at = &p->first, *call;
   if (!__atomic_load_n(at, __ATOMIC_RELAXED)) return NULL;
   lock(p);
-  if (own->begun < own->n)
-    while (*at != own) at = &(*at)->following;
+  if (thread_call->begun < thread_call->n)
+    while (*at != thread_call) at = &(*at)->following;
   call = *at;
   if (call && call->number < bound) {
     *w = &call->walkers[call->begun++];

@@ -20,7 +20,7 @@ typedef struct {
   int64_t delay[SENSORS][LANES];
   divec key[2][HALVES];
   wide seen[SENSORS][NJ]; /* exact before disturb(), then with errors */
-  wide kept[SENSORS][KEPT_READINGS][NJ];
+  wide stored[SENSORS][KEPT_READINGS][NJ];
 } Sensors;
 
 static void set_sensors(Sensors *s, int k, const SensorErrors *e)
@@ -75,8 +75,8 @@ static void add_noise(Sensors *s, const int64_t *tick)
 static void delay_reading(Sensors *s, int k, int n, int64_t tick)
 {
   const int64_t then = tick > s->delay[n][k] ? tick - s->delay[n][k] : 0;
-  wide *const now = s->kept[n][tick % KEPT_READINGS];
-  wide *const past = s->kept[n][then % KEPT_READINGS];
+  wide *const now = s->stored[n][tick % KEPT_READINGS];
+  wide *const past = s->stored[n][then % KEPT_READINGS];
   for (int j = 0; j < NJ; j++) {
     OF_LANE(now[j], k) = OF_LANE(s->seen[n][j], k);
     OF_LANE(s->seen[n][j], k) = OF_LANE(past[j], k);

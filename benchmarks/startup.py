@@ -39,7 +39,7 @@ NativeKernel.walk = first
 {COMMAND}
 """
 
-HELP: tuple[list[str], ...] = ([], ["optimize"], ["serve"], ["study", "noise"])
+HELP: tuple[list[str], ...] = ([], ["optimize"], ["serve"], ["db", "backup"])
 
 
 def shown(arguments: Sequence[str]) -> float:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
@@ -170,21 +170,6 @@ def job_run(
     if job.state is not JobState.SUCCEEDED:
         raise ended(jobs.job(job.id), jobs.place)
     return job
-
-
-@contextmanager
-def study_jobs(
-    workers: WorkerOptions,
-) -> Iterator[tuple[DatabaseJobs, Callable[[Spec], Job]]]:
-    """Open the database, and workers of this process when a job needs them.
-
-    Yields the jobs, and a function that runs one as `job_run` does.
-    """
-    settings = read_settings(**asdict(workers))
-    url = database_to_write(settings)
-    with closing(open_store(url)) as store, closing(Embedded(settings)) as embedded:
-        jobs = DatabaseJobs(JobService(store), url)
-        yield jobs, lambda spec: job_run(spec, store, jobs, embedded)
 
 
 def run_seeds(

@@ -18,6 +18,7 @@ from typer.core import TyperGroup
 from typer.main import get_command, get_command_name
 from typer.models import CommandInfo
 
+from gaitswarm.cli.commands import bench
 from gaitswarm.cli.commands.database import db
 from gaitswarm.cli.commands.designs import (
     certify,
@@ -52,13 +53,11 @@ from gaitswarm.cli.commands.robots import (
     gaits,
     identify,
     mjcf,
-    reconstruct,
     recordings,
     robot,
     synthesize,
     validate,
 )
-from gaitswarm.cli.commands.studies import bench, study
 from gaitswarm.cli.exit_codes import ExitCode, exit_code, explanation
 from gaitswarm.cli.output import (
     OutputClosed,
@@ -81,11 +80,9 @@ PANELS: Final = {
     "Designs": ("compare", "certify", "robustness", "firmware"),
     "Robots and measurements": (
         *("gaits", "mjcf", "record", "recordings", "identify", "parameters"),
-        *("calibrate", "targets", "validate", "synthesize", "reconstruct"),
+        *("calibrate", "targets", "validate", "synthesize"),
     ),
-    "Installation": (
-        *("optimizers", "cases", "plugins", "token", "audit", "db", "bench", "study"),
-    ),
+    "Installation": (*("optimizers", "cases", "plugins", "token", "audit", "db", "bench"),),
 }
 """Commands in the order of the help text, by heading."""
 
@@ -176,7 +173,6 @@ for _module in (
     audit,
     simulate,
     compare,
-    study,
     firmware,
     bench,
     export,
@@ -196,7 +192,6 @@ for _module in (
     recordings,
     calibrate,
     certify,
-    reconstruct,
     robot,
 ):
     _module.register(app)

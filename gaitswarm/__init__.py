@@ -78,7 +78,7 @@ if TYPE_CHECKING:
     from gaitswarm.sim.variables import Variable
     from gaitswarm.simulation import robustness, simulate
     from gaitswarm.simulation_result import ScenarioResult, SimulationResult
-    from gaitswarm.specs import SpecOptions
+    from gaitswarm.specs import SpecOptions, job_spec
     from gaitswarm.tables import EvaluationTable, Table
     from gaitswarm.views import (
         BestView,
@@ -197,6 +197,7 @@ __all__ = [
     "__version__",
     "connect",
     "connect_async",
+    "job_spec",
     "open",
     "open_async",
     "optimize",
@@ -230,7 +231,7 @@ _MODULES: Final = {
     "gaitswarm.requests.robustness": ("RobustnessOptions",),
     "gaitswarm.simulation": ("robustness", "simulate"),
     "gaitswarm.simulation_result": ("ScenarioResult", "SimulationResult"),
-    "gaitswarm.specs": ("SpecOptions",),
+    "gaitswarm.specs": ("SpecOptions", "job_spec"),
     "gaitswarm.tables": ("EvaluationTable", "Table"),
     "gaitswarm.views": (
         "BestView", "EvaluationView", "HistoryIterationView", "IterationView", "JobSummaryView",

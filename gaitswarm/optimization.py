@@ -5,23 +5,20 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gaitswarm.errors import InvalidRequest, JobEnded, NotFound, simulation_errors
+from gaitswarm.errors import InvalidRequest, JobEnded, NotFound
 from gaitswarm.jobs.database.embedded import Workers, check_same
 from gaitswarm.jobs.open import open as open_database
 from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.services.optimizer.run.evaluator import Evaluator
 from gaitswarm.services.runtime import EvaluatorKind
-from gaitswarm.specs import SpecInput, SpecOptions, chosen_spec
+from gaitswarm.specs import SpecInput, SpecOptions, job_spec
 from gaitswarm.tables import EvaluationTable, Table
 from gaitswarm.views import BestView, IterationView, JobView, OptimizerView, optimizer_views
-
-if TYPE_CHECKING:
-    from gaitswarm.services.optimizer.jobs.documents import AnySpec
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +90,7 @@ def optimize(
     spec: SpecInput | None = None,
     *,
     resume: str | None = None,
+    reuse: bool = False,
     accept_changes: bool = False,
     db: str | os.PathLike[str] | None = None,
     evaluator: EvaluatorKind | Evaluator = "in-process",
@@ -111,6 +109,8 @@ def optimize(
             for the defaults, those of the thesis's chapter 4.
         resume: Identifier of an earlier job to resume. A spec or options that are
             given as well must be the job's own.
+        reuse: Whether to take the job of the same name and specification that the same code ran
+            before, or to resume it if it has not ended, in place of a new job.
         accept_changes: Whether to continue a job although its provenance (code,
             robot, compiler) has changed; the change is recorded with it.
         db: Database to keep the job in: a file, or a URL as for `gaitswarm.open`. None: that of
@@ -142,13 +142,15 @@ def optimize(
         raise InvalidRequest("a new job has no changes to accept", field="accept_changes")
     asked = None
     if resume is None or spec is not None or options:
-        asked = _checked(chosen_spec(spec, options))
+        asked = job_spec(spec, **options)
     workers = Workers(evaluator, cpus=cpus, ray_address=ray_address)
     with open_database(db, create=resume is None) as jobs:
         if asked is not None and resume is not None:
             check_same(jobs.job(resume).spec, asked, resume)
+        elif asked is not None and reuse:
+            resume = jobs.earlier(asked)
         job = jobs.run(
-            jobs.submit_embedded(asked) if resume is None else resume,
+            resume or jobs.submit_embedded(asked),
             evaluator=workers.evaluator,
             cpus=cpus,
             ray_address=ray_address,
@@ -167,10 +169,3 @@ def optimizers() -> list[OptimizerView]:
         Each with its description, its settings and their JSON schema.
     """
     return optimizer_views()
-
-
-def _checked(spec: AnySpec) -> AnySpec:
-    """Check that a spec can be simulated, before a database is made for it."""
-    with simulation_errors("spec"):
-        spec.check_can_be_simulated()
-    return spec

@@ -27,11 +27,17 @@ from gaitswarm.sim.controllers.fixed_point import (
     required,
     to_fixed,
 )
+from gaitswarm.sim.controllers.fuzzy_pi import FuzzyPi
+from gaitswarm.sim.controllers.quantisation import Axis as TableAxis
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.kernel.walk import Kernel
+from gaitswarm.sim.noise import LinkNoise
 from gaitswarm.sim.outcome import OBJECTIVES, Objective, Outcome, Status
 from gaitswarm.sim.robot import Robot, load_robot
+from gaitswarm.sim.robot.identifiable import with_parameters
+from gaitswarm.sim.robot.robot import with_shafts
 from gaitswarm.sim.scenario import Scenario
+from gaitswarm.sim.simulate import simulate as simulate_walk
 from gaitswarm.sim.variables import Variable
 
 __all__ = [
@@ -45,9 +51,11 @@ __all__ = [
     "CaseSettings",
     "ControlLaw",
     "Controller",
+    "FuzzyPi",
     "Inference",
     "Judged",
     "Kernel",
+    "LinkNoise",
     "LongCase",
     "LookupTable",
     "Method",
@@ -66,6 +74,7 @@ __all__ = [
     "Space",
     "Start",
     "Status",
+    "TableAxis",
     "Variable",
     "Walk",
     "checked_fitness",
@@ -78,5 +87,8 @@ __all__ = [
     "parse_state",
     "polls",
     "required",
+    "simulate_walk",
     "to_fixed",
+    "with_parameters",
+    "with_shafts",
 ]

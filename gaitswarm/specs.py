@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeAlias, TypedDict, cast
+from typing import Any, TypeAlias, TypedDict, Unpack, cast, overload
 
 from pydantic import ValidationError
 
-from gaitswarm.errors import InvalidRequest, invalid_request
+from gaitswarm.errors import InvalidRequest, invalid_request, simulation_errors
 from gaitswarm.robots import robot_defaults
 from gaitswarm.services.optimizer.jobs.documents import SPECS, AnySpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 from gaitswarm.services.optimizer.jobs.optimizer_choice import with_settings
 from gaitswarm.services.optimizer.jobs.preference import Preference, PreferenceName
@@ -131,6 +132,33 @@ def laid_options(options: SpecOptions | ForkOptions) -> dict[str, Any]:
     if "scenarios" in given:
         given["scenarios"] = scenario_entries(given["scenarios"])
     return given
+
+
+@overload
+def job_spec(spec: None = None, **options: Unpack[SpecOptions]) -> JobSpec: ...
+
+
+@overload
+def job_spec(spec: SpecInput, **options: Unpack[SpecOptions]) -> AnySpec: ...
+
+
+def job_spec(spec: SpecInput | None = None, **options: Unpack[SpecOptions]) -> AnySpec:
+    """Build the specification of a job and check that it can be simulated; nothing is stored.
+
+    Args:
+        spec: Job to start from, as an object or as a document; None for the defaults.
+        **options: Fields laid over `spec`, see `SpecOptions`.
+
+    Returns:
+        The specification, for `gaitswarm.optimize` and `Jobs.submit`.
+
+    Raises:
+        InvalidRequest: A field is invalid or the job cannot be simulated; names the field.
+    """
+    chosen = chosen_spec(spec, options)
+    with simulation_errors("spec"):
+        chosen.check_can_be_simulated()
+    return chosen
 
 
 def chosen_spec(spec: SpecInput | None, options: SpecOptions) -> AnySpec:

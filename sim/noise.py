@@ -45,6 +45,10 @@ class LinkNoise(BaseModel):
     def samples(self, ticks: int, joints: int) -> NDArray[np.float64]:
         """Noise of a whole walk; a longer one has the same noise as a shorter one, and more.
 
+        Args:
+            ticks: Control ticks of the walk.
+            joints: Joints of the robot.
+
         Returns:
             (ticks, joints) [N m], of an angle [rad].
         """

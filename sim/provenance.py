@@ -26,12 +26,12 @@ _SUFFIXES: Final = (".py", ".c", ".h")
 
 _NOT_IN_A_CASE: Final = (
     "benchmark.py",
+    "drives.py",
     "measurement",
     "proposal",
     "provenance.py",
     "replay.py",
     "robot/shapes.py",
-    "studies",
     "validation.py",
 )
 """Modules and packages of `sim` that no case runs through."""

@@ -66,7 +66,7 @@ class Simulation:
 
 def simulate(
     scenario: Scenario,
-    controller: str,
+    controller: str | ControlLaw,
     variables: Sequence[str],
     designs: NDArray[np.float64],
     *,
@@ -78,11 +78,28 @@ def simulate(
     physics_rate: int = PHYSICS_RATE,
     precision: Precision = "double",
 ) -> Simulation:
-    """Let every design walk through a scenario.
+    """Simulate designs in one scenario, in the calling thread.
 
     Args:
+        scenario: Scenario to walk through.
+        controller: Name of the controller, or a compiled control law; then all variables are of
+            the gait.
+        variables: Names of the designs' columns: variables of the controller and of the gait.
         designs: (n, len(variables)), in the variables' units.
-        physics_rate: Physics steps a second [Hz], a multiple of the control rate.
+        robot: Robot to simulate: its name, a `RobotVariant`, `RobotFiles` or a `Robot`.
+        planner: Robot that the desired angles are planned for. Default: `robot`.
+        noise: Noise between gearheads and links.
+        log: Whether to record every simulation at 500 Hz.
+        backend: `native` is the compiled kernel, `reference` the CasADi interpreter, `auto` the
+            first that works on this machine.
+        physics_rate: Physics steps per second [Hz], a multiple of the control rate.
+        precision: Precision of the physics.
+
+    Returns:
+        Objectives, statuses, measurements and logs of all designs.
+
+    Raises:
+        SimulationInputError: An argument is invalid; names it.
     """
     (simulation,) = walk_together(
         [
@@ -134,7 +151,7 @@ def simulating(
 
 def _simulating(
     scenario: Scenario,
-    controller: str,
+    controller: str | ControlLaw,
     variables: Sequence[str],
     designs: NDArray[np.float64],
     *,
@@ -162,7 +179,11 @@ def _simulating(
     for index, row in enumerate(designs.tolist()):
         design = dict(zip(variables, row, strict=True))
         gait = {name: design.pop(name) for name in variables if name in GAIT_CATALOGUE}
-        law = control_law(controller, tuple(design.items()))
+        law = (
+            controller
+            if isinstance(controller, ControlLaw)
+            else control_law(controller, tuple(design.items()))
+        )
         key = tuple(gait.values())
         if key not in plans:
             walked = with_gait(scenario, gait)
@@ -246,19 +267,22 @@ def lanes(precision: Precision = "double") -> int:
 
 
 def _check_arguments(
-    controller: str,
+    controller: str | ControlLaw,
     variables: Sequence[str],
     designs: NDArray[np.float64],
     physics_rate: int,
 ) -> None:
-    if controller not in CONTROLLERS:
+    if isinstance(controller, ControlLaw):
+        own, label = frozenset[str](), "the gait"
+    elif controller in CONTROLLERS:
+        own, label = names_of(CONTROLLERS[controller]), controller
+    else:
         raise SimulationInputError(f"controller: {CONTROLLERS.unknown(controller)}")
-    own = names_of(CONTROLLERS[controller])
     for name in variables:
         if name not in own and name not in GAIT_CATALOGUE:
             known = own | set(GAIT_CATALOGUE)
             raise SimulationInputError(
-                f"{name}: not a variable of {controller}; {instead_of(name, sorted(known))}"
+                f"{name}: not a variable of {label}; {instead_of(name, sorted(known))}"
             )
     if designs.ndim != 2 or designs.shape[1] != len(variables):
         raise SimulationInputError(

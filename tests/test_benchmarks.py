@@ -83,9 +83,9 @@ def test_the_history_benchmark_reads_a_store_of_its_own(told: Told) -> None:
 def test_the_start_up_benchmark_tells_how_long_people_wait(
     told: Told, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("benchmarks.startup.HELP", (["study", "noise"],))
+    monkeypatch.setattr("benchmarks.startup.HELP", (["db", "backup"],))
     seconds = told("startup", "--rounds", "1", "--iterations", "1")
-    assert "gaitswarm study noise --help" in seconds
+    assert "gaitswarm db backup --help" in seconds
     assert all(0.0 < waited < 120.0 for waited in seconds.values())
     for cache in ("warm", "cold"):
         assert seconds[f"optimize, {cache}: first walk"] < seconds[f"optimize, {cache}: result"]

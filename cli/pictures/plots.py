@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from mpl_toolkits.mplot3d.axes3d import Axes3D
 
     from gaitswarm.sim.controllers.surface import Surface
-    from gaitswarm.sim.studies.drives import WalkFigures
+    from gaitswarm.sim.drives import WalkFigures
     from gaitswarm.views import IterationView
 
 _FORMATS: Final = ("png", "svg", "pdf")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
 from rich.text import Text
@@ -11,7 +11,6 @@ from rich.text import Text
 from gaitswarm.cli.tables.fitted import Table
 
 if TYPE_CHECKING:
-    from gaitswarm.services.optimizer.analysis.statistics import MedianInterval
     from gaitswarm.services.optimizer.jobs.fork import Lineage
     from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
     from gaitswarm.services.optimizer.jobs.spec import Spec
@@ -350,22 +349,6 @@ def number(value: float | str | None, digits: int = 4) -> str:
     if value is None:
         return MISSING
     return f"{value:.0f}" if 10.0**digits <= abs(value) < 1e9 else f"{value:.{digits}g}"
-
-
-def interval_cells(
-    interval: MedianInterval | None, written: Callable[[float], str]
-) -> tuple[str, str]:
-    """Median and interval of several runs; a dash for what there is not."""
-    if interval is None:
-        return MISSING, MISSING
-    if interval.low is None or interval.high is None:
-        return written(interval.median), MISSING
-    return written(interval.median), f"{written(interval.low)} to {written(interval.high)}"
-
-
-def relative_change(ratio: float) -> str:
-    """`+5.0 %` of 1.05."""
-    return f"{100.0 * (ratio - 1.0):+.1f} %"
 
 
 def duration(seconds: float) -> str:

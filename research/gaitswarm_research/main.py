@@ -5,6 +5,15 @@ from __future__ import annotations
 import sys
 
 import typer
+from pydantic import ValidationError
+
+from gaitswarm import GaitswarmError, Interrupted
+from gaitswarm.plugins import SimulationInputError
+from gaitswarm_research.reconstruction.command import reconstruction
+from gaitswarm_research.studies.accuracy import noise, steps, tables
+from gaitswarm_research.studies.controllers import controllers
+from gaitswarm_research.studies.precision import precision
+from gaitswarm_research.studies.worlds import worlds
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -19,15 +28,31 @@ def research() -> None:
     """Compare search methods, reconstruct published results, and study the model."""
 
 
+app.command()(reconstruction)
+study = typer.Typer(
+    no_args_is_help=True,
+    help="Measure the effect of tables, time steps, noise, precision, controllers and worlds.",
+)
+for command in (tables, steps, noise, precision, controllers, worlds):
+    study.command()(command)
+app.add_typer(study, name="study")
+
+
 def main() -> None:
     """Run the command line. An error of gaitswarm is shown without a traceback."""
-    from gaitswarm import GaitswarmError
-
     try:
         app()
-    except GaitswarmError as error:
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        field = ".".join(map(str, first["loc"]))
+        typer.echo(f"error: {field}: {first['msg']}", err=True)
+        sys.exit(2)
+    except (GaitswarmError, SimulationInputError) as error:
         typer.echo(f"error: {error}", err=True)
         sys.exit(2)
+    except Interrupted as interruption:
+        typer.echo(f"interrupted; the same command resumes: {interruption}", err=True)
+        sys.exit(130)
 
 
 if __name__ == "__main__":

@@ -160,7 +160,13 @@ class FuzzyPi:
         return self.compile_with(design, ERROR, CURRENT)
 
     def compile_with(self, design: Mapping[str, float], error: Axis, current: Axis) -> ControlLaw:
-        """Compile with a table of another resolution."""
+        """Compile the controller with a table of another resolution.
+
+        Args:
+            design: Value of every variable, by name.
+            error: Axis of the error.
+            current: Axis of the current.
+        """
         p = _Parameters.of(design)
         return ControlLaw(integral_gain=p.integral, direct=p.table(error, current))
 
@@ -179,7 +185,11 @@ class FuzzyPi:
         return (fuzzy_p,)
 
     def without_table(self, design: Mapping[str, float]) -> ControlLaw:
-        """Compile with the inference in place of the table (reference kernel only)."""
+        """Compile the controller with full inference, for the reference kernel only.
+
+        Args:
+            design: Value of every variable, by name.
+        """
         p = _Parameters.of(design)
         system = inference_system(*p.weights, p.shape, p.sets)
         exact = ExactInference(system, p.error_range, p.current_range, p.output_range)

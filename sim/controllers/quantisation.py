@@ -42,7 +42,11 @@ class Axis:
         return np.arange(n) / (n - 1)
 
     def gain(self, full_range: float) -> int:
-        """Fixed-point index per unit of an input."""
+        """Fixed-point index per unit of an input.
+
+        Args:
+            full_range: Value of the input at the last index.
+        """
         n = 1 << self.bits
         return to_fixed((n // 2 - 1 if self.centred else n - 1) / full_range, FRACTION_BITS)
 

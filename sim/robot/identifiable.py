@@ -131,7 +131,12 @@ def identifiable_variables(robot: Robot) -> tuple[Variable, ...]:
 
 
 def with_parameters(robot: Robot, values: Mapping[str, float | str]) -> Robot:
-    """The same robot with some of its parameters and conventions at other values."""
+    """Return the robot with some parameters and conventions at other values.
+
+    Args:
+        robot: Robot to start from.
+        values: Values by name; of a convention a choice or its index.
+    """
     conventions = _conventions(values)
     _check_gearheads(robot, values)
     numbers = _numbers({name: v for name, v in values.items() if name not in conventions})

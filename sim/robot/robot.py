@@ -338,7 +338,11 @@ def _torque_row(actuator: TorqueActuator) -> tuple[float, ...]:
 
 
 def with_shafts(robot: Robot) -> Robot:
-    """The same robot with elastic shafts between motors and links, also where there is no play."""
+    """Return the robot with elastic shafts between motors and links, also where there is no play.
+
+    Args:
+        robot: Robot to start from.
+    """
     if robot.has_backlash:
         return robot
     description = robot.description.model_copy(update={"elastic_shafts": True})

@@ -1,4 +1,4 @@
-"""`compare` and `study` as a person meets them."""
+"""`gaitswarm compare`."""
 
 from __future__ import annotations
 
@@ -54,9 +54,6 @@ def test_a_design_file_is_compared_on_a_variant_of_the_robot(
         (["compare", "--scenario", "moon"], "moon"),
         (["compare", "--robot", '{"backlash": 3}'], "robot.backlash"),
         (["compare", "--robot", "{"], "robot"),
-        (["study", "steps", "--scenario", "moon"], "moon"),
-        (["study", "noise", "--deviation", "5"], "deviation: 5 rad is more than 0.5 rad"),
-        (["study", "noise", "--deviation", "-1"], "deviation: must be greater than 0"),
     ],
 )
 def test_what_makes_no_sense_is_exit_code_2(
@@ -64,11 +61,3 @@ def test_what_makes_no_sense_is_exit_code_2(
 ) -> None:
     assert run(arguments) == 2
     assert said in capsys.readouterr().err
-
-
-def test_a_study_is_told_as_ratios(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["study", "noise", "--json", "--kind", "torque", "--deviation", "5"]) == 0
-    rows = json.loads(capsys.readouterr().out)
-    assert [row["variant"] for row in rows] == ["link 1", "link 2", "link 3"]
-    assert run(["study", "steps", "--scenario", "1"]) == 0
-    assert "2.5 kHz" in capsys.readouterr().out

@@ -69,9 +69,6 @@ COMMANDS = {
     "scenarios": "ID --json",
     "simulate": "--design job:ID --json",
     "status": "ID --json",
-    "study noise": "--design job:ID --scenario moon",
-    "study steps": "--design job:ID --scenario moon",
-    "study tables": "--design job:ID --scenario moon",
     "submit": "--start-from ID,ID --json",
     "synthesize": "--design job:ID --scenario 1 --cycles 2 --output FILE.csv",
     "targets": "ID",
@@ -84,8 +81,6 @@ COMMANDS = {
 OTHERWISE = {
     **dict.fromkeys(("cancel", "pause", "prioritize", "resume"), 4),
     "targets": 2,
-    # No walk is to be waited for: the scenario is refused after the job was found.
-    **dict.fromkeys(("study noise", "study steps", "study tables"), 2),
 }
 """Exit codes that are not 0, as the job has ended and tunes a drive."""
 

@@ -43,15 +43,6 @@ def test_a_design_is_judged_as_a_job_of_the_folder_judges_it(dog: Path, tmp_path
     assert other["fitness"] != again["fitness"]
 
 
-@pytest.mark.variants("study steps")
-@pytest.mark.slow
-@pytest.mark.parametrize("study", ["study steps", "study noise"])
-def test_studies_take_the_folders_controller(study: str, dog: Path) -> None:
-    result = command(study, dog, "--scenario", "slow", "--json")
-    assert result.code == 0, result.err
-    assert {row["scenario"] for row in result.json} == {"slow"}
-
-
 @pytest.mark.slow
 def test_walks_that_are_compared_with_logs_take_the_folders_controller(
     dog: Path, tmp_path: Path
@@ -94,7 +85,7 @@ def test_a_design_that_was_not_published_says_what_can_be_given(dog: Path) -> No
     )
 
 
-@pytest.mark.parametrize("name", ["optimize", "simulate", "certify", "study steps", "validate"])
+@pytest.mark.parametrize("name", ["optimize", "simulate", "certify", "validate"])
 def test_help_names_every_controller_that_there_is(name: str) -> None:
     shown = " ".join(run_command(*name.split(), "--help").out.replace("│", " ").split())
     for controller in CONTROLLERS.built_in:

@@ -27,7 +27,7 @@ HEAVY = (
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("of", [[], ["optimize"], ["serve"], ["study", "noise"]])
+@pytest.mark.parametrize("of", [[], ["optimize"], ["serve"], ["db", "backup"]])
 def test_help_imports_none_of_the_heavy_packages(of: list[str]) -> None:
     statements = f"from gaitswarm.cli.main import run; assert run({[*of, '--help']}) == 0"
     assert loaded_by(statements, HEAVY) == set()
@@ -42,7 +42,7 @@ def test_commands_on_a_database_import_nothing_that_few_of_them_need() -> None:
 def test_help_is_that_of_the_innermost_command_wherever_it_is_asked_for(
     gaitswarm: Gaitswarm,
 ) -> None:
-    for words in ("study noise --help", "study noise --kind torque -h", "study -h noise"):
+    for words in ("db backup --help", "db prune --audit-older-than 1 -h", "db -h backup"):
         shown = gaitswarm(*words.split())
         assert (shown.code, shown.err) == (0, "")
         assert shown.out.startswith(f"Usage: gaitswarm {words.partition(' -')[0]} ")

@@ -11,9 +11,9 @@ import pytest
 import gaitswarm
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, judge
 from gaitswarm.sim.controllers import ControllerName
+from gaitswarm.sim.drives import compare, find_drive
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.scenario import find_scenario
-from gaitswarm.sim.studies.drives import compare, find_drive
 
 pytestmark = pytest.mark.slow
 

@@ -14,7 +14,6 @@ from gaitswarm.sim.noise import LinkNoise
 from gaitswarm.sim.robot import Robot, load_robot
 from gaitswarm.sim.robot.robot import with_shafts
 from gaitswarm.sim.scenario import SCENARIOS
-from gaitswarm.sim.studies.accuracy import Deviation, noise_on_links
 from tests.examples.walks import short_walk, walk
 
 PI = {"P": 0.45, "I": 0.1}
@@ -80,20 +79,3 @@ def test_an_angle_cannot_be_displaced_without_shafts_that_yield() -> None:
 def test_a_torque_that_is_meant_as_an_angle_is_refused() -> None:
     with pytest.raises(ValidationError, match=r"10 rad is more than 0\.5 rad"):
         noise_on(1, 10.0)
-
-
-def test_the_quality_is_the_sixth_row_of_table_2_9() -> None:
-    reciprocal_speed = 1.0 / 1.05
-    ratio = np.array([3.28, 1.54, 2.11, 1.46, reciprocal_speed, 1.0])
-    link_1 = Deviation("link 1", "any", np.ones(6), ratio)
-    assert link_1.quality == pytest.approx(0.07, abs=0.005)
-
-
-@pytest.mark.slow
-def test_the_study_puts_noise_on_angles_unless_told_otherwise() -> None:
-    found = noise_on_links("pi", PI, [BRIEF])
-    same = noise_on_links("pi", PI, [BRIEF], kind="angle", deviation=0.001)
-    torque = noise_on_links("pi", PI, [BRIEF], kind="torque")
-    for noisy, again, other in zip(found, same, torque, strict=True):
-        assert noisy.ratio.tolist() == again.ratio.tolist() != other.ratio.tolist()
-        assert noisy.quality < 1.0

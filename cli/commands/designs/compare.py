@@ -11,7 +11,7 @@ import typer
 from gaitswarm.cli.inputs.options import Db, Json, RobotOption, Server
 
 if TYPE_CHECKING:
-    from gaitswarm.sim.studies.drives import NamedDrive, WalkFigures
+    from gaitswarm.sim.drives import NamedDrive, WalkFigures
 
 
 def register(app: typer.Typer) -> None:
@@ -43,8 +43,8 @@ def compare(
     from gaitswarm.cli.inputs.robots import chosen_robot, chosen_scenarios
     from gaitswarm.cli.output import note, print_text
     from gaitswarm.cli.pictures.plots import draw_comparison, save
-    from gaitswarm.sim.studies.drives import DRIVES
-    from gaitswarm.sim.studies.drives import compare as compare_drives
+    from gaitswarm.sim.drives import DRIVES
+    from gaitswarm.sim.drives import compare as compare_drives
 
     chosen = [_drive(name, server, db) for name in drives or DRIVES]
     figures = compare_drives(chosen, chosen_scenarios(scenario, robot), robot=chosen_robot(robot))
@@ -61,7 +61,7 @@ def _drive(name: str, server: str | None, db: str | None) -> NamedDrive:
     from gaitswarm.cli.inputs.design_file import given_design, read_design
     from gaitswarm.services.optimizer.errors import InvalidRequest
     from gaitswarm.sim.controllers import CONTROLLERS
-    from gaitswarm.sim.studies.drives import drive_of_design, find_drive
+    from gaitswarm.sim.drives import drive_of_design, find_drive
 
     kind, colon, what = name.partition(":")
     if not colon:

@@ -12,7 +12,7 @@ from itertools import islice
 from typing import Final, TypeVar, Unpack
 
 from gaitswarm.errors import simulation_errors
-from gaitswarm.jobs.database.embedded import Workers, run_here
+from gaitswarm.jobs.database.embedded import Workers, earlier_job, run_here
 from gaitswarm.jobs.database.findings import DatabaseFindings
 from gaitswarm.jobs.database.news import PAGE, JobNews
 from gaitswarm.jobs.database.walks import LocalWalks
@@ -141,6 +141,19 @@ class DatabaseJobs(DatabaseFindings, LocalWalks, Jobs):
         wanted = chosen_spec(spec, {})
         with simulation_errors("spec"):
             return self._service.submit_embedded(wanted)
+
+    def earlier(self, spec: SpecInput) -> str | None:
+        """Find a job of the same name and specification that is still valid.
+
+        Args:
+            spec: As for `submit`.
+
+        Returns:
+            Identifier of a job that was not cancelled and whose numbers depend on the same code,
+            robot and libraries as a new one's; None if there is none.
+        """
+        job = earlier_job(self._service, chosen_spec(spec, {}))
+        return None if job is None else job.id
 
     def run(
         self,

@@ -13,7 +13,11 @@ from pydantic import ConfigDict, Field, TypeAdapter, ValidationError, model_vali
 
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
-from gaitswarm.services.optimizer.jobs.kinds.held_out import certificate_scenarios
+from gaitswarm.services.optimizer.jobs.kinds.held_out import (
+    certificate_scenarios,
+    certificate_walks,
+)
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.walks import WalksSpec
 from gaitswarm.services.optimizer.jobs.optimizer_choice import OptimizerChoice
 from gaitswarm.services.optimizer.jobs.preference import PreferenceChoice
@@ -242,6 +246,42 @@ class CertificateSpec(WalksSpec):
     def design_space(self) -> DesignSpace:
         """The perturbations, and which of the `engines` computes the walk, if there are any."""
         return with_engine(self.world_space(), self.engines)
+
+    @classmethod
+    def of_job(
+        cls,
+        spec: JobSpec,
+        design: Mapping[str, float | str],
+        *,
+        name: str = "",
+        worlds: int = 1000,
+        seed: int = 1,
+    ) -> Self:
+        """Build the certificate of a design that a job found.
+
+        Args:
+            spec: The job. The certificate takes its robot, controller and preference, and adds
+                held-out scenarios to its scenarios.
+            design: Value of every variable, by name.
+            name: Name of the certificate's job.
+            worlds: Number of worlds to draw.
+            seed: Seed of the worlds.
+
+        Returns:
+            The specification of the certificate.
+        """
+        numbers = design_numbers(spec.controller, design)
+        return cls(
+            kind="certificate",
+            name=name,
+            robot=spec.robot,
+            controller=spec.controller,
+            design=dict(design),
+            **certificate_walks(spec.resolved_scenarios(), spec.robot, numbers),
+            preference=spec.preference,
+            worlds=worlds,
+            seed=seed,
+        )
 
     def world_space(self) -> DesignSpace:
         """The perturbations; what is neither drawn nor fixed is as the robot has it."""

@@ -1,4 +1,4 @@
-"""What f_G of A says of f_G of C, whatever the model: a bound by Jensen's inequality.
+"""Bound on f_G under C from f_G under A, independent of the model, by Jensen's inequality.
 
 With x the logarithms of the objectives, log f_A is a sum of e_m log(b_m + exp x_m), convex in x,
 averaged over scenarios. So it is at least its value at the scenarios' mean of x, which are the
@@ -10,22 +10,24 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from gaitswarm.services.optimizer.jobs.preference import Preference
+from gaitswarm import Preference
 
 
-def greatest_product(preference: Preference, fitness: float, known: Mapping[int, float]) -> float:
-    """Greatest product of all objectives' geometric means that a fitness leaves room for.
+def greatest_product(preference: Preference, fitness: float, means: Mapping[int, float]) -> float:
+    """Return the greatest product of all objectives' geometric means that a fitness allows.
+
+    means: geometric means that are given, by index of the objective.
 
     The logarithm of the product is linear and the constraint convex, so the stationary point is the
-    greatest: all e_m g_m / (b_m + g_m) of what is not known are equal.
+    greatest: all e_m g_m / (b_m + g_m) of the free means are equal.
     """
     terms = list(zip(preference.bias, preference.exponent, strict=True))
-    free = [term for m, term in enumerate(terms) if m not in known]
+    free = [term for m, term in enumerate(terms) if m not in means]
     room = math.log(fitness) - sum(
-        terms[m][1] * math.log(terms[m][0] + value) for m, value in known.items()
+        terms[m][1] * math.log(terms[m][0] + value) for m, value in means.items()
     )
     least = sum(e * math.log(b) for b, e in free)
-    product = math.prod(known.values())
+    product = math.prod(means.values())
     if not free:
         return product if room >= 0.0 else 0.0
     if room <= least:
@@ -34,14 +36,14 @@ def greatest_product(preference: Preference, fitness: float, known: Mapping[int,
     low, high = -700.0, 700.0
     for _ in range(200):
         middle = 0.5 * (low + high)
-        means = _means(free, middle)
-        spent = sum(e * math.log(b + g) for (b, e), g in zip(free, means, strict=True))
+        at_middle = _means(free, middle)
+        spent = sum(e * math.log(b + g) for (b, e), g in zip(free, at_middle, strict=True))
         low, high = (middle, high) if spent < room else (low, middle)
     return product * math.prod(_means(free, low))
 
 
 def _means(free: list[tuple[float, float]], u: float) -> list[float]:
-    """g_m at which every slope e g / (b + g) is t."""
+    """Means g_m at which every slope e g / (b + g) is t."""
     least = min(e for _, e in free)
     slack = least / (1.0 + math.exp(u))
     return [b * (least - slack) / (e - least + slack) for b, e in free]

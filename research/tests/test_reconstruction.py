@@ -1,4 +1,4 @@
-"""The reconstruction, from the command to the report, at a size that fits a test."""
+"""The reconstruction, from the command to the report, in small."""
 
 from __future__ import annotations
 
@@ -10,25 +10,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gaitswarm.cli.inputs.target_file import read_targets
-from gaitswarm.cli.reconstruction.alternatives import (
+import gaitswarm
+from gaitswarm import CONTROLLERS, PREFERENCES, JobSpec
+from gaitswarm_research.reconstruction.bound import greatest_product
+from gaitswarm_research.reconstruction.conventions import (
     alternatives,
     default_choice,
     simulated_targets,
 )
-from gaitswarm.cli.reconstruction.bound import greatest_product
-from gaitswarm.cli.reconstruction.optimality import OPTIMA, optimality, random_designs
-from gaitswarm.cli.reconstruction.plan import TARGETS, Size, calibrations
-from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, judge
-from gaitswarm.sim.controllers import CONTROLLERS
-from gaitswarm.sim.gait.quadratic_spline import driven_as_in_2011
-from gaitswarm.sim.gait_variables import with_gait
-from gaitswarm.sim.scenario import SCENARIOS
-from tests.cli.conftest import Gaitswarm
+from gaitswarm_research.reconstruction.optimality import OPTIMA, optimality, random_designs
+from gaitswarm_research.reconstruction.targets import Size, calibrations
+from research.tests.conftest import Command
 
 TINY = (
     *("--seeds", "2", "--particles", "2", "--iterations", "1", "--samples", "2"),
-    *("--change", "integrator_unit", "--evaluator", "in-process"),
+    *("--change", "integrator_unit"),
 )
 
 SECTIONS = [
@@ -49,45 +45,45 @@ def spec() -> Any:
     return calibrations(Size(1, 2, 1, 2, 1))[0]
 
 
-@pytest.mark.thorough("the whole study in small, whose parts the other tests of this file show")
 @pytest.mark.slow
 def test_the_command_reports_and_computes_nothing_twice(
-    gaitswarm: Gaitswarm, db: Path, tmp_path: Path
+    research: Command, db: Path, tmp_path: Path
 ) -> None:
     folder = tmp_path / "report"
-    first = gaitswarm("reconstruct", *TINY, "--db", db, "--output", folder)
+    first = research("reconstruction", *TINY, "--db", db, "--output", folder)
     assert first.code == 0, first.err
-    assert first.err.count("reconstruction, seed") == 2
     report = (folder / "report.md").read_text(encoding="utf-8")
     assert [line[3:] for line in report.splitlines() if line.startswith("## ")] == SECTIONS
-    assert "integrator_unit" in report and "best of seed" in report
-    for picture in ("targets.svg", "choices.svg", "exclusion.svg"):
-        assert f"]({picture})" in report and (folder / picture).stat().st_size > 1000
-    kept = (folder / "optimality.json").stat()
-    results = json.loads((folder / "optimality.json").read_text())
+    assert "integrator_unit" in report
+    assert "best of seed" in report
+    for figure in ("targets.svg", "choices.svg", "exclusion.svg"):
+        assert f"]({figure})" in report
+        assert (folder / figure).stat().st_size > 1000
+    stored = (folder / "optimality.json").stat()
     # Default, the best of two seeds, and two other units of the integrator.
-    assert len(results) == 5
-    again = gaitswarm("reconstruct", *TINY, "--db", db, "--output", folder)
+    assert len(json.loads((folder / "optimality.json").read_text())) == 5
+    again = research("reconstruction", *TINY, "--db", db, "--output", folder)
     assert again.code == 0, again.err
-    assert "reconstruction, seed" not in again.err
+    with gaitswarm.open(db) as jobs:
+        assert len(list(jobs.jobs())) == 2
     assert (folder / "report.md").read_text(encoding="utf-8") == report
-    assert (folder / "optimality.json").stat().st_mtime_ns == kept.st_mtime_ns
+    assert (folder / "optimality.json").stat().st_mtime_ns == stored.st_mtime_ns
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [(("--change", "colour"), "unknown convention 'colour'"), (("--particles", "1"), "particles")],
 )
-def test_a_size_or_convention_that_is_none_is_refused(
-    gaitswarm: Gaitswarm, db: Path, tmp_path: Path, options: tuple[str, ...], message: str
+def test_invalid_options_are_refused_before_anything_is_stored(
+    research: Command, db: Path, tmp_path: Path, options: tuple[str, ...], message: str
 ) -> None:
-    refused = gaitswarm("reconstruct", *options, "--db", db, "--output", tmp_path / "none")
+    refused = research("reconstruction", *options, "--db", db, "--output", tmp_path / "none")
     assert refused.code == 2
     assert message in refused.err
     assert not db.exists() and not (tmp_path / "none").exists()
 
 
-def test_optima_have_their_places_among_made_up_designs() -> None:
+def test_optima_are_ranked_among_random_designs() -> None:
     """Objectives that are all the same number rank by it under every preference."""
     numbers = np.array([2.0, 1.0, 3.0, 0.5, 1.5, 2.5, 4.0])
     objectives = np.repeat(numbers, 2 * 6).reshape(7, 2, 6)
@@ -102,7 +98,7 @@ def test_optima_have_their_places_among_made_up_designs() -> None:
     assert found.fitness["C"]["A"] == pytest.approx(2.0**5)
 
 
-def test_an_optimum_that_fails_is_beaten_by_all_that_walk() -> None:
+def test_an_optimum_that_fails_is_beaten_by_all_designs_that_walk() -> None:
     failed = np.array([[False], [False], [True], [False], [True]])
     found = optimality(np.ones((5, 1, 6)), failed)
     assert found.beaten["C"] == 0.5
@@ -110,7 +106,7 @@ def test_an_optimum_that_fails_is_beaten_by_all_that_walk() -> None:
     assert found.place("C") is None
 
 
-def test_random_designs_are_those_of_the_seed_and_in_bounds() -> None:
+def test_random_designs_depend_on_the_seed_and_lie_in_bounds() -> None:
     designs = random_designs(50, 3)
     np.testing.assert_array_equal(designs, random_designs(50, 3))
     np.testing.assert_array_equal(designs[:20], random_designs(20, 3))
@@ -119,22 +115,25 @@ def test_random_designs_are_those_of_the_seed_and_in_bounds() -> None:
         assert variable.low <= column.min() < column.max() <= variable.high
 
 
-@pytest.mark.variants
-@pytest.mark.parametrize("known", [{}, {0: 8.0, 4: 20.0}, {0: 8.0, 1: 1.0, 3: 80.0}])
-def test_no_objectives_have_a_greater_product_than_the_bound(known: dict[int, float]) -> None:
+@pytest.mark.parametrize("means", [{}, {0: 8.0, 4: 20.0}, {0: 8.0, 1: 1.0, 3: 80.0}])
+def test_no_objectives_have_a_greater_product_than_the_bound(means: dict[int, float]) -> None:
     preference, fitness = PREFERENCES["A"], 23.0
-    bound = greatest_product(preference, fitness, known)
-    free = [m for m in range(5) if m not in known]
+    bound = greatest_product(preference, fitness, means)
+    free = [m for m in range(5) if m not in means]
     generator = np.random.default_rng(1)
     logs = generator.uniform(-3.0, 12.0, (40_000, 5))
-    for m, value in known.items():
+    for m, value in means.items():
         logs[:, m] = np.log(value)
     # Spread over scenarios about the means: the bound is on the means alone.
     spread = generator.normal(0.0, 0.3, (len(logs), 2, 5))
     spread -= spread.mean(axis=1, keepdims=True)
     objectives = np.zeros((len(logs), 2, 6))
     objectives[:, :, :5] = np.exp(logs[:, None, :] + spread)
-    allowed = judge(objectives, np.zeros((len(logs), 2), dtype=np.bool_), preference).fitness
+    allowed = (
+        JobSpec(preference=preference)
+        .judge(objectives, np.zeros((len(logs), 2), dtype=np.bool_))
+        .fitness
+    )
     products = np.exp(logs.sum(axis=1))[allowed <= fitness]
     assert len(products) > 10
     assert products.max() <= bound
@@ -150,27 +149,17 @@ def test_no_objectives_have_a_greater_product_than_the_bound(known: dict[int, fl
     assert np.exp(best.sum()) == pytest.approx(bound, rel=0.02)
 
 
-def test_objectives_that_leave_no_room_have_no_product() -> None:
+def test_the_bound_is_zero_where_the_means_exceed_the_fitness() -> None:
     assert greatest_product(PREFERENCES["A"], 23.0, {0: 1e30, 4: 1.0}) == 0.0
 
 
-def test_the_walk_of_2011_is_the_named_drives(spec: Any) -> None:
-    walk = next(walk for walk in spec.walks if walk.name == "2011")
-    gait = {name: value for name, value in walk.numbers if name != "P"}
-    (scenario,) = walk.resolved_scenarios()
-    driven = driven_as_in_2011(SCENARIOS[0])
-    assert with_gait(scenario, gait) == driven.model_copy(update={"name": "2011"})
-
-
 def test_every_given_row_is_a_target(spec: Any) -> None:
-    found = read_targets(TARGETS)
-    assert len(spec.targets) == len(found["targets"]) == 19
+    assert len(spec.targets) == 19
     assert sum(target.use == "fit" for target in spec.targets) == 17
 
 
 @pytest.mark.slow
-def test_a_default_that_is_given_changes_nothing(spec: Any) -> None:
-    """The default by name walks as the model as it is shipped does, with nothing given."""
+def test_the_default_choice_equals_the_model_as_it_ships(spec: Any) -> None:
     shipped = spec.model_copy(update={"robots": (), "variables": ("energy",)})
     with ThreadPoolExecutor(2) as workers:
         simulated, _ = simulated_targets(spec, [{}], workers)
@@ -178,7 +167,7 @@ def test_a_default_that_is_given_changes_nothing(spec: Any) -> None:
     np.testing.assert_array_equal(simulated, expected)
 
 
-def test_alternatives_are_all_other_values(spec: Any) -> None:
+def test_alternatives_are_all_other_choices_and_some_values(spec: Any) -> None:
     found = [(a.variable.name, a.shown) for a in alternatives(spec)]
     assert ("integrator_unit", "volt_per_radian") in found
     assert ("integrator_unit", "counts") not in found

@@ -1,11 +1,11 @@
-"""How much better one method is than another: medians, and intervals that keep their word."""
+"""Medians and ratios of several runs, and the coverage of their intervals."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from gaitswarm.services.optimizer.analysis.statistics import (
+from gaitswarm_research.medians import (
     MedianInterval,
     median_interval,
     median_ratio,

@@ -1,4 +1,4 @@
-"""Drives side by side, and what the model's simplifications cost."""
+"""Named drives compared in the same scenarios."""
 
 from __future__ import annotations
 
@@ -6,14 +6,13 @@ import pytest
 
 from gaitswarm.sim.assembly import PHYSICS_RATE, plan_walk
 from gaitswarm.sim.controllers.fuzzy_pi import FuzzyPi
+from gaitswarm.sim.drives import DRIVES, compare, drive_of_design, find_drive, walk_figures
 from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.kernel.native import native_kernel
 from gaitswarm.sim.kernel.walk import Coding
 from gaitswarm.sim.outcome import Status
-from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotName, load_robot
+from gaitswarm.sim.robot import load_robot
 from gaitswarm.sim.scenario import SCENARIOS
-from gaitswarm.sim.studies.accuracy import noise_on_links, step_halving, tables_against_inference
-from gaitswarm.sim.studies.drives import DRIVES, compare, drive_of_design, find_drive, walk_figures
 from tests.examples.walks import PUBLISHED_A
 
 pytestmark = pytest.mark.slow
@@ -52,16 +51,6 @@ def test_an_unknown_drive_is_answered_with_those_that_exist() -> None:
         find_drive("2012")
 
 
-@pytest.mark.thorough("the inference itself walks, which takes the slow kernel")
-def test_finer_tables_are_closer_to_the_inference() -> None:
-    # Shorter than a cycle, a walk tells more of single steps than of tables.
-    cycle = SCENARIOS[0].model_copy(update={"cycles": 1.0})
-    coarse, _, fine = tables_against_inference(PUBLISHED_A, [cycle])
-    assert (coarse.variant, fine.variant) == ("6x6 bit", "10x6 bit")
-    assert fine.relative[:5].max() < 0.02
-    assert 0.0 < fine.relative[:5].mean() < coarse.relative[:5].mean() < 0.05
-
-
 def test_an_inference_is_refused_by_the_compiled_kernel() -> None:
     robot = load_robot("szabadka2")
     kernel = native_kernel(robot)
@@ -70,29 +59,3 @@ def test_an_inference_is_refused_by_the_compiled_kernel() -> None:
     assert plan is not None
     with pytest.raises(SimulationInputError, match="backend='reference'"):
         kernel.walk([plan(FuzzyPi().without_table(PUBLISHED_A))], Coding.of(robot, 10), log=False)
-
-
-@pytest.mark.variants
-@pytest.mark.parametrize("robot", [DEFAULT_ROBOT, "szabadka2"])
-def test_steps_of_walks_are_short_enough(robot: RobotName) -> None:
-    """Of a fast and of a slow walk. Landings, which are faster than a step, have shorter ones."""
-    walks = [scenario for scenario in SCENARIOS if scenario.name in ("normal-fast", "loaded-slow")]
-    found = step_halving("fuzzy-pi", PUBLISHED_A, walks, robot=robot)
-    assert [(d.variant, d.scenario) for d in found] == [
-        (f"{rate} kHz", scenario.name) for scenario in walks for rate in ("2.5", "5", "10", "20")
-    ]
-    assert found[0].variant == f"{PHYSICS_RATE / 1000} kHz"
-    for deviation in found:
-        assert deviation.relative[:5].max() < 0.006
-
-
-def test_noise_is_reported_for_each_link_against_the_noiseless_walk() -> None:
-    found = noise_on_links("pi", {"P": 0.45, "I": 0.1})
-    assert [d.variant for d in found] == ["link 1", "link 2", "link 3"]
-    # Accelerations grow on every link, as in table 2.9, torque on the first; speed hardly changes.
-    for deviation in found:
-        assert (deviation.ratio[1:3] > 1.5).all()
-        assert deviation.ratio[4] == pytest.approx(1.0, abs=0.15)
-    torques = [deviation.ratio[0] for deviation in found]
-    assert torques[0] > 1.1
-    assert torques == sorted(torques, reverse=True)

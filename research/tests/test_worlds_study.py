@@ -1,4 +1,4 @@
-"""Searches with and without worlds, judged in worlds that none of them has seen."""
+"""Searches with and without worlds, judged in held-out worlds."""
 
 from __future__ import annotations
 
@@ -7,26 +7,19 @@ from typing import Any
 
 import pytest
 
-from gaitswarm.cli.studies.worlds import (
+import gaitswarm
+from gaitswarm import PREFERENCES, CertificateView
+from gaitswarm_research.studies.worlds import (
     Contestant,
-    HeldOut,
     Run,
     contestants,
     runs_table,
     study_document,
     study_table,
 )
-from gaitswarm.services.optimizer.analysis.certificate import (
-    QUANTILES,
-    Proportion,
-    Spread,
-)
-from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
-from gaitswarm.views.certificate import CertificateView, ProportionView, SpreadView
-from tests.cli.conftest import Gaitswarm
+from research.tests.conftest import Command
 
 TINY = ("--particles", "4", "--iterations", "1", "--worlds", "2", "--held-out", "3")
-HERE = ("--evaluator", "in-process")
 COMMON = {
     "robot": "szabadka2",
     "preference": "A",
@@ -42,26 +35,34 @@ def planned(**changes: Any) -> list[Contestant]:
     return contestants(COMMON, **(options | changes))
 
 
-def judged(nominal: float, *, failed: int = 0) -> CertificateView:
+def judged(nominal: float | None, *, failed: int = 0) -> CertificateView:
     """A certificate of 1 000 worlds whose median is twice, and whose CVaR thrice the nominal."""
-    spread = Spread((nominal,) * 2 + (2 * nominal,) * 3, 0.0, 3 * nominal, failed / 50, nominal)
-    chance = ProportionView.from_proportion(Proportion(failed, 1000, 0.0, 0.1))
-    return CertificateView(
-        job="",
-        robot="szabadka2",
-        controller="pi",
-        design={},
-        preference=PREFERENCES["A"],
-        seed=0,
-        worlds=1000,
-        worlds_planned=1000,
-        quantiles=list(QUANTILES),
-        fitness=SpreadView.from_spread(spread),
-        fell=chance,
-        failed=chance,
-        scenarios={},
-        worst=[],
-        influences=[],
+    value = nominal or 10.0
+    quantiles = [value, value, 2 * value, 2 * value, 2 * value]
+    worst_tail = {"cvar": 3 * value, "worst": 3 * value, "tail_failed": failed / 50}
+    chance = {"count": failed, "share": failed / 1000, "low": 0.0, "high": 0.1}
+    return CertificateView.model_validate(
+        {
+            "job": "",
+            "robot": "szabadka2",
+            "controller": "pi",
+            "design": {},
+            "preference": PREFERENCES["A"],
+            "seed": 0,
+            "worlds": 1000,
+            "worlds_planned": 1000,
+            "quantiles": [0.05, 0.25, 0.5, 0.75, 0.95],
+            "fitness": {
+                "quantiles": quantiles,
+                "nominal": nominal,
+                **worst_tail,
+            },
+            "fell": chance,
+            "failed": chance,
+            "scenarios": {},
+            "worst": [],
+            "influences": [],
+        }
     )
 
 
@@ -70,7 +71,7 @@ def with_runs(contestant: Contestant, *views: CertificateView) -> Contestant:
     return Contestant(contestant.title, contestant.worlds, contestant.specs, runs)
 
 
-def test_each_search_has_the_same_budget_and_each_seed_worlds_of_its_own() -> None:
+def test_searches_have_the_same_budget_and_seeds_have_different_worlds() -> None:
     plain, *others = planned(counts=[2, 4], aggregates=["mean", "cvar"])
     assert [c.title for c in (plain, *others)] == [
         "without worlds",
@@ -87,13 +88,13 @@ def test_each_search_has_the_same_budget_and_each_seed_worlds_of_its_own() -> No
         assert len({c.specs[seed].model_dump_json(exclude=names) for c in (plain, *others)}) == 1
 
 
-def test_quantities_are_medians_over_runs_beside_the_search_without_worlds() -> None:
+def test_quantities_are_medians_over_runs_and_ratios_to_the_search_without_worlds() -> None:
     plain, cvar = planned()
     found = [
         with_runs(plain, *map(judged, (10.0, 12.0, 11.0, 13.0))),
         with_runs(cvar, *map(judged, (20.0, 24.0, 22.0, 26.0))),
     ]
-    searches = study_document(found, HeldOut(1000, 0))["searches"]
+    searches = study_document(found, 1000, 0)["searches"]
     medians = [
         {name: values["of_runs"]["median"] for name, values in search["quantities"].items()}
         for search in searches
@@ -111,10 +112,10 @@ def test_quantities_are_medians_over_runs_beside_the_search_without_worlds() -> 
 def test_a_quantity_that_a_run_lacks_is_left_out() -> None:
     plain, cvar = planned()
     found = [
-        with_runs(plain, judged(10.0), judged(float("nan"))),
+        with_runs(plain, judged(10.0), judged(None)),
         with_runs(cvar, judged(20.0), judged(22.0)),
     ]
-    first, second = study_document(found, HeldOut(1000, 0))["searches"]
+    first, second = study_document(found, 1000, 0)["searches"]
     assert first["quantities"]["nominal"]["of_runs"] is None
     assert second["quantities"]["nominal"]["of_runs"]["median"] == 21.0
     assert second["quantities"]["nominal"]["ratio"] is None
@@ -122,8 +123,8 @@ def test_a_quantity_that_a_run_lacks_is_left_out() -> None:
     assert next(iter(median.cells)) == "–"
 
 
-def test_without_a_design_that_walks_there_is_nothing_to_compare() -> None:
-    for search in study_document(planned(), HeldOut(1000, 0))["searches"]:
+def test_without_a_design_that_walks_nothing_is_compared() -> None:
+    for search in study_document(planned(), 1000, 0)["searches"]:
         assert search["runs"] == []
         assert {values["of_runs"] for values in search["quantities"].values()} == {None}
     _, _, median, _, change, _ = study_table(planned()).columns
@@ -141,19 +142,20 @@ def test_a_tail_that_failed_in_part_is_a_lower_bound() -> None:
 
 
 @pytest.mark.slow
-def test_searches_are_judged_in_the_same_held_out_worlds(gaitswarm: Gaitswarm, db: Path) -> None:
-    asked = ("study", "worlds", *TINY, "--seeds", "1", "--db", db, *HERE)
-    done = gaitswarm(*asked, "--json")
+def test_searches_are_judged_in_the_same_held_out_worlds(research: Command, db: Path) -> None:
+    arguments = ("study", "worlds", *TINY, "--seeds", "1", "--db", db)
+    done = research(*arguments, "--json")
     assert done.code == 0, done.err
-    for search in done.json["searches"]:
-        (run,) = search["runs"]
-        best = gaitswarm("best", run["job"], "--db", db, "--json").json
-        spec = gaitswarm("status", run["certificate"], "--db", db, "--json").json["spec"]
-        assert spec["design"] == best["design"]
-        assert (spec["worlds"], spec["seed"], spec["precision"]) == (3, 0, "double")
-    shown = gaitswarm(*asked)
-    assert shown.code == 0, shown.err
-    assert "job " not in shown.err, "a job was run again"
+    with gaitswarm.open(db) as jobs:
+        for search in done.json["searches"]:
+            (run,) = search["runs"]
+            spec: Any = jobs.job(run["certificate"]).spec
+            assert spec.design == jobs.best(run["job"]).design
+            assert (spec.worlds, spec.seed, spec.precision) == (3, 0, "double")
+        stored = len(list(jobs.jobs()))
+        shown = research(*arguments)
+        assert shown.code == 0, shown.err
+        assert len(list(jobs.jobs())) == stored, "a job was run again"
     assert "cvar of 2" in shown.out
     assert "…" not in shown.out, "a table is wider than a terminal"
 
@@ -162,17 +164,17 @@ def test_searches_are_judged_in_the_same_held_out_worlds(gaitswarm: Gaitswarm, d
     ("options", "said"),
     [
         (("--held-out-seed", "2"), "held-out-seed: 2 is the seed of a search's worlds"),
-        (("--worlds", "8,many"), "worlds: '8,many' are no whole numbers"),
+        (("--worlds", "8,many"), "worlds: '8,many' is not a list of integers"),
         (("--worlds", "0"), "worlds.count"),
         (("--aggregate", "median"), "worlds.aggregate"),
         (("--preference", "D"), "preference"),
         (("--optimizer", "annealer"), "unknown optimizer 'annealer'"),
     ],
 )
-def test_a_study_that_makes_no_sense_is_refused_by_name(
-    gaitswarm: Gaitswarm, db: Path, options: tuple[str, ...], said: str
+def test_invalid_options_are_refused_before_anything_is_stored(
+    research: Command, db: Path, options: tuple[str, ...], said: str
 ) -> None:
-    refused = gaitswarm("study", "worlds", *options, "--db", db)
+    refused = research("study", "worlds", *options, "--db", db)
     assert refused.code == 2
     assert said in refused.err
     assert not db.exists()

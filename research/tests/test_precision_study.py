@@ -1,33 +1,41 @@
-"""`gaitswarm study precision`: random designs in single and double precision, compared."""
+"""Random designs in single and double precision, compared."""
 
 from __future__ import annotations
+
+from typing import Literal
 
 import numpy as np
 import pytest
 
-from gaitswarm.cli.studies.precision import (
+from gaitswarm import (
+    MEASUREMENTS,
+    PREFERENCES,
+    SCENARIOS,
+    InvalidRequest,
+    RobotVariant,
+    SimulationResult,
+    Status,
+)
+from gaitswarm_research.studies.precision import (
     LAWS,
     Variant,
-    agreement,
+    agreement_of,
     compare,
-    study_document,
     study_tables,
     variants,
 )
-from gaitswarm.services.optimizer.errors import InvalidRequest
-from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
-from gaitswarm.sim.kernel.walk import Precision
-from gaitswarm.sim.outcome import N_MEASUREMENTS, Status
-from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotVariant
-from gaitswarm.sim.scenario import SCENARIOS
-from gaitswarm.simulation_result import SimulationResult
-from tests.cli.conftest import Gaitswarm
+from research.tests.conftest import Command
 
+DEFAULT_ROBOT = RobotVariant().name
 SCENARIO = SCENARIOS[0].model_copy(update={"cycles": 1.0})
 
 
 def result(
-    precision: Precision, fitness: list[float], *, f1: list[float], fallen: int | None = None
+    precision: Literal["single", "double"],
+    fitness: list[float],
+    *,
+    f1: list[float],
+    fallen: int | None = None,
 ) -> SimulationResult:
     n = len(fitness)
     objectives = np.ones((n, 1, 6))
@@ -45,7 +53,7 @@ def result(
         scenarios=("one",),
         statuses=statuses,
         objectives=objectives,
-        measurements=np.zeros((n, 1, N_MEASUREMENTS)),
+        measurements=np.zeros((n, 1, len(MEASUREMENTS))),
         utilities=np.array(fitness)[:, None],
         fitness=np.array(fitness),
     )
@@ -55,7 +63,7 @@ def test_deviations_are_relative_to_double_and_the_ranking_is_compared() -> None
     double = result("double", [4.0, 2.0, 8.0, 5.0], f1=[1.0, 2.0, 4.0, 1.0])
     single = result("single", [2.2, 2.4, 8.0, 5.0], f1=[1.1, 2.0, 4.04, 1.0], fallen=3)
     heavier = result("double", [4.0, 2.02, 8.0, 5.0], f1=[1.0, 2.0, 4.0, 1.0])
-    found = agreement("pair", double, single, heavier)
+    found = agreement_of("pair", double, single, heavier)
     assert (found.designs, found.walked, found.statuses) == (4, 3, 1)
     assert found.median.objectives["torque"] == pytest.approx(0.01)
     assert found.largest.objectives["torque"] == pytest.approx(0.1)
@@ -70,10 +78,10 @@ def test_deviations_are_relative_to_double_and_the_ranking_is_compared() -> None
 
 def test_only_designs_that_walk_are_among_the_ten_best() -> None:
     few = result("double", [1.0, 2.0, 3.0], f1=[1.0, 1.0, 1.0], fallen=2)
-    assert agreement("few", few, few, few).same_of_ten == 2
+    assert agreement_of("few", few, few, few).same_of_ten == 2
 
 
-def test_every_law_is_walked_as_it_is_with_backlash_and_for_a_minute() -> None:
+def test_every_law_is_compared_plain_with_backlash_and_over_a_minute() -> None:
     planned = variants(DEFAULT_ROBOT, designs=5, with_backlash=3, long=2)
     assert [v.designs for v in planned] == [*len(LAWS) * [5], *len(LAWS) * [3], *len(LAWS) * [2]]
     assert [v.robot.contact_law for v in planned] == 3 * list(LAWS)
@@ -87,17 +95,17 @@ def test_single_and_double_precision_nearly_agree_on_random_designs() -> None:
     found = compare(Variant("brief", RobotVariant(), (SCENARIO,), 12), seed=1, cpus=1)
     assert 0.0 < found.median.fitness < 1e-3 and 0.0 < found.median.sensitivity < 1e-3
     assert found.correlation is not None and found.correlation > 0.95
-    (document,) = study_document([found])
-    assert document["largest"]["objectives"]["torque"] > 0.0
+    assert found.largest.objectives["torque"] > 0.0
     assert [table.row_count for table in study_tables([found])] == [3, 1]
 
 
-def test_another_robot_than_the_shipped_ones_is_refused(gaitswarm: Gaitswarm) -> None:
-    refused = gaitswarm("study", "precision", "--robot", "spider")
-    assert refused.code == 2 and "robot: 'spider' is none of szabadka2" in refused.err
+def test_a_robot_that_does_not_ship_is_refused(research: Command) -> None:
+    refused = research("study", "precision", "--robot", "spider")
+    assert refused.code == 2
+    assert "name: Input should be 'szabadka2'" in refused.err
 
 
-def test_designs_of_which_none_walks_are_not_compared() -> None:
+def test_without_a_design_that_walks_nothing_is_compared() -> None:
     fallen = result("double", [1.0], f1=[1.0], fallen=0)
     with pytest.raises(InvalidRequest, match="designs: none of 1 random designs walks to the end"):
-        agreement("pair", fallen, fallen, fallen)
+        agreement_of("pair", fallen, fallen, fallen)

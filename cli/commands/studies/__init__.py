@@ -1,1 +1,0 @@
-"""Commands that compare: drives, search methods, machines."""

@@ -1,1 +1,0 @@
-"""Studies of several jobs, and what they come to."""

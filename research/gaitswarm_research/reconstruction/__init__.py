@@ -1,0 +1,1 @@
+"""Reconstruction of conventions that the thesis leaves open, from its printed results."""

@@ -1,0 +1,1 @@
+"""Studies of the model and of searches, one module each."""

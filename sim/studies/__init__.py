@@ -1,1 +1,0 @@
-"""Experiments with the model: drives side by side, and what its simplifications cost."""

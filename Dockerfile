@@ -28,6 +28,8 @@ COPY requirements/manual.lock /src/requirements/
 RUN pip install --no-deps --require-hashes --only-binary :all: -r /src/requirements/manual.lock
 COPY ARCHITECTURE.md CHANGELOG.md docker-compose.yml /src/
 COPY docs /src/docs
+COPY research/README.md /src/research/
+COPY research/docs /src/research/docs
 COPY examples /src/examples
 COPY deploy/kubernetes/kustomization.yaml /src/deploy/kubernetes/
 COPY scripts/manual /src/scripts/manual

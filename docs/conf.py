@@ -10,7 +10,14 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 project = "gaitswarm"
 root_doc = "docs/index"
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "scripts.manual"]
-include_patterns = ["README.md", "ARCHITECTURE.md", "CHANGELOG.md", "docs/**"]
+include_patterns = [
+    "README.md",
+    "ARCHITECTURE.md",
+    "CHANGELOG.md",
+    "docs/**",
+    "research/README.md",
+    "research/docs/**",
+]
 # Not to be walked through in search of pages.
 exclude_patterns = [".*", "api", "build", "dist", "gaitswarm", "sim", "tests", "web"]
 myst_heading_anchors = 4

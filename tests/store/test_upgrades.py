@@ -15,7 +15,8 @@ from alembic.config import Config
 from sqlalchemy import Connection, text
 
 from gaitswarm.services.optimizer.errors import Conflict, StoreUnavailable
-from gaitswarm.services.optimizer.jobs.job import LONGEST_LEASE_SECONDS
+from gaitswarm.services.optimizer.jobs.job import LONGEST_LEASE_SECONDS, JobOrder
+from gaitswarm.services.optimizer.jobs.labels import LabelsChange
 from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
 from gaitswarm.services.optimizer.store.rows.tables import metadata
 from gaitswarm.services.optimizer.store.schema import migrate, revisions
@@ -130,6 +131,32 @@ def test_a_database_of_the_first_revision_is_adopted(fresh_url: str) -> None:
         job, _ = store.create_job(spec())
         assert store.jobs().items[0].id == job.id
     assert revision(fresh_url) == NEWEST
+
+
+def test_a_database_of_the_first_revision_is_upgraded_with_what_jobs_are_searched_by(
+    fresh_url: str,
+) -> None:
+    store_job(fresh_url)
+    with closing(open_store(fresh_url)) as store:
+        job, _ = store.create_job(spec(name="Größe"))
+        store.label(job.id, LabelsChange(note="Look HERE", tags=("thesis",)))
+    # The first revision has neither these columns nor an index with them.
+    with (
+        closing(connect(parse_url(fresh_url), for_migration=True)) as database,
+        database.transaction(write=True) as connection,
+    ):
+        if connection.dialect.name == "sqlite":
+            connection.execute(text("DROP INDEX ix_jobs_entries"))
+            connection.execute(text("CREATE INDEX ix_jobs_entries ON jobs (id)"))
+        for column in ("sort_name", "search_text"):
+            connection.execute(text(f"ALTER TABLE jobs DROP COLUMN {column}"))
+        connection.execute(text("UPDATE alembic_version SET version_num = '0020'"))
+    assert upgrade(fresh_url) == FIRST
+    with closing(open_store(fresh_url)) as store:
+        assert len(store.jobs().items) == 2
+        for words in ("grösse", "here", "THESIS", job.id):
+            assert [found.id for found in store.jobs(search=words).items] == [job.id]
+        assert store.jobs(order=JobOrder.NAME).items[0].id == job.id
 
 
 @pytest.mark.parametrize("opened", [open_store, upgrade])

@@ -59,7 +59,7 @@ from gaitswarm.services.optimizer.store.statements.job_list import (
     jobs_of,
     newest_jobs,
 )
-from gaitswarm.services.optimizer.store.statements.job_orders import sort_jobs
+from gaitswarm.services.optimizer.store.statements.job_orders import sorted_ids
 from gaitswarm.services.optimizer.store.statements.labels import count_facets, label_job
 from gaitswarm.services.optimizer.store.statements.queue import count_jobs
 from gaitswarm.services.optimizer.store.statements.records import (
@@ -222,9 +222,8 @@ class SqlStore(SqlDeletion, SqlHistory, SqlRecordings, SqlRuns):
             with self._database.transaction(write=False) as connection:
                 return listed(connection, among, after, limit)
         while True:
-            version = None
             with self._database.transaction(write=False) as connection:
-                found = sort_jobs(
+                found = sorted_ids(
                     connection,
                     among=among,
                     kind=kind,
@@ -232,12 +231,12 @@ class SqlStore(SqlDeletion, SqlHistory, SqlRecordings, SqlRuns):
                     where=where,
                     order=order,
                     after=after,
-                    version=version,
+                    limit=limit + 1,
                     reverse=reverse,
                 )
                 ids, more = found[:limit], len(found) > limit
                 items = jobs_of(connection, ids)
-            # Else one was removed after it was sorted, and the version is another.
+            # Else a job was removed in between.
             if len(items) == len(ids):
                 end = cursor_of(items[-1], order, reverse=reverse) if more else None
                 return Page(items, end)

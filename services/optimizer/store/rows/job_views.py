@@ -32,6 +32,8 @@ _UNSHOWN: Final = frozenset(
         "notify_url",
         "deleted_at",
         "simulated_seconds",
+        "sort_name",
+        "search_text",
     }
 )
 """Columns of which a job that is shown has nothing."""

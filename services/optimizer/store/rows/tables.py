@@ -200,6 +200,10 @@ jobs: Final = Table(
     Column("archived", Boolean),
     # What its best is measured against, `Reference`; NULL while nobody has found that out.
     Column("reference", Document(none_as_null=True)),
+    # Its name, and all that a search looks through, as `search_columns` folds them; PostgreSQL
+    # sorts by code points, as SQLite does.
+    Column("sort_name", Text().with_variant(Text(collation="C"), "postgresql")),
+    Column("search_text", Text),
     PrimaryKeyConstraint("id"),
     UniqueConstraint("idempotency_key"),
     Index(None, "created_at", "id"),
@@ -217,7 +221,6 @@ jobs: Final = Table(
         "best_fitness",
         "evaluations",
         "state",
-        "labels",
         "iterations",
         "priority",
         "compute_seconds",
@@ -226,6 +229,8 @@ jobs: Final = Table(
         "archived",
         "parent_id",
         "deleted_at",
+        "sort_name",
+        "search_text",
         sqlite_where=text("deleted_at IS NULL"),
     ).ddl_if(dialect="sqlite"),
 )

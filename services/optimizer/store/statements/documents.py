@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from sqlalchemy import Column, ColumnElement, Connection, Text, case, cast, func
+from sqlalchemy import Column, ColumnElement, Connection, Text, and_, case, cast, func
 
 
 def is_readable(connection: Connection, column: Column[Any]) -> ColumnElement[bool]:
@@ -57,3 +57,14 @@ def length_at(connection: Connection, column: Column[Any], name: str) -> ColumnE
     else:
         length = func.json_array_length(column[name])
     return case((is_readable(connection, column), length), else_=None)
+
+
+def number_at(connection: Connection, column: Column[Any], name: str) -> ColumnElement[float]:
+    """Select a number of a document; NULL where the document has none there, or is no JSON."""
+    if connection.dialect.name == "sqlite":
+        types = func.json_type(column, f"$.{name}")
+    else:
+        types = func.json_typeof(column[name])
+    is_number = types.in_(("integer", "real", "number"))
+    readable = is_readable(connection, column)
+    return case((and_(readable, case((readable, is_number), else_=False)), column[name].as_float()))

@@ -5,18 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, Final
-from weakref import WeakKeyDictionary
 
 from sqlalchemy import (
     ColumnElement,
     Connection,
-    Engine,
     Integer,
     Select,
     bindparam,
     false,
     func,
-    literal_column,
     select,
     tuple_,
 )
@@ -24,13 +21,8 @@ from sqlalchemy import (
 from gaitswarm.services.optimizer.jobs.job import Job, JobOrder, JobState
 from gaitswarm.services.optimizer.store.port.reading import Page
 from gaitswarm.services.optimizer.store.rows.job_views import (
-    BRIEF,
-    LARGEST,
-    LONG,
     SHOWN,
-    RowMemory,
     Values,
-    length_of,
     shown_job,
 )
 from gaitswarm.services.optimizer.store.rows.tables import EXISTING, jobs
@@ -48,21 +40,8 @@ _MOST: Final = bindparam("most", type_=Integer)
 
 _IDS: Final = jobs.c.id.in_(bindparam("ids", expanding=True))
 
-_VERSION: Final[ColumnElement[Any]] = literal_column("jobs.xmin::text || jobs.ctid::text")
-"""On PostgreSQL: of a row, another after every change of it."""
-
-_WITHOUT_LONG: Final = (*BRIEF, _VERSION)
-
-_LONG_OF_IDS: Final = select(jobs.c.id, *LONG).where(_IDS)
-
-_long: Final = WeakKeyDictionary[Engine, RowMemory[Values]]()
-"""Long documents of jobs on a server, by the rest of their rows and its version."""
-
 Among = tuple[ColumnElement[bool], ...]
 """Conditions on jobs, all of which hold for those that are wanted."""
-
-Columns = tuple[ColumnElement[Any], ...]
-"""Of jobs that are listed."""
 
 
 @lru_cache(maxsize=_KEPT)
@@ -106,14 +85,13 @@ def newest_jobs(connection: Connection, among: Among, after: str | None, limit: 
     values: dict[str, Any] = {"most": limit + 1}
     if after is not None:
         values["created_at"], values["job"] = from_cursor(after)
-    rows = connection.execute(_newest(_columns(connection), among, after is not None), values)
-    page = _page(connection, list(map(tuple, rows)), limit, JobOrder.CREATED)
-    return page or newest_jobs(connection, among, after, limit)
+    rows = connection.execute(_newest(among, after is not None), values)
+    return _page(connection, list(map(tuple, rows)), limit, JobOrder.CREATED)
 
 
 @lru_cache(maxsize=_KEPT)
-def _newest(columns: Columns, among: Among, paged: bool) -> Select[Any]:
-    newest = select(*columns).order_by(jobs.c.created_at.desc(), jobs.c.id.desc())
+def _newest(among: Among, paged: bool) -> Select[Any]:
+    newest = select(*SHOWN).order_by(jobs.c.created_at.desc(), jobs.c.id.desc())
     query = newest.where(*among).limit(_MOST)
     if not paged:
         return query
@@ -138,21 +116,20 @@ def fittest_jobs(connection: Connection, among: Among, after: str | None, limit:
     """
     fitness, job_id = (None, "") if after is None else from_fitness_cursor(after)
     values = {"fitness": fitness, "job": job_id, "most": limit + 1}
-    columns, rows = _columns(connection), list[Values]()
+    rows = list[Values]()
     # Apart, for an index has those without a fitness at its other end.
     if after is None or fitness is not None:
-        rows += map(tuple, connection.execute(_fittest(columns, among, after is not None), values))
+        rows += map(tuple, connection.execute(_fittest(among, after is not None), values))
     if len(rows) <= limit:
         last = {"job": job_id if fitness is None else "", "most": limit + 1 - len(rows)}
-        rows += map(tuple, connection.execute(_without_fitness(columns, among), last))
-    page = _page(connection, rows, limit, JobOrder.FITNESS)
-    return page or fittest_jobs(connection, among, after, limit)
+        rows += map(tuple, connection.execute(_without_fitness(among), last))
+    return _page(connection, rows, limit, JobOrder.FITNESS)
 
 
 @lru_cache(maxsize=_KEPT)
-def _fittest(columns: Columns, among: Among, paged: bool) -> Select[Any]:
+def _fittest(among: Among, paged: bool) -> Select[Any]:
     order = (jobs.c.best_fitness, jobs.c.id)
-    query = select(*columns).where(*among, order[0].is_not(None)).order_by(*order).limit(_MOST)
+    query = select(*SHOWN).where(*among, order[0].is_not(None)).order_by(*order).limit(_MOST)
     if not paged:
         return query
     place = tuple_(bindparam("fitness", type_=order[0].type), bindparam("job"))
@@ -160,22 +137,15 @@ def _fittest(columns: Columns, among: Among, paged: bool) -> Select[Any]:
 
 
 @lru_cache(maxsize=_KEPT)
-def _without_fitness(columns: Columns, among: Among) -> Select[Any]:
+def _without_fitness(among: Among) -> Select[Any]:
     order = (jobs.c.best_fitness, jobs.c.id)
-    query = select(*columns).where(*among, order[0].is_(None), order[1] > bindparam("job"))
+    query = select(*SHOWN).where(*among, order[0].is_(None), order[1] > bindparam("job"))
     return query.order_by(*order).limit(_MOST)
 
 
-def _page(
-    connection: Connection, rows: Sequence[Values], limit: int, order: JobOrder
-) -> Page[Job] | None:
-    """A page of rows, of which one more than the page has tells that others follow.
-
-    None if one of its jobs was removed meanwhile.
-    """
+def _page(connection: Connection, rows: Sequence[Values], limit: int, order: JobOrder) -> Page[Job]:
+    """A page of rows, of which one more than the page tells that others follow."""
     found = _shown(connection, rows[:limit])
-    if len(found) < len(rows[:limit]):
-        return None
     return Page(found, cursor_of(found[-1], order) if len(rows) > limit else None)
 
 
@@ -189,53 +159,10 @@ def jobs_of(connection: Connection, ids: Sequence[str]) -> tuple[Job, ...]:
     Returns:
         The jobs, in the order of the ids, without those that are removed.
     """
-    rows = connection.execute(_of_ids(_columns(connection)), {"ids": list(ids)})
+    rows = connection.execute(select(*SHOWN).where(_IDS), {"ids": list(ids)})
     found = {job.id: job for job in _shown(connection, list(map(tuple, rows)))}
     return tuple(found[job_id] for job_id in ids if job_id in found)
 
 
-@lru_cache(maxsize=_KEPT)
-def _of_ids(columns: Columns) -> Select[Any]:
-    return select(*columns).where(_IDS)
-
-
-def _columns(connection: Connection) -> Columns:
-    """What is read of jobs that are listed: of a server no documents that are known."""
-    return _WITHOUT_LONG if connection.dialect.name == "postgresql" else SHOWN
-
-
 def _shown(connection: Connection, rows: Sequence[Values]) -> tuple[Job, ...]:
-    """Jobs of rows of those columns, without those that were removed meanwhile.
-
-    Long documents are only read where they are not known.
-    """
-    if connection.dialect.name != "postgresql":
-        return tuple(shown_job(row, connection.dialect) for row in rows)
-    memory = _long.setdefault(connection.engine, RowMemory(LARGEST, length_of))
-    known = list(map(memory.find, rows))
-    unknown = [row[0] for row, found in zip(rows, known, strict=True) if found is None]
-    read = read_long(connection, unknown) if unknown else {}
-    shown: list[Job] = []
-    for row, texts in zip(rows, known, strict=True):
-        found = texts or read.get(row[0])
-        if found is None:
-            continue
-        if texts is None:
-            # Of a row that was changed in between these are newer. It is not met with again.
-            memory.add(row, found)
-        shown.append(shown_job((*row[:-1], *found), connection.dialect))
-    return tuple(shown)
-
-
-def read_long(connection: Connection, ids: Sequence[str]) -> dict[str, Values]:
-    """Read the long documents of jobs on a server.
-
-    Args:
-        connection: An open transaction.
-        ids: Of the jobs.
-
-    Returns:
-        Their documents, by id; nothing of jobs that are removed.
-    """
-    rows = connection.execute(_LONG_OF_IDS, {"ids": list(ids)})
-    return {job_id: tuple(texts) for job_id, *texts in rows}
+    return tuple(shown_job(row, connection.dialect) for row in rows)

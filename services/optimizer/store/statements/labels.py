@@ -12,6 +12,7 @@ from gaitswarm.services.optimizer.jobs.audit import AuditAction
 from gaitswarm.services.optimizer.jobs.labels import (
     FacetCounts,
     Facets,
+    Labels,
     LabelsChange,
     is_own_robot,
     preference_name,
@@ -26,6 +27,19 @@ from gaitswarm.services.optimizer.store.statements.records import job_row, updat
 
 _FIELDS: Final = ("robot", "controller", "preference")
 """Of a spec, by which jobs are found."""
+
+
+def folded(text: str) -> str:
+    """Fold case, and replace characters that a database refuses."""
+    text = text.casefold().replace("\0", "\N{REPLACEMENT CHARACTER}")
+    return text.encode("utf-8", "replace").decode()
+
+
+def search_columns(job_id: str, spec_name: str, labels: Labels) -> dict[str, Any]:
+    """Return the columns by which a job is searched and sorted by name."""
+    name = labels.name or spec_name
+    words = "\n".join((name, job_id, labels.note, *labels.tags))
+    return {"sort_name": folded(name) or None, "search_text": folded(words)}
 
 
 def label_job(
@@ -44,7 +58,10 @@ def label_job(
         The job's row as it is then.
     """
     row = job_row(connection, job_id, lock=True)
-    columns: dict[str, Any] = {"labels": change.applied(labels_of(row)).model_dump(mode="json")}
+    labels, spec = change.applied(labels_of(row)), row["spec"]
+    name = spec.get("name") if isinstance(spec, dict) else None
+    columns: dict[str, Any] = {"labels": labels.model_dump(mode="json")}
+    columns |= search_columns(job_id, str(name or ""), labels)
     if change.archived is not None:
         columns["archived"] = change.archived
     note_change(connection, now, actor, AuditAction.LABEL, job_id)

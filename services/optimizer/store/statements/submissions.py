@@ -17,6 +17,7 @@ from gaitswarm.services.optimizer.jobs.chain import ask_digest
 from gaitswarm.services.optimizer.jobs.fork import Fork, Lineage, TakenHistory
 from gaitswarm.services.optimizer.jobs.iteration import best_particle
 from gaitswarm.services.optimizer.jobs.job import Job, JobState
+from gaitswarm.services.optimizer.jobs.labels import Labels
 from gaitswarm.services.optimizer.jobs.provenance import ProvenanceRecords
 from gaitswarm.services.optimizer.jobs.quota import Quota
 from gaitswarm.services.optimizer.jobs.spec import Spec
@@ -36,6 +37,7 @@ from gaitswarm.services.optimizer.store.rows.tables import (
     reevaluations,
 )
 from gaitswarm.services.optimizer.store.statements.chain import chain_taken
+from gaitswarm.services.optimizer.store.statements.labels import search_columns
 from gaitswarm.services.optimizer.store.statements.records import job_row, new_job_id, update_job
 
 
@@ -120,8 +122,9 @@ def insert_job(connection: Connection, asked: Submission, now: datetime) -> Job:
     parent = None if asked.lineage is None else asked.lineage.parent
     if parent is not None and asked.fork is not None and asked.fork.taken is not None:
         _require_parent(connection, parent)
+    job_id = new_job_id()
     columns = {
-        "id": new_job_id(),
+        "id": job_id,
         "state": JobState.QUEUED,
         "spec": spec_document(asked.spec),
         "provenance": provenance_document(asked.provenance),
@@ -139,6 +142,7 @@ def insert_job(connection: Connection, asked: Submission, now: datetime) -> Job:
         "iterations": 0,
         "evaluations": 0,
         "compute_seconds": 0.0,
+        **search_columns(job_id, asked.spec.name, Labels()),
     }
     row = connection.execute(insert(jobs).values(columns).returning(jobs)).mappings().one()
     if asked.fork is None or asked.fork.taken is None:

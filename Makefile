@@ -46,7 +46,7 @@ research: setup-dev ## Compare search methods in a small experiment of the resea
 bench: setup ## Measure the simulator on one core of this machine.
 	@$(BIN)/gaitswarm bench $(ARGS)
 
-# Tests start hundreds of processes: compiling every module anew would be a third of what one takes.
+# Tests start hundreds of processes; compiling every module again would take a third of their time.
 test test-all unit: export PYTHONDONTWRITEBYTECODE =
 
 test: EACH_ONCE = -m "not thorough"
@@ -74,6 +74,7 @@ lint-code: setup-dev
 	@$(BIN)/mypy
 	@$(BIN)/lint-imports
 	@$(BIN)/deptry .
+	@git ls-files | xargs -d '\n' $(BIN)/codespell
 	@$(BIN)/deptry --config research/pyproject.toml research/gaitswarm_research
 
 lint-page: setup-dev
@@ -85,13 +86,13 @@ format: setup-dev ## Format the code and fix what can be fixed.
 	@$(BIN)/ruff format .
 	@scripts/npm.sh --if-possible run format
 
-pictures: setup-dev ## Draw the pictures in docs/images anew: the page's, two walks, and the concepts.
+pictures: setup-dev ## Redraw the pictures in docs/images: the page's, two walks, and the concepts.
 	@$(BIN)/python -m scripts.concepts
 	@$(BIN)/python -m scripts.walks
 	@scripts/page.sh
 	@GAITSWARM_REQUIRE_PAGE=1 GAITSWARM_SCREENSHOTS=docs/images $(BIN)/python -m pytest -q tests/web/test_pictures.py $(ARGS)
 
-lock: ## Choose versions anew, after a change of the dependencies in pyproject.toml (needs uv).
+lock: ## Update the lock files after a change of the dependencies in pyproject.toml (needs uv).
 	$(COMPILE) pyproject.toml --extra postgres --group build -o requirements/run.lock
 	$(COMPILE) pyproject.toml --extra postgres --extra search --extra mujoco --extra telemetry --group dev --group research -c requirements/run.lock -o requirements/dev.lock
 	$(COMPILE) pyproject.toml --extra postgres --extra search --extra mujoco --extra telemetry --extra cluster --group build -c requirements/run.lock -o requirements/image.lock

@@ -9,7 +9,7 @@ off by 2.6 % at 2.5 kHz, 0.7 % at 10 kHz and 0.14 % at 40 kHz, ours by 0.07 % at
 of them alike; medians are compared. Two figures are not one:
 
     throughput   many walks at once: wall time over all walkers' steps. What a search needs.
-    latency      one walk alone: wall time over its steps. What somebody who waits for one needs.
+    latency      one simulation alone: wall time over its steps.
 
 What they compute is not the same either, and each row says it: the kernel walks, with control,
 battery, ground and objectives; MuJoCo rolls out logged motor voltages, with its own contacts or in

@@ -2,7 +2,7 @@
 
     python -m benchmarks.known_walks [--rows 100000] [--rounds 200] [--json]
 
-Iterations of the chapter-4 job, of 25 designs that nobody has walked. What the cache adds to each
+Iterations of the chapter-4 job, of 25 designs without stored results. What the cache adds to each
 is timed part by part: making keys, asking the store for them, and a commit that keeps them, which
 takes turns with a commit that does not. Walks are a formula, and not timed.
 """

@@ -1,4 +1,4 @@
-"""What legs cost: a quadruped's compiled kernel beside the hexapod's.
+"""Cost of legs: a quadruped's compiled kernel against the hexapod's.
 
     python -m benchmarks.legs [--rounds 7] [--json]
 

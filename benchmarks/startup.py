@@ -93,10 +93,10 @@ def served(folder: Path) -> dict[str, float]:
         while not ready(url):
             time.sleep(0.005)
         taken = time.monotonic() - begun
-        told = time.monotonic()
+        stopping = time.monotonic()
         process.send_signal(signal.SIGINT)
         process.communicate()
-    return {"ready": taken, "stopped": time.monotonic() - told}
+    return {"ready": taken, "stopped": time.monotonic() - stopping}
 
 
 def ready(url: str) -> bool:

@@ -4,7 +4,7 @@
 
 The published optimum A walks `normal-fast` on the robot of `benchmarks.engines`. Objectives are
 compared with those of our walk at 160 kHz. In MuJoCo the laws of gears and ground are ours,
-written anew in NumPy (sim/mujoco), and all steps have one length, so that nothing but the step
+rewritten in NumPy (sim/mujoco), and all steps have one length, so that only the step
 differs.
 """
 

@@ -1,9 +1,9 @@
-"""What searches find of the trade-offs of the chapter-4 job, `hype` beside another library's.
+"""Trade-offs of the chapter-4 job found by `hype` and by another library's search.
 
     python -m benchmarks.trade_offs [--seeds 4] [--evaluations 625] [--json]
 
-Every method judges as many designs, in single precision. Told are the five objectives over the six
-scenarios; the methods of jobs that are not multi-objective are told the fitness by preference A.
+Every method judges as many designs, in single precision. It receives the five objectives over all
+six scenarios; methods that are not multi-objective receive the fitness by preference A.
 Hypervolume is of all designs that a run judged, and not of a last population: the share of a box
 that they dominate, in logarithms. The box is that of the front of all runs together, a tenth of its
 range beyond.
@@ -33,7 +33,7 @@ _SAMPLES: Final = 100_000
 """Points of the box by which hypervolumes are estimated: to half a percent of them."""
 
 _FAILED: Final = 1e6
-"""What other libraries are told of each objective of a failed design."""
+"""Value of each objective of a failed design for other libraries."""
 
 
 class Problem:
@@ -83,9 +83,9 @@ def by_pymoo(create: Callable[[], Any], problem: Problem, seed: int) -> None:
     algorithm.setup(box, termination=never, seed=seed, verbose=False)
     while problem.left > 0:
         asked = algorithm.ask()
-        told = problem.evaluate(problem.space.from_unit(asked.get("X")))[0]
-        told = np.where(np.isfinite(told), told, _FAILED)
-        evaluator.Evaluator().eval(static.StaticProblem(box, F=told), asked)
+        values = problem.evaluate(problem.space.from_unit(asked.get("X")))[0]
+        values = np.where(np.isfinite(values), values, _FAILED)
+        evaluator.Evaluator().eval(static.StaticProblem(box, F=values), asked)
         algorithm.tell(infills=asked)
 
 

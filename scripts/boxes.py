@@ -38,7 +38,7 @@ class Picture:
 
         Args:
             arrows: What each says, by the boxes that it leads from and to.
-            words: Whether that is written beside it, and not only shown under a pointer.
+            words: Whether the label is always shown, and not only under a pointer.
 
         Raises:
             ValueError: An arrow leads upwards.

@@ -12,7 +12,7 @@ optional=
 [ "${1:-}" != --if-possible ] || [ -n "${GAITSWARM_REQUIRE_PAGE:-}" ] || optional=yes
 give_up() {
     if [ -f api/page/index.html ]; then
-        say "it was not built anew; an older one is served"
+        say "the page was not rebuilt; the previous build is served"
     else
         say "it was not built; the service runs without it"
     fi

@@ -50,7 +50,7 @@ install_with_uv() {
     install --target "$scratch/uv" --require-hashes --only-binary :all: -r requirements/installer.lock \
         >/dev/null 2>&1 || return 1
     index=${PIP_INDEX_URL:-$("$venv/bin/python" -m pip config get global.index-url 2>/dev/null || true)}
-    # The cache beside the environment, so that files are linked and not copied; few and short retries.
+    # The cache is next to the environment, so that files are linked, not copied; few and short retries.
     env ${index:+"UV_DEFAULT_INDEX=$index"} UV_HTTP_TIMEOUT=30 UV_HTTP_RETRIES=1 \
         UV_CACHE_DIR="$scratch/cache" "$scratch/uv/bin/uv" --no-config --quiet pip install \
         --python "$venv/bin/python" --no-deps --require-hashes --only-binary :all: -r "$1" 2>/dev/null

@@ -124,7 +124,7 @@ def _row(walk: WalkReplay, design: Mapping[str, float | str], name: str, words: 
 
 
 def _screen(points: Points) -> Points:
-    """Positions (..., 3) beside the body [m] to places (..., 2) in a row of the picture [px]."""
+    """Positions (..., 3) relative to the body [m] to places (..., 2) in the picture [px]."""
     x, y, z = np.moveaxis(points, -1, 0)
     across = _WIDTH * 0.64 + _SCALE * (x + 0.18 * y)
     down = _ROW - 50.0 - _SCALE * (0.96 * z + 0.22 * y)
@@ -132,7 +132,7 @@ def _screen(points: Points) -> Points:
 
 
 def _ground(moved: Points, seconds: float) -> str:
-    """Marks that pass; they begin anew with the walk."""
+    """Marks that pass; they restart with the walk."""
     left, right = 262.0, _WIDTH - 16.0
     count = int((right - left) / _SCALE / _MARK + (moved[-1] - moved[0]) / _MARK) + 2
     (far, near) = (_screen(np.array([0.0, side * _STRIP, 0.0])) for side in (1.0, -1.0))

@@ -163,7 +163,7 @@ def pytest_configure() -> None:
     """Before anything is collected, let alone run."""
     # What is imported and collected lasts: nothing of it is garbage.
     gc.disable()
-    # Ray's workers of the tests compute beside other tests, and not once these have done.
+    # Ray's workers run at normal priority, so that other tests do not starve them.
     os.environ.setdefault("RAY_worker_niceness", "1")
 
 

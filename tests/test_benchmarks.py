@@ -12,13 +12,13 @@ import pytest
 
 from tests.robots.known import QUADRUPEDS, urdf_of
 
-pytestmark = pytest.mark.thorough("programs that measure, through which nobody's job runs")
+pytestmark = pytest.mark.thorough("benchmarks, which no job depends on")
 
-Told = Callable[..., Any]
+Report = Callable[..., Any]
 
 
 @pytest.fixture
-def told(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Told:
+def report(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Report:
     """The document that a benchmark prints, run in this process."""
 
     def run(name: str, *options: str) -> Any:
@@ -31,8 +31,8 @@ def told(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) ->
 
 
 @pytest.mark.slow
-def test_the_physics_benchmark_tells_ratios(told: Told) -> None:
-    rows = told("physics", "--rounds", "1")
+def test_the_physics_benchmark_tells_ratios(report: Report) -> None:
+    rows = report("physics", "--rounds", "1")
     assert len(rows) == 3
     for row in rows:
         assert 0.0 < row["fastest"] <= row["us_per_step"]
@@ -44,9 +44,9 @@ def test_the_physics_benchmark_tells_ratios(told: Told) -> None:
 
 @pytest.mark.slow
 def test_the_engines_benchmark_says_what_each_contestant_computes_and_what_is_timed(
-    told: Told,
+    report: Report,
 ) -> None:
-    rows = told("engines", "--rounds", "1")["rows"]
+    rows = report("engines", "--rounds", "1")["rows"]
     assert {row["figure"] for row in rows} == {"throughput", "latency", "both"}
     assert all(row["computes"] and 0.0 < row["fastest"] <= row["us_per_step"] for row in rows)
     speed = {(row["what"], row["figure"]): row["us_per_step"] for row in rows}
@@ -64,16 +64,16 @@ def test_the_engines_benchmark_says_what_each_contestant_computes_and_what_is_ti
 
 @pytest.mark.slow
 def test_the_accuracy_benchmark_finds_our_step_nearer_to_a_fine_one_than_mujocos(
-    told: Told,
+    report: Report,
 ) -> None:
-    ours, mujocos = told("step_accuracy", "--rates", "2500")
+    ours, mujocos = report("step_accuracy", "--rates", "2500")
     assert (ours["rate"], mujocos["rate"]) == (2_500, 2_500)
     assert max(ours["percent"]) < max(mujocos["percent"]) < 5.0
 
 
 @pytest.mark.slow
-def test_the_history_benchmark_reads_a_store_of_its_own(told: Told) -> None:
-    found = told("history", "--jobs", "8", "--iterations", "20", "--repeats", "1")
+def test_the_history_benchmark_reads_a_store_of_its_own(report: Report) -> None:
+    found = report("history", "--jobs", "8", "--iterations", "20", "--repeats", "1")
     assert found["evaluations"] == 500
     assert found["seconds"]
     assert all(0.0 < seconds < 60.0 for seconds in found["seconds"].values())
@@ -81,10 +81,10 @@ def test_the_history_benchmark_reads_a_store_of_its_own(told: Told) -> None:
 
 @pytest.mark.slow
 def test_the_start_up_benchmark_tells_how_long_people_wait(
-    told: Told, monkeypatch: pytest.MonkeyPatch
+    report: Report, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("benchmarks.startup.HELP", (["db", "backup"],))
-    seconds = told("startup", "--rounds", "1", "--iterations", "1")
+    seconds = report("startup", "--rounds", "1", "--iterations", "1")
     assert "gaitswarm db backup --help" in seconds
     assert all(0.0 < waited < 120.0 for waited in seconds.values())
     for cache in ("warm", "cold"):
@@ -92,16 +92,16 @@ def test_the_start_up_benchmark_tells_how_long_people_wait(
 
 
 @pytest.mark.slow
-def test_the_benchmark_of_known_walks_tells_what_the_cache_adds(told: Told) -> None:
-    seconds = told("known_walks", "--rows", "1000", "--rounds", "2")
+def test_the_benchmark_of_known_walks_tells_what_the_cache_adds(report: Report) -> None:
+    seconds = report("known_walks", "--rows", "1000", "--rounds", "2")
     parts = seconds["keys"] + seconds["query"] + seconds["index"]
     assert seconds["added"] == pytest.approx(parts)
 
 
 @pytest.mark.slow
-def test_the_trade_offs_benchmark_judges_as_many_designs_by_every_method(told: Told) -> None:
+def test_the_trade_offs_benchmark_judges_as_many_designs_by_every_method(report: Report) -> None:
     methods = ["hype", "cma-es", "random", "NSGA-II, 25", "NSGA-III, 35"]
-    rows = told(
+    rows = report(
         *("trade_offs", "--seeds", "1", "--evaluations", "50", "--methods", ";".join(methods))
     )
     assert [row["method"] for row in rows] == methods
@@ -112,8 +112,8 @@ def test_the_trade_offs_benchmark_judges_as_many_designs_by_every_method(told: T
 
 
 @pytest.mark.slow
-def test_the_benchmark_of_legs_tells_how_much_faster_fewer_are(told: Told) -> None:
-    rows = {(row["robot"], row["what"]): row for row in told("legs", "--rounds", "1")}
+def test_the_benchmark_of_legs_tells_how_much_faster_fewer_are(report: Report) -> None:
+    rows = {(row["robot"], row["what"]): row for row in report("legs", "--rounds", "1")}
     assert set(rows) >= set(product(("hexapod", "quadruped"), ("walks", "stands")))
     for (_, what), row in rows.items():
         ratio = rows["hexapod", what]["us_per_step"] / row["us_per_step"]
@@ -121,9 +121,9 @@ def test_the_benchmark_of_legs_tells_how_much_faster_fewer_are(told: Told) -> No
 
 
 @pytest.mark.slow
-def test_the_benchmark_of_known_robots_runs_the_users_commands(told: Told) -> None:
+def test_the_benchmark_of_known_robots_runs_the_users_commands(report: Report) -> None:
     urdf_of(QUADRUPEDS["a1"])
-    row = told("known_robots", "a1", "--iterations", "2", "--particles", "4")["a1"]
+    row = report("known_robots", "a1", "--iterations", "2", "--particles", "4")["a1"]
     assert row["designs"] == 8 and 0 < row["upright"] <= 8
     assert row["standing"] == pytest.approx(1.0, rel=0.01)
     assert {walk["status"] for walk in row["walks"].values()} == {"ok"}
@@ -132,11 +132,11 @@ def test_the_benchmark_of_known_robots_runs_the_users_commands(told: Told) -> No
 
 @pytest.mark.slow
 def test_the_benchmark_of_statement_orders_compares_the_same_results(
-    told: Told, monkeypatch: pytest.MonkeyPatch
+    report: Report, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("benchmarks.statement_order.ROBOTS", ("szabadka2",))
     monkeypatch.setattr("benchmarks.statement_order.PRECISIONS", ("double",))
-    rows = told("statement_order", "--rounds", "1")
+    rows = report("statement_order", "--rounds", "1")
     assert rows
     for row in rows:
         assert row["ratio"] == pytest.approx(row["as_derived"] / row["ordered"])

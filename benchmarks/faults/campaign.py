@@ -49,7 +49,7 @@ def specs(iterations: int) -> list[JobSpec]:
 
 @dataclass
 class Clients:
-    """Somebody who keeps jobs coming by the API, and looks how far they are. A thread of its own.
+    """A client that keeps submitting jobs and follows them, in a thread of its own.
 
     Attributes:
         lost: Iterations that were reported as committed, and later were not.
@@ -178,7 +178,7 @@ def run(
         patience: How long nothing may be committed after a fault, before that counts as a need for
             a person [s].
         enough: Asked before each fault whether no more are to be injected.
-        say: Told of each fault.
+        say: Called with each fault.
 
     Returns:
         What came of it.

@@ -83,7 +83,7 @@ class Deployment:
         return [*others, self.api, *self.runners]
 
     def store(self) -> SqlStore:
-        """The database, as soon as it answers; whoever opens it closes it."""
+        """The database, as soon as it answers; the caller closes it."""
         while True:
             try:
                 return open_store(self.url)
@@ -206,7 +206,7 @@ class Deployment:
 
 
 def free_port() -> int:
-    """A TCP port that nobody listens on."""
+    """A free TCP port."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])

@@ -177,7 +177,7 @@ class StopRunner(Fault):
 
 
 class DatabaseLocked(Fault):
-    """Somebody else's transaction holds the write lock."""
+    """Another process's transaction holds the write lock."""
 
     name = "database-locked"
     shortest, longest = 1.0, 8.0

@@ -36,7 +36,7 @@ _LARGE: Final = 1000.0
 _SMALL_P: Final = 0.01
 
 _ENOUGH: Final = 4
-"""Runs of which medians, quartiles and tests are told."""
+"""Runs of which medians, quartiles and tests are reported."""
 
 
 def all_tables(records: Iterable[Record], earlier: Path = EARLIER) -> list[str]:

@@ -1,4 +1,4 @@
-"""Evidence of one small job, and evidence that somebody has tampered with."""
+"""Evidence of one small job, and tampered copies of it."""
 
 from __future__ import annotations
 

@@ -110,7 +110,7 @@ def test_a_check_of_the_database_names_job_and_iteration_unless_histories_are_sk
 def test_a_number_that_was_changed_with_its_digests_is_found_by_the_replay(
     copy: Path, proved: Proved
 ) -> None:
-    """Whoever can write to the database can chain it anew; walks cannot be made up."""
+    """A writer of the database can recompute the chain, but cannot forge simulations."""
     from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
     from gaitswarm.services.optimizer.store.rows.job_rows import chain_documents
     from gaitswarm.services.optimizer.store.statements.chain import chain_taken

@@ -272,7 +272,7 @@ def test_what_a_multi_objective_search_was_told_is_checked_too(tmp_path: Path) -
     assert gaitswarm.verify(content, replay=3).verified
 
     def change(columns: Columns) -> None:
-        # The energy has no part in the fitness, but the search was told of it.
+        # The energy does not affect the fitness, but the search received it.
         for row in range(4):
             columns["short.energy"][row] = 1.0 / columns["short.energy"][row]
 

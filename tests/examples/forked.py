@@ -35,7 +35,7 @@ Stream = IO[Any] | int | None
 class ForkedCommand:
     """A command in a process, used as `subprocess.Popen` is.
 
-    arguments: of `gaitswarm`; environment: beside this process's; program: a function of a module
+    arguments: of `gaitswarm`; environment: added to this process's; program: a function of a module
     that a process runs in place of `gaitswarm`.
     """
 
@@ -64,7 +64,7 @@ class ForkedCommand:
                 streams,
                 start_new_session,
             ),
-            # At the end of the tests nobody waits for it.
+            # At the end of the tests nothing waits for it.
             daemon=True,
         )
         self._process.start()

@@ -20,7 +20,7 @@ COMMAND_LINE = ("-u", "-c", "from gaitswarm.cli.main import main; main()")
 def python(
     *arguments: str | Path, environment: Mapping[str, str] | None = None, **options: Any
 ) -> subprocess.CompletedProcess[str]:
-    """Run Python to its end. environment: beside this process's; options: of `subprocess.run`."""
+    """Run Python to its end. environment: added to this process's; options: of `subprocess.run`."""
     return subprocess.run(
         [sys.executable, *map(str, arguments)],
         env=environment_of_process(environment),

@@ -109,9 +109,9 @@ class Server(Served):
 
 
 class ServerProcess(Served):
-    """`gaitswarm serve` as a process, with a runner unless told otherwise, and a client of it.
+    """`gaitswarm serve` as a process, with a runner by default, and a client of it.
 
-    database: a file, or a URL. environment: beside this process's.
+    database: a file, or a URL. environment: added to this process's.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""`python -m tests.golden` measures the golden numbers anew, and `git diff` shows what moved.
+"""`python -m tests.golden` recomputes the golden numbers, and `git diff` shows what moved.
 
 Only to be run when numbers are meant to change; the commit then says why they do.
 """

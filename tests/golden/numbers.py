@@ -46,7 +46,7 @@ Optimum = dict[str, dict[str, float]]
 class DemoIteration:
     """One iteration of the demo's job.
 
-    designs: digest of all designs' bits. fitness: of every design; coarse beside them, because
+    designs: digest of all designs' bits. fitness: of every design; less strict, because
     a drive's tables are quantised.
     """
 

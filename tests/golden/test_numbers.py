@@ -28,7 +28,7 @@ from tests.golden.numbers import (
 
 GOLDEN = read()
 
-# What a machine with narrower vectors would do: the kernel is compiled for it, and numpy is told by
+# Emulates a machine with narrower vectors: the kernel is compiled for it, numpy is restricted by
 # its environment to leave the wider instructions alone.
 NARROW_MACHINE = """
 import json, sys

@@ -278,10 +278,10 @@ def test_what_is_no_url_is_refused_at_once() -> None:
 
 
 def test_a_server_without_certificates_is_trusted_for_none() -> None:
-    nobody = authorities("http://127.0.0.1:8000")
-    assert isinstance(nobody, ssl.SSLContext)
-    assert nobody.verify_mode is ssl.CERT_REQUIRED
-    assert nobody.cert_store_stats()["x509"] == 0
+    default = authorities("http://127.0.0.1:8000")
+    assert isinstance(default, ssl.SSLContext)
+    assert default.verify_mode is ssl.CERT_REQUIRED
+    assert default.cert_store_stats()["x509"] == 0
     assert authorities("HTTPS://gaitswarm.example") is True
 
 
@@ -369,7 +369,7 @@ Follow = Callable[..., list[Any]]
 def follow(request: pytest.FixtureRequest) -> Follow:
     """What following a job tells: indices of iterations, and states."""
 
-    def told(script: Script, *, after: int | None = None) -> list[Any]:
+    def requests(script: Script, *, after: int | None = None) -> list[Any]:
         options: dict[str, Any] = {"backoff": QUICK, "reconnect": QUICK}
         way = httpx2.MockTransport(script)
         if request.param == "blocking":
@@ -390,7 +390,7 @@ def follow(request: pytest.FixtureRequest) -> Follow:
             for event in events
         ]
 
-    return told
+    return requests
 
 
 @pytest.mark.slow

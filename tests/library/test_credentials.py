@@ -1,4 +1,4 @@
-"""A token goes to the server that it is for, and nobody on the way there can read it."""
+"""A token is sent only to its own server, and only over encrypted connections."""
 
 from __future__ import annotations
 

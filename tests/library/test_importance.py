@@ -29,11 +29,11 @@ def test_what_makes_no_sense_is_refused(reach: Reach, finished: Finished) -> Non
 
 
 def test_the_terminal_shows_a_row_for_every_variable(finished: Finished) -> None:
-    told = run_command("importance", finished.id, "--db", finished.db)
-    assert told.code == 0, told.err
-    rows = [line.split()[0] for line in told.out.splitlines() if line.strip()]
+    result = run_command("importance", finished.id, "--db", finished.db)
+    assert result.code == 0, result.err
+    rows = [line.split()[0] for line in result.out.splitlines() if line.strip()]
     assert {"variable", "P", "I"} <= set(rows)
-    said = " ".join(told.out.split())
+    said = " ".join(result.out.split())
     assert "of 6 in all failed" in said
     assert "walk in every case, and indices need 20: `gaitswarm extend`" in said
     document = run_command("importance", finished.id, "--db", finished.db, "--json").json

@@ -244,7 +244,7 @@ def test_a_job_without_a_design_that_walks_has_no_best(reach: Reach, db: Path) -
     jobs = reach(db)
     job = jobs.submit(**SMALL)
     assert job.best is None
-    with pytest.raises(gaitswarm.NotFound, match="no design yet"):
+    with pytest.raises(gaitswarm.NotFound, match="design yet"):
         jobs.best(job.id)
 
 
@@ -331,11 +331,11 @@ def test_polling_a_database_tells_what_is_new_once(db: Path) -> None:
     with gaitswarm.open(db) as jobs:
         job = jobs.submit(**SMALL)
         news = jobs.news(job.id)
-        told = [[type(event) for event in news.poll()] for _ in range(2)]
+        received = [[type(event) for event in news.poll()] for _ in range(2)]
         jobs.run(job.id)
-        told += [[type(event) for event in news.poll()] for _ in range(2)]
+        received += [[type(event) for event in news.poll()] for _ in range(2)]
     iteration, state = gaitswarm.IterationView, gaitswarm.StateView
-    assert told == [[state], [], [iteration, iteration, state], []]
+    assert received == [[state], [], [iteration, iteration, state], []]
 
 
 def test_waiting_for_a_job_returns_it_as_it_ended(reach: Reach, finished: Finished) -> None:

@@ -59,8 +59,8 @@ def test_a_list_says_that_there_is_more(reach: Reach, finished: Finished) -> Non
     with gaitswarm.open(finished.db) as jobs:
         for seed in (8, 9):
             jobs.submit(spec, seed=seed)
-    told = run_command("list", "--db", finished.db, "--limit", "2")
-    assert "there are more than 2: see them by --limit" in told.err
+    result = run_command("list", "--db", finished.db, "--limit", "2")
+    assert "there are more than 2: see them by --limit" in result.err
     assert "there are more" not in run_command("list", "--db", finished.db, "--limit", "3").err
 
 
@@ -71,8 +71,8 @@ def test_jobs_are_set_beside_each_other(reach: Reach, finished: Finished) -> Non
     assert [difference.field for difference in view.differences] == ["seed"]
     assert view.comparable
     assert view.jobs[0].best_fitness == finished.result.best.fitness
-    told = run_command("diff", finished.id, queued.id, "--db", finished.db)
-    assert told.code == 0, told.err
-    assert any(line.split() == ["seed", "7", "8"] for line in told.out.splitlines())
+    result = run_command("diff", finished.id, queued.id, "--db", finished.db)
+    assert result.code == 0, result.err
+    assert any(line.split() == ["seed", "7", "8"] for line in result.out.splitlines())
     with pytest.raises(gaitswarm.InvalidRequest):
         jobs.comparison([finished.id, finished.id])

@@ -77,14 +77,14 @@ def test_convergence_and_evaluations_are_tables(finished: Finished) -> None:
 
 
 def test_progress_is_told_after_each_iteration_is_stored(db: Path) -> None:
-    told: list[tuple[int, int]] = []
+    received: list[tuple[int, int]] = []
 
     def progress(iteration: gaitswarm.IterationView) -> None:
         with gaitswarm.open(db) as jobs:
-            told.append((iteration.index, next(iter(jobs.jobs())).iterations))
+            received.append((iteration.index, next(iter(jobs.jobs())).iterations))
 
     result = gaitswarm.optimize(db=db, on_iteration=progress, **SMALL)
-    assert told == [(0, 1), (1, 2)]
+    assert received == [(0, 1), (1, 2)]
     assert result.job.iterations == 2
 
 
@@ -343,14 +343,14 @@ def test_a_run_that_is_told_to_stop_returns_the_job_as_it_gave_it_back(db: Path)
 
 
 def test_an_event_loop_goes_on_while_it_runs_a_job(db: Path, finished: Finished) -> None:
-    told: list[gaitswarm.JobEvent] = []
+    received: list[gaitswarm.JobEvent] = []
 
     async def work() -> gaitswarm.JobView:
         async with gaitswarm.open_async(db) as jobs:
             job = await jobs.submit(**SMALL)
 
             async def follow() -> None:
-                told.extend([event async for event in jobs.follow(job.id)])
+                received.extend([event async for event in jobs.follow(job.id)])
 
             async with anyio.create_task_group() as group:
                 group.start_soon(follow)
@@ -360,7 +360,7 @@ def test_an_event_loop_goes_on_while_it_runs_a_job(db: Path, finished: Finished)
     job = anyio.run(work)
     assert job.best is not None
     assert job.best.design == finished.result.best.design
-    assert [e.index for e in told if isinstance(e, gaitswarm.IterationView)] == [0, 1]
+    assert [e.index for e in received if isinstance(e, gaitswarm.IterationView)] == [0, 1]
 
 
 def test_a_task_that_is_cancelled_gives_its_job_back(db: Path) -> None:

@@ -47,7 +47,7 @@ def test_optimum_a_is_worth_what_was_printed_and_c_about_that() -> None:
 
 
 @pytest.mark.thorough(
-    "240 designs walk beside that of",
+    "simulates 240 designs in addition to that of",
     "test_optimum_a_is_worth_what_was_printed_and_c_about_that",
 )
 def test_optima_a_and_b_are_among_the_best_twentieth_of_random_designs() -> None:

@@ -28,9 +28,11 @@ def test_the_index_is_the_same_wherever_it_is_estimated(reach: Reach, db: Path) 
 
 
 def test_it_tells_how_far_it_is() -> None:
-    told: list[tuple[int, int]] = []
-    gaitswarm.robustness(PI, progress=lambda done, planned: told.append((done, planned)), **ASKED)
-    assert told == [(64, 101), (101, 101)]
+    received: list[tuple[int, int]] = []
+    gaitswarm.robustness(
+        PI, progress=lambda done, planned: received.append((done, planned)), **ASKED
+    )
+    assert received == [(64, 101), (101, 101)]
 
 
 def test_what_makes_no_sense_is_refused_by_argument() -> None:

@@ -36,8 +36,8 @@ def test_one_design_is_worth_what_a_request_says() -> None:
     for k, walk in enumerate(view.scenarios.values()):
         assert result.utilities[0, k] == walk.utility
         assert dict(zip(OBJECTIVE_NAMES, result.objectives[0, k], strict=True)) == walk.objectives
-        told = dict(zip(MEASUREMENT_NAMES, result.measurements[0, k], strict=True))
-        assert told == dict(walk.measurements)
+        measured = dict(zip(MEASUREMENT_NAMES, result.measurements[0, k], strict=True))
+        assert measured == dict(walk.measurements)
 
 
 def test_by_the_preference_of_chapter_3_a_design_has_a_figure_of_merit() -> None:

@@ -11,7 +11,7 @@ CONCEPTS = {concept for row in ROWS for concept in row}
 
 
 def test_the_picture_is_drawn_from_the_glossary() -> None:
-    assert PICTURE.read_text(encoding="utf-8") == drawn(), "`make pictures` draws it anew"
+    assert PICTURE.read_text(encoding="utf-8") == drawn(), "`make pictures` redraws it"
 
 
 def test_every_concept_has_an_entry_and_hangs_together_with_others() -> None:

@@ -1,6 +1,6 @@
 """The manifests in deploy/kubernetes name commands, settings, versions and objects that exist.
 
-They are checked as texts, with docker-compose.yml beside them: applying them takes a cluster.
+They are checked as texts, together with docker-compose.yml: applying them takes a cluster.
 """
 
 from __future__ import annotations

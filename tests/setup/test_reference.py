@@ -47,8 +47,8 @@ def test_a_route_has_its_parameters_and_statuses(
 ) -> None:
     for route, operation in operations.items():
         parameters = {parameter["name"] for parameter in operation.get("parameters", ())}
-        told = parameters | set(operation["responses"])
-        assert told - set(first_cells(sections[route])) == set(), route
+        documented = parameters | set(operation["responses"])
+        assert documented - set(first_cells(sections[route])) == set(), route
         assert operation["summary"] in sections[route]
 
 

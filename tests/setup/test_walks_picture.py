@@ -16,7 +16,7 @@ def test_the_picture_has_the_published_optimums_numbers_and_both_walks_move() ->
     root = ET.fromstring(PICTURE.read_text(encoding="utf-8"))  # noqa: S314 - our own
     words = [text.text for text in root.iter(f"{SVG}text")]
     fitness = fitness_of(dict(CONTROLLERS["fuzzy-pi"].published["A"]))
-    assert f"fitness {fitness:.2f}" in words, "`make pictures` draws it anew"
+    assert f"fitness {fitness:.2f}" in words, "`make pictures` redraws it"
     shaken = read().optimum["normal-fast"]["acceleration"]
     assert f"body shaken by {shaken:.2f} m/s²" in words
     legs = [line for line in root.iter(f"{SVG}polyline") if line.find(f"{SVG}animate") is not None]

@@ -17,7 +17,7 @@ LEASE = 30.0
 
 
 class Clock:
-    """A clock that stands until it is told to go on."""
+    """A clock that stands until it is advanced."""
 
     def __init__(self) -> None:
         self.now = datetime(2030, 1, 2, 3, 4, 5, 678901, tzinfo=UTC)

@@ -40,8 +40,8 @@ def main() -> None:
     with postgres_server(binaries) as server:
         by_network = f"{server.url}/postgres"
         # A socket of the file system knows no network.
-        beside = f"postgresql://gaitswarm@/postgres?host={server.folder}&port={server.port}"
-        with closing(open_store(by_network)) as cut_off, closing(open_store(beside)) as other:
+        direct = f"postgresql://gaitswarm@/postgres?host={server.folder}&port={server.port}"
+        with closing(open_store(by_network)) as cut_off, closing(open_store(direct)) as other:
             cut_off.create_job(spec())
             claim = cut_off.claim("cut off", lease_seconds=LEASE_SECONDS)
             assert claim is not None

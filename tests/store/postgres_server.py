@@ -113,7 +113,7 @@ def _unprivileged_user() -> pwd.struct_passwd | None:
     if os.geteuid() != 0:
         return None
     names = {entry.pw_name for entry in pwd.getpwall()}
-    return pwd.getpwnam("postgres" if "postgres" in names else "nobody")
+    return pwd.getpwnam("postgres" if "postgres" in names else "nobody")  # codespell:ignore nobody
 
 
 def _free_port() -> int:

@@ -75,7 +75,7 @@ def _extended_too_little(store: SqlStore, job_id: str) -> None:
 
 
 def _revoked_nothing(store: SqlStore, job_id: str) -> None:
-    store.tokens.revoke("nobody")
+    store.tokens.revoke("unknown")
 
 
 @pytest.mark.parametrize("change", [_cancelled_twice, _extended_too_little, _revoked_nothing])

@@ -235,8 +235,8 @@ def test_a_design_that_was_evaluated_anew_is_chained_too(
     claim = store.claim("runner", lease_seconds=LEASE)
     assert claim is not None
     store.begin(claim, ask(0))
-    anew = Reevaluation(0, np.full((2, 6), 0.5), np.zeros(2, dtype=np.uint8), 2.5)
-    done = replace(completed(0), precision="single", reevaluation=anew)
+    reevaluation = Reevaluation(0, np.full((2, 6), 0.5), np.zeros(2, dtype=np.uint8), 2.5)
+    done = replace(completed(0), precision="single", reevaluation=reevaluation)
     store.commit(claim, done, ask(1))
     assert checked(store, claim.job.id).problem == ""
     execute(database_url, "UPDATE reevaluations SET fitness = 2.25")

@@ -1,4 +1,4 @@
-"""Whoever waits for a job hears of its changes, whichever process commits them."""
+"""Followers of a job are notified of its changes, whichever process commits them."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def waiting(database_url: str) -> Iterator[SqlStore]:
 
 @pytest.fixture
 def poll_seconds(database_url: str) -> float:
-    """On PostgreSQL changes are told, so that nobody has to look."""
+    """PostgreSQL notifies of changes, so that polling is not needed."""
     return NEVER if database_url.startswith("postgresql") else 0.02
 
 
@@ -45,7 +45,7 @@ def listening(url: str) -> list[int]:
 
 
 def settle(url: str, waiting: SqlStore, woken: threading.Event) -> None:
-    """Wait until whoever watches has looked once, which may wake without a change."""
+    """Wait until the watcher has polled once, which may wake without a change."""
     if url.startswith("postgresql"):
         eventually(lambda: len(listening(url)) == 1)
     eventually(woken.is_set)

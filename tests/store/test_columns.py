@@ -243,7 +243,7 @@ def test_a_history_that_grows_beyond_half_of_the_memory_is_read_anew(store: SqlS
     claim = begun(store)
     go_on(store, claim, *[(4.0, 3.0)] * 6)
     job = store.job(claim.job.id)
-    # Room for one of 8 iterations, not for it beside one of 6.
+    # Room for one history of 8 iterations, not for another of 6.
     memory = HistoryMemory(memory_of_one(store, job) * 8 // 6)
     cache = HistoryCache(store, memory=memory)
     cache.columns(job)

@@ -16,7 +16,7 @@ from tests.store.examples import begun, completed, spec
 
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
-    """An SQLite database with a job, which nobody has open."""
+    """An SQLite database with a job, opened by no process."""
     path = tmp_path / "jobs.db"
     store = open_store(str(path))
     store.create_job(spec())

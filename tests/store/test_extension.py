@@ -81,7 +81,7 @@ def test_a_runner_that_begins_under_an_older_budget_is_told_so_too(store: SqlSto
     assert store.claim("runner-a", lease_seconds=LEASE) is None
     current = replace(claim, job=store.job(claim.job.id))
     store.begin(current, ask(0))
-    # What was asked stays, so whoever begins once more need not know of a later budget.
+    # The spec stays, so a restart does not depend on a later budget.
     store.extend(claim.job.id, 50)
     store.begin(current, ask(0))
 

@@ -24,7 +24,7 @@ def submit(store: SqlStore, owner: str | None, quota: Quota | None = TWO, **opti
 def test_an_owner_has_only_so_many_unfinished_jobs(store: SqlStore, owner: str | None) -> None:
     first = submit(store, owner)
     store.command(submit(store, owner), Command.PAUSE)
-    submit(store, "somebody else")
+    submit(store, "another")
     with pytest.raises(QuotaExceeded, match=r"2 unfinished jobs.*may be 2.*cancel one"):
         submit(store, owner)
     submit(store, owner, quota=None)

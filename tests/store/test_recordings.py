@@ -1,4 +1,4 @@
-"""Recorded walks: kept once, never changed, handed to whoever claims a job that needs them."""
+"""Recordings: stored once, never changed, and passed to runners of jobs that need them."""
 
 from __future__ import annotations
 

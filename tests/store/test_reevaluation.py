@@ -24,16 +24,16 @@ def begun(store: SqlStore) -> Claim:
     return claim
 
 
-def searched(index: int, fitness: tuple[float, ...], anew: float | None) -> CompletedIteration:
-    """An iteration whose best particle came to `anew` in double; None: it was not looked at."""
+def searched(index: int, fitness: tuple[float, ...], double: float | None) -> CompletedIteration:
+    """An iteration whose best particle has fitness `double` in double; None: not reevaluated."""
     done = replace(completed(index, fitness), precision="single")
-    if anew is None:
+    if double is None:
         return done
-    fell = math.isinf(anew)
-    objectives = np.full((2, 6), NAN if fell else anew / 7.0)
+    fell = math.isinf(double)
+    objectives = np.full((2, 6), NAN if fell else double / 7.0)
     statuses = np.full(2, Status.FELL if fell else Status.OK, dtype=np.uint8)
     return replace(
-        done, reevaluation=Reevaluation(int(np.argmin(fitness)), objectives, statuses, anew)
+        done, reevaluation=Reevaluation(int(np.argmin(fitness)), objectives, statuses, double)
     )
 
 

@@ -62,7 +62,7 @@ def test_many_streams_of_a_job_have_every_iteration_once_and_in_order(
     store: SqlStore, database_url: str
 ) -> None:
     claim = begun(store, iterations=ITERATIONS)
-    # On PostgreSQL nobody polls as often as that: what comes was told.
+    # On PostgreSQL nothing polls that often: the event comes from a notification.
     poll_seconds = 60.0 if database_url.startswith("postgresql") else 0.02
     with (
         closing(open_store(database_url)) as served,

@@ -57,8 +57,8 @@ def test_a_name_that_is_none_is_refused(store: SqlStore, name: str) -> None:
 
 
 def test_there_is_no_token_of_an_unknown_name(store: SqlStore) -> None:
-    with pytest.raises(NotFound, match="'nobody'"):
-        store.tokens.revoke("nobody")
+    with pytest.raises(NotFound, match="'unknown'"):
+        store.tokens.revoke("unknown")
 
 
 def test_of_many_servers_that_start_at_once_one_makes_the_first_token(database_url: str) -> None:
@@ -73,7 +73,7 @@ def test_of_many_servers_that_start_at_once_one_makes_the_first_token(database_u
         found = store.tokens.find(secrets[0])
         assert found is not None and found.scope is Scope.ADMIN
         store.tokens.revoke(found.name)
-        # Whoever revoked all tokens does not want one that the next start prints.
+        # After all tokens were revoked, the next start must not print a new one.
         assert store.tokens.create_first() is None
 
 

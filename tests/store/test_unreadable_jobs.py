@@ -1,4 +1,4 @@
-"""Jobs that another version stored, or somebody edited: they fail alone, and lose nothing."""
+"""Jobs stored by another version, or edited: they fail alone, and lose nothing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Only an explicit upgrade migrates a database that holds something, and only if nobody uses it."""
+"""Only an explicit upgrade migrates a database that holds data, and only if it is not in use."""
 
 from __future__ import annotations
 

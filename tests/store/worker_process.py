@@ -29,7 +29,7 @@ def claim_all(store: SqlStore) -> None:
 
 def commit_for_ever(store: SqlStore) -> None:
     """Claim a job and commit iteration after iteration; prints the index of each."""
-    # A lease of no time: whoever comes after this process's death need not wait.
+    # A lease of no time: after this process's death others need not wait.
     claim = store.claim("process", lease_seconds=0.0)
     assert claim is not None
     if claim.ask is None:

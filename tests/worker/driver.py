@@ -22,7 +22,7 @@ heard = threading.Event()
 
 
 def say(line: str) -> None:
-    """At once, as whoever reads it may then end this process."""
+    """Flushed at once, as the reader may then end this process."""
     sys.stdout.write(f"{line}\n")
     sys.stdout.flush()
 
@@ -73,7 +73,7 @@ def terminated() -> str:
 def until_lost(evaluator: RayEvaluator) -> str:
     """What is said when the loss is noticed, during a request.
 
-    Of a loss between two requests nobody is told: the next opens Ray.
+    A loss between two requests is not reported: the next request opens Ray.
     """
     (walk, *_) = request(1).cases
     assert isinstance(walk, Walk)

@@ -77,9 +77,9 @@ def other_version(folder: Path) -> dict[str, str]:
     shutil.copytree(ROOT / "tests", folder / "tests", ignore=shutil.ignore_patterns("__py*"))
     changed = copy_package(folder) / "sim" / "outcome.py"
     changed.write_text(changed.read_text(encoding="utf-8") + "# older\n", encoding="utf-8")
-    told = folder / "gaitswarm-0.0.9.dist-info"
-    told.mkdir()
-    (told / "METADATA").write_text("Metadata-Version: 2.1\nName: gaitswarm\nVersion: 0.0.9\n")
+    metadata = folder / "gaitswarm-0.0.9.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: gaitswarm\nVersion: 0.0.9\n")
     return {"PYTHONPATH": str(folder)}
 
 
@@ -268,7 +268,7 @@ def test_the_node_of_a_head_that_has_just_begun_to_listen_here_is_waited_for(
     looks = iter([False, False, True, False])
     monkeypatch.setattr(joining, "runs_here", lambda _port: next(looks))
     assert joining.comes_here("127.0.0.1", 6379)
-    # Elsewhere it is not waited for: the address is for documentation, and nobody's.
+    # Elsewhere it is not waited for: the address is reserved for documentation.
     assert not joining.comes_here("203.0.113.77", 6379)
     monkeypatch.setattr(joining, "runs_here", lambda _port: False)
     monkeypatch.setattr(joining, "_LATE_SECONDS", 0.3)

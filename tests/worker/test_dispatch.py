@@ -1,4 +1,4 @@
-"""What becomes of chunks' results, whoever runs them."""
+"""Handling of chunks' results, wherever they run."""
 
 from __future__ import annotations
 

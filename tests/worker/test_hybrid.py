@@ -101,10 +101,10 @@ def test_walks_go_on_while_ray_is_started_and_a_stop_is_heard(
     assert not hybrid.on_ray
     assert bits(hybrid.evaluate(wanted, never)) == bits(walked_at_once(wanted))
     long = short_walk(cycle_time=2.0, cycles=5)
-    told = time.monotonic() + 0.2
+    stopped_at = time.monotonic() + 0.2
     with pytest.raises(EvaluationStopped):
-        hybrid.evaluate(request(8000, scenarios=(long,)), lambda: time.monotonic() > told)
-    assert time.monotonic() - told < 10.0
+        hybrid.evaluate(request(8000, scenarios=(long,)), lambda: time.monotonic() > stopped_at)
+    assert time.monotonic() - stopped_at < 10.0
     assert not opening.may_end.is_set()
 
 

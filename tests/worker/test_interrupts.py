@@ -35,7 +35,7 @@ def interrupted(
         del sys.modules[name]
 
 
-@pytest.fixture(params=[signal.default_int_handler, signal.SIG_IGN], ids=["heeded", "ignored"])
+@pytest.fixture(params=[signal.default_int_handler, signal.SIG_IGN], ids=["handled", "ignored"])
 def before(request: pytest.FixtureRequest) -> Iterator[Callable[..., object]]:
     """What becomes of SIGINT in the process otherwise."""
     own = signal.signal(signal.SIGINT, request.param)

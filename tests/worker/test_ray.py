@@ -204,7 +204,7 @@ def test_a_second_ray_in_the_same_process_is_refused(ray_evaluator: RayEvaluator
 @contextmanager
 def driver(ending: str, home: Path) -> Iterator[subprocess.Popen[str]]:
     environment = os.environ | {"PYTHONPATH": str(ROOT), "HOME": str(home)}
-    # Kernels are those of this home, not compiled anew.
+    # Kernels are those of this home, not compiled again.
     environment.setdefault("XDG_CACHE_HOME", str(Path.home() / ".cache"))
     for name in [name for name in environment if name.startswith("RAY_")]:
         del environment[name]
@@ -256,7 +256,7 @@ def test_a_cluster_that_was_lost_is_noticed_and_opened_again_with_the_same_bits(
     with driver("lose", tmp_path) as started:
         lost, stopped, terminated = (output(started.stdout).readline() for _ in range(3))
         assert "Ray was lost" in lost
-        # Whoever is told to stop need not wait until it is open again, and its signals are ours.
+        # A stop need not wait until Ray is open again, and its signals are ours.
         assert (stopped, terminated) == ("stopped\n", "heard\n")
         vital = [p for p in descendants(started.pid) if p in walkers(started.pid) or is_daemon(p)]
         assert len(vital) >= 3

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
@@ -110,8 +109,6 @@ def serve(
         tell(f"gaitswarm serves {server.url} and {doing}; {server.url}/docs; Ctrl-C ends it")
         if settings.tokens_required:
             _tell_of_tokens(tell, opened.service.store.tokens.create_first(), server.url)
-        # A full collection in the event loop would otherwise visit all modules, for 0.1 s.
-        gc.freeze()
         server.run()
 
 

@@ -40,8 +40,8 @@ wheel: setup page-if-possible manual ## Build a wheel into dist/, with the page,
 	@$(BIN)/python -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .
 	@rm -rf sim/compiler/prebuilt
 
-research: setup-dev ## Compare search methods in a small experiment of the research package.
-	@$(BIN)/gaitswarm-research --help
+research: setup-dev ## Compare search methods in a small experiment (a minute or two).
+	@$(BIN)/gaitswarm-research compare small $(ARGS)
 
 bench: setup ## Measure the simulator on one core of this machine.
 	@$(BIN)/gaitswarm bench $(ARGS)

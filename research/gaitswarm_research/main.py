@@ -9,6 +9,7 @@ from pydantic import ValidationError
 
 from gaitswarm import GaitswarmError, Interrupted
 from gaitswarm.plugins import SimulationInputError
+from gaitswarm_research.compare.command import compare
 from gaitswarm_research.reconstruction.command import reconstruction
 from gaitswarm_research.studies.accuracy import noise, steps, tables
 from gaitswarm_research.studies.controllers import controllers
@@ -28,6 +29,7 @@ def research() -> None:
     """Compare search methods, reconstruct published results, and study the model."""
 
 
+app.command()(compare)
 app.command()(reconstruction)
 study = typer.Typer(
     no_args_is_help=True,

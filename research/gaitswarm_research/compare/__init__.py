@@ -1,0 +1,1 @@
+"""Comparison of search methods on test functions and walking jobs."""

@@ -1,0 +1,177 @@
+"""Optimizers of other libraries, for comparison.
+
+Each runs with its library's defaults except for what is set here, in coordinates in which every
+variable spans [0, 1] unless stated otherwise. A failed evaluation counts as 1e30, because not every
+library accepts infinity. A method that ends before its budget restarts elsewhere. None uses random
+numbers that a process shares.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Mapping
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaitswarm.plugins import Axis, Space
+
+if TYPE_CHECKING:
+    from optuna.distributions import BaseDistribution
+
+Floats = NDArray[np.float64]
+
+_FAILED: Final = 1e30
+
+
+Evaluate = Callable[[Floats], Floats]
+"""(n, d) positions -> (n,) fitness, +inf for a failure; raises when the budget is spent."""
+
+
+def pymoo_pso(space: Space, seed: int, evaluate: Evaluate) -> None:
+    """Search by pymoo's particle swarm of 25, which adapts its weights."""
+    pso = import_module("pymoo.algorithms.soo.nonconvex.pso")
+    core, evaluator = (import_module(f"pymoo.core.{name}") for name in ("problem", "evaluator"))
+    termination = import_module("pymoo.core.termination").NoTermination
+    judged = import_module("pymoo.problems.static").StaticProblem
+    d = space.dimension
+    problem = core.Problem(n_var=d, n_obj=1, xl=np.zeros(d), xu=np.ones(d))
+    swarm = pso.PSO(pop_size=25)
+    swarm.setup(problem, termination=termination(), seed=seed)
+    while True:
+        asked = swarm.ask()
+        fitness = _told(evaluate(space.from_unit(asked.get("X"))))
+        evaluator.Evaluator().eval(judged(problem, F=fitness[:, None]), asked)
+        swarm.tell(infills=asked)
+
+
+def scipy_de(space: Space, seed: int, evaluate: Evaluate) -> None:
+    """Search by scipy's differential evolution with a population of 25, in the variables' units.
+
+    Its tolerance is 0, so that it spends its budget.
+    """
+    optimize, qmc = (import_module(f"scipy.{name}") for name in ("optimize", "stats.qmc"))
+
+    def worth(columns: Floats) -> Floats:
+        return _told(evaluate(np.clip(space.positions(columns.T), space.low, space.high)))
+
+    discrete = space.integer | space.categorical
+    generator = np.random.default_rng(seed)
+    while True:
+        unit = qmc.LatinHypercube(space.dimension, rng=generator).random(25)
+        with warnings.catch_warnings():
+            # The mean of a population of failures is undefined.
+            warnings.simplefilter("ignore", RuntimeWarning)
+            optimize.differential_evolution(
+                worth,
+                list(zip(space.low, space.high, strict=True)),
+                init=space.low + unit * space.span,
+                integrality=discrete,
+                maxiter=1_000_000_000,
+                tol=0.0,
+                polish=False,
+                updating="deferred",
+                vectorized=True,
+                rng=generator,
+            )
+
+
+def cma_es(space: Space, seed: int, evaluate: Evaluate) -> None:
+    """Search by the library cma with sigma 0.3, restarted with twice the offspring (IPOP).
+
+    It begins with 12 offspring. Integers are in their own units and keep a smallest step.
+    """
+    cma = import_module("cma")
+    discrete = space.integer | space.categorical
+    low = np.where(discrete, space.low, 0.0)
+    high = np.where(discrete, space.high, 1.0)
+    generator = np.random.default_rng(seed)
+    offspring = 12
+    while True:
+        options = {
+            "bounds": [low.tolist(), high.tolist()],
+            "CMA_stds": (high - low).tolist(),
+            "integer_variables": np.flatnonzero(discrete).tolist(),
+            "popsize": offspring,
+            "randn": lambda *shape: generator.standard_normal(shape),
+            "seed": np.nan,
+            "verbose": -9,
+            "verb_log": 0,
+        }
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            strategy = cma.CMAEvolutionStrategy(
+                low + generator.random(space.dimension) * (high - low), 0.3, options
+            )
+            while not strategy.stop():
+                asked = strategy.ask()
+                points = np.array(asked)
+                positions = np.where(discrete, points, space.low + points * space.span)
+                clipped = np.clip(positions, space.low, space.high)
+                whole = np.where(discrete, np.rint(clipped), clipped)
+                strategy.tell(asked, _told(evaluate(space.positions(whole))).tolist())
+        offspring *= 2
+
+
+def optuna_tpe(space: Space, seed: int, evaluate: Evaluate) -> None:
+    """Search by Optuna's TPE sampler with its constant liar, in batches of 25."""
+    _study("TPESampler", {"constant_liar": True}, 25, space, seed, evaluate)
+
+
+def optuna_cma_es(space: Space, seed: int, evaluate: Evaluate) -> None:
+    """Search by Optuna's CMA-ES sampler, in generations of 12.
+
+    Categorical variables are drawn independently, as the sampler does.
+    """
+    options = {"popsize": 12, "warn_independent_sampling": False}
+    _study("CmaEsSampler", options, 12, space, seed, evaluate)
+
+
+RIVALS: Final[Mapping[str, tuple[Callable[[Space, int, Evaluate], None], str]]] = {
+    "cma": (cma_es, "cma"),
+    "optuna-cma-es": (optuna_cma_es, "cmaes optuna"),
+    "optuna-tpe": (optuna_tpe, "optuna scipy"),
+    "pymoo-pso": (pymoo_pso, "pymoo"),
+    "scipy-de": (scipy_de, "scipy"),
+}
+"""Functions by name, with the distributions they need."""
+
+
+def _told(fitness: Floats) -> Floats:
+    return np.where(np.isfinite(fitness), fitness, _FAILED)
+
+
+def _study(
+    sampler: str,
+    options: Mapping[str, Any],
+    batch: int,
+    space: Space,
+    seed: int,
+    evaluate: Evaluate,
+) -> None:
+    """Search by a sampler of Optuna, in the variables' own units."""
+    optuna = import_module("optuna")
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    distributions = {f"x{j}": _distribution(axis) for j, axis in enumerate(space.axes)}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
+        chosen = getattr(optuna.samplers, sampler)(seed=seed, **options)
+        study = optuna.create_study(sampler=chosen)
+        while True:
+            trials = [study.ask(distributions) for _ in range(batch)]
+            designs = np.array([[t.params[name] for name in distributions] for t in trials], float)
+            fitness = _told(evaluate(space.positions(designs)))
+            for trial, value in zip(trials, fitness.tolist(), strict=True):
+                study.tell(trial, value)
+
+
+def _distribution(axis: Axis) -> BaseDistribution:
+    from optuna import distributions
+
+    if axis.kind == "continuous":
+        return distributions.FloatDistribution(axis.low, axis.high)
+    if axis.kind == "integer":
+        return distributions.IntDistribution(int(axis.low), int(axis.high))
+    return distributions.CategoricalDistribution(tuple(range(int(axis.high) + 1)))

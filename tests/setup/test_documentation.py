@@ -15,9 +15,6 @@ from tests.examples.paths import ROOT
 from tests.setup import command_line, settings_classes
 from tests.setup.documents import blocks, documentation, shell_commands, typed_commands
 
-_RESEARCH = ("study", "reconstruct")
-"""Commands that move to `gaitswarm-research`."""
-
 
 def test_every_gaitswarm_command_that_is_written_exists_with_its_options() -> None:
     written = shell_commands("gaitswarm")
@@ -53,8 +50,7 @@ def test_a_command_that_the_command_line_does_not_take_is_seen(wrong: str) -> No
 
 def test_every_command_is_shown() -> None:
     shown = {" ".join(words[:n]) for words in shell_commands("gaitswarm") for n in (1, 2)}
-    commands = {name for name in command_line.commands() if not name.startswith(_RESEARCH)}
-    assert sorted(commands - shown) == []
+    assert sorted(set(command_line.commands()) - shown) == []
 
 
 def test_every_make_target_that_is_written_exists() -> None:

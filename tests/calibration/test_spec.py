@@ -121,8 +121,8 @@ def test_a_stored_spec_reads_as_it_was_and_names_its_choices() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"targets": [target("speed", walk="nobody")]}, "targets.0.walk: no walk 'nobody'"),
-        ({"targets": [target("speed", relative_to="nobody")]}, "relative_to: no walk 'nobody'"),
+        ({"targets": [target("speed", walk="absent")]}, "targets.0.walk: no walk 'absent'"),
+        ({"targets": [target("speed", relative_to="absent")]}, "relative_to: no walk 'absent'"),
         ({"targets": [target("speed", relative_to="stiff")]}, "the walk itself"),
         ({"targets": [target("height_loss", walk="fuzzy", relative_to="stiff")]}, "has no ratio"),
         ({"targets": [target("speed", value=-0.1)]}, "speed is greater than 0"),
@@ -142,7 +142,7 @@ def test_a_stored_spec_reads_as_it_was_and_names_its_choices() -> None:
         ({"robots": ["szabadka2"]}, "two different ones at least"),
     ],
 )
-def test_what_makes_no_sense_is_refused(change: dict[str, Any], message: str) -> None:
+def test_inconsistent_specs_are_refused(change: dict[str, Any], message: str) -> None:
     with pytest.raises(ValidationError, match=message):
         spec(**change)
 

@@ -131,7 +131,7 @@ def test_evidence_decides_for_choices_that_any_run_has_near_its_best(
     assert law.explanation is not None
 
 
-def test_the_least_misfit_of_each_choice_is_told_by_run() -> None:
+def test_the_smallest_misfit_of_each_choice_is_reported_by_run() -> None:
     (law,) = identifiability([LAW], [run_of(linear=2.0, stick=1.0), run_of(stick=1.5)]).parameters
     assert [choice.fitness for choice in law.choices] == [
         (2.0, math.inf),

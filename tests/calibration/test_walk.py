@@ -36,7 +36,7 @@ def test_a_robot_walks_as_it_would_alone(law: Any) -> None:
         np.testing.assert_array_equal(found.objectives[row, :6], alone.objectives[0])
 
 
-def test_a_design_does_not_depend_on_the_laws_of_friction_beside_it() -> None:
+def test_a_design_does_not_depend_on_the_friction_laws_of_others() -> None:
     designs = np.array([[0.0], [1.0], [2.0], [0.0], [1.0], [2.0]])
     together = case("contact_law").run(designs)
     for row in range(3):

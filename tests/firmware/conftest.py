@@ -1,4 +1,4 @@
-"""Folders of firmware, and the commands of their Makefiles."""
+"""Firmware folders, and the commands of their Makefiles."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The folder is written whole or not at all, over firmware only."""
+"""Firmware folders are written completely or not at all, and replace only firmware."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_the_same_design_gives_the_same_bytes(tmp_path: Path) -> None:
     assert contents(tmp_path / "a") == contents(tmp_path / "b")
 
 
-def test_firmware_is_replaced_with_all_that_was_built_of_it(tmp_path: Path) -> None:
+def test_firmware_is_replaced_together_with_its_build_results(tmp_path: Path) -> None:
     folder = tmp_path / "firmware"
     write(folder, P=0.5)
     (folder / "build").mkdir()
@@ -47,7 +47,7 @@ def test_an_empty_folder_is_written(tmp_path: Path) -> None:
     assert (tmp_path / "firmware" / "controller.c").is_file()
 
 
-def test_other_peoples_files_are_left_alone(tmp_path: Path) -> None:
+def test_files_that_are_not_firmware_are_left_alone(tmp_path: Path) -> None:
     folder = tmp_path / "firmware"
     write(folder)
     (folder / "test" / "mine.txt").write_text("keep", encoding="utf-8")
@@ -61,7 +61,7 @@ def test_other_peoples_files_are_left_alone(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("fails", [Path.write_bytes, Path.rename], ids=["a file", "the folder"])
-def test_what_was_there_stays_where_writing_fails(
+def test_a_failed_write_keeps_the_previous_folder(
     fails: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = tmp_path / "firmware"

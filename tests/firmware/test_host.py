@@ -1,4 +1,4 @@
-"""Firmware on this machine: it answers every reading of every walk as the simulator did."""
+"""Firmware on this machine reproduces the simulator's outputs for every reading of every walk."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ PID = {"P": 0.4, "I": 0.1, "D": 0.003}
     ],
     ids=["A", "B", "C", "fuzzy-pso-ps", "fuzzy-pso", "pi-pso-ps", "2011", "pid"],
 )
-def test_every_sample_of_the_six_walks_is_the_simulators(
+def test_every_sample_of_the_six_walks_equals_the_simulators(
     controller: ControllerName, design: Mapping[str, float], robot: str, tmp_path: Path
 ) -> None:
     view = write_firmware(design, tmp_path / "firmware", controller=controller, robot=robot)
@@ -63,7 +63,7 @@ def test_every_sample_of_the_six_walks_is_the_simulators(
     ],
     ids=["encoders before the backlash", "four legs"],
 )
-def test_every_sample_is_the_simulators_on_other_robots(
+def test_every_sample_equals_the_simulators_on_other_robots(
     robot: RobotVariant | Path, tmp_path: Path
 ) -> None:
     gait = short_walk(cycle_time=0.5, stride=0.04, height=0.02)
@@ -96,13 +96,13 @@ def test_walks_by_a_coarser_table_are_repeated_too(
     assert tested.code == 0, tested.out + tested.err
     assert tested.compared[-1][1:] == (view.samples, 0)
     assert view.tables[0].shape == [256, 64, 1]
-    # It is the way out for a controller that else does not fit.
+    # The remedy for a controller that does not fit otherwise.
     assert view.memory.fits
     assert view.table_difference is not None
     assert all(share is not None and 0.0 < share < 0.5 for share in view.table_difference.values())
 
 
-def test_a_changed_cell_that_walks_come_to_is_seen_in_their_samples(copy_of_a: Path) -> None:
+def test_a_changed_cell_that_walks_visit_changes_their_samples(copy_of_a: Path) -> None:
     # No error and no current: every walk begins there.
     with_changed_cell(copy_of_a, 512 * 64)
     tested = make(copy_of_a, "test")
@@ -111,7 +111,7 @@ def test_a_changed_cell_that_walks_come_to_is_seen_in_their_samples(copy_of_a: P
     assert "direct table: 65536 cells, CHANGED" in tested.out
 
 
-def test_a_changed_cell_that_no_walk_comes_to_is_seen_all_the_same(copy_of_a: Path) -> None:
+def test_a_changed_cell_that_no_walk_visits_is_detected(copy_of_a: Path) -> None:
     with_changed_cell(copy_of_a, 65535)
     tested = make(copy_of_a, "test")
     assert tested.code != 0
@@ -119,14 +119,14 @@ def test_a_changed_cell_that_no_walk_comes_to_is_seen_all_the_same(copy_of_a: Pa
     assert "direct table: 65536 cells, CHANGED" in tested.out
 
 
-def test_a_changed_gain_is_seen(copy_of_a: Path) -> None:
+def test_a_changed_gain_is_detected(copy_of_a: Path) -> None:
     replaced(copy_of_a / "law.h", "#define INTEGRAL_GAIN 1468879", "#define INTEGRAL_GAIN 1468979")
     tested = make(copy_of_a, "test")
     assert tested.code != 0
     assert tested.compared[-1][2] > 0
 
 
-def test_a_changed_trajectory_is_seen(copy_of_a: Path) -> None:
+def test_a_changed_trajectory_is_detected(copy_of_a: Path) -> None:
     path = copy_of_a / "trajectories.c"
     replaced(path, '{"normal-fast", rows_0, 755, 5, 6', '{"normal-fast", rows_0, 755, 4, 6')
     tested = make(copy_of_a, "test")
@@ -135,7 +135,7 @@ def test_a_changed_trajectory_is_seen(copy_of_a: Path) -> None:
     assert "desired angles compared, 0 differing" not in tested.out
 
 
-def test_a_walk_that_is_cut_off_is_no_success(copy_of_a: Path) -> None:
+def test_a_truncated_walk_fails(copy_of_a: Path) -> None:
     path = copy_of_a / "test" / "walks" / "slope-fast.walk"
     path.write_bytes(path.read_bytes()[:-1])
     tested = make(copy_of_a, "test")
@@ -151,7 +151,7 @@ def test_integers_that_are_too_narrow_do_not_compile(tmp_path: Path) -> None:
     assert "the direct part needs wider integers" in tested.err
 
 
-def test_whatever_a_design_is_called_its_firmware_compiles(tmp_path: Path) -> None:
+def test_firmware_compiles_for_any_label(tmp_path: Path) -> None:
     folder = tmp_path / "firmware"
     gait = short_walk(cycle_time=0.5, stride=0.04)
     label = "*/ #error /* $P ${I} \\\n */*/ \u00fc"
@@ -160,7 +160,7 @@ def test_whatever_a_design_is_called_its_firmware_compiles(tmp_path: Path) -> No
     assert tested.code == 0, tested.out + tested.err
 
 
-def test_simulator_and_firmware_compile_one_text(published_a: Path) -> None:
+def test_simulator_and_firmware_compile_the_same_source(published_a: Path) -> None:
     text = (published_a / "tick.c").read_text(encoding="utf-8")
     assert text == (ROOT / "sim" / "kernel" / "emitted" / "tick.c").read_text(encoding="utf-8")
     assert text in kernel_source(load_robot("szabadka2"))

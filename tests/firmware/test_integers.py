@@ -1,4 +1,4 @@
-"""Integers of firmware: wide enough for all readings; tables of desired angles go on for ever."""
+"""Integers of firmware, wide enough for all readings, and tables of desired angles."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_extreme_readings_stay_within_the_ranges(
     assert all(own.largest < 1 << (own.bits - 1) for own in law.ranges)
 
 
-def test_the_narrow_integers_are_taken_as_far_as_they_reach() -> None:
+def test_narrow_integers_are_used_where_they_suffice() -> None:
     def bits(gain: int) -> int:
         return law_integers(ControlLaw(proportional_gain=gain), CODING).fine_bits
 

@@ -1,4 +1,4 @@
-"""Firmware on emulated microcontrollers: the same samples, and what they take."""
+"""Firmware on emulated microcontrollers: equal samples, sizes and cycles."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ def tools() -> None:
             pytest.skip(f"NOT TESTED without {name}: run scripts/microcontroller.sh")
 
 
-def test_both_processors_answer_as_the_simulator_and_in_time(copy_of_a: Path) -> None:
+def test_both_processors_reproduce_the_simulator_in_time(copy_of_a: Path) -> None:
     ran = make(copy_of_a, "target")
     assert ran.code == 0, ran.out + ran.err
     totals = [entry for entry in ran.compared if entry[0] == "all"]
     assert totals == 2 * [("all", 280_800, 0)]
     counts = [tuple(map(int, found)) for found in COUNTED.findall(ran.out)]
     assert len(counts) == 2
-    # Half the budget is left to converters, buses and interrupts.
+    # Half the budget remains for converters, buses and interrupts.
     assert all(0 < mean <= most < BUDGET.cycles / 2 for mean, most in counts)
     sizes = {name: tuple(map(int, s)) for *s, name in SIZES.findall(ran.out)}
     text, data, bss = sizes["controller"]
@@ -51,14 +51,14 @@ def test_both_processors_answer_as_the_simulator_and_in_time(copy_of_a: Path) ->
     assert sum(size[0] for size in sizes.values()) > 65536
 
 
-def test_a_processor_that_answers_otherwise_is_no_success(brief_a: Path) -> None:
+def test_a_processor_with_other_outputs_fails(brief_a: Path) -> None:
     with_changed_cell(brief_a, 512 * 64)
     ran = make(brief_a, "target")
     assert ran.code != 0
     assert ran.compared[-1][2] > 0
 
 
-def test_a_table_of_64_bits_of_fraction_answers_as_the_simulator(tmp_path: Path) -> None:
+def test_a_law_with_64_bit_integers_reproduces_the_simulator(tmp_path: Path) -> None:
     folder = tmp_path / "firmware"
     design = published("fuzzy-pi-3", "fuzzy-pso-ps")
     gait = short_walk(cycle_time=0.5, stride=0.04, height=0.02)
@@ -102,12 +102,12 @@ def test_cycles_are_those_of_the_counted_instructions(brief_a: Path) -> None:
     )
     assert counted is not None
     assert abs(instructions - int(counted[1])) <= 3
-    # An instruction takes a cycle to four, and none is done in less on 16 bits.
+    # An instruction takes one to four cycles, and none is shorter on 16 bits.
     assert instructions < cortex < 4 * instructions
     assert cortex < estimated < BUDGET.cycles
 
 
-def test_without_the_tools_it_is_said_what_is_missing(brief_a: Path, tmp_path: Path) -> None:
+def test_missing_tools_are_named(brief_a: Path, tmp_path: Path) -> None:
     (tmp_path / "bin").mkdir()
     for name in ("sh", "mkdir", "echo"):
         found = shutil.which(name)

@@ -1,4 +1,4 @@
-"""A twin whose true parameters are known, and what was recorded of its walk."""
+"""A twin with known parameters, and a recording of its walk."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ def test_currents_are_those_of_the_log(source: str | RobotVariant) -> None:
     np.testing.assert_allclose(recorded_currents(robot, result.states), log.current, atol=1e-10)
 
 
-def test_the_truth_leaves_nothing_but_the_instruments_errors(twin: Twin) -> None:
+def test_true_parameters_leave_only_the_instruments_errors(twin: Twin) -> None:
     fit = CurrentFit("a walk", "szabadka2", twin.recording, tuple(TRUTH))
     nominal = described_values(twin.robot) | {"body_mass": 3.2}
     designs = np.array([list(TRUTH.values()), [nominal[name] for name in TRUTH]])
@@ -112,7 +112,7 @@ def test_a_recording_of_other_joints_is_refused(twin: Twin) -> None:
         ({"first_tick": 10}, "after the end of the walk at 2 s"),
     ],
 )
-def test_a_recording_that_makes_no_sense_is_refused(
+def test_an_inconsistent_recording_is_refused(
     twin: Twin, change: dict[str, object], message: str
 ) -> None:
     with pytest.raises(ValidationError, match=message):

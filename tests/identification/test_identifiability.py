@@ -16,7 +16,7 @@ from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.sim.variables import Variable
 
 VARIABLES = (
-    Variable(name="told", low=0.0, high=10.0, unit="V"),
+    Variable(name="determined", low=0.0, high=10.0, unit="V"),
     Variable(name="free", low=0.0, high=10.0, unit="kg"),
 )
 
@@ -50,16 +50,16 @@ def test_intervals_are_those_of_the_designs_within_each_threshold() -> None:
 
 
 def test_runs_that_agree_are_trusted_and_runs_that_do_not_are_not() -> None:
-    told, free = identifiability(
+    determined, free = identifiability(
         VARIABLES, [run(free, seed=int(free)) for free in (1, 5, 9)]
     ).parameters
-    assert told.trust is Trust.TRUSTED
-    assert told.best == pytest.approx(4.0, abs=0.1)
+    assert determined.trust is Trust.TRUSTED
+    assert determined.best == pytest.approx(4.0, abs=0.1)
     assert free.trust is Trust.UNKNOWN
     assert len(free.bests) == 3
 
 
-def test_a_single_run_cannot_tell() -> None:
+def test_a_single_run_is_inconclusive() -> None:
     contracted = identifiability(VARIABLES, [run(7.0, seed=1)]).parameters[1]
     assert contracted.trust is None
 

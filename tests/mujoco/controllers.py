@@ -1,4 +1,4 @@
-"""PI and Fuzzy-PI in the robot's integers, written anew from docs/model.md."""
+"""PI and Fuzzy-PI in the robot's integers, implemented independently from docs/model.md."""
 
 from __future__ import annotations
 

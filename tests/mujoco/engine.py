@@ -1,4 +1,4 @@
-"""Walks by MuJoCo's kernel, with all that a kernel is given by the simulator."""
+"""Walks by MuJoCo's kernel with the simulator's inputs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The step of docs/model.md, written anew on MuJoCo's positions, inertia and bias forces.
+"""The step of docs/model.md, implemented on MuJoCo's positions, inertia and bias forces.
 
 A drift turns and moves the robot at constant velocities; a kick changes the velocities at fixed
 positions. What damps is taken at the kick's middle: the accelerations solve

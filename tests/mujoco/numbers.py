@@ -1,4 +1,4 @@
-"""A robot's numbers as the forces in MuJoCo want them, straight from its description."""
+"""A robot's numbers for the forces in MuJoCo, directly from its description."""
 
 from __future__ import annotations
 

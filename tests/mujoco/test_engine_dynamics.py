@@ -1,4 +1,4 @@
-"""One instant of the robot, in MuJoCo and here: masses, inertia, accelerations, contact."""
+"""One instant of the robot in MuJoCo and in the kernel: masses, inertia, accelerations, contact."""
 
 from __future__ import annotations
 
@@ -208,7 +208,7 @@ def remember_anything(
 
 
 def internal_state_of(gears: Gears, ground: Ground) -> Floats:
-    """What our kernel carries beside q and v: rotors, then springs along the ground."""
+    """The kernel's internal state: rotors, then springs along the ground."""
     return np.concatenate([*gears.memory, ground.memory.ravel(), []])
 
 

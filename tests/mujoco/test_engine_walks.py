@@ -1,4 +1,4 @@
-"""Whole walks, in MuJoCo and here: first under the same ground forces, then under MuJoCo's own."""
+"""Whole walks in MuJoCo and in the kernel, under equal ground forces and under MuJoCo's own."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def test_what_parts_us_from_mujocos_own_steps_vanishes_with_their_length(
     variant: RobotVariant,
 ) -> None:
     """Semi-implicit Euler is of first order: at 160 kHz it is near our step at the same rate."""
-    # With backlash a shorter walk gets nowhere.
+    # With backlash a shorter walk covers no distance.
     scenario = cycles(0.07 if variant is LOOSE else 0.04, NORMAL_FAST)
     _, log = our_walk("stiff PI", scenario, variant, physics_rate=160_000)
     controller, design, _ = DRIVES["stiff PI"]

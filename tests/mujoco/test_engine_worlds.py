@@ -1,4 +1,4 @@
-"""What a walk may meet, in MuJoCo as here: mishaps, worlds, falls, and nobody who waits."""
+"""Mishaps, worlds, falls and abandoned walks in MuJoCo."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ NOMINAL = np.array([[variable.default for variable in PERTURBATIONS]], dtype=np.
 
 @pytest.mark.variants
 @pytest.mark.parametrize("mishap", MISHAPS)
-def test_mishaps_happen_in_mujoco_as_they_do_here(mishap: str) -> None:
+def test_mishaps_act_in_mujoco_as_in_the_kernel(mishap: str) -> None:
     walk = world_walk(STEP.model_copy(update=MISHAPS[mishap]))
     found = EngineWalk(walk, len(PERTURBATIONS)).run(rows(NOMINAL, 0, 1))
     calm = world_walk(STEP).run(NOMINAL).objectives[0]
@@ -59,7 +59,7 @@ def test_mishaps_happen_in_mujoco_as_they_do_here(mishap: str) -> None:
     assert np.abs(ours[:5] / calm[:5] - 1.0).max() > 2.0 * apart
 
 
-@pytest.mark.thorough("test_mishaps_happen_in_mujoco_as_they_do_here")
+@pytest.mark.thorough("test_mishaps_act_in_mujoco_as_in_the_kernel")
 def test_a_world_is_another_one_in_mujoco_too_but_for_our_own_engine_nothing_changes() -> None:
     """All perturbations at once: masses, soles, battery, gears, noise, delays, slope and start."""
     walk, worlds = world_walk(STEP), sample_worlds(2, 3)
@@ -98,7 +98,7 @@ def test_a_robot_that_falls_or_diverges_ends_so_and_leaves_no_file(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_walk_that_nobody_waits_for_is_broken_off() -> None:
+def test_an_abandoned_walk_is_stopped() -> None:
     case = EngineWalk(world_walk(Scenario.model_validate(UPHILL_WALK)), len(PERTURBATIONS))
     asked: list[bool] = []
 

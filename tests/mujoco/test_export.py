@@ -1,4 +1,4 @@
-"""The exported robot: a model that MuJoCo opens, looks at and lets stand."""
+"""The exported robot as a model that MuJoCo opens, shows and simulates."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A quadruped of other people walks a cycle of its proposed gait in MuJoCo, under our forces."""
+"""A well-known quadruped in its proposed gait, in MuJoCo under the kernel's ground forces."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""A walk in MuJoCo in our own steps, all but the rigid bodies written anew from docs/model.md.
+"""A walk in MuJoCo with the steps of docs/model.md, an oracle of the whole simulator.
 
-Motors, gears, battery and ground are those of sim/mujoco, controllers and objectives are computed
-here and in the modules beside; nothing of the simulator's kernel takes part. From its own log of
-the same walk come the start and the desired angles.
+Rigid bodies are MuJoCo's; motors, gears, battery and ground are those of sim/mujoco, controllers
+and objectives are computed here and in neighbouring modules. The simulator's kernel takes no part,
+but its log provides the start and the desired angles.
 """
 
 from __future__ import annotations

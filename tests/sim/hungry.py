@@ -1,4 +1,4 @@
-"""A program for `LimitedProcesses` that takes too much when it is asked to."""
+"""A program for `LimitedProcesses` that exceeds limits on request."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pinocchio's view of a robot, in our order of joints."""
+"""Pinocchio's view of a robot, in the project's order of joints."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class Oracle:
         return float(0.5 * self.v(v) @ inertia @ self.v(v))
 
     def contact_forces(self, q: np.ndarray, v: np.ndarray) -> tuple[Any, np.ndarray]:
-        """Spatial forces for pin.aba and world forces (L, 3), written anew from eq. 2.13."""
+        """Spatial forces for pin.aba and world forces (L, 3), by eq. 2.13."""
         pin.forwardKinematics(self.model, self.data, self.q(q), self.v(v))
         pin.updateFramePlacements(self.model, self.data)
         external = [pin.Force.Zero() for _ in range(self.model.njoints)]

@@ -1,4 +1,4 @@
-"""Python in a process of its own, which may die or lack what this one has."""
+"""Python in a separate process, which may die or lack modules."""
 
 from __future__ import annotations
 

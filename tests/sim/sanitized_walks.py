@@ -111,7 +111,7 @@ def digest_of_odd_batches(kernel: NativeKernel, robot: Robot) -> str:
         batch = walked(size, log=size % 2 == 1)
         assert len(batch) == size
         digest.update(b"".join(batch))
-    # Whoever takes over a walk has no part in the memory of its call when it has ended. With
+    # A thread that takes over a walk must not use the memory of its call after that has ended. With
     # backlash a walk has sixteen times as many steps.
     with ThreadPoolExecutor(4) as pool:
         calls = [

@@ -1,4 +1,4 @@
-"""Kinds of actuators in a robot.toml: what is read, and what is refused with which words."""
+"""Kinds of actuators in a robot.toml: parsing and error messages."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def test_the_message_has_the_meaning_of_the_kinds_own_field() -> None:
         ("nominal_voltage", "\n", "supply.nominal_voltage: missing; DC motors need it"),
     ],
 )
-def test_dc_motors_need_what_they_ever_needed(begin: str, end: str, said: str) -> None:
+def test_dc_motors_require_the_same_fields_as_before_kinds(begin: str, end: str, said: str) -> None:
     start = DC.toml.index(begin)
     assert said in refusal(DC.toml[:start] + DC.toml[DC.toml.index(end, start) :])
 

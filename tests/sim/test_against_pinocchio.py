@@ -1,4 +1,4 @@
-"""Where our links are, how they move and what energy they have, against Pinocchio."""
+"""Kinematics and energy of the links against Pinocchio."""
 
 from __future__ import annotations
 

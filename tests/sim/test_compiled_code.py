@@ -1,4 +1,4 @@
-"""What compilers and sanitizers say of the C code."""
+"""Compiler warnings and sanitizers on the C code."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def quadruped() -> RobotFiles:
 def test_a_robots_kernel_compiles_without_a_warning(
     robot: RobotVariant | RobotFiles, precision: Precision
 ) -> None:
-    """Beside those that are compiled with sanitizers, and those of every level."""
+    """In addition to those compiled with sanitizers, and those of every level."""
     assert load_kernel(load_robot(robot), precision, extra_flags=STRICT) is not None
 
 
@@ -153,7 +153,7 @@ OTHERS: list[Kind] = [
 
 @pytest.mark.variants("all internal state")
 @pytest.mark.parametrize("kinds", [INTERNAL_STATE, OTHERS], ids=["all internal state", "others"])
-def test_walks_and_falls_read_and_write_what_is_theirs_only(kinds: list[Kind]) -> None:
+def test_walks_and_falls_access_only_their_memory(kinds: list[Kind]) -> None:
     """And what they are compiled from gives no warning."""
     flags = (*sanitizers(), *WARNINGS)
     libraries = [sanitized_kernel(ROBOTS[name], precision, flags) for name, precision in kinds]
@@ -177,7 +177,7 @@ def sanitized_kernel(robot: Robot, precision: Precision, flags: tuple[str, ...])
     return library
 
 
-def test_inferences_read_and_write_what_is_theirs_only() -> None:
+def test_inferences_access_only_their_memory() -> None:
     source = inference_source()
     library = build_library(
         "inference-sanitized", source.encode(), lambda: source, extra_flags=sanitizers()
@@ -186,7 +186,7 @@ def test_inferences_read_and_write_what_is_theirs_only() -> None:
     assert run_sanitized("sanitized_tables()", library) == digest_of_tables(None)
 
 
-def test_the_sanitizers_find_what_they_are_run_for(tmp_path: Path) -> None:
+def test_the_sanitizers_detect_planted_errors(tmp_path: Path) -> None:
     source = (
         "int past_the_end(const int *values, int n) { return values[n]; }\n"
         "int overflow(int value) { return value + 1; }\n"

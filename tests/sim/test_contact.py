@@ -1,4 +1,4 @@
-"""What the ground does to a foot that moves a little faster: the resistances of all laws."""
+"""Resistances of the contact laws: forces of the ground on a slightly faster foot."""
 
 from __future__ import annotations
 
@@ -147,7 +147,7 @@ def test_friction_that_may_stop_a_foot_within_a_step_is_taken_by_its_secant(
     np.testing.assert_allclose((sure - damping * np.outer(UP, UP)) @ slip, 0.0, atol=1e-9)
 
 
-def test_a_foot_slides_for_sure_if_its_friction_takes_little_of_its_speed_in_a_step() -> None:
+def test_a_foot_surely_slides_if_friction_takes_little_of_its_speed_in_a_step() -> None:
     def sliding(mobility: float) -> float:
         foot = Ground("karnopp", mobility).foot
         return float(ca.evalf(foot.sliding(drag=10.0 / 0.1, timestep=1e-3)))

@@ -1,4 +1,4 @@
-"""What the default robot's feet, those of table 2.7, do to its walks."""
+"""Effects of the default robot's feet, those of table 2.7, on its walks."""
 
 from __future__ import annotations
 

@@ -69,7 +69,7 @@ def numbers_that_cancel(n: int) -> Floats:
 
 
 @pytest.mark.parametrize("wanted", WIDTHS, ids=str)
-def test_a_product_that_is_only_a_term_of_sums_is_not_rounded_on_its_own(wanted: Target) -> None:
+def test_a_product_used_only_in_sums_is_fused(wanted: Target) -> None:
     x: Any = ca.SX.sym("x", 4)
     a, b, c, d = x.elements()
     outputs = [a * b + c, c + a * b, c - a * b, a * b - c, a * b + c * d, a * a + c, (a * b) + d]

@@ -1,4 +1,4 @@
-"""Fuzzy inference against scikit-fuzzy, and the integers that the robot runs."""
+"""Fuzzy inference against scikit-fuzzy, and the robot's integers."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ SETS = MembershipSets(
 
 
 def scikit_fuzzy_union(e: float, c: float, w: tuple[float, ...], shape: Shape) -> np.ndarray:
-    """Table 4.3 written once more, with scikit-fuzzy's own functions."""
+    """Table 4.3 implemented with scikit-fuzzy."""
     import skfuzzy  # slow to import
 
     y = np.arange(-50, 51) / 50 * 1.5
@@ -125,7 +125,7 @@ WIDTHS = st.one_of(st.sampled_from([0.01, 0.5, 1.0, 2.0, 10.0]), st.floats(0.01,
         extreme_peak=WIDTHS,
     ),
 )
-def test_the_compiled_table_has_the_same_bits_whatever_the_weights_and_sets(
+def test_the_compiled_table_has_the_same_bits_for_any_weights_and_sets(
     weights: tuple[float, float, float, float], shape: Shape, sets: MembershipSets
 ) -> None:
     axes = {"error": Axis(7, True), "current": CURRENT}
@@ -199,7 +199,7 @@ def test_a_table_of_many_sets_has_the_same_bits(count: int) -> None:
 
 
 @pytest.mark.parametrize(("sets", "rules"), [(33, 16), (16, 17)])
-def test_a_system_larger_than_is_compiled_is_inferred_all_the_same(sets: int, rules: int) -> None:
+def test_a_system_too_large_for_the_compiled_code_is_still_inferred(sets: int, rules: int) -> None:
     outputs = {f"{k}": FuzzySet(0.01 * k, 0.1) for k in range(sets)}
     inputs = {name: {"near": FuzzySet(0.0, 1.0)} for name in ("error", "current")}
     system = Mamdani(

@@ -127,7 +127,7 @@ def test_a_stride_that_a_turn_lengthens_out_of_reach_names_scenario_leg_and_mill
 
 
 @given(st.sampled_from(SCENARIOS), st.floats(0.01, 0.3), st.floats(1.0, 6.0))
-def test_a_walk_can_be_begun_if_all_of_its_angles_can_be_reached(
+def test_a_walk_may_start_if_all_of_its_angles_are_reachable(
     walk: Scenario, stride: float, cycles: float
 ) -> None:
     robot = load_robot("szabadka2")
@@ -141,7 +141,7 @@ def test_a_walk_can_be_begun_if_all_of_its_angles_can_be_reached(
         require_reachable(robot, longer)
 
 
-def test_reach_is_checked_in_no_time_however_long_walk_and_filter_are(robot: Robot) -> None:
+def test_checking_reach_takes_no_longer_for_long_walks_and_filters(robot: Robot) -> None:
     longest = SCENARIOS[0].model_copy(
         update={"cycle_time": 10.0, "cycles": 100.0, "fir_ms": 1000, "fir_window": "hamming"}
     )
@@ -262,7 +262,7 @@ def test_scenarios_and_robots_whose_legs_move_alike_share_a_trajectory(robot: Ro
     ],
     ids=str,
 )
-def test_whatever_a_trajectory_depends_on_makes_it_another(
+def test_trajectories_differ_in_everything_they_depend_on(
     robot: Robot, change: dict[str, object]
 ) -> None:
     usual = desired_angles(robot, SCENARIOS[0])

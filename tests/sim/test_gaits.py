@@ -121,7 +121,7 @@ def test_the_tripod_by_name_is_the_thesiss_half_a_cycle_on(hexapod: Robot) -> No
     np.testing.assert_array_equal(named.angles, own.angles)
 
 
-def test_phases_of_ones_own_are_by_leg(hexapod: Robot) -> None:
+def test_custom_phases_are_given_by_leg(hexapod: Robot) -> None:
     phases = {leg.name: leg.phase for leg in hexapod.description.legs}
     own = level(phases=phases)
     np.testing.assert_array_equal(
@@ -205,7 +205,9 @@ def test_groups_of_legs_are_rows_sides_and_legs(hexapod: Robot, quadruped: Robot
     assert "middle" not in leg_groups(quadruped)
 
 
-def test_a_group_has_a_stride_of_its_own_and_the_smallest_group_counts(hexapod: Robot) -> None:
+def test_a_group_may_have_its_own_stride_and_the_smallest_group_takes_precedence(
+    hexapod: Robot,
+) -> None:
     scenario = level(
         by_group={"stride[front]": 0.05, "stride[left_front]": 0.04, "height[left]": 0.02}
     )
@@ -221,7 +223,7 @@ def test_a_group_has_a_stride_of_its_own_and_the_smallest_group_counts(hexapod: 
     )
 
 
-def test_a_robot_names_groups_of_its_own(quadruped: Robot) -> None:
+def test_a_robot_may_define_groups(quadruped: Robot) -> None:
     files = quadruped_files()
     group = '[leg_groups]\ndiagonal = ["left_front", "right_rear"]\n'
     spine = parse_robot(files.toml + group, files.urdf)

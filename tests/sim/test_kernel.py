@@ -1,4 +1,4 @@
-"""The compiled kernel: same physics as the readable one, same bits wherever a walker is."""
+"""The compiled kernel: same physics as the Python one, same bits in any lane."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ def _sums(kernel: Kernel, setups: Sequence[WalkSetup], robot: Robot) -> list[tup
     return [(result.status, result.sums.tobytes()) for result in results]
 
 
-def test_one_walkers_divergence_and_fall_touch_no_neighbour(robot: Robot) -> None:
+def test_a_diverging_or_falling_walk_does_not_affect_its_neighbours(robot: Robot) -> None:
     kernel = native_kernel(robot)
     assert kernel is not None
     good = _setup(robot, kernel, SHORT)
@@ -134,7 +134,7 @@ def _falling(setup: WalkSetup, kernel: NativeKernel | ReferenceKernel) -> WalkSe
     return dataclasses.replace(setup, parameters=parameters)
 
 
-def test_a_fallen_walkers_log_is_the_same_alone_and_in_company(robot: Robot) -> None:
+def test_a_fallen_walks_log_is_the_same_alone_and_with_others(robot: Robot) -> None:
     kernel, reference = native_kernel(robot), reference_kernel(robot)
     assert kernel is not None
     good = _setup(robot, kernel, SHORT)
@@ -172,7 +172,7 @@ def test_a_walk_whose_internal_state_is_undefined_has_diverged(kind: str) -> Non
     assert np.isfinite(results[1].end).all()
 
 
-def test_what_a_lane_does_after_its_walk_has_ended_does_not_count(robot: Robot) -> None:
+def test_steps_of_a_lane_after_its_walk_do_not_count(robot: Robot) -> None:
     kernel = native_kernel(robot)
     assert kernel is not None
     long = _setup(robot, kernel, SHORT)
@@ -212,14 +212,12 @@ def test_a_table_that_a_kernel_cannot_look_up_is_refused(shape: tuple[int, ...])
 @pytest.mark.parametrize(
     "name", ["angle_step", "current_step", "pwm_step", "pwm_counts", "substeps", "refinement"]
 )
-def test_a_resolution_that_the_kernel_would_divide_by_is_one_at_least(
-    robot: Robot, name: str
-) -> None:
+def test_resolutions_below_one_are_refused(robot: Robot, name: str) -> None:
     with pytest.raises(ValueError, match=f"^{name}: 0 "):
         dataclasses.replace(control_steps(robot)[0], **{name: 0})
 
 
-def test_a_reading_that_is_no_number_has_the_code_0_and_a_large_one_the_last_code(
+def test_a_nan_reading_is_coded_as_0_and_a_large_one_as_the_largest_code(
     robot: Robot,
 ) -> None:
     coding, _ = control_steps(robot)

@@ -1,4 +1,4 @@
-"""In which order walks enter the lanes, and what is left idle."""
+"""Order in which walks enter the lanes, and idle lanes."""
 
 from __future__ import annotations
 

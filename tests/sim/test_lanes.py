@@ -1,4 +1,4 @@
-"""Lanes: a walk's bits do not depend on which one it has, after whom, or beside whom."""
+"""Lanes: a walk's bits do not depend on its lane, its predecessor or its neighbours."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ def lane_use(kernel: NativeKernel, coding: Coding, ticks: Sequence[int]) -> Lane
     return results.lane_use
 
 
-def test_a_call_tells_how_many_rounds_were_walked_and_how_many_computed() -> None:
+def test_a_call_reports_walked_and_computed_rounds() -> None:
     kernel, coding = kernel_and_coding(VARIANTS["dead_zone"])
     n = kernel.lanes
     assert lane_use(kernel, coding, [7]) == LaneUse(walked=7, computed=7 * n)
@@ -139,7 +139,7 @@ def test_a_call_tells_how_many_rounds_were_walked_and_how_many_computed() -> Non
     assert kernel.walk([], coding, log=False).lane_use.share == 1.0
 
 
-def test_a_call_tells_what_control_ticks_took_of_some_rounds_of_each_call() -> None:
+def test_a_call_reports_the_time_of_control_ticks_in_sampled_rounds() -> None:
     kernel, coding = kernel_and_coding(VARIANTS["dead_zone"])
     first = lane_use(kernel, coding, [7])
     assert 0 < first.control < first.timed
@@ -163,7 +163,7 @@ def test_a_control_tick_with_a_landing_takes_as_many_rounds_as_it_has_more_steps
     use = kernel.walk([landing], coding, log=False).lane_use
     extra, rest = divmod(use.walked - landing.ticks, coding.refinement - 1)
     assert rest == 0
-    # Nine ticks are over before the feet come down in the tenth, which is told before it begins.
+    # Nine ticks pass before the feet touch down in the tenth, which is predicted before it begins.
     assert 1 <= extra <= landing.ticks - 9
     reference = reference_kernel(load_robot(VARIANTS["dead_zone"]))
     assert reference.walk([landing], coding, log=False).lane_use.walked == use.walked
@@ -255,7 +255,7 @@ def test_a_call_takes_over_no_walks_of_calls_that_came_after_its_own_walks_had_e
     assert any(takes_over_of_the_earlier_alone() for _ in range(3))
 
 
-def test_walks_whose_logs_are_waited_for_are_not_held_up_by_others() -> None:
+def test_walks_with_logs_are_not_delayed_by_others() -> None:
     kernel, coding = kernel_and_coding(VARIANTS["dead_zone"])
     assert [taken_over(kernel, coding, log=True) for _ in range(3)] == [0, 0, 0]
 
@@ -274,7 +274,7 @@ class Interrupted:
         return int(self.walking)
 
 
-def test_memory_of_an_interrupted_call_is_kept_until_other_threads_have_done_with_it() -> None:
+def test_memory_of_an_interrupted_call_outlives_its_use_by_other_threads() -> None:
     library = Interrupted()
     pool = Pool(cast("ctypes.CDLL", library))
     owner, coding, walkers = np.empty(1), LaneCounts(), (ctypes.c_double * 2)()

@@ -1,4 +1,4 @@
-"""Legs of any names, frames and mounting: their feet, the angles that put them there, limits."""
+"""Legs with any names, frames and mounting: feet, joint angles, limits."""
 
 from __future__ import annotations
 
@@ -52,12 +52,12 @@ def turned(urdf: str) -> str:
 
 
 def renamed(text: str) -> str:
-    """Joints and feet as other people name them."""
+    """Joints and feet with other names."""
     return re.sub(r"(right|left)_(front|rear)_(coxa|femur|tibia|foot)\b", r"\3 of \2 \1", text)
 
 
 def named(toml: str) -> str:
-    """The same names, told to robot.toml."""
+    """The same names in robot.toml."""
     return re.sub(
         r'name = "(right|left)_(front|rear)"',
         r'name = "\2 \1"'
@@ -138,7 +138,7 @@ def test_a_leg_of_turned_frames_puts_its_foot_on_the_path() -> None:
     assert np.abs(np.diff(angles, axis=0)).max() < 0.1
 
 
-def test_a_target_has_the_same_angles_to_the_bit_wherever_it_comes_and_comes_back() -> None:
+def test_equal_targets_have_bit_identical_angles_anywhere_in_a_walk() -> None:
     leg = chain(quadruped())
     begin, way = np.array(leg.foot(leg.stance.tolist())), np.linspace(-1.0, 1.0, 9)[:, None]
     targets = begin + way * [0.03, 0.01, -0.02]
@@ -162,7 +162,7 @@ def test_a_target_out_of_reach_is_missed_by_its_distance() -> None:
     np.testing.assert_allclose(miss, expected, rtol=1e-6)
 
 
-def test_joints_and_feet_of_any_names_walk_as_the_same_robot() -> None:
+def test_names_of_joints_and_feet_do_not_matter() -> None:
     files = quadruped_files()
     as_it_is = RobotFiles(toml=with_stance(files.toml), urdf=files.urdf)
     others = RobotFiles(toml=named(with_stance(files.toml)), urdf=renamed(files.urdf))
@@ -188,7 +188,7 @@ def test_a_stance_beyond_a_limit_is_refused() -> None:
         quadruped(lambda text: text.replace(STANCE, "[0.0, 0.5, -3.0]"))
 
 
-def test_a_turned_leg_without_a_stance_is_told_to_have_one() -> None:
+def test_a_turned_leg_requires_a_stance() -> None:
     files = quadruped_files()
     with pytest.raises(RobotFileError, match=r"give leg 'right_front' of robot\.toml a stance"):
         parse_robot(files.toml, turned(files.urdf))

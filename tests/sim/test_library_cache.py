@@ -1,4 +1,4 @@
-"""Compiled libraries on disk: never loaded damaged, stored for good, swept when of no use."""
+"""Cache of compiled libraries: never loaded damaged, stored durably, swept when unused."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def built(cache: Path, name: str = "answer") -> Path:
 
 
 def replaced(path: Path, content: bytes) -> None:
-    """By rename: what this process has loaded stays as it was."""
+    """By rename: a library loaded by this process is unchanged."""
     other = path.with_suffix(".new")
     other.write_bytes(content)
     other.replace(path)
@@ -87,7 +87,7 @@ def test_a_damaged_library_is_built_again(cache: Path, damage: Callable[[Path], 
 
 
 @DAMAGES
-def test_a_damaged_library_without_a_compiler_is_refused_with_what_to_do(
+def test_a_damaged_library_without_a_compiler_is_refused_with_the_remedy(
     cache: Path, damage: Callable[[Path], None]
 ) -> None:
     library = built(cache)
@@ -124,11 +124,11 @@ def test_an_intact_library_is_loaded_from_a_cache_that_cannot_be_written(
 def test_a_checksum_is_as_sha256sum_writes_it(cache: Path) -> None:
     library = built(cache)
     digest = hashlib.sha256(library.read_bytes()).hexdigest()
-    beside = library.with_name(library.name + ".sha256")
-    assert beside.read_text() == f"{digest}  {library.name}\n"
+    checksum = library.with_name(library.name + ".sha256")
+    assert checksum.read_text() == f"{digest}  {library.name}\n"
 
 
-def test_a_library_that_the_system_cannot_load_says_so(cache: Path) -> None:
+def test_a_library_that_cannot_be_loaded_is_an_error_with_the_remedy(cache: Path) -> None:
     library = built(cache, "unloadable")
     other = cache.parent / "elsewhere" / "gaitswarm"
     other.mkdir(parents=True)
@@ -160,7 +160,7 @@ def test_a_library_is_on_disk_before_it_has_its_name_and_the_name_afterwards(
 
 
 def test_one_builds_at_a_time_also_after_builds_that_failed(cache: Path) -> None:
-    """Each leaves the lock to the next one, and others come meanwhile."""
+    """Each releases the lock to the next one while others arrive."""
     building = threading.Lock()
     overlaps: list[str] = []
 
@@ -199,7 +199,7 @@ def test_a_build_sweeps_what_dead_processes_and_old_versions_left(cache: Path) -
         (cache / name).touch()
         (cache / f"{name}.sha256").touch()
     os.utime(cache / old, (LONG_AGO, LONG_AGO))
-    stay = {"notes.txt", "somebody.lock", "other.so", young, f"{young}.sha256"}
+    stay = {"notes.txt", "unrelated.lock", "other.so", young, f"{young}.sha256"}
     stay |= {f"{held}.lock", f"{held}-k3x.tmp"}
     for name in stay:
         (cache / name).touch()
@@ -220,7 +220,7 @@ def test_a_library_in_use_stays_however_old_it_is(cache: Path) -> None:
 
 
 def stored(cache: Path, name: str, megabytes: int, *, hours_ago: float) -> Path:
-    """A library that another process built and used so long ago."""
+    """A library that another process built and last used at a given age."""
     cache.mkdir(exist_ok=True)
     library = cache / f"kernel-{name}-{'0' * 24}-abcdef01.so"
     library.write_bytes(b"")
@@ -302,7 +302,7 @@ def test_a_library_that_is_removed_before_it_is_loaded_is_built_again(
 
 
 @pytest.mark.parametrize("size", ["much", "-1", "1e9", "1GB"])
-def test_a_size_that_is_no_number_of_bytes_is_named_by_its_variable(
+def test_an_invalid_size_limit_is_refused_by_its_variable(
     cache: Path, monkeypatch: pytest.MonkeyPatch, size: str
 ) -> None:
     monkeypatch.setenv(SIZE_VARIABLE, size)
@@ -368,7 +368,7 @@ def test_a_user_without_a_home_has_the_private_cache(
 
 
 @pytest.mark.parametrize("name", ["a/b", "../../up", "[*]", "nul\0", "", "ü" * 300], ids=ascii)
-def test_any_name_makes_a_file_in_the_cache(cache: Path, name: str) -> None:
+def test_any_robot_name_makes_a_valid_file_name(cache: Path, name: str) -> None:
     library = load_library(name, b"", lambda: SOURCE)
     assert library is not None
     library.answer.restype = ctypes.c_char_p

@@ -1,4 +1,4 @@
-"""Limbs: as Pinocchio reads the URDF, refused by name, and data of a kernel that robots share."""
+"""Limbs as Pinocchio reads the URDF, and as data of a kernel shared by robots."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The filter that smooths desired angles."""
+"""The filter of the desired angles."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a walk tells beside its objectives: currents, heat, power and speed."""
+"""Measurements of a walk besides its objectives: currents, heat, power and speed."""
 
 from __future__ import annotations
 
@@ -86,9 +86,9 @@ def test_power_and_speed_are_those_of_the_objectives() -> None:
 
 def test_measurements_are_an_array_and_back() -> None:
     rows = np.arange(10.0).reshape(2, 5)
-    told = Measurements.of(rows)
-    assert told.motor_heat.tolist() == [2.0, 7.0]
-    np.testing.assert_array_equal(told.array(), rows)
+    measurements = Measurements.of(rows)
+    assert measurements.motor_heat.tolist() == [2.0, 7.0]
+    np.testing.assert_array_equal(measurements.array(), rows)
 
 
 def test_a_failed_walk_has_no_measurements() -> None:
@@ -116,7 +116,7 @@ def test_kernels_agree_on_measurements_under_every_convention(
     np.testing.assert_allclose(fast.outcome.objectives, slow.outcome.objectives, rtol=1e-9)
 
 
-def test_what_braking_gives_back_counts_by_the_convention_and_changes_nothing_else(
+def test_regenerated_energy_counts_by_the_convention_only(
     robot: Robot,
 ) -> None:
     signed, positive, absolute = (

@@ -1,4 +1,4 @@
-"""Compilation: cached, shared, done without, and never half-done."""
+"""Compilation: cached, shared between processes, optional, and atomic."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_a_library_is_compiled_once(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert len(calls) == 2
 
 
-def test_a_refused_source_says_why_and_leaves_nothing(
+def test_a_source_with_errors_is_reported_and_leaves_no_files(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
@@ -83,7 +83,7 @@ def test_a_process_with_a_warm_cache_needs_neither_casadi_nor_pinocchio() -> Non
     assert done.stdout.strip() == "[]", done.stderr
 
 
-def test_without_a_compiler_the_interpreter_serves_and_says_so(tmp_path: Path) -> None:
+def test_without_a_compiler_the_interpreter_runs_with_a_warning(tmp_path: Path) -> None:
     done = run_python(
         "import gaitswarm.sim.compiler.compilation as c\n"
         "from gaitswarm.sim.simulate import prepare\nprint(prepare())",
@@ -167,7 +167,7 @@ def test_a_compiler_that_takes_too_long_is_ended_with_all_that_it_started(tmp_pa
     )
     with ThreadPoolExecutor(1) as pool:
         running = pool.submit(run_python, code, CC=slow, XDG_CACHE_HOME=str(cache))
-        # Opens when the compiler's child does, and ends when nobody holds it open any more.
+        # Opens when the compiler's child does, and ends when no process holds it open.
         assert alive.read_bytes() == b""
         done = running.result()
     assert "KernelBuildError" in done.stderr
@@ -240,7 +240,7 @@ def test_a_kernel_loads_while_another_one_is_compiled(tmp_path: Path) -> None:
     assert done.stdout.split("\n") == ["native", "and the other one was refused", ""], done.stderr
 
 
-def test_integers_wrap_rather_than_let_the_compiler_assume_that_they_never_do() -> None:
+def test_integer_overflow_wraps() -> None:
     source = "int grows(int value) { return value + 1 > value; }"
     library = load_library("wrapping-check", source.encode(), lambda: source)
     assert library is not None
@@ -313,7 +313,7 @@ for name in ["unchanged", *sys.argv[1:]]:
 """
 
 
-def test_a_kernel_is_made_anew_if_a_file_changes_that_its_source_is_made_by(tmp_path: Path) -> None:
+def test_an_identity_changes_with_every_file_that_generates_the_source(tmp_path: Path) -> None:
     used = run_python(
         "import sys\n"
         "from gaitswarm.sim.kernel.emitted import emit_c, pieces, source\n"

@@ -1,4 +1,4 @@
-"""Kernels that a wheel brings: machines without a compiler, and without a cache, walk on them."""
+"""Kernels shipped in a wheel, for machines without a compiler or a cache."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from gaitswarm.sim.simulate import prepare
 print(prepare(RobotVariant(contact_law="karnopp")))
 """
 
-# What the server shows to people: `make page` and `make manual` make it.
+# The page and the manual, made by `make page` and `make manual`.
 BUILT = ("api/page/index.html", "api/manual/docs/index.html")
 
 # ELF's names for machines: EM_X86_64 and EM_AARCH64.
@@ -57,7 +57,7 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ignored = shutil.ignore_patterns("__pycache__", "prebuilt", "page", "manual", "node_modules")
     for name in ("sim", "services", "gaitswarm", "api", "cli"):
         shutil.copytree(ROOT / name, source / name, ignore=ignored, symlinks=True)
-    # With what git ignores, so that a wheel brings it only because it is told to.
+    # With files that git ignores, which a wheel contains only if configured.
     for name in ("pyproject.toml", "README.md", ".gitignore"):
         shutil.copy(ROOT / name, source)
     for built in BUILT:
@@ -106,7 +106,7 @@ def test_a_robot_whose_kernel_the_wheel_does_not_bring_walks_on_the_interpreter(
     assert "no C compiler found" in done.stderr
 
 
-def test_a_damaged_kernel_of_a_wheel_is_refused_with_what_to_do(
+def test_a_damaged_kernel_of_a_wheel_is_refused_with_the_remedy(
     installed: Path, tmp_path: Path
 ) -> None:
     copied = Path(shutil.copytree(installed, tmp_path / "packages"))
@@ -119,7 +119,7 @@ def test_a_damaged_kernel_of_a_wheel_is_refused_with_what_to_do(
 
 
 @pytest.mark.parametrize("built", BUILT)
-def test_a_wheel_brings_what_was_built_for_people(installed: Path, built: str) -> None:
+def test_a_wheel_contains_the_libraries_built_for_release(installed: Path, built: str) -> None:
     assert (installed / "gaitswarm" / built).is_file()
 
 
@@ -159,14 +159,14 @@ def test_a_prebuilt_library_saves_the_compilation_whatever_the_robot_is_called(
         load_library("robot", b"another one", refuse)
 
 
-def test_a_damaged_prebuilt_library_is_compiled_anew_into_the_cache(prebuilt: Path) -> None:
+def test_a_damaged_prebuilt_library_is_recompiled_into_the_cache(prebuilt: Path) -> None:
     (library,) = prebuilt.glob("*.so")
     library.write_bytes(b"")
     assert load_library("robot", b"", lambda: ANSWER) is not None
     assert len(list((prebuilt.parent / "cache").rglob("*.so"))) == 1
 
 
-def test_who_names_a_compiler_gets_what_it_makes(
+def test_a_compiler_named_by_cc_takes_precedence_over_prebuilt_libraries(
     prebuilt: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("CC", "cc")

@@ -1,4 +1,4 @@
-"""High current makes the drive soft, extreme current reverses it (4.3.2, fig. 4.5, Thesis 5)."""
+"""Soft drive at high current, and reversal at extreme current (4.3.2, fig. 4.5, Thesis 5)."""
 
 from __future__ import annotations
 

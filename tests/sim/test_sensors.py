@@ -1,4 +1,4 @@
-"""Sensors with noise and delay, as the kernels have them."""
+"""Sensors with noise and delay in the kernels."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def words(text: str) -> list[int]:
         ),
     ],
 )
-def test_philox_gives_the_known_answers(counter: str, key: str, answer: str) -> None:
+def test_philox_reproduces_published_values(counter: str, key: str, answer: str) -> None:
     """Those of Random123, the authors' library."""
     first, second = np.array(words(key), dtype=np.uint64)
     found = philox(np.array(words(counter), dtype=np.uint64), (first, second))
@@ -66,8 +66,8 @@ def test_philox_gives_the_known_answers(counter: str, key: str, answer: str) -> 
 def readings(errors: SensorErrors, ticks: int, joints: int = 18) -> tuple[Floats, Floats]:
     """Of angles that are the number of the tick, and of no current."""
     sensors = Sensors(errors)
-    told = [sensors.read(np.full(joints, float(t)), np.zeros(joints)) for t in range(ticks)]
-    angles, currents = zip(*told, strict=True)
+    readings = [sensors.read(np.full(joints, float(t)), np.zeros(joints)) for t in range(ticks)]
+    angles, currents = zip(*readings, strict=True)
     return np.array(angles), np.array(currents)
 
 
@@ -94,7 +94,7 @@ def test_noise_is_another_one_with_another_seed() -> None:
 
 
 @pytest.mark.parametrize("delay", [0, 1, LARGEST_DELAY])
-def test_a_delay_shifts_what_is_told_and_begins_with_the_first_reading(delay: int) -> None:
+def test_a_delay_shifts_readings_and_begins_with_the_first_one(delay: int) -> None:
     angles, currents = readings(SensorErrors(angle_delay=delay), 40)
     np.testing.assert_array_equal(angles[:, 0], np.maximum(np.arange(40.0) - delay, 0.0))
     noise = SensorErrors(current_noise=1.0, seed=3)
@@ -117,7 +117,7 @@ def kernel_and_coding(robot: Robot, precision: Precision = "double") -> tuple[Na
     return kernel, control_steps(robot)[0]
 
 
-def test_a_drive_follows_what_its_encoders_told_it(robot: Robot) -> None:
+def test_a_drive_follows_its_encoders_readings(robot: Robot) -> None:
     errors = SensorErrors(angle_noise=1e-3, angle_delay=3, seed=11)
     kernel, coding = kernel_and_coding(robot)
     setup = setup_of(robot, errors)
@@ -125,11 +125,11 @@ def test_a_drive_follows_what_its_encoders_told_it(robot: Robot) -> None:
     assert result.states is not None
     sensors, n = Sensors(errors), robot.n_joints
     angles, duty = result.states[:, 7 : 7 + n], result.states[:, -n:]
-    told = np.array([sensors.read(row, np.zeros(n))[0] for row in angles])
-    counts = setup.desired - np.rint(told * coding.angle_counts)
+    readings = np.array([sensors.read(row, np.zeros(n))[0] for row in angles])
+    counts = setup.desired - np.rint(readings * coding.angle_counts)
     expected = np.clip(counts, -coding.pwm_counts, coding.pwm_counts) * coding.duty_per_count
     np.testing.assert_array_equal(duty, expected)
-    assert np.abs(np.diff(told - angles, axis=0)).max() > 1e-3
+    assert np.abs(np.diff(readings - angles, axis=0)).max() > 1e-3
 
 
 @pytest.mark.variants
@@ -138,7 +138,7 @@ def test_a_drive_follows_what_its_encoders_told_it(robot: Robot) -> None:
     [RobotVariant(name="szabadka2"), RobotVariant(), RobotVariant(backlash=(2.5, 1.0, 1.0))],
     ids=["plain", "filtered", "backlash"],
 )
-def test_kernels_agree_on_bad_sensors(variant: RobotVariant) -> None:
+def test_kernels_agree_on_imperfect_sensors(variant: RobotVariant) -> None:
     robot = load_robot(variant)
     native, coding = kernel_and_coding(robot)
     setup = setup_of(robot, BAD, GUARDED, cycle_time=0.3)
@@ -158,7 +158,7 @@ def bits(result: WalkResult) -> bytes:
 
 
 @pytest.mark.parametrize("precision", ["double", "single"])
-def test_bad_sensors_have_the_same_bits_in_any_lane_and_touch_no_neighbour(
+def test_imperfect_sensors_have_the_same_bits_in_any_lane_and_do_not_affect_neighbours(
     robot: Robot, precision: Precision
 ) -> None:
     kernel, coding = kernel_and_coding(robot, precision)
@@ -186,6 +186,6 @@ def test_bad_sensors_have_the_same_bits_in_any_lane_and_touch_no_neighbour(
         ("seed", -1),
     ],
 )
-def test_errors_that_no_sensor_has_are_refused_by_name(name: str, value: Any) -> None:
+def test_impossible_sensor_errors_are_refused_by_name(name: str, value: Any) -> None:
     with pytest.raises(SimulationInputError, match=f"^{name}: "):
         SensorErrors(**{name: value})

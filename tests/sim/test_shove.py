@@ -101,7 +101,7 @@ def bits(result: WalkResult) -> bytes:
 
 
 @pytest.mark.parametrize("precision", ["double", "single"])
-def test_a_shove_touches_no_neighbour(robot: Robot, precision: str) -> None:
+def test_a_shove_does_not_affect_neighbours(robot: Robot, precision: str) -> None:
     kernel = native_kernel(robot, "single" if precision == "single" else "double")
     assert kernel is not None
     coding, timestep = control_steps(robot)
@@ -120,7 +120,7 @@ def test_a_shove_touches_no_neighbour(robot: Robot, precision: str) -> None:
     assert bits(kernel.walk([never], coding, log=False)[0]) == alone[0]
 
 
-def test_the_published_optimum_walks_on_when_it_is_shoved() -> None:
+def test_the_published_optimum_survives_a_shove() -> None:
     shoved, straight = (find_scenario(name) for name in ("shove-fast", "straight"))
     moved = logged_walk(shoved).base_position[-1, 1] - logged_walk(straight).base_position[-1, 1]
     assert moved > 0.015

@@ -1,4 +1,4 @@
-"""Single precision: twice the lanes, its own bits, results that double precision confirms."""
+"""Single precision: twice the lanes, its own bits, results close to double precision."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Statements of emitted C: each once, after what it reads, and few values kept at a time."""
+"""Order of emitted C statements: each once, after its operands, with few live values."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_the_order_is_the_same_on_every_machine() -> None:
 
 
 def by_the_definition(statements: Sequence[Statement]) -> list[str]:
-    """Operations in order, of which all is asked anew before each."""
+    """Operations in order; preferences are evaluated again before each."""
     operations = [s for s in statements if s.operations]
     number = {name: k for k, s in enumerate(operations) for name in s.defines}
     sources = [{number[name] for name in s.reads if name in number} for s in operations]
@@ -108,7 +108,7 @@ def test_values_that_are_used_late_are_defined_late() -> None:
     assert most_kept(list(ordered(statements))) <= 32
 
 
-def test_while_registers_are_free_nothing_waits_that_others_can_be_done_for() -> None:
+def test_while_registers_are_free_latencies_are_hidden() -> None:
     """Of chains that do not depend on one another, none is written to its end before the others."""
     chains = [
         [value(f"{c}{k}", *([f"{c}{k - 1}"] if k else []), latency=3 * PATIENCE) for k in range(4)]

@@ -1,4 +1,4 @@
-"""What is compiled for which machine, and what a system without POSIX or a compiler does."""
+"""Compilation targets, and systems without POSIX or a compiler."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ INTEL_MAC = (
 
 @pytest.fixture(autouse=True)
 def _asked_anew() -> Iterator[None]:
-    """What was found out of this machine is kept by the process, and so of a faked one."""
+    """Clear cached facts about this machine, before and after a simulated one."""
     target.cache_clear()
     yield
     target.cache_clear()
@@ -78,12 +78,12 @@ def test_arm_of_every_system_has_two_lanes(
     assert target() == Target(2, "", ARM)
 
 
-def test_an_unknown_architecture_has_plain_code(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unknown_architecture_gets_baseline_code(monkeypatch: pytest.MonkeyPatch) -> None:
     pretend(monkeypatch, "Linux", "riscv64")
     assert target() == Target(2, "", "riscv64")
 
 
-def test_macos_says_what_an_intel_mac_can_do(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_macos_reports_the_flags_of_an_intel_mac(monkeypatch: pytest.MonkeyPatch) -> None:
     pretend(monkeypatch, "Darwin", "x86_64")
     asked: list[str] = []
 
@@ -96,7 +96,7 @@ def test_macos_says_what_an_intel_mac_can_do(monkeypatch: pytest.MonkeyPatch) ->
     assert asked[0] == "/usr/sbin/sysctl"
 
 
-def test_a_cpu_that_is_not_known_gets_plain_code(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unknown_cpu_gets_baseline_code(monkeypatch: pytest.MonkeyPatch) -> None:
     pretend(monkeypatch, "Darwin", "x86_64")
 
     def sysctl(*_: object, **__: object) -> str:
@@ -120,7 +120,7 @@ def test_zig_spells_levels_in_its_own_way() -> None:
     ("system", "way_out"),
     [("Linux", "install gcc"), ("Darwin", "xcode-select --install"), ("Windows", "WSL")],
 )
-def test_every_system_has_a_way_out_where_there_is_no_compiler(
+def test_every_system_has_advice_for_a_missing_compiler(
     monkeypatch: pytest.MonkeyPatch, system: str, way_out: str
 ) -> None:
     pretend(monkeypatch, system, platform.machine())
@@ -128,7 +128,7 @@ def test_every_system_has_a_way_out_where_there_is_no_compiler(
     assert way_out in without_compiler()
 
 
-def test_no_compiler_makes_code_for_an_architecture_that_nobody_has() -> None:
+def test_no_compiler_is_found_for_an_unknown_architecture() -> None:
     assert find_compiler("z80") is None or host_architecture() == "z80"
 
 
@@ -160,7 +160,7 @@ main()
 
 
 @pytest.mark.slow
-def test_without_posix_and_a_compiler_the_interpreter_walks_and_says_why() -> None:
+def test_without_posix_and_a_compiler_the_interpreter_runs_with_a_warning() -> None:
     elsewhere, here = (
         run_python(f"{system}{SIMULATE}", CC="") for system in (ANOTHER_SYSTEM, "import sys")
     )

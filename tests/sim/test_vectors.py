@@ -1,4 +1,4 @@
-"""Operations on vectors: the same bits on every target, and the ones that arithmetic asks for."""
+"""Vector operations: the same bits on every target."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def specials(precision: Precision) -> list[float]:
 
 @cache
 def triples(precision: Precision) -> tuple[Reals, ...]:
-    """Special values, numbers of all sizes, and sums that cancel or lie beside a tie."""
+    """Special values, numbers of all sizes, and sums that cancel or are close to a tie."""
     info = np.finfo(TYPES[precision])
     digits, largest = info.nmant + 1, info.maxexp
     ulp, count = 2.0**-info.nmant, 3000

@@ -1,4 +1,4 @@
-"""What pydantic finds wrong is told in plain words, with the way out."""
+"""Plain wording of pydantic's errors, with the remedy."""
 
 from __future__ import annotations
 

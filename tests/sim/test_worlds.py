@@ -263,7 +263,7 @@ def test_bounds_of_table_2_7_span_the_intervals_of_all_legs() -> None:
 def test_every_perturbation_matters() -> None:
     others = {"slope_added": 1.0, "start_angle": 0.01, "angle_noise": 1e-4}
     scenario = short_walk(load=1.0, cycle_time=0.5)
-    # Two ticks are short beside the current's low-pass.
+    # Two ticks are short compared with the current's low-pass.
     values = {v.name: v.high for v in PERTURBATIONS} | {"current_delay": 15.0}
     rows = [others, *(others | {name: values[name]} for name in NAMES)]
     worlds = np.array([[(NOMINAL_VALUES | row)[name] for name in NAMES] for row in rows])

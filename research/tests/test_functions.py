@@ -210,8 +210,8 @@ def test_at_its_step_a_discontinuous_function_is_between_its_two_sides() -> None
 def test_the_pole_is_a_failed_evaluation(function: BenchmarkFunction) -> None:
     x = points(function, 20)
     assert np.isposinf(value(function, moved(x, 1, 0.9))).all()
-    for beside in (0.86, 0.94):
-        failed = np.isposinf(value(function, moved(x, 1, beside)))
+    for near in (0.86, 0.94):
+        failed = np.isposinf(value(function, moved(x, 1, near)))
         assert not failed.any() if function.is_continuous else failed.all()
     for outside in (0.84, 0.96):
         assert np.isfinite(value(function, moved(x, 1, outside))).all()

@@ -1,4 +1,4 @@
-"""Pattern search: what it polls, how its mesh grows and shrinks, where it begins anew."""
+"""Pattern search: what it polls, how its mesh grows and shrinks, where it restarts."""
 
 from __future__ import annotations
 
@@ -76,12 +76,12 @@ def test_the_order_of_a_poll_is_drawn() -> None:
 def test_the_mesh_doubles_after_a_success_and_halves_after_a_failure() -> None:
     values = iter([10.0, 9.0, 8.0, 8.0, 8.0])
 
-    def told(designs: Floats) -> Floats:
+    def feedback(designs: Floats) -> Floats:
         """A poll is worth the next value at its first design, and worse elsewhere."""
         return np.array([next(values)] + [11.0] * (len(designs) - 1))
 
     optimizer = search(PLANE, initial_mesh=2.0**-6)
-    start, first, second, third, fourth = proposals(optimizer, PLANE, told, 5)
+    start, first, second, third, fourth = proposals(optimizer, PLANE, feedback, 5)
     centres = start[0], first[0], second[0], second[0]
     meshes = [
         sizes(centre, poll, PLANE).max()

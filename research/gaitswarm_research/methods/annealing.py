@@ -23,7 +23,7 @@ from gaitswarm_research.methods.local_search import (
 Floats = NDArray[np.float64]
 
 _STEP_CHANGE: Final = 2.0
-"""How strongly a step follows the share of accepted moves: c of Corana et al."""
+"""Sensitivity of a step to the share of accepted moves: c of Corana et al."""
 
 
 class AnnealingSettings(SearchSettings):
@@ -34,21 +34,21 @@ class AnnealingSettings(SearchSettings):
         default=1,
         ge=1,
         le=1_000,
-        description="Chains that are annealed at once, each with its share of the budget.",
+        description="Chains that run at once, each with its share of the budget.",
     )
     sample: int = Field(
         default=10,
         ge=2,
         le=10_000,
-        description="Random designs before each annealing: their spread gives the first"
+        description="Random designs before each annealing: their spread determines the first"
         " temperature, and chains begin at the best.",
     )
     acceptance: float = Field(
         default=0.2,
         gt=0,
         lt=1,
-        description="Share in which a rise as large as the median difference in the sample is"
-        " accepted to begin with.",
+        description="Initial probability to accept a rise as large as the median difference in the"
+        " sample.",
     )
     cooling: float = Field(
         default=1e-4,
@@ -60,7 +60,7 @@ class AnnealingSettings(SearchSettings):
         default=3,
         ge=1,
         le=1_000,
-        description="Moves in each variable at one temperature, after which steps are adapted.",
+        description="Moves in each variable at one temperature, before steps are adapted.",
     )
     step: float = Field(
         default=0.5, gt=0, le=1, description="First step, as a share of each variable's range."
@@ -118,7 +118,7 @@ def _annealings(
 def _anneal(
     chains: list[Chain], temperatures: list[float], cycles: int, random: RandomNumbers
 ) -> Generator[Floats, Floats, list[Point]]:
-    """Anneal chains side by side; returns the best of each."""
+    """Anneal chains in parallel and return the best of each."""
     for temperature in temperatures:
         for _ in range(cycles):
             for j in range(len(chains[0].best.unit)):
@@ -133,23 +133,23 @@ def _anneal(
 
 
 def initial_temperature(fitness: list[float], acceptance: float) -> float:
-    """Give the temperature at which a usual rise is accepted in a given share."""
+    """Return the temperature at which a median rise is accepted with a probability."""
     values = [f for f in fitness if math.isfinite(f)]
     rises = sorted(abs(a - b) for k, a in enumerate(values) for b in values[:k] if abs(a - b) > 0.0)
     return rises[len(rises) // 2] / -math.log(acceptance) if rises else 1.0
 
 
 class Chain:
-    """One chain: where it is, its best, and its step in each variable.
+    """A chain.
 
     Attributes:
-        here: Where it is.
-        best: The best point that it has been at.
+        here: Current point.
+        best: Best point so far.
         steps: (d,) longest step in each variable [unit].
     """
 
     def __init__(self, start: Point, axes: Axes, step: float) -> None:
-        """Begin a chain."""
+        """Start a chain."""
         self.here = start
         self.best = start
         self.steps: Floats = np.maximum(np.full(len(start.unit), step), axes.least)
@@ -170,14 +170,14 @@ class Chain:
                 way = (2.0 * draw - 1.0) * self.steps[j] * space.span[j]
                 way = math.copysign(max(1.0, math.floor(abs(way) + 0.5)), way)
                 there = design[j] + way
-                # Beyond a bound, the other way; in a range too narrow for both, to the bound.
+                # Beyond a bound, move the other way; in a range too narrow for both, to the bound.
                 there = there if space.low[j] <= there <= space.high[j] else design[j] - way
                 design[j] = min(max(there, space.low[j]), space.high[j])
             unit[j] = space.to_unit(space.positions(design[None]))[0, j]
             return unit
         unit[j] += (2.0 * draw - 1.0) * self.steps[j]
         if not 0.0 <= unit[j] <= 1.0:
-            # Corana et al.: a move that leaves the box is drawn anew from all of its range.
+            # Corana et al.: a move that leaves the box is replaced by a uniform draw.
             unit[j] = fallback
         return unit
 
@@ -192,7 +192,7 @@ class Chain:
                 self.best = there
 
     def adapt(self, cycles: int) -> None:
-        """Adapt the steps to what was accepted, and go back to the best."""
+        """Adapt the steps to the accepted moves, and return to the best."""
         share = self._accepted / cycles
         longer = 1.0 + _STEP_CHANGE * (share - 0.6) / 0.4
         shorter = 1.0 / (1.0 + _STEP_CHANGE * (0.4 - share) / 0.4)

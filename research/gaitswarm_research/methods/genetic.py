@@ -1,4 +1,4 @@
-"""The mixed-variable genetic algorithm of the library pymoo."""
+"""Mixed-variable genetic algorithm of the library pymoo."""
 
 from __future__ import annotations
 
@@ -23,16 +23,19 @@ class GaSettings(SearchSettings):
 
     name: Literal["ga"] = "ga"
     population: int = Field(
-        default=25, ge=2, le=10_000, description="Members; the best of all so far stay."
+        default=25,
+        ge=2,
+        le=10_000,
+        description="Members of the population; the best so far survive.",
     )
     offspring: int = Field(
-        default=25, ge=1, le=10_000, description="Designs that are bred for each generation."
+        default=25, ge=1, le=10_000, description="New designs of each generation."
     )
     selection: Literal["random", "tournament"] = Field(
-        default="tournament", description="How parents are chosen; a tournament is of two."
+        default="tournament", description="Selection of parents; tournaments are of two."
     )
     crossover_probability: float = Field(
-        default=0.9, ge=0.0, le=1.0, description="Chance of two parents to be crossed."
+        default=0.9, ge=0.0, le=1.0, description="Probability of two parents to be crossed."
     )
     crossover_eta: float = Field(
         default=15.0,
@@ -41,7 +44,7 @@ class GaSettings(SearchSettings):
         description="Index of simulated binary crossover: the greater, the closer to the parents.",
     )
     mutation_probability: float = Field(
-        default=0.9, ge=0.0, le=1.0, description="Chance of a child to be mutated."
+        default=0.9, ge=0.0, le=1.0, description="Probability of a child to be mutated."
     )
     mutation_eta: float = Field(
         default=20.0,
@@ -57,12 +60,12 @@ def genetic_algorithm(
     budget: int,  # noqa: ARG001 - the same for every budget
     random: RandomNumbers,
 ) -> Proposals:
-    """Search by a population that breeds: MixedVariableGA of pymoo (Blank and Deb 2020).
+    """Search by MixedVariableGA of pymoo (Blank and Deb 2020).
 
-    Real and integer variables by simulated binary crossover and polynomial mutation, choices by
-    uniform crossover and random mutation. Of members and offspring together the best stay, so that
-    all members are elites. No child is the same design as a member. Where none can be bred that is
-    not, it starts anew with another population, and keeps nothing.
+    Real and integer variables use simulated binary crossover and polynomial mutation, choices
+    uniform crossover and random mutation. The best of members and offspring survive. No child has
+    the design of a member. If no new child can be bred, the method restarts with another population
+    and keeps nothing.
     """
     from pymoo.core.evaluator import Evaluator
     from pymoo.core.termination import NoTermination
@@ -79,7 +82,7 @@ def genetic_algorithm(
 
 
 def _generations(algorithm: MixedVariableGA) -> Iterator[Any]:
-    """What is bred, until nothing new can be."""
+    """Yield offspring until nothing new can be bred."""
     while True:
         bred = algorithm.ask()
         if bred is None or not len(bred):
@@ -88,7 +91,7 @@ def _generations(algorithm: MixedVariableGA) -> Iterator[Any]:
 
 
 def _problem(space: Space) -> Problem:
-    """The box in pymoo's variables, by index."""
+    """Convert the box to variables of pymoo, by index."""
     from pymoo.core.problem import Problem
     from pymoo.core.variable import Choice, Integer, Real
 

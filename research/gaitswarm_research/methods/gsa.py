@@ -14,14 +14,14 @@ from gaitswarm.plugins import Proposals, RandomNumbers, SearchSettings, Space, f
 Floats = NDArray[np.float64]
 
 _RANGE: Final = 2.0
-"""Range of every variable in the units of the search: that of the thesis's test functions."""
+"""Range of every variable in units of the search, as in the thesis's test functions."""
 
 _EPSILON: Final = 2.0**-52
-"""Keeps the distance between two masses in one place from being zero."""
+"""Avoids a zero distance between two masses at one place."""
 
 
 class GsaSettings(SearchSettings):
-    """Settings of the gravitational search algorithm; the defaults are the source's."""
+    """Settings of the gravitational search algorithm, with the source's defaults."""
 
     name: Literal["gsa"] = "gsa"
     particles: int = Field(default=25, ge=1, le=10_000, description="Masses.")
@@ -41,23 +41,23 @@ class GsaSettings(SearchSettings):
         default=0.02,
         ge=0.0,
         le=1.0,
-        description="Share of the masses that attract at the end (Kbest), at least one; at the"
-        " start all do.",
+        description="Share of the masses that attract at the end (Kbest), at least one; all attract"
+        " at the start.",
     )
 
 
 def gsa(settings: GsaSettings, space: Space, budget: int, random: RandomNumbers) -> Proposals:
-    """Search by masses that attract each other, the heavier the better they are.
+    """Search by masses that attract each other, better ones being heavier.
 
-    Masses are eq. 14 and 15 of the source, the pull of the Kbest heaviest ones eq. 7 to 10 and 21,
-    the motion eq. 11 and 12, the fall of the gravitational constant eq. 28. The pull does not fall
-    with the square of the distance but with the distance, as there. A variable whose value leaves
-    the box is drawn anew, as in the authors' program. A failed evaluation has no mass.
+    Masses follow eq. 14 and 15 of the source, the attraction by the Kbest heaviest ones eq. 7 to 10
+    and 21, the motion eq. 11 and 12, the decay of the gravitational constant eq. 28. As in the
+    source, the attraction falls with the distance rather than with its square. A variable that
+    leaves the box is redrawn, as in the authors' program. A failed evaluation has no mass.
 
-    The source measures distances in the variables' own units, which here have nothing in common; so
-    every variable is scaled to a range of 2, which nearly all have in the thesis's test functions.
+    The source measures distances in the variables' own units; here every variable is scaled to a
+    range of 2, which nearly all have in the thesis's test functions.
 
-    The schedule takes the budget; after it, all begins anew and nothing is kept.
+    The schedule lasts for the budget; then the method restarts and keeps nothing.
     """
     shape = settings.particles, space.dimension
     iterations = max(math.ceil(budget / settings.particles), 1)
@@ -78,7 +78,7 @@ def gsa(settings: GsaSettings, space: Space, budget: int, random: RandomNumbers)
 
 
 def masses(fitness: Floats) -> Floats:
-    """What masses are of what fitness (eq. 14, 15)."""
+    """Return the masses of fitness values (eq. 14, 15)."""
     alive = np.isfinite(fitness)
     if not alive.any():
         return np.full(len(fitness), 1.0 / len(fitness))
@@ -91,9 +91,9 @@ def masses(fitness: Floats) -> Floats:
 
 
 def accelerations(places: Floats, mass: Floats, attracting: int, random: RandomNumbers) -> Floats:
-    """How the heaviest masses pull each one, for a gravitational constant of 1 (eq. 7 to 10, 21).
+    """Return the accelerations by the heaviest masses for G = 1 (eq. 7 to 10, 21).
 
-    A mass cancels out of its own acceleration, so that one of no mass moves, too.
+    A mass cancels in its own acceleration, so that one without mass moves, too.
     """
     n, d = places.shape
     pull = np.zeros((n, d))

@@ -1,4 +1,4 @@
-"""Mesh adaptive direct search, of the library NOMAD."""
+"""Mesh adaptive direct search of the library NOMAD."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from gaitswarm.plugins import Proposals, RandomNumbers, SearchSettings, Space, S
 Floats = NDArray[np.float64]
 
 _DRAWS: Final = 20
-"""Random starts to draw, at most, before one that was judged already is taken."""
+"""Random starts drawn, at most, before one that was already evaluated is used."""
 
 
 class MadsSettings(SearchSettings):
@@ -33,7 +33,7 @@ class MadsSettings(SearchSettings):
         default=0.1,
         gt=0.0,
         le=1.0,
-        description="First size of the frame that is polled, as a share of each variable's range.",
+        description="Initial frame size, as a share of each variable's range.",
     )
     mesh_tolerance: float = Field(
         default=1e-8,
@@ -61,11 +61,11 @@ def mads(
 ) -> Proposals:
     """Search by polling in directions that become dense: MADS of NOMAD 4 (Audet et al. 2022).
 
-    Orthogonal directions (OrthoMADS, Abramson et al. 2009), 2d of them, in random bases; a poll is
-    judged in blocks of up to `particles` designs, and what is left is dropped after a success. A
-    run begins at a random design. When its mesh is below the tolerance it begins anew at another
-    one, with another seed, and keeps nothing. A random design that fails is left at once. A choice
-    of more than two is an integer to NOMAD, its index. No design is judged twice, but where
+    A poll has 2d orthogonal directions in random bases (OrthoMADS, Abramson et al. 2009). It is
+    evaluated in blocks of up to `particles` designs, and the rest is dropped after a success. A run
+    begins at a random design. When its mesh is below the tolerance, the method restarts at another
+    design with another seed and keeps nothing. A random design that fails is abandoned at once. To
+    NOMAD, a choice of more than two is an integer, its index. No design is evaluated twice unless
     draws find no other.
     """
     known: dict[bytes, float] = {}
@@ -78,7 +78,7 @@ def mads(
         while True:
             centre = _random_design(space, random, known)
             if _keys(centre[np.newaxis])[0] in known:
-                # There is hardly a design left; NOMAD would ask for nothing else.
+                # Hardly any design is left, and NOMAD would propose nothing else.
                 yield space.positions(centre[np.newaxis])
                 continue
             yield from _run(nomad, settings, space, centre, known, random.seed())
@@ -109,12 +109,12 @@ def _run(
         if new:
             values = yield space.positions(designs[new])
             known.update(zip([keys[i] for i in new], values.tolist(), strict=True))
-        told = [known[key] for key in keys]
-        block = nomad.tell([value if math.isfinite(value) else None for value in told])
+        values_of_block = [known[key] for key in keys]
+        block = nomad.tell([v if math.isfinite(v) else None for v in values_of_block])
 
 
 def _parameters(settings: MadsSettings, space: Space, seed: int) -> list[str]:
-    """Parameters of NOMAD."""
+    """Return the parameters of NOMAD."""
     real = ~(space.integer | space.categorical)
     kinds = np.where(real, "R", np.where((space.low == 0.0) & (space.high == 1.0), "B", "I"))
     frames = settings.initial_frame * np.where(real, 1.0, space.span)
@@ -134,13 +134,13 @@ def _parameters(settings: MadsSettings, space: Space, seed: int) -> list[str]:
         "NB_THREADS_PARALLEL_EVAL 1",
         f"NM_SEARCH {yes[settings.simplex]}",
         f"QUAD_MODEL_SEARCH {yes[settings.models and bool(real.any())]}",
-        # NOMAD throws away as many random numbers first, one by one.
+        # NOMAD discards this many random numbers first, one by one.
         f"SEED {seed >> 16}",
     ]
 
 
 def _random_design(space: Space, random: RandomNumbers, known: dict[bytes, float]) -> Floats:
-    """(d,) a design that was not judged yet, if one is found soon."""
+    """Draw (d,) a design that was not evaluated yet, if one is found soon."""
     design = space.designs(space.evenly(random.uniform(1, space.dimension)))
     for _ in range(_DRAWS - 1):
         if _keys(design)[0] not in known:
@@ -151,50 +151,50 @@ def _random_design(space: Space, random: RandomNumbers, known: dict[bytes, float
 
 
 def _keys(designs: Floats) -> list[bytes]:
-    """What tells designs apart, bit by bit."""
+    """Return the bytes of designs."""
     return [row.tobytes() for row in designs + 0.0]
 
 
 _SCRIPT: Final = Path(__file__).with_name("nomad_process.py")
 
 MOST_PROCESSES: Final = 4
-"""Idle processes of NOMAD, at most, that this process keeps."""
+"""Largest number of idle NOMAD processes."""
 
 Block = list[list[float]]
 
 
 class Nomad:
-    """A conversation with NOMAD, whose process is a mere convenience.
+    """A conversation with NOMAD, whose process can be replaced at any time.
 
-    NOMAD says the same again where it is told the same again. So of all conversations the least
-    recently used ones lose their process, and have another one when they go on.
+    NOMAD is deterministic, so a new process reproduces a conversation from its messages. The least
+    recently used conversations lose their process, and start another when they continue.
     """
 
     def __init__(self) -> None:
-        """Begin a conversation; the process starts with the first message."""
+        """Create a conversation; its process starts with the first message."""
         self._said: list[str] = []
         self._process: subprocess.Popen[str] | None = None
-        # Its own reference: a conversation may be closed when this module's names are gone.
+        # A conversation may be closed after this module's names have been deleted.
         self._idle = _IDLE
 
     def begin(
         self, x0: list[float], lower: list[float], upper: list[float], parameters: list[str]
     ) -> Block | None:
-        """Begin a run, where none is under way."""
+        """Begin a run."""
         run = {"x0": x0, "lower": lower, "upper": upper, "parameters": parameters}
         return self._exchange(json.dumps(run))
 
     def tell(self, values: list[float | None]) -> Block | None:
-        """Give what the last points are worth."""
+        """Send the values of the last points, and return the next."""
         return self._exchange(json.dumps({"values": values}))
 
     def close(self) -> None:
-        """End the process, if there is one, and wait until it is gone."""
+        """End the process, if any, and wait for it."""
         self._idle.remove(self)
         self.sleep()
 
     def sleep(self) -> None:
-        """End the process; the conversation can go on with another one."""
+        """End the process; the conversation can continue with another one."""
         process, self._process = self._process, None
         if process is not None:
             process.kill()
@@ -213,11 +213,11 @@ class Nomad:
 
 
 class _Idle:
-    """Conversations that have a process and are not waited for, the least recently used first."""
+    """Idle conversations with a process, the least recently used first."""
 
     def __init__(self) -> None:
         self._order: OrderedDict[int, Nomad] = OrderedDict()
-        # Reentrant: collecting garbage may close a conversation wherever memory is asked for.
+        # Reentrant: garbage collection may close a conversation during any allocation.
         self._lock = threading.RLock()
 
     def add(self, nomad: Nomad) -> None:
@@ -238,19 +238,19 @@ class _Idle:
 
 
 _IDLE: Final = _Idle()
-# Searches that are never closed are collected when this process ends, too late to wait for others.
+# Searches that are never closed are collected at exit, too late to wait for processes.
 atexit.register(_IDLE.sleep)
 
 
 def _start() -> subprocess.Popen[str]:
-    """A process that ends with this one, as its stdin does."""
+    """Start a process that ends with this one, when its stdin closes."""
     return subprocess.Popen(
         [sys.executable, "-P", str(_SCRIPT)],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         text=True,
-        # More threads wait for each other most of the time.
+        # More threads would mostly wait for each other.
         env=os.environ | {"OMP_NUM_THREADS": "1"},
     )
 

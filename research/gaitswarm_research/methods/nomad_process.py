@@ -1,15 +1,15 @@
-"""NOMAD in a process of its own, asked by lines of JSON.
+"""NOMAD in a separate process, controlled by lines of JSON.
 
-It is run as a script, so that it imports PyNomad and nothing of this project. Each line on stdin
-is answered by one on stdout:
+It runs as a script, so that it imports only PyNomad. Each line on stdin is answered by one on
+stdout:
 
     {"x0": [...], "lower": [...], "upper": [...], "parameters": [...]}   begins a run
-    {"values": [...]}         what the points of the last block are worth, null for a failure
+    {"values": [...]}         values of the points of the last block, null for a failure
 
     {"block": [[...], ...]}   points to evaluate
     {"block": null}           the run has ended
 
-It ends when stdin does, also in the middle of a run.
+The process ends when stdin closes, also in the middle of a run.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def main() -> None:
     """Serve runs until stdin ends."""
     import PyNomad
 
-    # NOMAD has messages of its own on stdout, so answers get a copy of it.
+    # NOMAD prints messages to stdout, so answers use a copy of it.
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
 
@@ -52,7 +52,7 @@ def main() -> None:
 
 
 def _receive() -> dict[str, Any]:
-    """The next line. At the end leave at once: an exception would not get through NOMAD."""
+    """Read the next line. Exit at the end, because an exception would not pass through NOMAD."""
     line = sys.stdin.readline()
     if not line:
         os._exit(0)

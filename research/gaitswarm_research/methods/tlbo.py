@@ -22,11 +22,11 @@ from gaitswarm.plugins import (
 Floats = NDArray[np.float64]
 
 _DRAWS: Final = 20
-"""Changes of a duplicate, at most, before it is judged again: a small space may have no other."""
+"""Largest number of changes of a duplicate; a small space may have no other design."""
 
 
 class TlboSettings(SearchSettings):
-    """Settings of teaching-learning-based optimization: the class, and when it is replaced."""
+    """Settings of teaching-learning-based optimization."""
 
     name: Literal["tlbo"] = "tlbo"
     particles: int = Field(default=25, ge=2, le=10_000, description="Learners of the class.")
@@ -34,26 +34,25 @@ class TlboSettings(SearchSettings):
         default=1e-9,
         ge=0.0,
         le=0.1,
-        description="Share of each variable's range; a class that is closer together than this is"
-        " replaced by a new one.",
+        description="Extent, as a share of each variable's range, below which a class is replaced.",
     )
 
 
 @dataclass(slots=True)
 class _Class:
-    """Learners, with what they are worth."""
+    """Learners and their fitness."""
 
     positions: Floats
     fitness: Floats
 
     def learn(self, positions: Floats, fitness: Floats) -> None:
-        """Take over what is better, learner by learner."""
+        """Replace learners by better positions."""
         better = fitness < self.fitness
         self.positions[better] = positions[better]
         self.fitness[better] = fitness[better]
 
     def spread(self, space: Space) -> float:
-        """The largest distance in any variable, as a share of its range."""
+        """Return the largest extent in any variable, as a share of its range."""
         return float(np.max(np.ptp(space.to_unit(self.positions), axis=0)))
 
 
@@ -64,12 +63,11 @@ def tlbo(
     random: RandomNumbers,
     start: Start | None = None,
 ) -> Proposals:
-    """Search by a class that learns from its teacher and from one another, phase by phase.
+    """Search by a class that learns from its teacher and from one another, in phases.
 
-    All learners of a phase are one batch, which sees the class as it was before. A design that was
-    judged already is changed in variables that are drawn, before it is judged: so duplicates, which
-    the authors' program removes, cost no evaluation. A class that has collapsed into one place, or
-    of which everything failed, is replaced by a new one, and nothing is kept.
+    All learners of a phase are one batch, which uses the class before the phase. A design that was
+    already evaluated is changed in random variables first, so duplicates cost no evaluation. A
+    class that has collapsed, or in which every evaluation failed, is replaced and nothing is kept.
 
     Moves are in the variables' own units, as in the source. The teacher phase depends on where a
     variable has its zero.
@@ -94,7 +92,7 @@ def tlbo(
 
 
 def _taught(group: _Class, random: RandomNumbers) -> Floats:
-    """Teacher phase: X + r (teacher - T_F mean), with T_F 1 or 2 of each learner."""
+    """Apply the teacher phase: X + r (teacher - T_F mean), T_F 1 or 2 by learner."""
     n, d = group.positions.shape
     teacher = group.positions[int(np.argmin(group.fitness))]
     factor = 1.0 + np.floor(2.0 * random.uniform(n, 1))
@@ -104,7 +102,7 @@ def _taught(group: _Class, random: RandomNumbers) -> Floats:
 
 
 def _discussed(group: _Class, random: RandomNumbers) -> Floats:
-    """Learner phase: each one goes away from a worse other one, or to a better one."""
+    """Apply the learner phase: move away from a worse learner, or to a better one."""
     n, d = group.positions.shape
     others = (np.arange(n) + 1 + np.floor(random.uniform(n) * (n - 1)).astype(np.intp)) % n
     away = group.fitness < group.fitness[others]
@@ -117,7 +115,7 @@ def _discussed(group: _Class, random: RandomNumbers) -> Floats:
 def _without_duplicates(
     positions: Floats, space: Space, judged: Judged, random: RandomNumbers
 ) -> Floats:
-    """The same positions, but one variable after the other of a judged design drawn anew."""
+    """Redraw variables of positions whose designs were already evaluated, one by one."""
     for row in positions:
         for _ in range(_DRAWS):
             if judged.new(space.designs(row[np.newaxis]))[0]:

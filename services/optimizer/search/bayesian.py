@@ -28,20 +28,20 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 _CANDIDATES: Final = 1_000
-"""Points among which a batch is chosen."""
+"""Number of points among which a batch is chosen."""
 
 _LONGEST: Final = 1.6
 _SHORTEST: Final = 0.5**7
-"""Sides of a trust region, as shares of the box (Eriksson et al. 2019)."""
+"""Longest and shortest side of a trust region, as shares of the box (Eriksson et al. 2019)."""
 
 _SUCCESSES: Final = 3
-"""Batches in a row that improve, after which a trust region is twice as long."""
+"""Improving batches in a row after which the side of the trust region doubles."""
 
 _IMPROVEMENT: Final = 1e-3
-"""Share of the best fitness by which a batch has to improve on it to be a success."""
+"""Relative improvement that makes a batch a success."""
 
 _CHANGED: Final = 20.0
-"""Variables of a candidate that differ from the best design, on average at most."""
+"""Largest average number of variables in which a candidate differs from the best design."""
 
 
 class BayesianSettings(SearchSettings):
@@ -52,11 +52,9 @@ class BayesianSettings(SearchSettings):
         default=None,
         ge=2,
         le=10_000,
-        description="Designs of a Sobol sequence to begin with. Default: 2 d, for d variables.",
+        description="Initial designs of a Sobol sequence. Default: 2 d, for d variables.",
     )
-    batch: int = Field(
-        default=5, ge=1, le=1_000, description="Designs that are chosen by one model."
-    )
+    batch: int = Field(default=5, ge=1, le=1_000, description="Designs chosen by one model.")
     region: float = Field(
         default=0.8,
         gt=_SHORTEST,
@@ -78,15 +76,15 @@ def bayesian(
     random: RandomNumbers,
     start: Start | None = None,
 ) -> Proposals:
-    """Search where a model of the fitness expects the greatest improvement: TuRBO-1 with batches.
+    """Search by expected improvement of a model of the fitness: TuRBO-1 with batches.
 
-    A Gaussian process with a Matern 5/2 kernel, one length a variable (scikit-learn). Candidates
-    lie in a trust region about the best design, which grows with success and shrinks with failure
-    (Eriksson et al. 2019, arXiv 1910.01739). A batch takes the greatest expected improvements one
-    after the other, each as if it had come to what was expected of it (Kriging believer,
-    Ginsbourger et al. 2010). The model sees designs: integers rounded, choices as 0 and 1. Where
-    the region has shrunk to nothing, it starts anew with another sample, and keeps nothing. Bits
-    may differ between processors, as LAPACK's do; it is held to one thread.
+    A Gaussian process with a Matern 5/2 kernel and one length per variable (scikit-learn).
+    Candidates lie in a trust region around the best design, which grows with success and shrinks
+    with failure (Eriksson et al. 2019, arXiv 1910.01739). A batch takes the largest expected
+    improvements one by one, each as if the previous had their expected fitness (Kriging believer,
+    Ginsbourger et al. 2010). The model sees designs: integers rounded, choices as 0 and 1. When the
+    region has become too small, the method restarts with another sample and keeps nothing. Bits may
+    differ between processors because LAPACK's do; it uses one thread.
     """
     known = (np.empty((0, space.dimension)), np.empty(0))
     if start is not None:
@@ -106,7 +104,7 @@ def _region(
     designs: Floats,
     fitness: Floats,
 ) -> Generator[Floats, Floats, None]:
-    """One trust region, until it has shrunk to nothing."""
+    """Search in one trust region until it is too small."""
     length, successes, failures = settings.region, 0, 0
     patience = math.ceil(max(4.0, space.dimension) / settings.batch)
     model = GaussianProcess(space)
@@ -116,23 +114,23 @@ def _region(
         model.fit(designs[near], _bounded(fitness[near]))
         candidates = _candidates(space, random, designs[best], length * model.sides())
         chosen = model.batch(candidates, settings.batch)
-        told = yield space.positions(chosen)
-        improved = _is_better(float(told.min()), float(fitness[best]))
+        feedback = yield space.positions(chosen)
+        improved = _is_better(float(feedback.min()), float(fitness[best]))
         successes, failures = (successes + 1, 0) if improved else (0, failures + 1)
         if successes == _SUCCESSES:
             length, successes = min(2.0 * length, _LONGEST), 0
         elif failures == patience:
             length, failures = 0.5 * length, 0
-        designs, fitness = np.vstack([designs, chosen]), np.append(fitness, told)
+        designs, fitness = np.vstack([designs, chosen]), np.append(fitness, feedback)
 
 
 def _is_better(value: float, best: float) -> bool:
-    """Whether a batch's best is a success; the first that does not fail is one."""
+    """Return whether a batch is a success; the first that does not fail is one."""
     return value < (best - _IMPROVEMENT * abs(best) if math.isfinite(best) else best)
 
 
 def _bounded(fitness: Floats) -> Floats:
-    """Values to model: what is far worse than the median or has failed is as bad as that."""
+    """Standardize fitness for the model, bounding bad and failed values above."""
     finite = fitness[np.isfinite(fitness)]
     if not len(finite):
         return np.zeros(len(fitness))
@@ -143,7 +141,7 @@ def _bounded(fitness: Floats) -> Floats:
 
 
 def _sobol(space: Space, count: int, random: RandomNumbers) -> Floats:
-    """Positions of a scrambled Sobol sequence."""
+    """Return positions of a scrambled Sobol sequence."""
     require_room_for_scipy()
     from scipy.stats.qmc import Sobol  # noqa: PLC0415 - slow to import
 
@@ -153,9 +151,9 @@ def _sobol(space: Space, count: int, random: RandomNumbers) -> Floats:
 
 
 def _candidates(space: Space, random: RandomNumbers, best: Floats, sides: Floats) -> Floats:
-    """Designs in a trust region, of which each differs from the best one in some variables."""
+    """Draw designs in a trust region that differ from the best in some variables."""
     n, d = _CANDIDATES, space.dimension
-    # An integer may always go by one, a choice to any other.
+    # An integer may always move by one, a choice to any other.
     half = np.maximum(0.5 * sides, np.where(space.integer, 1.0 / space.span, 0.0))
     half = np.where(space.categorical, 1.0, half)
     middle = space.to_unit(space.positions(best[np.newaxis]))[0]
@@ -167,14 +165,14 @@ def _candidates(space: Space, random: RandomNumbers, best: Floats, sides: Floats
 
 
 _STEPS: Final = 30
-"""Steps of a fit, at most; the next one begins where it ended."""
+"""Largest number of steps of a fit; the next fit continues from there."""
 
 
 class GaussianProcess:
     """A model of fitness that sees integers rounded and choices as 0 and 1 (scikit-learn)."""
 
     def __init__(self, space: Space) -> None:
-        """Create a model that knows nothing."""
+        """Create a model without data."""
         from sklearn.gaussian_process.kernels import (  # noqa: PLC0415 - optional, slow to import
             ConstantKernel,
             Matern,
@@ -190,12 +188,12 @@ class GaussianProcess:
         self._least = 0.0
 
     def nearest(self, designs: Floats, centre: Floats, most: int) -> NDArray[np.intp]:
-        """Which designs are nearest to one."""
+        """Return the indices of the designs nearest to a centre."""
         offset = self._features(designs) - self._features(centre[np.newaxis])
         return np.sort(np.argsort(np.square(offset).sum(axis=1), kind="stable")[:most])
 
     def fit(self, designs: Floats, values: Floats) -> None:
-        """Fit by the likelihood, from the last fit on."""
+        """Fit by maximum likelihood, starting from the last fit."""
         require_room_for_scipy()
         from scipy.optimize import minimize  # noqa: PLC0415 - slow to import
         from sklearn.gaussian_process import GaussianProcessRegressor  # noqa: PLC0415
@@ -225,7 +223,7 @@ class GaussianProcess:
         self._model, self._least = model, float(values.min())
 
     def sides(self) -> Floats:
-        """Sides of a region that is long where the fitness changes little."""
+        """Return relative sides of a region, long where the fitness changes little."""
         lengths = self._kernel.k1.k2.length_scale
         first = np.cumsum(self._widths()) - self._widths()
         sides: Floats = np.atleast_1d(lengths)[first]
@@ -233,7 +231,7 @@ class GaussianProcess:
         return scaled
 
     def batch(self, candidates: Floats, count: int) -> Floats:
-        """Choose designs by expected improvement, each as if those before were as expected."""
+        """Choose designs by expected improvement, each given the previous ones."""
         require_room_for_scipy()
         from scipy.special import ndtr  # noqa: PLC0415 - slow to import
 
@@ -252,7 +250,7 @@ class GaussianProcess:
             improvement[chosen] = -1.0
             pick = int(np.argmax(improvement))
             chosen.append(pick)
-            # What is known of a design is known of those like it, too.
+            # Condition the covariance on the chosen design.
             row = covariance[pick]
             for earlier in known:
                 row = row - earlier[pick] * earlier
@@ -263,12 +261,12 @@ class GaussianProcess:
         return candidates[chosen + [chosen[-1]] * (count - len(chosen))]
 
     def _widths(self) -> NDArray[np.intp]:
-        """(d,) features of each variable."""
+        """Return (d,) numbers of features by variable."""
         choices = self._space.categorical
         return np.where(choices, self._space.span + 1.0, 1.0).astype(np.intp)
 
     def _features(self, designs: Floats) -> Floats:
-        """(n, k) unit coordinates; of choices, 1 for the one that it is."""
+        """Return (n, k) unit coordinates, choices one-hot encoded."""
         unit = self._space.to_unit(designs)
         columns = []
         for j, width in enumerate(self._widths().tolist()):
@@ -280,14 +278,14 @@ class GaussianProcess:
 
 
 def _one_thread() -> AbstractContextManager[object]:
-    """Hold linear algebra to one thread: another number of them would add in another order."""
+    """Limit linear algebra to one thread, because the order of sums depends on threads."""
     limiter: AbstractContextManager[object] = _linear_algebra().limit(limits=1)
     return limiter
 
 
 @cache
 def _linear_algebra() -> ThreadpoolController:
-    """The libraries that scikit-learn computes with, looked for once a process."""
+    """Return the controller of scikit-learn's libraries, created once per process."""
     import sklearn.gaussian_process  # noqa: F401, PLC0415 - so that they are loaded
     from threadpoolctl import ThreadpoolController  # noqa: PLC0415
 

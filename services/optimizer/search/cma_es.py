@@ -32,7 +32,7 @@ _RESTART: Final = 6
 _LARGEST_POPULATION: Final = 10_000
 
 _FLAT: Final = 1e-4
-"""Share of the fitness that generations gain, at most, if they gain nothing that counts."""
+"""Relative gain in fitness below which generations count as stagnating."""
 
 
 class CmaEsSettings(SearchSettings):
@@ -60,12 +60,11 @@ class CmaEsSettings(SearchSettings):
 
 
 class _CmaEsState(GenerationState):
-    """What `dump` writes.
+    """The dumped state.
 
     Attributes:
-        restarts: How often a new distribution was begun.
+        restarts: Number of distributions before the current one.
         bests: Least fitness of the latest generations.
-        distribution: That is sampled.
     """
 
     restarts: NonNegativeInt
@@ -74,20 +73,20 @@ class _CmaEsState(GenerationState):
 
 
 class CmaEs(Generational[CmaEsSettings, _CmaEsState]):
-    """A normal distribution that adapts to where the better half of its samples is.
+    """A normal distribution that adapts to the better half of its samples.
 
-    dd-CMA-ES (Akimoto and Hansen 2020): the scale of each variable is learned beside, and faster
-    than, how they go together. Only the order of fitness values counts; failures are the last.
+    dd-CMA-ES (Akimoto and Hansen 2020): the scales of the variables are learned separately from
+    their correlations, and faster. Only the order of fitness values counts; failures come last.
 
-    The first distribution is about the box's middle, or about the best of the start positions,
-    which are judged before. One that has converged, or stagnates, is given up for another at a
-    random place, of a larger population (IPOP, Auger and Hansen 2005), which keeps nothing.
+    The first distribution is centred in the box, or at the best of the start positions, which are
+    evaluated first. A distribution that has converged or stagnates is replaced by one at a random
+    place with a larger population (IPOP, Auger and Hansen 2005).
     """
 
     state_model = _CmaEsState
 
     def __init__(self, settings: CmaEsSettings, space: Space, budget: int, seed: int) -> None:
-        """Create a search that has not been asked yet."""
+        """Create a search before its first ask."""
         super().__init__(settings, space, budget, seed)
         self._restarts = 0
         self._bests: list[float] = []
@@ -101,17 +100,17 @@ class CmaEs(Generational[CmaEsSettings, _CmaEsState]):
 
     @property
     def first_size(self) -> int:
-        """Start positions that are learned from, at most."""
+        """Largest number of start positions that are learned from."""
         return self.population
 
     def propose(self) -> Floats:
-        """Sample the distribution; before that, judge the start positions."""
+        """Sample the distribution, after the start positions."""
         if not self.generations and len(self._start):
             return np.empty((0, self.space.dimension))
         return self._distribution.sample(self._random())
 
     def learn(self, positions: Floats, fitness: Floats) -> None:
-        """Adapt to the samples' order, or begin about the best start position."""
+        """Adapt to the order of the samples, or begin at the best start position."""
         if not self.generations and len(self._start):
             best = positions[np.argmin(fitness)]
             self._distribution = self._about(self.space.to_unit(best[np.newaxis])[0])
@@ -128,7 +127,7 @@ class CmaEs(Generational[CmaEsSettings, _CmaEsState]):
             self._bests = []
 
     def memory(self) -> dict[str, Any]:
-        """Give the distribution and what led to it."""
+        """Return the distribution, restarts and recent bests."""
         return {
             "restarts": self._restarts,
             "bests": as_json(self._bests),
@@ -136,7 +135,7 @@ class CmaEs(Generational[CmaEsSettings, _CmaEsState]):
         }
 
     def recall(self, state: _CmaEsState) -> None:
-        """Take on a distribution."""
+        """Restore the distribution, restarts and recent bests."""
         before, self._restarts = self._restarts, state.restarts
         try:
             distribution = self._about(np.full(self.space.dimension, 0.5))
@@ -147,18 +146,18 @@ class CmaEs(Generational[CmaEsSettings, _CmaEsState]):
         self._distribution, self._bests = distribution, of_worth(state.bests).tolist()
 
     def _about(self, mean: Floats) -> NormalDistribution:
-        """A new distribution about a unit position."""
+        """Create a distribution around a unit position."""
         return NormalDistribution(self.space, self.population, mean, self.settings.sigma)
 
     def _random(self) -> RandomNumbers:
-        """Numbers of this generation, from the first on."""
+        """Return the random numbers of this generation."""
         return RandomNumbers(self.seed, _SAMPLE, iteration=self.generations)
 
     def _stagnates(self) -> bool:
-        """Whether the latest third of the generations looked at is no better than the first.
+        """Return whether the latest third of the recent generations is no better than the first.
 
-        Neither in its best nor in its median, as in Hansen's tutorial (2016, B.3), which looks at
-        more generations. They need not be alike: steps of a surface make them differ for ever.
+        Compares best and median, as in Hansen's tutorial (2016, B.3) but over fewer generations.
+        The thirds need not be equal, because a stepped surface makes them differ.
         """
         third = len(self._bests) // 3
         before, after = self._bests[:third], self._bests[-third:]
@@ -166,44 +165,44 @@ class CmaEs(Generational[CmaEsSettings, _CmaEsState]):
 
 
 def _gains(before: float, after: float) -> bool:
-    """Whether one fitness is less than another by what counts."""
+    """Return whether the gain exceeds the threshold."""
     if not math.isfinite(after):
         return False
     return not math.isfinite(before) or before - after > _FLAT * abs(after)
 
 
 _REACH: Final = 2.0
-"""Standard deviations by which the mean may lie beyond a bound, so that most samples are on it."""
+"""Standard deviations by which the mean may lie beyond a bound."""
 
 _WIDEST: Final = 1.0
-"""Standard deviation of a variable, at most, as a share of its range."""
+"""Largest standard deviation of a variable, as a share of its range."""
 
 _OTHERS: Final = 0.5
-"""Samples of a generation that have another integer, or another choice, than most, on average."""
+"""Average number of samples of a generation with another integer or choice than most."""
 
 _CONVERGED: Final = 1e-9
-"""Standard deviation of every real variable, as a share of its range, of one that has converged."""
+"""Standard deviation, as a share of the range, at which a distribution has converged."""
 
 _WORST_CONDITION: Final = 1e7
-"""Of the root of a correlation matrix that can still be decomposed."""
+"""Largest condition of the root of a correlation matrix."""
 
 _NEARLY_DIAGONAL: Final = 2.0
-"""Root of the correlations' condition up to which scales learn at full speed (beta_thresh)."""
+"""Root of the condition up to which scales learn at full speed (beta_thresh)."""
 
 
 class DistributionState(BaseModel):
-    """What `NormalDistribution.dump` writes; unit coordinates.
+    """The dumped state of `NormalDistribution`, in unit coordinates.
 
     Attributes:
         mean: (d,).
         sigma: Overall standard deviation.
-        scale: (d,) of each variable, which `sigma` is multiplied by.
+        scale: (d,) factors of `sigma`.
         correlation: (d, d).
         sigma_path: (d,) evolution path of `sigma`.
         correlation_path: (d,) that of the correlations.
         scale_path: (d,) that of the scales.
-        weights: Of the three paths, how much of its steady state each has reached.
-        chances: Of every choice of each categorical variable.
+        weights: Share of the steady state that each of the three paths has reached.
+        chances: Probabilities of the choices, by categorical variable.
     """
 
     model_config = ConfigDict(extra="forbid", strict=True)
@@ -221,13 +220,13 @@ class DistributionState(BaseModel):
 
 @dataclass(frozen=True, slots=True)
 class _Rates:
-    """How fast a part of the covariance is learned.
+    """Learning rates of a part of the covariance.
 
     Attributes:
-        path: Of the evolution path, c_c.
-        rank_one: Of the path's update, c_1.
-        rank_mu: Of all samples' update, c_mu.
-        weights: (n,) of the samples in order, negative in the worse half (active CMA).
+        path: c_c of the evolution path.
+        rank_one: c_1.
+        rank_mu: c_mu.
+        weights: (n,) weights of the ordered samples, negative in the worse half (active CMA).
     """
 
     path: float
@@ -238,12 +237,10 @@ class _Rates:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Root:
-    """Of a correlation matrix.
+    """Root of a correlation matrix.
 
     Attributes:
-        matrix: (d, d), symmetric; its square is the matrix.
-        inverse: (d, d) of that root.
-        condition: Of that root.
+        matrix: (d, d), symmetric; its square is the correlation matrix.
     """
 
     matrix: Floats
@@ -252,17 +249,16 @@ class _Root:
 
 
 class NormalDistribution:
-    """Samples m + sigma D y, y ~ N(0, C), of dd-CMA-ES; choices have chances of their own.
+    """Distribution m + sigma D y, y ~ N(0, C), of dd-CMA-ES, with probabilities of choices.
 
-    A sample beyond a bound is judged at the bound, and learned from where it was. The mean stays
-    near the box. An integer's scale never falls so far that no sample tries another one (CMA-ES
-    with margin, Hamano et al. 2022), nor do a choice's chances, which are learned as fast as
-    scales. Sums are made in a stated order and no library decomposes, so that bits are the same on
-    all processors.
+    A sample beyond a bound is evaluated at the bound and learned from where it was. The mean stays
+    near the box. The scale of an integer never becomes so small that no sample has another value
+    (CMA-ES with margin, Hamano et al. 2022), nor do probabilities of choices. Sums have a fixed
+    order and matrices are decomposed without a library, so that all processors give the same bits.
     """
 
     def __init__(self, space: Space, size: int, mean: Floats, sigma: float) -> None:
-        """Make one that knows nothing."""
+        """Create an initial distribution."""
         d = space.dimension
         self._space: Final = space
         self._size: Final = size
@@ -286,7 +282,7 @@ class NormalDistribution:
         self._scale_rates: Final = self._rates(float(d))
 
     def sample(self, random: RandomNumbers) -> Floats:
-        """Draw a generation."""
+        """Sample a generation."""
         _, y = self._steps(random)
         unit = self._mean + self._sigma * self._scale * y
         designs = self._space.designs(self._space.from_unit(unit))
@@ -295,7 +291,7 @@ class NormalDistribution:
         return self._space.positions(designs)
 
     def learn(self, random: RandomNumbers, order: NDArray[np.intp]) -> None:
-        """Move towards the better samples."""
+        """Update by the order of the samples."""
         root = self._root()
         z, y = self._steps(random)
         choices = self._choices(random)[order] if self._chosen else None
@@ -305,8 +301,8 @@ class NormalDistribution:
         h_sigma = self._adapt_sigma(product(self._better[np.newaxis], z)[0])
         path_step = h_sigma * self._scale * shift
         squares = np.ascontiguousarray(np.square(z).T).sum(axis=0)
-        # Worse samples far away would take more variance than there is, so each counts as d / |z|^2
-        # (active CMA); one nearby that would count for more than four does for four.
+        # Distant bad samples could remove more variance than there is, so each counts as d / |z|^2
+        # (active CMA), at most four times.
         weight_factor = np.minimum(4.0, self._space.dimension / np.maximum(squares, 1e-12))
         correlation = self._learned_correlation(path_step, y, weight_factor)
         change = self._learned_scale(path_step, z, weight_factor)
@@ -324,13 +320,13 @@ class NormalDistribution:
             self._learn_choices(choices)
 
     def has_converged(self) -> bool:
-        """Whether samples differ in nothing any more, or the covariance cannot be decomposed."""
+        """Return whether all samples are equal or the covariance cannot be decomposed."""
         real = ~(self._space.integer | self._space.categorical)
         widest = float(self._scale[real].max()) if real.any() else math.inf
         return self._sigma * widest < _CONVERGED or self._root().condition > _WORST_CONDITION
 
     def dump(self) -> dict[str, Any]:
-        """Give the whole state, JSON-able."""
+        """Return the complete state, JSON-compatible."""
         return {
             "mean": self._mean.tolist(),
             "sigma": self._sigma,
@@ -344,7 +340,7 @@ class NormalDistribution:
         }
 
     def load(self, state: DistributionState) -> None:
-        """Take on a state of the same space and size."""
+        """Restore a state of the same space and size."""
         d = self._space.dimension
         rows = {
             name: matrix([getattr(state, name)], (1, d), f"distribution.{name}")[0]
@@ -354,7 +350,7 @@ class NormalDistribution:
         if len(state.weights) != len(self._reached):
             raise ValueError(f"distribution.weights: expected {len(self._reached)} of them")
         if [len(row) for row in state.chances] != [len(row) for row in self._chances]:
-            raise ValueError("distribution.chances: of other choices than this job's")
+            raise ValueError("distribution.chances: do not match the choices of this job")
         self._mean, self._sigma, self._scale = rows["mean"], state.sigma, rows["scale"]
         self._correlation, self._decomposed = correlation, None
         self._reached = list(state.weights)
@@ -363,7 +359,7 @@ class NormalDistribution:
         self._chances = [np.array(row) for row in state.chances]
 
     def _rates(self, parameters: float) -> _Rates:
-        """Rates of a part of so many parameters (Akimoto and Hansen 2020, table 1)."""
+        """Return the rates of a part with a number of parameters (table 1)."""
         d, n, mu_eff = self._space.dimension, self._size, self._mu_eff
         root = math.sqrt(d + 1.0)
         c_1 = 1.0 / (2.0 * (parameters / d + 1.0) * root * math.sqrt(root) + 0.5 * mu_eff)
@@ -374,7 +370,7 @@ class NormalDistribution:
         return _Rates(math.sqrt(0.5 * gain * c_1), c_1, c_mu, weights)
 
     def _root(self) -> _Root:
-        """Of the correlations; decomposed once after they have changed."""
+        """Return the root of the correlations, cached until they change."""
         if self._decomposed is None:
             values, vectors = eigen(self._correlation)
             roots = np.sqrt(np.maximum(values, 1e-20))
@@ -386,12 +382,12 @@ class NormalDistribution:
         return self._decomposed
 
     def _steps(self, random: RandomNumbers) -> tuple[Floats, Floats]:
-        """(size, d) z ~ N(0, I) and y ~ N(0, C); the first numbers of a generation."""
+        """Draw (size, d) z ~ N(0, I) and y ~ N(0, C); the first numbers of a generation."""
         z = random.normal(self._size, self._space.dimension)
         return z, product(z, self._root().matrix)
 
     def _choices(self, random: RandomNumbers) -> Floats:
-        """(size, c) choices of the categorical variables; what a generation draws next."""
+        """Draw (size, c) choices of the categorical variables; the next numbers."""
         lots = random.uniform(self._size, len(self._chosen))
         columns = [
             np.minimum(np.searchsorted(np.cumsum(chances), lot, side="right"), len(chances) - 1)
@@ -400,7 +396,7 @@ class NormalDistribution:
         return np.array(columns, dtype=np.float64).T
 
     def _adapt_sigma(self, step: Floats) -> float:
-        """Lengthen or shorten steps (CSA); returns h_sigma, 0 while the other paths wait, or 1."""
+        """Adapt sigma (CSA) and return h_sigma: 0 while the other paths wait, else 1."""
         d, mu_eff = self._space.dimension, self._mu_eff
         rate = (mu_eff + 2.0) / (d + mu_eff + 5.0)
         damping = 1.0 + rate + 2.0 * max(0.0, math.sqrt((mu_eff - 1.0) / (d + 1.0)) - 1.0)
@@ -415,7 +411,7 @@ class NormalDistribution:
         return 1.0 if length / self._reached[0] < (2.0 + 4.0 / (d + 1.0)) * d else 0.0
 
     def _learned_correlation(self, path_step: Floats, y: Floats, weight_factor: Floats) -> Floats:
-        """The covariance of y after this generation; its diagonal has left 1."""
+        """Return the updated covariance of y, whose diagonal is no longer 1."""
         rates = self._correlation_rates
         self._correlation_path, self._reached[1] = self._path(
             rates, self._correlation_path, path_step, self._reached[1]
@@ -429,7 +425,7 @@ class NormalDistribution:
         return self._correlation + rates.rank_one * rank_one + rates.rank_mu * rank_mu
 
     def _learned_scale(self, path_step: Floats, z: Floats, weight_factor: Floats) -> Floats:
-        """(d,) by how much the logarithm of each variance is to change."""
+        """Return (d,) changes of the logarithms of the variances."""
         rates = self._scale_rates
         self._scale_path, self._reached[2] = self._path(
             rates, self._scale_path, path_step, self._reached[2]
@@ -445,16 +441,16 @@ class NormalDistribution:
     def _path(
         self, rates: _Rates, path: Floats, step: Floats, reached: float
     ) -> tuple[Floats, float]:
-        """An evolution path after this generation, and how much of its steady state it has."""
+        """Return an updated evolution path and its share of the steady state."""
         decay, added = 1.0 - rates.path, rates.path * (2.0 - rates.path)
         stalled = not step.any()
         reached = decay * decay * reached + (0.0 if stalled else added)
         return decay * path + math.sqrt(added * self._mu_eff) * step, reached
 
     def _keep_trying_integers(self) -> None:
-        """Widen integers' scales, so that some samples still have other values."""
+        """Widen the scales of integers so that some samples have other values."""
         require_room_for_scipy()
-        from scipy.special import ndtri  # noqa: PLC0415 - slow, and few searches need it
+        from scipy.special import ndtri  # noqa: PLC0415 - slow to import, and few searches need it
 
         away = float(-ndtri(_OTHERS / self._size))
         for j in np.flatnonzero(self._space.integer).tolist():
@@ -466,7 +462,7 @@ class NormalDistribution:
             self._scale[j] = max(self._scale[j], least)
 
     def _learn_choices(self, choices: Floats) -> None:
-        """Move chances towards the better samples' choices, and keep the least one."""
+        """Move probabilities towards the choices of better samples, above the minimum."""
         rate = min(1.0, self._scale_rates.rank_one + self._scale_rates.rank_mu)
         for column, chances in zip(choices.T, self._chances, strict=True):
             taken = [math.fsum(self._better[column == choice]) for choice in range(len(chances))]
@@ -478,29 +474,29 @@ class NormalDistribution:
 
 
 _SWEEPS: Final = 30
-"""More than any matrix needs: convergence is quadratic."""
+"""Upper limit; convergence is quadratic."""
 
 _MOST_TERMS: Final = 1 << 21
-"""Numbers in memory at once, but those of two rows of the result at least: 16 MiB."""
+"""Largest number of terms in memory at once (16 MiB), except for two rows of the result."""
 
 _NEGLIGIBLE: Final = 1e-15
-"""Share of the diagonal below which an element off it is as good as zero."""
+"""Share of the diagonal below which an off-diagonal element counts as zero."""
 
 
 def product(left: Floats, right: Floats) -> Floats:
-    """Matrix product, summed in the order of the inner index."""
+    """Multiply matrices, summing in the order of the inner index."""
     rows = max(2, _MOST_TERMS // max(1, right.size))
     if len(left) > rows:
         blocks = [left[first : first + rows] for first in range(0, len(left), rows)]
         return np.concatenate([product(block, right) for block in blocks])
     terms = left.T[:, :, np.newaxis] * right[:, np.newaxis, :]
-    # Along its first axis, numpy adds one element after the other.
+    # Along the first axis, numpy adds sequentially.
     total: Floats = np.ascontiguousarray(terms).sum(axis=0)
     return total
 
 
 def eigen(symmetric: Floats) -> tuple[Floats, Floats]:
-    """Decompose a symmetric matrix, by Jacobi's rotations (Golub and Van Loan, 8.5)."""
+    """Decompose a symmetric matrix by Jacobi rotations (Golub and Van Loan, 8.5)."""
     a, vectors = (symmetric + symmetric.T) * 0.5, np.eye(len(symmetric))
     for _ in range(_SWEEPS):
         turned = False
@@ -517,7 +513,7 @@ def eigen(symmetric: Floats) -> tuple[Floats, Floats]:
 
 
 def _rotate(a: Floats, vectors: Floats, p: int, q: int) -> None:
-    """Turn in the plane of two coordinates, so that the element between them vanishes."""
+    """Rotate in the plane of two coordinates so that their common element vanishes."""
     off = float(a[p, q])
     ratio = (float(a[q, q]) - float(a[p, p])) / (2.0 * off)
     tangent = math.copysign(1.0, ratio) / (abs(ratio) + math.sqrt(1.0 + ratio * ratio))

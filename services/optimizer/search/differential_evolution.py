@@ -1,4 +1,4 @@
-"""L-SHADE: adaptive differential evolution of a falling population."""
+"""L-SHADE: differential evolution with success-history adaptation and a shrinking population."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ _EVOLVE: Final = 4
 """Purpose of random streams: never renumbered, or stored jobs would change their future."""
 
 _SPREAD: Final = 0.1
-"""Of a scale and a crossover about remembered ones (Tanabe and Fukunaga 2014)."""
+"""Spread of scale and crossover around remembered values (Tanabe and Fukunaga 2014)."""
 
 _DRAWS: Final = 6
-"""Scales that are drawn, of which the first positive one is taken."""
+"""Number of scales drawn; the first positive one is used."""
 
 _CONVERGED: Final = 1e-9
-"""Extent of a population, as a share of each variable's range, below which it starts anew."""
+"""Extent of a population, as a share of each variable's range, below which it restarts."""
 
 
 class DeSettings(SearchSettings):
@@ -47,35 +47,35 @@ class DeSettings(SearchSettings):
         default=4,
         ge=4,
         le=10_000,
-        description="Members at the end of the budget, to which their number falls evenly.",
+        description="Members at the end of the budget; their number falls linearly.",
     )
     best_share: float = Field(
         default=0.1,
         gt=0.0,
         le=1.0,
-        description="Share of the population, of its best, towards one of which a member moves.",
+        description="Share of the best members that a member moves towards.",
     )
     archive: float = Field(
         default=1.0,
         ge=0.0,
         le=10.0,
-        description="Replaced members that are kept to take differences with, in populations.",
+        description="Size of the archive of replaced members, in populations.",
     )
     adaptation: Literal["success-history", "none"] = Field(
         default="success-history",
-        description="Whether scale and crossover are learned from those that had success.",
+        description="Whether scale and crossover are learned from successful trials.",
     )
     memory: int = Field(
-        default=10, ge=1, le=1_000, description="Generations with success that are learned from."
+        default=10, ge=1, le=1_000, description="Successful generations that are remembered."
     )
     scale: float = Field(
-        default=0.5, gt=0.0, le=1.0, description="Scale of differences, F, at first."
+        default=0.5, gt=0.0, le=1.0, description="Initial scale of differences, F."
     )
     crossover: float = Field(
         default=0.9,
         ge=0.0,
         le=1.0,
-        description="Chance of each variable to be changed, CR, at first.",
+        description="Initial probability of a variable to be changed, CR.",
     )
 
     @model_validator(mode="after")
@@ -86,16 +86,14 @@ class DeSettings(SearchSettings):
 
 
 class _PopulationState(GenerationState):
-    """What `dump` writes.
+    """The dumped state.
 
     Attributes:
         began: Evaluations before this population.
-        members: Its positions, none before its first generation was judged.
-        member_fitness: Of each; None where none has succeeded yet.
+        members: Positions of the population, empty before its first generation is evaluated.
+        member_fitness: Fitness of the members; None where none has succeeded yet.
         archive: Positions that were replaced.
-        scales: Remembered ones.
-        crossovers: Remembered ones.
-        successes: Generations with success.
+        successes: Number of successful generations.
     """
 
     began: NonNegativeInt
@@ -108,15 +106,13 @@ class _PopulationState(GenerationState):
 
 
 class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
-    """A population of which each member is replaced by its trial, if that is no worse.
+    """A population in which each member is replaced by its trial if that is no worse.
 
-    The `de` of job specs is L-SHADE (Tanabe and Fukunaga, CEC 2014): current-to-pbest/1 with an
-    archive, binomial crossover, success-history adaptation, a population that falls over the budget
-    and is then small enough to converge.
+    L-SHADE (Tanabe and Fukunaga, CEC 2014): current-to-pbest/1 with an archive, binomial crossover,
+    success-history adaptation, and a population that shrinks over the budget so that it converges.
 
-    Members are real in integer variables, too; whoever evaluates them rounds. A trial of a design
-    that the population has already, or another trial, has one variable drawn anew. A population
-    that has converged is given up for a new one, of which the former keeps nothing.
+    Members are real in integer variables, too. A trial whose design the population or another trial
+    already has gets one random variable. A population that has converged is replaced by a new one.
     """
 
     state_model = _PopulationState
@@ -128,7 +124,7 @@ class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
     _crossovers: Floats
 
     def __init__(self, settings: DeSettings, space: Space, budget: int, seed: int) -> None:
-        """Create a search that has not been asked yet."""
+        """Create a search before its first ask."""
         super().__init__(settings, space, budget, seed)
         self._begin()
 
@@ -139,11 +135,11 @@ class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
 
     @property
     def population(self) -> Floats:
-        """(n, d) the members' positions, (0, d) before their first generation was judged."""
+        """(n, d) positions of the members, (0, d) before their first generation is evaluated."""
         return self._members.copy()
 
     def propose(self) -> Floats:
-        """Scatter a population, or make a trial of each member."""
+        """Sample a population, or create a trial of each member."""
         random = self._random()
         if not len(self._members):
             return latin_hypercube(self.space, self.settings.population, random)
@@ -162,7 +158,7 @@ class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
             self._begin()
 
     def memory(self) -> dict[str, Any]:
-        """Give the population, its archive and what it has learned."""
+        """Return the population, its archive and its memory."""
         return {
             "began": self._began,
             "members": self._members.tolist(),
@@ -174,7 +170,7 @@ class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
         }
 
     def recall(self, state: _PopulationState) -> None:
-        """Take on a population, its archive and what it had learned."""
+        """Restore the population, its archive and its memory."""
         settings, d = self.settings, self.space.dimension
         size = len(state.members)
         least = settings.population_end if size else 0
@@ -200,7 +196,7 @@ class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
         self._began, self._successes = state.began, state.successes
 
     def _begin(self) -> None:
-        """Know nothing, as at the start."""
+        """Reset to the start."""
         settings, d = self.settings, self.space.dimension
         self._began = self.evaluations
         self._members, self._fitness_of_members = np.empty((0, d)), np.empty(0)
@@ -210,11 +206,11 @@ class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
         self._successes = 0
 
     def _random(self) -> RandomNumbers:
-        """Numbers of this generation, from the first on."""
+        """Return the random numbers of this generation."""
         return RandomNumbers(self.seed, _EVOLVE, iteration=self.generations)
 
     def _parameters(self, random: RandomNumbers) -> tuple[Floats, Floats]:
-        """(n,) scale and (n,) crossover of each trial; the first numbers of a generation."""
+        """Draw (n,) scales and (n,) crossovers; the first numbers of a generation."""
         n = len(self._members)
         chosen = indices(random.uniform(n), self.settings.memory)
         scales, crossovers = self._scales[chosen], self._crossovers[chosen]
@@ -228,7 +224,7 @@ class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
         return np.minimum(np.where(scale > 0.0, scale, scales), 1.0), crossover
 
     def _mutants(self, random: RandomNumbers, scale: Floats) -> Floats:
-        """current-to-pbest/1: towards one of the best, and by a difference of two others."""
+        """Move members towards one of the best and by a difference of two others."""
         space, members = self.space, self._members
         n, me = len(members), np.arange(len(members))
         order = np.argsort(self._fitness_of_members, kind="stable")
@@ -237,7 +233,7 @@ class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
         one = (me + 1 + indices(random.uniform(n), n - 1)) % n
         pool = np.concatenate([members, self._archive])
         other = indices(random.uniform(n), len(pool) - 2)
-        # Neither the member itself nor the first of the two.
+        # Excludes the member itself and the first of the two.
         other += other >= np.minimum(me, one)
         other += other >= np.maximum(me, one)
         first, second = members[one], pool[other]
@@ -248,7 +244,7 @@ class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
         return with_choices(space, mutants, (best, first, second), random)
 
     def _select(self, trials: Floats, fitness: Floats) -> None:
-        """Let trials that are no worse take their members' places."""
+        """Replace members by trials that are no worse."""
         before, better = self._fitness_of_members, fitness < self._fitness_of_members
         if better.any():
             self._archive = np.concatenate([self._archive, self._members[better]])
@@ -258,7 +254,7 @@ class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
         self._fitness_of_members = np.where(taken, fitness, before)
 
     def _remember(self, better: NDArray[np.bool_], gain: Floats) -> None:
-        """Keep what had success, by how much it gained, in place of the oldest memory."""
+        """Replace the oldest memory by successful values, weighted by their gains."""
         if self.settings.adaptation == "none":
             return
         scale, crossover = self._parameters(self._random())
@@ -268,7 +264,7 @@ class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
         self._successes += 1
 
     def _shrink(self) -> None:
-        """Let the worst members go, and the oldest of the archive."""
+        """Remove the worst members, and the oldest of the archive."""
         settings = self.settings
         done = (self.evaluations - self._began) / max(1, self.budget - self._began)
         fall = settings.population - settings.population_end
@@ -284,7 +280,7 @@ class DifferentialEvolution(Generational[DeSettings, _PopulationState]):
 
 
 def gains(before: Floats, after: Floats) -> Floats:
-    """By how much trials are better than their members."""
+    """Return by how much trials are better than their members."""
     known = np.isfinite(before) & np.isfinite(after)
     gain = np.where(known, np.where(known, before, 0.0) - np.where(known, after, 0.0), 0.0)
     greatest = float(gain.max()) if (gain > 0.0).any() else 1.0
@@ -292,17 +288,17 @@ def gains(before: Floats, after: Floats) -> Floats:
 
 
 def lehmer_mean(values: Floats, weights: Floats) -> float:
-    """Weighted Lehmer mean, of sums that are rounded once, so that their order does not matter."""
+    """Return the weighted Lehmer mean; exact sums make it independent of the order."""
     total = math.fsum(weights * values)
     return math.fsum(weights * values * values) / total if total > 0.0 else 0.0
 
 
 _ANY_CHOICE: Final = 0.1
-"""Chance that a changed categorical variable takes any of its choices, not another member's."""
+"""Probability that a changed categorical variable takes a random choice."""
 
 
 def latin_hypercube(space: Space, count: int, random: RandomNumbers) -> Floats:
-    """Scatter positions so that each variable has one in each of `count` equal parts."""
+    """Sample positions with one in each of `count` equal parts of every variable."""
     d = space.dimension
     cells = np.array([random.permutation(count) for _ in range(d)], dtype=np.float64).T
     return space.evenly((cells + random.uniform(count, d)) / count)
@@ -311,7 +307,7 @@ def latin_hypercube(space: Space, count: int, random: RandomNumbers) -> Floats:
 def with_choices(
     space: Space, mutants: Floats, givers: tuple[Floats, Floats, Floats], random: RandomNumbers
 ) -> Floats:
-    """Give mutants their choices, which have no differences: a giver's, or now and then any."""
+    """Set the choices of mutants, which have no differences: a giver's, or a random one."""
     lot, share = random.uniform(*mutants.shape), (1.0 - _ANY_CHOICE) / 3.0
     conditions = [lot < share, lot < 2.0 * share, lot < 3.0 * share]
     anything = space.from_unit((lot - 3.0 * share) / _ANY_CHOICE)
@@ -319,7 +315,7 @@ def with_choices(
 
 
 def crossed(parents: Floats, mutants: Floats, crossover: Floats, random: RandomNumbers) -> Floats:
-    """Binomial crossover: of the mutant, at least one variable."""
+    """Apply binomial crossover with at least one variable of the mutant."""
     n, d = mutants.shape
     changed = random.uniform(n, d) < crossover[:, np.newaxis]
     changed[np.arange(n), indices(random.uniform(n), d)] = True
@@ -329,7 +325,7 @@ def crossed(parents: Floats, mutants: Floats, crossover: Floats, random: RandomN
 def without_duplicates(
     space: Space, members: Floats, trials: Floats, random: RandomNumbers
 ) -> Floats:
-    """Draw one variable anew of a trial whose design is a member's or another trial's, too."""
+    """Randomize one variable of each trial whose design a member or another trial has."""
     n, d = trials.shape
     variable, anything = indices(random.uniform(n), d), space.evenly(random.uniform(n, d))
     seen = {design.tobytes() for design in space.designs(members)}
@@ -341,5 +337,5 @@ def without_duplicates(
 
 
 def indices(uniform: Floats, count: int) -> NDArray[np.intp]:
-    """Choose from `count` things."""
+    """Convert uniform numbers to indices below `count`."""
     return (uniform * count).astype(np.intp)

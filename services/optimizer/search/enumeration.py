@@ -46,7 +46,7 @@ class Enumeration:
 
     @property
     def evaluations(self) -> int:
-        """Number of positions told so far."""
+        """Number of positions evaluated so far."""
         return self._evaluations
 
     def start_from(self, positions: Floats) -> None:
@@ -55,7 +55,7 @@ class Enumeration:
             raise ValueError(f"start_from(): {self._name} does not accept start positions")
 
     def ask(self, most: int | None = None) -> Floats:
-        """Return the positions to evaluate next; the same ones until they are told."""
+        """Return the positions to evaluate next; the same ones until their fitness is known."""
         if not self._asked:
             self._asked = self._particles if most is None else min(most, self._particles)
         return self._positions(self._evaluations, self._evaluations + self._asked)

@@ -33,10 +33,10 @@ class GenerationState(BaseModel):
 
     Attributes:
         iteration: Completed tells.
-        evaluations: Positions told so far.
+        evaluations: Positions evaluated so far.
         generations: Generations learned from.
         positions: The current generation, empty before the first.
-        fitness: Fitness of the positions that were told, in order.
+        fitness: Fitness of its first positions, as far as it is known.
         asked: Number of the following positions that are asked for.
     """
 
@@ -99,7 +99,7 @@ class Generational(ABC, Generic[S, G]):
 
     @property
     def evaluations(self) -> int:
-        """Number of positions told so far."""
+        """Number of positions evaluated so far."""
         return self._evaluations
 
     def start_from(self, positions: Floats) -> None:
@@ -108,7 +108,7 @@ class Generational(ABC, Generic[S, G]):
         self._start = checked_start(positions, self.space, begun=begun)
 
     def ask(self, most: int | None = None) -> Floats:
-        """Return the positions to evaluate next; the same ones until they are told."""
+        """Return the positions to evaluate next; the same ones until their fitness is known."""
         done = len(self._fitness)
         if not self._asked:
             if done == len(self.positions):

@@ -1,4 +1,4 @@
-"""HypE: a population that is selected for the hypervolume that it dominates."""
+"""HypE: a population selected for the hypervolume it dominates (Bader and Zitzler 2011)."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _SAMPLE: Final = 8
 """Purposes of random streams: never renumbered, or stored jobs would change their future."""
 
 _CONVERGED: Final = 1e-9
-"""Extent of a population, as a share of each variable's range, below which it starts anew."""
+"""Extent of a population, as a share of each variable's range, below which it restarts."""
 
 
 class HypeSettings(SearchSettings):
@@ -43,9 +43,7 @@ class HypeSettings(SearchSettings):
 
     name: Literal["hype"] = "hype"
     population: int = Field(default=40, ge=4, le=500, description="Members of the population.")
-    offspring: int = Field(
-        default=25, ge=1, le=500, description="Designs that are made for each generation."
-    )
+    offspring: int = Field(default=25, ge=1, le=500, description="New designs of each generation.")
     scale_least: float = Field(
         default=0.4, gt=0.0, le=1.0, description="Least scale of differences, F."
     )
@@ -59,7 +57,7 @@ class HypeSettings(SearchSettings):
         default=4_000,
         ge=100,
         le=20_000,
-        description="Points by which hypervolumes are estimated.",
+        description="Random points by which hypervolumes are estimated.",
     )
 
     @model_validator(mode="after")
@@ -83,12 +81,12 @@ class _PopulationState(GenerationState):
 
 
 class Hype(Generational[HypeSettings, _PopulationState]):
-    """A population of which those stay that dominate the most hypervolume together.
+    """A population whose members together dominate the largest hypervolume.
 
-    Selection is that of HypE (Bader and Zitzler 2011): of members and trials together, whole Pareto
-    fronts stay as long as there is room, and of the next one those whose hypervolume is the
-    greatest. Variation is that of differential evolution, current-to-best/1: a member that won a
-    tournament moves towards another winner and by a difference of two members.
+    Selection is that of HypE (Bader and Zitzler 2011): of members and trials together, complete
+    Pareto fronts survive as long as there is room; of the next front, the designs with the largest
+    hypervolume survive. Variation is that of differential evolution, current-to-best/1: the winner
+    of a tournament moves towards another winner and by a difference of two members.
 
     The fitness that `Generational` handles is (n, M) objective vectors here; a vector with any +inf
     belongs to a failed evaluation.
@@ -100,7 +98,7 @@ class Hype(Generational[HypeSettings, _PopulationState]):
     _vectors: Floats
 
     def __init__(self, settings: HypeSettings, space: Space, budget: int, seed: int) -> None:
-        """Create a search that has not been asked yet."""
+        """Create a search before its first ask."""
         super().__init__(settings, space, budget, seed)
         self._begin()
 
@@ -111,12 +109,12 @@ class Hype(Generational[HypeSettings, _PopulationState]):
 
     @property
     def population(self) -> tuple[Floats, Floats]:
-        """(n, d) positions and (n, M) objective vectors of the members; none at first."""
+        """(n, d) positions and (n, M) objective vectors of the members; empty at first."""
         return self._members.copy(), self._vectors.copy()
 
     @property
     def objectives(self) -> int | None:
-        """Number of objectives, M; None before the first vectors are told."""
+        """Number of objectives, M; None before the first feedback."""
         vectors = self._vectors if len(self._vectors) else self._fitness
         return vectors.shape[1] if len(vectors) else None
 
@@ -134,14 +132,14 @@ class Hype(Generational[HypeSettings, _PopulationState]):
         return vectors_of(values, "fitness")
 
     def propose(self) -> Floats:
-        """Scatter a population, or make trials."""
+        """Sample a population, or create trials."""
         random = RandomNumbers(self.seed, _VARY, iteration=self.generations)
         if not len(self._members):
             return latin_hypercube(self.space, self.settings.population, random)
         return self._trials(random)
 
     def learn(self, positions: Floats, fitness: Floats) -> None:
-        """Let the best of members and trials be the population."""
+        """Select the next population from members and trials."""
         pool = np.concatenate([self._members, positions])
         vectors = np.concatenate([self._vectors, fitness]) if len(self._vectors) else fitness
         kept = self.best(vectors, min(len(pool), self.settings.population))
@@ -150,7 +148,7 @@ class Hype(Generational[HypeSettings, _PopulationState]):
             self._begin()
 
     def best(self, fitness: Floats, count: int) -> Indices:
-        """Choose whole fronts, and of the next one those that dominate the most hypervolume."""
+        """Choose complete fronts, and of the next one the largest hypervolume."""
         ranks = pareto_ranks(fitness)
         kept = np.empty(0, dtype=np.intp)
         for rank in range(int(ranks.max()) + 1):
@@ -162,26 +160,26 @@ class Hype(Generational[HypeSettings, _PopulationState]):
         return np.sort(kept)
 
     def memory(self) -> dict[str, Any]:
-        """Give the population."""
+        """Return the population."""
         return {"members": self._members.tolist(), "vectors": self.written(self._vectors)}
 
     def recall(self, state: _PopulationState) -> None:
-        """Take on a population."""
+        """Restore a population."""
         size, most = len(state.members), self.settings.population
         if size > most:
             raise ValueError(f"members: {size} of them, more than {most}")
         if len(state.vectors) != size:
             raise ValueError(f"vectors: {len(state.vectors)} of them, not {size}")
         vectors = vectors_of(state.vectors, "vectors")
-        told = vectors_of(state.fitness, "fitness")
-        if len(told) and size and told.shape[1] != vectors.shape[1]:
-            raise ValueError(f"fitness: vectors of {told.shape[1]}, not {vectors.shape[1]}")
+        current = vectors_of(state.fitness, "fitness")
+        if len(current) and size and current.shape[1] != vectors.shape[1]:
+            raise ValueError(f"fitness: vectors of {current.shape[1]}, not {vectors.shape[1]}")
         shape = (size, self.space.dimension)
         self._members = self.inside(matrix(state.members, shape, "members"), "members")
         self._vectors = vectors
 
     def _begin(self) -> None:
-        """Know nothing, as at the start."""
+        """Reset to the start."""
         self._members, self._vectors = np.empty((0, self.space.dimension)), np.empty((0, 0))
 
     def _hypervolume(self, front: Floats) -> SampledHypervolume:
@@ -189,7 +187,7 @@ class Hype(Generational[HypeSettings, _PopulationState]):
         return SampledHypervolume(front, self.settings.samples, random)
 
     def _trials(self, random: RandomNumbers) -> Floats:
-        """Winners of tournaments, moved towards others and by differences of any two members."""
+        """Move winners of tournaments towards others and by differences of any two members."""
         settings, space, members = self.settings, self.space, self._members
         n, m = settings.offspring, len(members)
         places = self._places()
@@ -198,7 +196,7 @@ class Hype(Generational[HypeSettings, _PopulationState]):
         least, most = settings.scale_least, settings.scale_most
         scale = least + (most - least) * random.uniform(n, 1)
         parents, best = members[own], members[towards]
-        # What goes beyond a bound is brought to it: the best designs often lie at some.
+        # Clipped to the bounds: the best designs often lie at some.
         moved = parents + scale * (best - parents) + scale * (one - other)
         mutants = np.clip(moved, space.low, space.high)
         mutants = with_choices(space, mutants, (best, one, other), random)
@@ -206,7 +204,7 @@ class Hype(Generational[HypeSettings, _PopulationState]):
         return without_duplicates(space, members, trials, random)
 
     def _places(self) -> Indices:
-        """(m,) place of each member, 0 the best: by its front, then by its share in it."""
+        """Return (m,) places of the members, 0 the best: by front, then by share of it."""
         ranks = pareto_ranks(self._vectors)
         shares = np.zeros(len(ranks), dtype=np.int64)
         for rank in range(int(ranks.max()) + 1):
@@ -216,7 +214,7 @@ class Hype(Generational[HypeSettings, _PopulationState]):
         return np.argsort(np.lexsort((-shares, ranks)))
 
     def _winners(self, places: Indices, random: RandomNumbers) -> Indices:
-        """(offspring,) the better of two members that are drawn, each."""
+        """Return (offspring,) winners of two random members each."""
         n, m = self.settings.offspring, len(places)
         one, other = indices(random.uniform(n), m), indices(random.uniform(n), m)
         return np.where(places[one] <= places[other], one, other)
@@ -248,10 +246,10 @@ def pareto_ranks(vectors: Floats) -> Indices:
 
 
 class SampledHypervolume:
-    """The box that a front dominates, estimated from points that are drawn in it.
+    """The hypervolume that a front dominates, estimated from random points.
 
-    The front is scaled to [0, 1] between its least and its greatest value in each objective; the
-    box ends at the reference point, a tenth beyond.
+    The front is scaled to [0, 1] in each objective; the box ends at the reference point, a tenth
+    beyond.
     """
 
     def __init__(self, front: Floats, samples: int, random: RandomNumbers) -> None:
@@ -266,15 +264,15 @@ class SampledHypervolume:
         self._covers: Final = covers
 
     def shares(self) -> NDArray[np.int64]:
-        """How much is dominated by each vector alone."""
+        """Return how many points each vector alone dominates."""
         alone = self._covers.sum(axis=0) == 1
         return np.asarray((self._covers & alone).sum(axis=1), dtype=np.int64)
 
     def chosen(self, count: int) -> Indices:
-        """Choose the vectors that dominate the most together (HypE; Bader and Zitzler 2011).
+        """Choose the vectors that together dominate the largest hypervolume.
 
-        One after the other goes whose loss is the least to be expected, if of all that have to go
-        the others were drawn at random (equations 12 and 13 of the paper).
+        Vectors are removed one by one, always the one with the least expected loss if the other
+        vectors to remove were drawn at random (HypE, equations 12 and 13).
         """
         kept = np.arange(len(self._covers))
         covered = self._covers.sum(axis=0)
@@ -288,9 +286,9 @@ class SampledHypervolume:
 
 
 def _weights(size: int, going: int) -> NDArray[np.int64]:
-    """(size + 1,) share of a point in the loss of each of so many vectors that dominate it.
+    """Return (size + 1,) weights of a point by the number of vectors that dominate it.
 
-    It is lost only where all the others that dominate it go as well.
+    A point is lost only if all vectors that dominate it are removed.
     """
     weights, chance = np.zeros(size + 1), 1.0
     for others in range(min(size, going)):
@@ -300,7 +298,7 @@ def _weights(size: int, going: int) -> NDArray[np.int64]:
 
 
 def vectors_of(rows: list[Worth], name: str) -> Floats:
-    """Read objective vectors of a dumped state."""
+    """Convert objective vectors of a dumped state."""
     if len({len(row) for row in rows}) > 1 or any(not row for row in rows):
         raise ValueError(f"{name}: vectors of one length were expected")
     return np.array([of_worth(row) for row in rows], dtype=np.float64)

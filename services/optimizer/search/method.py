@@ -24,7 +24,7 @@ class Method:
         settings: Model of its settings.
         summary: One line for lists of methods, with the source.
         create: Creates an optimizer.
-        multi_objective: Whether it is told objective vectors instead of fitness values.
+        multi_objective: Whether it receives objective vectors instead of fitness values.
         replays: Whether its state is the complete feedback, which bounds the length of a job.
         uses_start: Whether it learns from the designs that a job starts from. Otherwise these
             designs are evaluated first and the method begins as if there were none.

@@ -48,7 +48,7 @@ class Optimizer(Protocol):
 
     @property
     def evaluations(self) -> int:
-        """Number of positions told so far."""
+        """Number of positions evaluated so far."""
 
     def start_from(self, positions: NDArray[np.float64]) -> None:
         """Begin with known good positions: they are the first that are asked for.
@@ -62,7 +62,7 @@ class Optimizer(Protocol):
         """
 
     def ask(self, most: int | None = None) -> NDArray[np.float64]:
-        """Return the positions to evaluate next; the same ones until they are told.
+        """Return the positions to evaluate next; the same ones until their fitness is known.
 
         Args:
             most: Largest number of positions, >= 1; positions already asked for stay. Default and
@@ -113,14 +113,14 @@ class Rejudging(Optimizer, Protocol):
     def rejudge(
         self, generations: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]
     ) -> None:
-        """Replace the fitness of all positions told so far.
+        """Replace the fitness of all positions evaluated so far.
 
         Args:
             generations: (n, d) positions and (n,) fitness, +inf for a failed evaluation, of
-                everything told, in order.
+                all evaluations, in order.
 
         Raises:
-            ValueError: This is not everything told, or a generation was not told as a whole.
+            ValueError: These are not all evaluations, or a generation is incomplete.
         """
 
 

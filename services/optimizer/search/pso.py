@@ -32,7 +32,7 @@ _INITIAL_VELOCITY: Final = 0.1
 
 
 class SwarmSettings(SearchSettings):
-    """Settings of a swarm's motion, for every method that has one."""
+    """Settings of a swarm's motion, for methods that have a swarm."""
 
     particles: int = Field(default=25, ge=1, le=10_000, description="Size of the swarm.")
     cognitive: float = Field(default=0.5, ge=0.0, le=10.0, description="Pull to a particle's best.")
@@ -50,14 +50,14 @@ class SwarmSettings(SearchSettings):
     )
     topology: Literal["global", "ring", "random"] = Field(
         default="global",
-        description="Who informs a particle: all, both neighbours, or some that are drawn anew"
-        " when the swarm's best was not improved.",
+        description="Which particles inform a particle: all, both neighbours, or random ones that"
+        " change when the swarm's best does not improve.",
     )
     informants: int = Field(
         default=3,
         ge=1,
         le=100,
-        description="Particles that each one informs, if the topology is random.",
+        description="Particles that each particle informs in the random topology.",
     )
 
     @model_validator(mode="after")
@@ -68,15 +68,17 @@ class SwarmSettings(SearchSettings):
 
 
 class PsoSettings(SwarmSettings):
-    """Settings of the particle swarm; defaults are the thesis's, but for an inertia that falls."""
+    """Settings of the particle swarm; the thesis's defaults, except for a falling inertia."""
 
     name: Literal["pso"] = "pso"
 
 
 class _SwarmState(GenerationState):
-    """What `dump` writes. best_fitness: None where a particle has not succeeded yet.
+    """The dumped state.
 
-    informed_since: the generation by whose random numbers informants are drawn.
+    Attributes:
+        best_fitness: None where a particle has not succeeded yet.
+        informed_since: Generation whose random numbers determine the informants.
     """
 
     velocities: list[Row]
@@ -86,16 +88,15 @@ class _SwarmState(GenerationState):
 
 
 class ParticleSwarm(Generational[SwarmSettings, _SwarmState]):
-    """A swarm that remembers each particle's best, the `pso` of job specs.
+    """A swarm that remembers the best position of each particle.
 
-    It moves in the continuous box, in the variables' own units; whoever evaluates a position
-    rounds its integer variables. So a particle keeps its velocity while it crosses the width of an
-    integer, and does not freeze there. A velocity is the change of position in one iteration, in
-    the same units.
+    It moves in the continuous box, in the variables' own units. Positions stay real in integer
+    variables, so that a particle keeps its velocity while it crosses the width of an integer. A
+    velocity is the change of position in one iteration.
 
     Attributes:
-        best_positions: (particles, d) the best that each particle remembers.
-        best_fitness: (particles,) what those are worth, +inf for a particle that never succeeded.
+        best_positions: (particles, d) best position of each particle.
+        best_fitness: (particles,) fitness of these, +inf for a particle that never succeeded.
     """
 
     state_model = _SwarmState
@@ -110,24 +111,24 @@ class ParticleSwarm(Generational[SwarmSettings, _SwarmState]):
         self._informed_since = 0
 
     def propose(self) -> NDArray[np.float64]:
-        """Scatter the swarm, or move it on."""
+        """Sample the swarm, or move it."""
         return self._moved() if self.generations else self._scattered()
 
     def learn(self, positions: NDArray[np.float64], fitness: NDArray[np.float64]) -> None:
-        """Let each particle remember its best."""
+        """Update the best of each particle."""
         self._remember(self.generations, positions, fitness)
 
     def rejudge(
         self, generations: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]
     ) -> None:
-        """Let each particle remember its best of what it came by, by another fitness.
+        """Recompute the best of each particle from another fitness of its positions.
 
-        Positions and velocities stay: the swarm goes on from where it is, towards other bests.
+        Positions and velocities stay.
         """
         shape = self.best_positions.shape
         whole = all(positions.shape == shape for positions, _ in generations)
         if len(generations) != self.generations or self.iteration != self.generations or not whole:
-            raise ValueError(f"{self.settings.name} was not told whole swarms one after the other")
+            raise ValueError(f"{self.settings.name} has not received feedback in whole swarms")
         self.best_fitness = np.full(shape[0], np.inf)
         self._informed_since = 0
         for number, (positions, fitness) in enumerate(generations):
@@ -168,10 +169,10 @@ class ParticleSwarm(Generational[SwarmSettings, _SwarmState]):
         self._informed_since = state.informed_since
 
     def _scattered(self) -> NDArray[np.float64]:
-        """Uniform in the box, with small random velocities.
+        """Sample uniform positions with small random velocities.
 
-        Small, because a swarm that starts fast spends its first steps at the walls; not zero,
-        because the leader, and a swarm of which every member failed, would then stand still.
+        Small, because a fast swarm spends its first steps at the walls; not zero, because the
+        leader, or a swarm in which every member failed, would then stand still.
         """
         draws = self._draw(purpose=_SCATTER)
         space = self.space
@@ -198,7 +199,7 @@ class ParticleSwarm(Generational[SwarmSettings, _SwarmState]):
         return moved
 
     def _leaders(self) -> NDArray[np.intp]:
-        """(particles,) the best of those that inform each one."""
+        """Return (particles,) the best informant of each particle."""
         particles, fitness = self.settings.particles, self.best_fitness
         if self.settings.topology == "global":
             return np.full(particles, np.argmin(fitness))
@@ -214,14 +215,14 @@ class ParticleSwarm(Generational[SwarmSettings, _SwarmState]):
         return leaders(random_informants(draws), fitness)
 
     def _inertia(self) -> float:
-        """Linear from the first to the last iteration of the plan, then it stays."""
+        """Return the inertia: linear over the planned iterations, then constant."""
         planned = math.ceil(self.budget / self.settings.particles)
         share = min(self.generations / max(planned - 1, 1), 1.0)
         start, end = self.settings.inertia_start, self.settings.inertia_end
         return start + share * (end - start)
 
     def _draw(self, *, purpose: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Two numbers in [0, 1) per particle and coordinate: twice (particles, d)."""
+        """Draw two numbers in [0, 1) per particle and coordinate: twice (particles, d)."""
         particles, d = self.best_positions.shape
         draws = swarm_uniform(
             self.seed, purpose, iteration=self.generations, particles=particles, count=2 * d
@@ -235,7 +236,7 @@ def absorb(
     low: NDArray[np.float64],
     high: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Let a particle beyond a wall stop at it."""
+    """Stop particles at the walls."""
     inside = np.clip(positions, low, high)
     return inside, np.where(inside == positions, velocities, 0.0)
 
@@ -246,7 +247,7 @@ def reflect(
     low: NDArray[np.float64],
     high: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Let a particle beyond a wall bounce, as often as it takes."""
+    """Reflect particles at the walls, repeatedly if needed."""
     span = high - low
     outside = (positions < low) | (positions > high)
     phase = np.mod(positions - low, 2.0 * span)
@@ -259,24 +260,20 @@ def reflect(
 
 
 Links = tuple[NDArray[np.intp], NDArray[np.intp]]
-"""(m,) particles that inform, (m,) those that they inform. Each one informs itself."""
+"""(m,) informing particles and (m,) informed particles. Each particle informs itself."""
 
 
 def ring(particles: int) -> Links:
-    """Links of a swarm in which each particle informs both its neighbours.
-
-    The "lbest" swarm of Bratton and Kennedy (2007). The last particle is a neighbour of the first.
-    """
+    """Link each particle with both neighbours, cyclically ("lbest", Bratton and Kennedy 2007)."""
     every = np.arange(particles)
     informed = [every, (every + 1) % particles, (every - 1) % particles]
     return np.tile(every, 3), np.concatenate(informed)
 
 
 def random_informants(draws: NDArray[np.float64]) -> Links:
-    """Links of a swarm in which each particle informs some that are drawn.
+    """Link each particle with random ones (standard swarm of 2011, Clerc 2012).
 
-    The same one may be drawn twice, so how many inform a particle varies: the topology of the
-    standard swarm of 2011 (Clerc 2012).
+    A particle may be drawn twice, so the number of informants varies.
     """
     particles, k = draws.shape
     every = np.arange(particles)
@@ -285,10 +282,10 @@ def random_informants(draws: NDArray[np.float64]) -> Links:
 
 
 def leaders(links: Links, fitness: NDArray[np.float64]) -> NDArray[np.intp]:
-    """The best of those that inform each particle."""
+    """Return the best informant of each particle."""
     informs, informed = links
     worst_first = np.argsort(-fitness[informs], kind="stable")
     best = np.empty(len(fitness), dtype=np.intp)
-    # Where an index is assigned to several times, the last value stays.
+    # If an index is assigned several times, the last value stays.
     best[informed[worst_first]] = informs[worst_first]
     return best

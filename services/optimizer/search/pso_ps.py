@@ -18,17 +18,17 @@ Floats = NDArray[np.float64]
 
 
 class PsoPsSettings(SwarmSettings, PollSettings):
-    """Settings of the hybrid: those of the swarm, of the polls, and of the turn between them."""
+    """Settings of the hybrid: those of swarm and polls, and of the change between them."""
 
     name: Literal["pso-ps"] = "pso-ps"
     swarm_share: float = Field(
-        default=0.5, gt=0.0, lt=1.0, description="Share of the budget that the swarm has."
+        default=0.5, gt=0.0, lt=1.0, description="Share of the budget of the swarm."
     )
     searches: int = Field(
         default=1,
         ge=1,
         le=100,
-        description="How many of the swarm's best designs a pattern search starts from.",
+        description="Number of the swarm's best designs that pattern searches start from.",
     )
     initial_mesh: float = Field(
         default=0.0625,
@@ -45,13 +45,13 @@ def pso_ps(
     random: RandomNumbers,
     start: Start | None = None,
 ) -> Proposals:
-    """Search by a swarm, then by pattern searches from the best that its particles remember.
+    """Search by a swarm, then by pattern searches from the best positions of its particles.
 
-    The thesis's hybrid: pattern search runs after the swarm. That of Vaz and Vicente (2007),
-    PSwarm, polls within the swarm instead, whenever an iteration has not improved its best.
+    In the thesis's hybrid, pattern search runs after the swarm. PSwarm (Vaz and Vicente 2007) polls
+    within the swarm instead, whenever an iteration does not improve its best.
 
-    The searches take turns: each batch has one poll of each that goes on. When all have ended, it
-    begins anew with another swarm and keeps nothing.
+    The pattern searches take turns: each batch has one poll of each. When all have ended, the
+    method restarts with another swarm and keeps nothing.
     """
     iterations = max(round(settings.swarm_share * budget / settings.particles), 1)
     while True:
@@ -75,7 +75,7 @@ def pso_ps(
 
 
 def _begin(swarm: ParticleSwarm, start: Start) -> None:
-    """Let a swarm ask for what was evaluated before, and tell it."""
+    """Feed start positions with their fitness to a swarm."""
     swarm.start_from(start.positions)
     fitness = start.fitness
     while len(fitness):
@@ -85,7 +85,7 @@ def _begin(swarm: ParticleSwarm, start: Start) -> None:
 
 
 def best_members(swarm: ParticleSwarm, count: int) -> tuple[Floats, Floats]:
-    """The best designs that a swarm's particles remember."""
+    """Return the best distinct designs of a swarm and their fitness."""
     designs = swarm.space.designs(swarm.best_positions)
     order = np.argsort(swarm.best_fitness, kind="stable")
     order = order[np.isfinite(swarm.best_fitness[order])]
@@ -94,15 +94,15 @@ def best_members(swarm: ParticleSwarm, count: int) -> tuple[Floats, Floats]:
 
 
 def _in_turns(searches: list[Polls]) -> Polls:
-    """One poll of each search in a batch, until all have ended."""
+    """Combine one poll of each search to a batch, until all have ended."""
     under_way = [(search, poll) for search in searches if (poll := next(search, None)) is not None]
     while under_way:
         fitness = yield np.concatenate([poll for _, poll in under_way])
         ends = np.cumsum([len(poll) for _, poll in under_way])[:-1]
-        told = zip(under_way, np.split(fitness, ends), strict=True)
+        feedback = zip(under_way, np.split(fitness, ends), strict=True)
         under_way = [
             (search, poll)
-            for (search, _), values in told
+            for (search, _), values in feedback
             if (poll := _next_poll(search, values)) is not None
         ]
 

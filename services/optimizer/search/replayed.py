@@ -133,7 +133,7 @@ class Replayed:
 
     @property
     def evaluations(self) -> int:
-        """Number of positions told so far."""
+        """Number of positions evaluated so far."""
         return len(self._feedback)
 
     def start_from(self, positions: Floats) -> None:
@@ -143,7 +143,7 @@ class Replayed:
         self._course = None
 
     def ask(self, most: int | None = None) -> Floats:
-        """Return the positions to evaluate next; the same ones until they are told."""
+        """Return the positions to evaluate next; the same ones until their fitness is known."""
         course = self._running()
         done = len(course.fitness)
         if not self._asked:

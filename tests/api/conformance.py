@@ -107,7 +107,7 @@ class Found:
 
 @contextmanager
 def served() -> Iterator[tuple[Server, dict[str, list[str]]]]:
-    """A server that lets nobody walk for long, with finished jobs of three kinds.
+    """A server with short limits on simulations, and finished jobs of three kinds.
 
     Yields:
         The server, and ids of what it has, by parameter of a path.
@@ -239,7 +239,7 @@ def sequences(schema: BaseSchema, url: str, found: Found, cases: int) -> None:
 
 
 class _Tracebacks(logging.Handler):
-    """Gathers what the server's log has of exceptions that nobody expected."""
+    """Collects unexpected exceptions from the server's log."""
 
     def __init__(self, found: Found) -> None:
         super().__init__(logging.ERROR)

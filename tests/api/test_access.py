@@ -155,7 +155,7 @@ def test_only_a_token_of_all_rights_puts_a_job_before_those_of_others(
 def test_a_token_of_all_rights_commands_every_job(
     guarded: httpx2.Client, bearer: Bearer, store: SqlStore, spec: JobSpec
 ) -> None:
-    job, _ = store.create_job(spec, owner="somebody")
+    job, _ = store.create_job(spec, owner="someone")
     answer = guarded.post(f"/v1/jobs/{job.id}/cancel", headers=bearer(Scope.ADMIN))
     assert answer.status_code == 200
 
@@ -234,8 +234,8 @@ def test_a_session_begins_with_a_valid_token_only(guarded: httpx2.Client) -> Non
     answer = guarded.post("/v1/session", json={"token": "guessed"})
     assert answer.status_code == 401
     assert "Set-Cookie" not in answer.headers
-    nobody = {"required": True, "name": None, "scope": None, "manual": False}
-    assert guarded.get("/v1/session").json() == nobody
+    open_session = {"required": True, "name": None, "scope": None, "manual": False}
+    assert guarded.get("/v1/session").json() == open_session
 
 
 def test_a_program_sends_the_token_of_its_environment(

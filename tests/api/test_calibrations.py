@@ -75,7 +75,7 @@ def test_it_is_asked_about_as_any_job(client: httpx2.Client, store: SqlStore) ->
 
 def test_what_makes_no_sense_is_refused_by_field(client: httpx2.Client) -> None:
     bad: dict[str, dict[str, Any]] = {
-        "targets.0.walk": {"targets": [SPEC["targets"][0] | {"walk": "nobody"}]},
+        "targets.0.walk": {"targets": [SPEC["targets"][0] | {"walk": "unknown"}]},
         "targets.0.tolerance": {"targets": [SPEC["targets"][0] | {"tolerance": 0}]},
         "walks.0": {"walks": [WALKS[0] | {"design": {"P": 1.0}}, WALKS[1]]},
         "variables": {"variables": ["hat"]},

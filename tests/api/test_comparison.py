@@ -1,4 +1,4 @@
-"""Jobs beside each other, over HTTP."""
+"""Comparison of jobs over HTTP."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_the_published_design_and_the_gain_over_it_are_told_where_they_are_known
     view = client.get(f"/v1/jobs/{job.id}/comparison", params={"also": other.id}).json()
     assert [(found["reference"], found["gain"]) for found in view["jobs"]] == [
         ({"name": "A", "kind": "published", "fitness": 198.0}, 0.5),
-        # Nobody walks for what is not known.
+        # Missing values are not simulated.
         (None, None),
     ]
 
@@ -90,7 +90,7 @@ def test_jobs_of_different_controllers_differ_by_a_field_for_every_variable(
     assert fields["variables.fir_ms"] == [None, "integers, 4 to 300 ms"]
     assert fields["variables.curve"][1].startswith("quadratic_spline, ")
     assert fields["controller"] == ['"fuzzy-pi"', '"pi"']
-    # Variables stay together, whoever has them.
+    # Variables stay together, whichever job has them.
     rooms = [field.split(".")[0] for field in fields]
     assert rooms == sorted(rooms, key=rooms.index)
     assert len(fields) < 20

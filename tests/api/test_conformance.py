@@ -148,7 +148,7 @@ def _first(value: Any) -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """A server that lets nobody walk for long."""
+    """A server with short limits on simulations."""
     store = open_store(str(tmp_path_factory.mktemp("conformance") / "jobs.db"))
     server = Server(
         JobService(store),
@@ -162,7 +162,7 @@ def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 
 def is_as_documented(case: schemathesis.Case[Any], url: str, connected: Session) -> None:
-    # An estimate may compile a kernel, on a machine that runs other tests beside it.
+    # An estimate may compile a kernel, while other tests run.
     case.call_and_validate(base_url=url, session=connected, checks=CHECKS, timeout=120.0)
 
 

@@ -205,7 +205,7 @@ def test_a_waiting_stream_holds_no_transaction(serve: Serve, database: Path, job
         stream = parsed(answer.iter_lines())
         next(stream)
         with closing(sqlite3.connect(database)) as connection:
-            # SQLite can empty its write-ahead log only while nobody reads or writes.
+            # SQLite can empty its write-ahead log only while no process reads or writes.
             busy, _, _ = connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()
         server.stop()
 

@@ -11,7 +11,7 @@ from gaitswarm.services.optimizer.jobs.documents import SPECS
 from gaitswarm.views import field_errors
 
 
-def told(document: dict[str, Any]) -> dict[str, str]:
+def messages(document: dict[str, Any]) -> dict[str, str]:
     with pytest.raises(ValidationError) as refused:
         SPECS.validate_python(document)
     found = field_errors(refused.value.errors())
@@ -39,11 +39,11 @@ def told(document: dict[str, Any]) -> dict[str, str]:
 def test_only_the_fields_that_are_wrong_are_named(
     document: dict[str, Any], fields: list[str]
 ) -> None:
-    assert sorted(told(document)) == sorted(fields)
+    assert sorted(messages(document)) == sorted(fields)
 
 
 def test_a_robot_file_speaks_for_itself() -> None:
-    found = told({"robot": {"toml": "legs = = 4", "urdf": "<robot/>"}})
+    found = messages({"robot": {"toml": "legs = = 4", "urdf": "<robot/>"}})
     assert list(found) == ["robot"]
     assert found["robot"].startswith("robot.toml: ")
 
@@ -60,7 +60,7 @@ def test_a_robot_file_speaks_for_itself() -> None:
 def test_a_wrong_name_hears_nothing_of_objects(
     document: dict[str, Any], field: str, hint: str
 ) -> None:
-    found = told(document)
+    found = messages(document)
     assert list(found) == [field]
     assert hint in found[field]
 
@@ -77,29 +77,31 @@ def test_a_wrong_name_hears_nothing_of_objects(
 def test_what_is_neither_a_name_nor_an_object_hears_of_both(
     document: dict[str, Any], field: str
 ) -> None:
-    found = told(document)
+    found = messages(document)
     assert list(found) == [field]
     assert "or an object: " in found[field]
 
 
 def test_a_robot_with_one_of_its_files_hears_of_the_other() -> None:
-    assert list(told({"robot": {"urdf": "<robot/>"}})) == ["robot.toml"]
+    assert list(messages({"robot": {"urdf": "<robot/>"}})) == ["robot.toml"]
 
 
 def test_a_job_hears_of_its_own_kind_alone() -> None:
     document = {"kind": "identification", "recordings": ["7"], "scenarios": ["moon"]}
-    assert sorted(told(document)) == ["recordings.0", "scenarios"]
+    assert sorted(messages(document)) == ["recordings.0", "scenarios"]
 
 
 def test_an_unknown_kind_hears_of_the_known() -> None:
-    assert told({"kind": "magic"}) == {
+    assert messages({"kind": "magic"}) == {
         "kind": "must be tuning, identification, calibration or certificate"
     }
 
 
 def test_a_wrong_key_is_told_by_its_path() -> None:
-    assert list(told({"fixed": {"not a name": 1.0}})) == ["fixed.not a name"]
+    assert list(messages({"fixed": {"not a name": 1.0}})) == ["fixed.not a name"]
 
 
 def test_a_check_of_the_whole_names_the_field_that_it_blames() -> None:
-    assert told({"variables": ["nonsense"]})["variables"].startswith("unknown variable 'nonsense'")
+    assert messages({"variables": ["nonsense"]})["variables"].startswith(
+        "unknown variable 'nonsense'"
+    )

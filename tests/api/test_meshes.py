@@ -36,7 +36,7 @@ NAMES = (
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """Of a robot that names meshes in every way, in a folder of robots, beside a secret."""
+    """Files of a robot that names meshes in every way, in a folder of robots, next to a secret."""
     folder = tmp_path / "robots" / "quadruped_description"
     (folder / "meshes").mkdir(parents=True)
     urdf = with_mesh((QUADRUPED / "robot.urdf").read_text(encoding="utf-8"), *NAMES)
@@ -127,17 +127,17 @@ def test_a_robot_in_no_folder_has_none(server: Server) -> None:
 def test_serve_gives_out_the_meshes_of_the_folders_that_its_option_names_and_no_others(
     folder: Path, digest: str, tmp_path: Path
 ) -> None:
-    told, untold = (
+    serving, closed = (
         ServerProcess(tmp_path / f"{name}.db", "--no-runner", *options)
-        for name, options in (("told", ("--robots", str(folder))), ("untold", ()))
+        for name, options in (("serving", ("--robots", str(folder))), ("closed", ()))
     )
     try:
-        items = told.client.get(f"/v1/robots/{digest}/meshes").json()["items"]
+        items = serving.client.get(f"/v1/robots/{digest}/meshes").json()["items"]
         assert [item["name"] for item in items if item["url"]][:2] == [*NAMES[:2]]
-        assert untold.client.get(f"/v1/robots/{digest}/meshes").json()["items"] == []
+        assert closed.client.get(f"/v1/robots/{digest}/meshes").json()["items"] == []
     finally:
-        told.close()
-        untold.close()
+        serving.close()
+        closed.close()
     refused = run_command("serve", "--robots", tmp_path / "nowhere")
     assert refused.code == 2 and "nowhere" in refused.err
 

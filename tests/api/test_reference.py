@@ -1,4 +1,4 @@
-"""A job's best beside the published design: found once, listed and sorted by from then on."""
+"""A job's best compared with the published design: computed once, then listed and sorted by."""
 
 from __future__ import annotations
 

@@ -102,7 +102,7 @@ def test_without_a_database_the_server_is_alive_but_not_ready_and_only_the_log_s
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     def away(_: object) -> None:
-        raise StoreUnavailable("jobs.db is gone; restore it or start anew")
+        raise StoreUnavailable("jobs.db is gone; restore it or create another")
 
     monkeypatch.setattr(type(store), "ping", away)
 

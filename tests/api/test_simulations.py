@@ -210,7 +210,7 @@ def test_a_stopping_server_answers_what_was_asked_before(serve: Serve, gate: Gat
 
 
 def wait_until_refused(url: str) -> None:
-    """Until nobody listens there any more."""
+    """Wait until the port is closed."""
     try:
         while True:
             httpx2.get(f"{url}/v1/healthz")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
@@ -109,6 +110,8 @@ def serve(
         tell(f"gaitswarm serves {server.url} and {doing}; {server.url}/docs; Ctrl-C ends it")
         if settings.tokens_required:
             _tell_of_tokens(tell, opened.service.store.tokens.create_first(), server.url)
+        # Full collections would otherwise block the event loop for 0.1 s to visit all modules.
+        gc.freeze()
         server.run()
 
 

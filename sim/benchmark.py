@@ -19,31 +19,19 @@ from gaitswarm.sim.simulate import simulating
 
 @dataclass(frozen=True, slots=True)
 class BenchmarkResult:
-    """How fast a pass was.
+    """How fast a pass was."""
 
-    Attributes:
-        us_per_step_per_walker: wall time of a physics step of one walker [us].
-        real_time_factor_per_core: simulated over elapsed seconds [1].
-        lanes: walkers that are stepped together.
-        lane_use: share of the lanes' time that was walked [1].
-        backend: `native` or `reference`.
-        precision: of the physics' numbers.
-        bytes_of_code: machine code of the kernel [B]; None where it has none that can be measured.
-        walkers: walks of every scenario.
-        simulated_seconds: of all walks together [s].
-        elapsed_seconds: wall time of the pass [s].
-    """
-
-    us_per_step_per_walker: float
-    real_time_factor_per_core: float
-    lanes: int
-    lane_use: float
-    backend: str
-    precision: Precision
+    us_per_step_per_walker: float  # wall time of a physics step of one walker [us]
+    real_time_factor_per_core: float  # simulated over elapsed seconds [1]
+    lanes: int  # walkers that are stepped together
+    lane_use: float  # share of the lanes' time that was walked [1]
+    backend: str  # `native` or `reference`
+    precision: Precision  # of the physics' numbers
+    # machine code of the kernel [B]; None where it has none that can be measured
     bytes_of_code: int | None
-    walkers: int
-    simulated_seconds: float
-    elapsed_seconds: float
+    walkers: int  # walks of every scenario
+    simulated_seconds: float  # of all walks together [s]
+    elapsed_seconds: float  # wall time of the pass [s]
 
 
 def measure(

@@ -36,21 +36,13 @@ class PluginError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Plugin:
-    """One entry point.
+    """One entry point."""
 
-    Attributes:
-        kind: What it brings.
-        name: By which jobs name it.
-        distribution: That brings it.
-        version: Of the distribution.
-        place: `module:attribute` of what it brings.
-    """
-
-    kind: Kind
-    name: str
-    distribution: str
-    version: str
-    place: str
+    kind: Kind  # What it brings
+    name: str  # By which jobs name it
+    distribution: str  # That brings it
+    version: str  # Of the distribution
+    place: str  # `module:attribute` of what it brings
 
     @property
     def module(self) -> str:

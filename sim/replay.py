@@ -22,43 +22,25 @@ CONTROL_RATE: Final = round(1.0 / CONTROL_PERIOD)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Replay:
-    """A walk up to its end, F frames of B links, J joints, L legs; arrays by frame.
+    """A walk up to its end, F frames of B links, J joints, L legs; arrays by frame."""
 
-    Attributes:
-        duration: walked [s].
-        links: in the order of `link_pose`.
-        time: (F,) [s], exact.
-        link_pose: in the world, (F, B, 7): position [m], quaternion x y z w, whose sign never
-            jumps.
-        foot_position: the tibia's end, a sole's length above the ground where it stands,
-            (F, L, 3) [m].
-        foot_force: in the world, (F, L, 3) [N].
-        joint_angle: of the links, (F, J) [rad].
-        desired_angle: (F, J) [rad].
-        motor_angle: (F, J) [rad].
-        current: (F, J) [A].
-        voltage: (F, J) [V].
-        load_torque: (F, J) [N m].
-        body_acceleration: in the body's frame, (F, 3) [m/s2].
-        body_velocity: in the body's frame, (F, 6) linear [m/s] and angular [rad/s].
-        supply: (F,) [V].
-    """
-
-    duration: float
-    links: tuple[VisibleLink, ...]
-    time: Floats
+    duration: float  # walked [s]
+    links: tuple[VisibleLink, ...]  # in the order of `link_pose`
+    time: Floats  # (F,) [s], exact
+    # in the world, (F, B, 7): position [m], quaternion x y z w, whose sign never jumps
     link_pose: Floats
+    # the tibia's end, a sole's length above the ground where it stands, (F, L, 3) [m]
     foot_position: Floats
-    foot_force: Floats
-    joint_angle: Floats
-    desired_angle: Floats
-    motor_angle: Floats
-    current: Floats
-    voltage: Floats
-    load_torque: Floats
-    body_acceleration: Floats
-    body_velocity: Floats
-    supply: Floats
+    foot_force: Floats  # in the world, (F, L, 3) [N]
+    joint_angle: Floats  # of the links, (F, J) [rad]
+    desired_angle: Floats  # (F, J) [rad]
+    motor_angle: Floats  # (F, J) [rad]
+    current: Floats  # (F, J) [A]
+    voltage: Floats  # (F, J) [V]
+    load_torque: Floats  # (F, J) [N m]
+    body_acceleration: Floats  # in the body's frame, (F, 3) [m/s2]
+    body_velocity: Floats  # in the body's frame, (F, 6) linear [m/s] and angular [rad/s]
+    supply: Floats  # (F,) [V]
 
 
 def replay(robot: Robot, log: WalkLog, *, rate: float, load: float = 0.0) -> Replay:

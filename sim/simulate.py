@@ -50,17 +50,12 @@ _PLANS_KEPT: Final = 16
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Simulation:
-    """What designs came to, in their order.
+    """What designs came to, in their order."""
 
-    Attributes:
-        outcome: of all designs.
-        measurements: of all designs: currents, heat, power and speed.
-        logs: of every walk, if they were asked for. A design that was never simulated
-            (unreachable) has none; one that ended early has NaN after its end.
-    """
-
-    outcome: Outcome
-    measurements: Measurements
+    outcome: Outcome  # of all designs
+    measurements: Measurements  # of all designs: currents, heat, power and speed
+    # of every walk, if they were asked for. A design that was never simulated (unreachable) has
+    # none; one that ended early has NaN after its end.
     logs: tuple[WalkLog | None, ...] = ()
 
 

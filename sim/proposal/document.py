@@ -119,21 +119,13 @@ _SIDEWAYS: Final = (
 
 @dataclass(frozen=True, slots=True)
 class Proposal:
-    """A robot's folder.
+    """A robot's folder."""
 
-    Attributes:
-        toml: text of robot.toml.
-        urdf: text of robot.urdf.
-        job: what a job of this robot has unless it says otherwise, as a spec.
-        guesses: what to look at, one sentence each, as robot.toml has them too.
-        problems: what no body has in the URDF, one sentence each.
-    """
-
-    toml: str
-    urdf: str
-    job: dict[str, Any]
-    guesses: tuple[str, ...]
-    problems: tuple[str, ...] = ()
+    toml: str  # text of robot.toml.
+    urdf: str  # text of robot.urdf.
+    job: dict[str, Any]  # what a job of this robot has unless it says otherwise, as a spec
+    guesses: tuple[str, ...]  # what to look at, one sentence each, as robot.toml has them too.
+    problems: tuple[str, ...] = ()  # what no body has in the URDF, one sentence each
 
     @property
     def notes(self) -> tuple[str, ...]:

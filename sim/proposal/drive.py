@@ -52,36 +52,22 @@ ACTUATOR_CHOICES: Final[tuple[ActuatorChoice, ...]] = get_args(ActuatorChoice)
 
 @dataclass(frozen=True, slots=True)
 class DriveNumbers:
-    """What drives a joint, by what it does there.
+    """What drives a joint, by what it does there."""
 
-    Attributes:
-        torque: at standstill, of a DC motor at full voltage [N m].
-        speed: without load, of a DC motor at full voltage [rad/s].
-        armature: inertia of the rotor, seen at the joint [kg m2].
-        note: where the numbers come from.
-        believed: whether torque and speed are the URDF's.
-    """
-
-    torque: float
-    speed: float
-    armature: float
-    note: str
-    believed: bool = False
+    torque: float  # at standstill, of a DC motor at full voltage [N m]
+    speed: float  # without load, of a DC motor at full voltage [rad/s]
+    armature: float  # inertia of the rotor, seen at the joint [kg m2]
+    note: str  # where the numbers come from
+    believed: bool = False  # whether torque and speed are the URDF's
 
 
 @dataclass(frozen=True, slots=True)
 class SoleNumbers:
-    """Soles on ground.
+    """Soles on ground."""
 
-    Attributes:
-        length: of the sole's spring beyond the leg's end [m].
-        stiffness: [N/m].
-        damping: [N s/m].
-    """
-
-    length: float
-    stiffness: float
-    damping: float
+    length: float  # of the sole's spring beyond the leg's end [m]
+    stiffness: float  # [N/m]
+    damping: float  # [N s/m]
 
 
 def propose_drives(

@@ -32,20 +32,13 @@ _FOOT_NAME: Final = re.compile(r"foot|toe|sole|ankle|tip|contact", re.IGNORECASE
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LegEnd:
-    """Where a leg ends, in its last link's frame.
+    """Where a leg ends, in its last link's frame."""
 
-    Attributes:
-        at: position, (3,) [m].
-        foot: name of the frame there; None for none.
-        sole: radius of a sphere there [m]; None for none.
-        notes: what was guessed.
-        others: where it ends as well as the shapes say, (n, 3) [m]; none if these were not asked.
-    """
-
-    at: Floats
-    foot: str | None = None
-    sole: float | None = None
-    notes: tuple[str, ...] = ()
+    at: Floats  # position, (3,) [m]
+    foot: str | None = None  # name of the frame there; None for none
+    sole: float | None = None  # radius of a sphere there [m]; None for none
+    notes: tuple[str, ...] = ()  # what was guessed
+    # where it ends as well as the shapes say, (n, 3) [m]; none if these were not asked
     others: Floats = field(default_factory=lambda: np.empty((0, 3)))
 
 

@@ -38,15 +38,10 @@ _SIDEWAYS: Final = 1.5
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """Axes of a URDF's first link.
+    """Axes of a URDF's first link."""
 
-    Attributes:
-        up: that which points up; None for z, if the legs do not speak against it.
-        forward: that which points ahead, at right angles to it; None for x.
-    """
-
-    up: Axis | None = None
-    forward: Axis | None = None
+    up: Axis | None = None  # that which points up; None for z, if the legs do not speak against it
+    forward: Axis | None = None  # that which points ahead, at right angles to it; None for x
 
     @property
     def right_angled(self) -> bool:

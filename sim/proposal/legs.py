@@ -92,37 +92,24 @@ _SHARE_OF_THE_LONGEST: Final = 0.5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FoundLeg:
-    """A leg of a URDF.
+    """A leg of a URDF."""
 
-    Attributes:
-        joints: names, from the body on.
-        link: name of the last one.
-        foot: name of a link or fixed joint at the leg's end; None if there is none.
-        end: of the leg in the last link's frame [m].
-        sole: radius of the sphere at its end [m]; None if there is none.
-        notes: what was guessed.
-        ends: others that it may have, by its shapes, (n, 3) [m].
-    """
-
-    joints: tuple[str, str, str]
-    link: str
-    foot: str | None
-    end: tuple[float, float, float]
-    sole: float | None
-    notes: tuple[str, ...] = ()
+    joints: tuple[str, str, str]  # names, from the body on
+    link: str  # name of the last one
+    foot: str | None  # name of a link or fixed joint at the leg's end; None if there is none
+    end: tuple[float, float, float]  # of the leg in the last link's frame [m]
+    sole: float | None  # radius of the sphere at its end [m]; None if there is none
+    notes: tuple[str, ...] = ()  # what was guessed
+    # others that it may have, by its shapes, (n, 3) [m]
     ends: Floats = field(default_factory=lambda: np.empty((0, 3)))
 
 
 @dataclass(frozen=True, slots=True)
 class FoundLegs:
-    """What the movable joints of a URDF are.
+    """What the movable joints of a URDF are."""
 
-    Attributes:
-        legs: in the order of their first joints in the file.
-        held: all other movable joints, each with an angle within its limits [rad].
-    """
-
-    legs: tuple[FoundLeg, ...]
+    legs: tuple[FoundLeg, ...]  # in the order of their first joints in the file
+    # all other movable joints, each with an angle within its limits [rad]
     held: Mapping[str, float] = field(default_factory=dict)
 
 

@@ -32,17 +32,11 @@ as far from the body's long axis: of legs that are mounted about so."""
 
 @dataclass(frozen=True, slots=True)
 class Stance:
-    """How a robot stands.
+    """How a robot stands."""
 
-    Attributes:
-        angles: of each leg's joints [rad].
-        height: of the highest hip over the feet [m].
-        radii: lateral distance of each foot from the body's long axis [m].
-    """
-
-    angles: tuple[tuple[float, float, float], ...]
-    height: float
-    radii: tuple[float, ...]
+    angles: tuple[tuple[float, float, float], ...]  # of each leg's joints [rad]
+    height: float  # of the highest hip over the feet [m]
+    radii: tuple[float, ...]  # lateral distance of each foot from the body's long axis [m]
 
     @property
     def radius(self) -> float:

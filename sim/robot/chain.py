@@ -27,34 +27,21 @@ _MOST_DEGREES: Final = 720.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placement:
-    """Where a joint is, by any reader of a URDF.
+    """Where a joint is, by any reader of a URDF."""
 
-    Attributes:
-        axis: of the joint, (3,).
-        rotation: in the frame before it, (3, 3).
-        offset: in the frame before it, (3,) [m].
-        inertia: of the link behind it.
-    """
-
-    axis: Floats
-    rotation: Floats
-    offset: Floats
-    inertia: BodyInertia
+    axis: Floats  # of the joint, (3,)
+    rotation: Floats  # in the frame before it, (3, 3)
+    offset: Floats  # in the frame before it, (3,) [m]
+    inertia: BodyInertia  # of the link behind it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Chain:
-    """A leg's joints and its foot.
+    """A leg's joints and its foot."""
 
-    Attributes:
-        placements: of the joints, from the body on.
-        foot: in the last link's frame, (3,) [m].
-        limits: least and largest angle of each joint, (3, 2) [rad].
-    """
-
-    placements: tuple[Placement, ...]
-    foot: Floats
-    limits: Floats
+    placements: tuple[Placement, ...]  # of the joints, from the body on
+    foot: Floats  # in the last link's frame, (3,) [m]
+    limits: Floats  # least and largest angle of each joint, (3, 2) [rad]
 
 
 def chain_of(urdf: Urdf, leg: Leg) -> Chain:

@@ -25,15 +25,10 @@ MOST_TURNED: Final = 4.0 * math.pi
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Origin:
-    """Where a frame lies in another one.
+    """Where a frame lies in another one."""
 
-    Attributes:
-        xyz: position, (3,) [m].
-        rpy: roll, pitch and yaw about the other frame's fixed axes, (3,) [rad].
-    """
-
-    xyz: Floats
-    rpy: Floats
+    xyz: Floats  # position, (3,) [m]
+    rpy: Floats  # roll, pitch and yaw about the other frame's fixed axes, (3,) [rad]
 
     def matrix(self) -> Floats:
         """Rotation from the frame to the other one, (3, 3); exact if it does not turn."""

@@ -13,17 +13,11 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyInertia:
-    """Inertia of a rigid body in some frame.
+    """Inertia of a rigid body in some frame."""
 
-    Attributes:
-        mass: [kg].
-        centre: of mass, (3,) [m].
-        rotational: about the centre of mass, (3, 3) [kg m2].
-    """
-
-    mass: float
-    centre: Floats
-    rotational: Floats
+    mass: float  # [kg]
+    centre: Floats  # of mass, (3,) [m]
+    rotational: Floats  # about the centre of mass, (3, 3) [kg m2]
 
     def seen_from(self, rotation: Floats, position: Floats) -> BodyInertia:
         """The same body in another frame.

@@ -27,31 +27,18 @@ TURNS: Final = frozenset({"revolute", "continuous"})
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Joint:
-    """A joint of any type.
+    """A joint of any type."""
 
-    Attributes:
-        name: as in the file.
-        kind: its type: revolute, fixed, ...
-        parent: link that carries it.
-        child: link that it carries.
-        origin: of the child's frame in the parent's, at rest.
-        axis: that it turns about in the child's frame, of unit length, (3,).
-        limits: least and largest position [rad]; infinite where there are none.
-        effort: largest torque [N m]; 0 where the file gives none.
-        velocity: largest rate [rad/s]; 0 where the file gives none.
-        follows: joint that it mimics, if it is moved by that alone.
-    """
-
-    name: str
-    kind: str
-    parent: str
-    child: str
-    origin: Origin
-    axis: Floats
-    limits: tuple[float, float]
-    effort: float
-    velocity: float
-    follows: str | None = None
+    name: str  # as in the file
+    kind: str  # its type: revolute, fixed, ...
+    parent: str  # link that carries it
+    child: str  # link that it carries
+    origin: Origin  # of the child's frame in the parent's, at rest
+    axis: Floats  # that it turns about in the child's frame, of unit length, (3,)
+    limits: tuple[float, float]  # least and largest position [rad]; infinite where there are none
+    effort: float  # largest torque [N m]; 0 where the file gives none
+    velocity: float  # largest rate [rad/s]; 0 where the file gives none
+    follows: str | None = None  # joint that it mimics, if it is moved by that alone
 
     @property
     def fixed(self) -> bool:

@@ -53,21 +53,13 @@ class LegKinematics(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class KneeUpLeg:
-    """A leg as the thesis's: coxa about z, femur and tibia about x, all frames parallel.
+    """A leg as the thesis's: coxa about z, femur and tibia about x, all frames parallel."""
 
-    Attributes:
-        name: of the leg.
-        hip: coxa axis in the body frame, (3,) [m].
-        side: +1 left, -1 right.
-        lengths: of coxa, femur and tibia [m].
-        limits: of the joints, (3, 2) [rad].
-    """
-
-    name: str
-    hip: tuple[float, float, float]
-    side: float
-    lengths: tuple[float, float, float]
-    limits: Floats
+    name: str  # of the leg
+    hip: tuple[float, float, float]  # coxa axis in the body frame, (3,) [m]
+    side: float  # +1 left, -1 right
+    lengths: tuple[float, float, float]  # of coxa, femur and tibia [m]
+    limits: Floats  # of the joints, (3, 2) [rad]
 
     def foot(self, angles: Sequence[float]) -> tuple[float, float, float]:
         """Where the tibia ends, in the body's frame."""
@@ -83,25 +75,15 @@ class KneeUpLeg:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChainLeg:
-    """A leg of three revolute joints, however they are mounted.
+    """A leg of three revolute joints, however they are mounted."""
 
-    Attributes:
-        name: of the leg.
-        rotations: of each joint's frame in the one before it, the body's first, (3, 3, 3).
-        offsets: of each joint's frame in the one before it, (3, 3) [m].
-        axes: that the joints turn about, in their own frames, of unit length, (3, 3).
-        end: the foot in the last joint's frame, (3,) [m].
-        stance: angles at which the leg stands, (3,) [rad].
-        limits: of the joints, (3, 2) [rad].
-    """
-
-    name: str
-    rotations: Floats
-    offsets: Floats
-    axes: Floats
-    end: Floats
-    stance: Floats
-    limits: Floats
+    name: str  # of the leg
+    rotations: Floats  # of each joint's frame in the one before it, the body's first, (3, 3, 3)
+    offsets: Floats  # of each joint's frame in the one before it, (3, 3) [m]
+    axes: Floats  # that the joints turn about, in their own frames, of unit length, (3, 3)
+    end: Floats  # the foot in the last joint's frame, (3,) [m]
+    stance: Floats  # angles at which the leg stands, (3,) [rad]
+    limits: Floats  # of the joints, (3, 2) [rad]
 
     @property
     def hip(self) -> tuple[float, float, float]:

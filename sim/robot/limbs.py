@@ -26,62 +26,39 @@ Matrix = tuple[Vector, Vector, Vector]
 
 @dataclass(frozen=True, slots=True)
 class LimbJoint:
-    """A joint, the link behind it and the motor that drives it.
+    """A joint, the link behind it and the motor that drives it."""
 
-    Attributes:
-        axis: in the link's frame; one of the frame's own axes is counted along it.
-        sign: 1, or -1 if the joint turns against `axis`.
-        rotation: of the joint in the frame before it, at rest.
-        offset: of the joint in the frame before it [m].
-        mass: of the link [kg].
-        moment: first moment of the link's mass [kg m].
-        angular: of the link about its origin: xx, yy, zz, xy, xz, yz [kg m2].
-        torque: r K_M [N m/A].
-        resistance: of the motor [ohm].
-        conductance: its inverse [1/ohm].
-        armature: of the rotor at the joint [kg m2].
-        shaft_stiffness: of the closed play [N m/rad].
-        shaft_damping: of the closed play [N m s/rad].
-        inverse_torque: 1 / (r K_M) of a torque-controlled actuator; 0 for a DC motor [A/(N m)].
-        torque_limit: of a torque-controlled actuator; 0 for a DC motor [N m].
-        stall_torque: of the line by which speed limits its torque, at rest [N m].
-        stall_torque_per_volt: the same where the battery's voltage makes that line [N m/V].
-        torque_drop: by which that line falls with the rate [N m s/rad].
-    """
-
-    axis: Vector
-    sign: float
-    rotation: Matrix
-    offset: Vector
-    mass: float
-    moment: Vector
+    axis: Vector  # in the link's frame; one of the frame's own axes is counted along it
+    sign: float  # 1, or -1 if the joint turns against `axis`
+    rotation: Matrix  # of the joint in the frame before it, at rest
+    offset: Vector  # of the joint in the frame before it [m]
+    mass: float  # of the link [kg]
+    moment: Vector  # first moment of the link's mass [kg m]
+    # of the link about its origin: xx, yy, zz, xy, xz, yz [kg m2]
     angular: tuple[float, float, float, float, float, float]
-    torque: float
-    resistance: float
-    conductance: float
-    armature: float
-    shaft_stiffness: float
-    shaft_damping: float
+    torque: float  # r K_M [N m/A]
+    resistance: float  # of the motor [ohm]
+    conductance: float  # its inverse [1/ohm]
+    armature: float  # of the rotor at the joint [kg m2]
+    shaft_stiffness: float  # of the closed play [N m/rad]
+    shaft_damping: float  # of the closed play [N m s/rad]
+    # 1 / (r K_M) of a torque-controlled actuator; 0 for a DC motor [A/(N m)]
     inverse_torque: float = 0.0
-    torque_limit: float = 0.0
-    stall_torque: float = 0.0
+    torque_limit: float = 0.0  # of a torque-controlled actuator; 0 for a DC motor [N m]
+    stall_torque: float = 0.0  # of the line by which speed limits its torque, at rest [N m]
+    # the same where the battery's voltage makes that line [N m/V]
     stall_torque_per_volt: float = 0.0
-    torque_drop: float = 0.0
+    torque_drop: float = 0.0  # by which that line falls with the rate [N m s/rad]
 
 
 @dataclass(frozen=True, slots=True)
 class Limb:
-    """A leg.
+    """A leg."""
 
-    Attributes:
-        joints: from the body to the foot.
-        foot: in the last link's frame [m].
-        mobility: upper bound of how fast a force accelerates the foot against the rotors' inertia,
-            which is most of a geared leg's: with the body held and the leg stretched [1/kg].
-    """
-
-    joints: tuple[LimbJoint, ...]
-    foot: Vector
+    joints: tuple[LimbJoint, ...]  # from the body to the foot
+    foot: Vector  # in the last link's frame [m]
+    # upper bound of how fast a force accelerates the foot against the rotors' inertia, which is
+    # most of a geared leg's: with the body held and the leg stretched [1/kg]
     mobility: float
 
 

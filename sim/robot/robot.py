@@ -158,40 +158,23 @@ class JointActuators:
     """Motors and gears in joint order, referred to the joint; arrays (J,), read-only.
 
     What a kind of actuator does not have is 0.
-
-    Attributes:
-        torque: r K_M [N m/A], also the back-EMF [V s/rad].
-        resistance: [ohm].
-        inductance: [H].
-        armature: J_M r^2 [kg m2].
-        motor_friction: B_M r^2 [N m s/rad].
-        gear_friction: B_G at eta = 0 [N m s/rad], to be multiplied by 1 - eta.
-        efficiency: eta [1].
-        static_friction: of the gearhead, against the motion [N m].
-        backlash: play, end to end [rad].
-        shaft_stiffness: of the closed play [N m/rad].
-        shaft_damping: of the closed play [N m s/rad].
-        torque_limit: of torque-controlled actuators [N m].
-        stall_torque: of the line by which speed limits their torque, at rest [N m].
-        stall_torque_per_volt: the same where the battery's voltage makes that line [N m/V].
-        torque_drop: by which that line falls with the rate [N m s/rad].
     """
 
-    torque: Floats
-    resistance: Floats
-    inductance: Floats
-    armature: Floats
-    motor_friction: Floats
-    gear_friction: Floats
-    efficiency: Floats
-    static_friction: Floats
-    backlash: Floats
-    shaft_stiffness: Floats
-    shaft_damping: Floats
-    torque_limit: Floats
-    stall_torque: Floats
-    stall_torque_per_volt: Floats
-    torque_drop: Floats
+    torque: Floats  # r K_M [N m/A], also the back-EMF [V s/rad]
+    resistance: Floats  # [ohm]
+    inductance: Floats  # [H]
+    armature: Floats  # J_M r^2 [kg m2]
+    motor_friction: Floats  # B_M r^2 [N m s/rad]
+    gear_friction: Floats  # B_G at eta = 0 [N m s/rad], to be multiplied by 1 - eta
+    efficiency: Floats  # eta [1]
+    static_friction: Floats  # of the gearhead, against the motion [N m]
+    backlash: Floats  # play, end to end [rad]
+    shaft_stiffness: Floats  # of the closed play [N m/rad]
+    shaft_damping: Floats  # of the closed play [N m s/rad]
+    torque_limit: Floats  # of torque-controlled actuators [N m]
+    stall_torque: Floats  # of the line by which speed limits their torque, at rest [N m]
+    stall_torque_per_volt: Floats  # the same where the battery's voltage makes that line [N m/V]
+    torque_drop: Floats  # by which that line falls with the rate [N m s/rad]
 
     @property
     def viscous(self) -> Floats:

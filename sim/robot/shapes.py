@@ -39,36 +39,25 @@ _UPRIGHT: Final = np.array([0.0, 0.0, 0.0, 1.0])
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """One solid, fixed to a link.
+    """One solid, fixed to a link."""
 
-    Attributes:
-        type: what it is.
-        size: edges x, y, z of a box; radius of a sphere; radius and length of a cylinder or a
-            capsule along its own z, a capsule's between the centres of its hemispheres [m].
-        origin: of its centre in the link's frame, position [m] and quaternion x y z w.
-        role: part of the robot that it belongs to.
-    """
-
-    type: SolidKind
+    type: SolidKind  # what it is
+    # edges x, y, z of a box; radius of a sphere; radius and length of a cylinder or a capsule along
+    # its own z, a capsule's between the centres of its hemispheres [m]
     size: tuple[float, ...]
+    # of its centre in the link's frame, position [m] and quaternion x y z w
     origin: tuple[float, float, float, float, float, float, float]
-    role: Role
+    role: Role  # part of the robot that it belongs to
 
 
 @dataclass(frozen=True, slots=True)
 class VisibleLink:
-    """A link of the URDF, fixed ones too.
+    """A link of the URDF, fixed ones too."""
 
-    Attributes:
-        name: as in the URDF.
-        parent: name of the link that carries it, None for the body.
-        shapes: what it looks like, in simple solids.
-        meshes: what it looks like in the URDF's own meshes, if that has any.
-    """
-
-    name: str
-    parent: str | None
-    shapes: tuple[Shape, ...]
+    name: str  # as in the URDF
+    parent: str | None  # name of the link that carries it, None for the body
+    shapes: tuple[Shape, ...]  # what it looks like, in simple solids
+    # what it looks like in the URDF's own meshes, if that has any
     meshes: tuple[VisualMesh, ...] = ()
 
 
@@ -171,19 +160,13 @@ _LARGEST_SCALE: Final = 1e6
 
 @dataclass(frozen=True, slots=True)
 class VisualMesh:
-    """A mesh on a link. Only pictures have it; nothing of it is simulated.
+    """A mesh on a link. Only pictures have it; nothing of it is simulated."""
 
-    Attributes:
-        name: of its file, as the URDF has it.
-        origin: of its frame in the link's, position [m] and quaternion x y z w.
-        scale: along its own x, y and z [1].
-        colour: of its material in the URDF; None if that says none.
-    """
-
-    name: str
+    name: str  # of its file, as the URDF has it
+    # of its frame in the link's, position [m] and quaternion x y z w
     origin: tuple[float, float, float, float, float, float, float]
-    scale: tuple[float, float, float]
-    colour: Colour | None
+    scale: tuple[float, float, float]  # along its own x, y and z [1]
+    colour: Colour | None  # of its material in the URDF; None if that says none
 
 
 def material_colours(urdf: str) -> Mapping[str, Colour]:

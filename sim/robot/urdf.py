@@ -37,33 +37,22 @@ _SIZES: Final[Mapping[str, tuple[str, ...]]] = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solid:
-    """A simple solid that a link looks like.
+    """A simple solid that a link looks like."""
 
-    Attributes:
-        kind: what it is.
-        size: edges x, y, z of a box; radius of a sphere; radius and length of a cylinder or a
-            capsule, a capsule's between the centres of its hemispheres [m].
-        origin: of its centre in the link's frame.
-    """
-
-    kind: SolidKind
+    kind: SolidKind  # what it is
+    # edges x, y, z of a box; radius of a sphere; radius and length of a cylinder or a capsule, a
+    # capsule's between the centres of its hemispheres [m]
     size: Floats
-    origin: Origin
+    origin: Origin  # of its centre in the link's frame
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Link:
-    """A link.
+    """A link."""
 
-    Attributes:
-        name: as in the file.
-        inertia: in the link's frame; `NO_INERTIA` if the file gives none.
-        element: of the file.
-    """
-
-    name: str
-    inertia: BodyInertia
-    element: ET.Element
+    name: str  # as in the file
+    inertia: BodyInertia  # in the link's frame; `NO_INERTIA` if the file gives none
+    element: ET.Element  # of the file
 
     def solids(self, use: GeometryUse = "visual") -> tuple[Solid, ...]:
         """Simple solids of its geometry; meshes are left out."""
@@ -86,38 +75,24 @@ class Link:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Place:
-    """Where a link is in its rigid body.
+    """Where a link is in its rigid body."""
 
-    Attributes:
-        body: name of the rigid body's first link, in whose frame it is.
-        rotation: from the link's frame, (3, 3).
-        position: of the link's origin, (3,) [m].
-    """
-
-    body: str
-    rotation: Floats
-    position: Floats
+    body: str  # name of the rigid body's first link, in whose frame it is
+    rotation: Floats  # from the link's frame, (3, 3)
+    position: Floats  # of the link's origin, (3,) [m]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Urdf:
-    """A URDF that has been read.
+    """A URDF that has been read."""
 
-    Attributes:
-        text: of the file; with held joints fixed and continuous ones revolute.
-        links: by name, parents before their children, the robot's body first.
-        joints: in the file's order.
-        bodies: inertia of every rigid body in the frame of its first link, by this link's name, the
-            robot's body first. Links that are fixed to one another are one rigid body, as in
-            Pinocchio.
-        places: where each link is in its rigid body.
-    """
-
-    text: str
-    links: Mapping[str, Link]
-    joints: tuple[Joint, ...]
+    text: str  # of the file; with held joints fixed and continuous ones revolute
+    links: Mapping[str, Link]  # by name, parents before their children, the robot's body first
+    joints: tuple[Joint, ...]  # in the file's order
+    # inertia of every rigid body in the frame of its first link, by this link's name, the robot's
+    # body first. Links that are fixed to one another are one rigid body, as in Pinocchio.
     bodies: Mapping[str, BodyInertia]
-    places: Mapping[str, Place]
+    places: Mapping[str, Place]  # where each link is in its rigid body
 
     @property
     def body(self) -> BodyInertia:

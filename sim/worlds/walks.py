@@ -212,25 +212,16 @@ _PLANS_KEPT: Final = 16
 
 @dataclass(frozen=True, slots=True)
 class PerturbedWalk:
-    """Designs of a controller walk through a scenario of one world, of which they know nothing.
+    """Designs of a controller walk through a scenario of one world, of which they know nothing."""
 
-    Attributes:
-        name: unique in its job.
-        robot: as described.
-        controller: name of the motor controller.
-        scenario: that is walked through.
-        world: names and values of perturbations; what is not named is nominal.
-        variables: columns of the designs.
-        precision: of the physics' numbers.
-    """
-
-    name: str
-    robot: RobotSource
-    controller: ControllerName
-    scenario: Scenario
+    name: str  # unique in its job
+    robot: RobotSource  # as described
+    controller: ControllerName  # name of the motor controller
+    scenario: Scenario  # that is walked through
+    # names and values of perturbations; what is not named is nominal
     world: tuple[tuple[str, float], ...]
-    variables: tuple[str, ...]
-    precision: Precision = "double"
+    variables: tuple[str, ...]  # columns of the designs
+    precision: Precision = "double"  # of the physics' numbers
 
     @property
     def robots(self) -> tuple[RobotSource, ...]:
@@ -346,22 +337,15 @@ class WorldWalk:
 
     Desired angles and control law are those of the robot as described: its controller knows
     nothing of the world. All worlds share the robot's kernel.
-
-    Attributes:
-        robot: as described.
-        controller: name of the motor controller.
-        design: names and numbers of the design.
-        scenario: that is walked through.
-        variables: columns of the worlds, names of `PERTURBATIONS`; what is not named is nominal.
-        precision: of the physics' numbers.
     """
 
-    robot: RobotSource
-    controller: ControllerName
-    design: tuple[tuple[str, float], ...]
-    scenario: Scenario
+    robot: RobotSource  # as described
+    controller: ControllerName  # name of the motor controller
+    design: tuple[tuple[str, float], ...]  # names and numbers of the design
+    scenario: Scenario  # that is walked through
+    # columns of the worlds, names of `PERTURBATIONS`; what is not named is nominal
     variables: tuple[str, ...]
-    precision: Precision = "double"
+    precision: Precision = "double"  # of the physics' numbers
 
     @property
     def name(self) -> str:
@@ -452,14 +436,10 @@ class EngineWalk:
     """Worlds that say which engine computes them.
 
     A walk in another engine takes some hundred times as long, so that it can be broken off.
-
-    Attributes:
-        walk: that is walked, whose worlds are without the column of the engine.
-        engine_column: index of that column: 0 for our own engine, k for the k-th of `ENGINES`.
     """
 
-    walk: WorldWalk
-    engine_column: int
+    walk: WorldWalk  # that is walked, whose worlds are without the column of the engine
+    engine_column: int  # index of that column: 0 for our own engine, k for the k-th of `ENGINES`
 
     @property
     def name(self) -> str:

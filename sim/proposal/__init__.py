@@ -1,1 +1,1 @@
-"""A robot.toml from a URDF: legs, stance, actuators and gaits, each guess with its reason."""
+"""Proposed robot.toml for a URDF: legs, stance, actuators and gaits, each guess with its reason."""

@@ -1,4 +1,4 @@
-"""Proposed actuators as text of a robot.toml, with what controls them."""
+"""Proposed actuators and control as text of a robot.toml."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from gaitswarm.sim.proposal.drive import DriveNumbers
 from gaitswarm.sim.robot.actuators import ActuatorKind
 
 _VOLTAGE: Final = 24.0
-"""Of a battery that is unknown [V]."""
+"""Assumed battery voltage [V]."""
 
 _RATIO: Final = 9.0
-"""Of a gearhead that is unknown."""
+"""Assumed efficiency of a gearhead."""
 
 _EFFICIENCY: Final = 0.95
 
 _LARGEST_CODE: Final = 26000.0
-"""Of a current at standstill: some room is left below what 16 bits hold [counts]."""
+"""Code of the current at standstill, somewhat below the largest of 16 bits [counts]."""
 
 ACTUATOR_NOTES: Final[Mapping[ActuatorKind, str]] = MappingProxyType(
     {
@@ -31,14 +31,14 @@ ACTUATOR_NOTES: Final[Mapping[ActuatorKind, str]] = MappingProxyType(
 )
 
 _KNEE: Final = 0.5
-"""Share of the speed limit up to which a quasi-direct drive has all of its torque."""
+"""Share of the speed limit up to which a quasi-direct drive has its full torque."""
 
 _STIFFNESS, _DAMPING = (0.5, 10.0), (0.005, 0.1)
-"""Bounds of a joint PD's gains per torque limit [1/rad], [s/rad]."""
+"""Bounds of a joint PD's gains relative to the torque limit [1/rad], [s/rad]."""
 
 
 def actuator_tables(kind: ActuatorKind, drives: Sequence[Sequence[DriveNumbers]]) -> list[str]:
-    """Lines of robot.toml: actuators, battery, command and sensors."""
+    """Return lines of robot.toml: actuators, battery, command and sensors."""
     if kind == "torque":
         return [*_torque_actuators(drives), *_torque_electronics(drives)]
     return [*_dc_motors(drives), *_dc_electronics(drives)]
@@ -47,7 +47,7 @@ def actuator_tables(kind: ActuatorKind, drives: Sequence[Sequence[DriveNumbers]]
 def proposed_control(
     kind: ActuatorKind, drives: Sequence[Sequence[DriveNumbers]]
 ) -> dict[str, Any]:
-    """A controller, and bounds of its variables that follow from the torques."""
+    """Return a controller, and bounds of its variables that follow from the torques."""
     if kind == "dc":
         return {"controller": "pid"}
     limit = float(np.median([drive.torque for of_leg in drives for drive in of_leg]))
@@ -67,7 +67,7 @@ def proposed_control(
 
 
 def drive_names(drives: Sequence[Sequence[DriveNumbers]]) -> dict[DriveNumbers, str]:
-    """A name for every drive that differs."""
+    """Name all distinct drives."""
     kinds = dict.fromkeys(drive for of_leg in drives for drive in of_leg)
     return {drive: f"drive{number}" for number, drive in enumerate(kinds, start=1)}
 
@@ -76,7 +76,7 @@ def _dc_motors(drives: Sequence[Sequence[DriveNumbers]]) -> list[str]:
     lines = [
         "",
         "# Each drive is a DC motor whose torque falls from standstill to its no-load speed at",
-        f"# {_VOLTAGE:g} V; rotors weigh 2 % of a leg's part of the mass at the leg's length.",
+        f"# {_VOLTAGE:g} V; rotor inertia is 2 % of a leg's share of the mass at the leg's length.",
     ]
     for drive, name in drive_names(drives).items():
         constant = _VOLTAGE / drive.speed / _RATIO
@@ -106,10 +106,10 @@ def _dc_motors(drives: Sequence[Sequence[DriveNumbers]]) -> list[str]:
 def _torque_actuators(drives: Sequence[Sequence[DriveNumbers]]) -> list[str]:
     lines = [
         "",
-        "# Each actuator has its torque up to half its speed limit, and less from there on.",
+        "# Each actuator has its full torque up to half its speed limit, and less above that.",
         f"# Guessed: the motor's voltage at the speed limit is {_VOLTAGE:g} V; its heat at the",
-        "# torque limit is the largest power of a line from the one limit to the other; rotors",
-        "# weigh 2 % of a leg's part of the mass at the leg's length; there is no friction.",
+        "# torque limit is the largest power on a line between the two limits; rotor inertia is",
+        "# 2 % of a leg's share of the mass at the leg's length; there is no friction.",
     ]
     for drive, name in drive_names(drives).items():
         constant = _VOLTAGE / drive.speed
@@ -152,7 +152,7 @@ def _dc_electronics(drives: Sequence[Sequence[DriveNumbers]]) -> list[str]:
         "resistance = 0.01                   # ohm",
         f"nominal_voltage = {_VOLTAGE}         # V",
         "",
-        "[pwm]                               # a fine 10 bits and a sign",
+        "[pwm]                               # 10 bits and a sign",
         "counts = 1023",
         f"full_scale = {_VOLTAGE}              # V",
         "step = 1",
@@ -162,10 +162,10 @@ def _dc_electronics(drives: Sequence[Sequence[DriveNumbers]]) -> list[str]:
 
 
 def _sensors(largest: float) -> list[str]:
-    """largest: current [A]."""
+    """Return lines of sensors for a largest current [A]."""
     return [
-        "[sensors]                           # 16 bits a turn, 12 bits of current",
-        "angle_counts = 10430.0              # a rad",
+        "[sensors]                           # 16 bits per turn, 12 bits of current",
+        "angle_counts = 10430.0              # per rad",
         "angle_step = 1",
         f"current_counts = {_LARGEST_CODE / largest:.6g}    # an A",
         "current_step = 16",
@@ -173,5 +173,5 @@ def _sensors(largest: float) -> list[str]:
 
 
 def quoted(text: str) -> str:
-    """Text as a string of TOML."""
+    """Quote text as a TOML string."""
     return json.dumps(text, ensure_ascii=False)

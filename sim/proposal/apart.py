@@ -1,4 +1,4 @@
-"""A proposal that is known to walk; for URDFs by anybody made in a process that may be ended."""
+"""Proposals that are checked to walk, made in a limited process for untrusted URDFs."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from gaitswarm.sim.robot.robot import parse_robot
 from gaitswarm.sim.robot.urdf_errors import by_line
 
 SECONDS: Final = 40.0
-"""That a proposal may take; it takes some tenths of a second, the first a second more."""
+"""Time limit of a proposal [s]; one takes tenths of a second, the first a second more."""
 
 CPU_SECONDS: Final = 20
 
 MEMORY: Final = 2 << 30
-"""Address space of a process that proposes [B]; it takes a tenth of that."""
+"""Address space of a proposing process [B], of which it needs a tenth."""
 
 PROCESSES: Final = LimitedProcesses(
     "gaitswarm.sim.proposal.apart", count=1, seconds=SECONDS, cpu_seconds=CPU_SECONDS, memory=MEMORY
@@ -36,7 +36,7 @@ def walking_proposal(
     frame: Frame = AS_IT_IS,
     bounds: MeshBounds = no_meshes,
 ) -> Proposal:
-    """Propose a robot, and make sure that it can be used and that its legs reach."""
+    """Propose a robot, and check that it can be used and that its legs reach."""
     proposal = propose_robot(urdf, name, actuator, frame, bounds)
     robot = parse_robot(proposal.toml, proposal.urdf)
     with by_line(urdf):
@@ -50,7 +50,7 @@ def walking_proposal(
 def propose_apart(
     urdf: str, name: str, actuator: ActuatorChoice = "auto", frame: Frame = AS_IT_IS
 ) -> Proposal:
-    """The same, in another process with limits of time, processor and memory."""
+    """Propose a robot in another process with limits of time, processor and memory."""
     bounds.check_urdf(urdf)
     try:
         made = PROCESSES.ask(

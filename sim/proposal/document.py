@@ -1,4 +1,4 @@
-"""A proposed robot as files: robot.toml with a comment on every guess, and what goes with it."""
+"""A proposed robot as files: robot.toml with a comment on each guess, and robot.urdf."""
 
 from __future__ import annotations
 
@@ -36,16 +36,16 @@ from gaitswarm.sim.robot.urdf import parse_urdf, unphysical
 from gaitswarm.sim.robot.urdf_errors import by_line
 
 _LEVEL: Final = 0.2
-"""How far hips may be above or below the body's origin, as a share of the legs' length."""
+"""Accepted height of hips above or below the body's origin, relative to the legs' length."""
 
 _LOWER: Final = 0.02
-"""By how much another end has to be lower than the farthest one, as a share of the leg's length."""
+"""How much lower than the farthest end another one must be, relative to the leg's length."""
 
 
 def stood_up(urdf: str, frame: Frame, bounds: MeshBounds) -> tuple[str, FoundLegs, list[str]]:
-    """Find the legs of a URDF, which is given a frame with z up, x ahead and hips about level.
+    """Find the legs of a URDF and give it a frame with z up, x ahead and hips about level.
 
-    What a body does is told by its origin, so one on the ground would always have fallen.
+    A body moves by its origin: one on the ground would count as fallen from the start.
     """
     root, *others = parse_urdf(urdf).links
     text = turned(urdf, root, [root, *others], frame)
@@ -62,7 +62,7 @@ def stood_up(urdf: str, frame: Frame, bounds: MeshBounds) -> tuple[str, FoundLeg
 
 
 def _at_their_lowest(urdf: str, found: FoundLegs) -> FoundLegs:
-    """Legs that end where they are lowest as they stand, if only shapes say where they end."""
+    """Put ends of legs that only shapes indicate at their lowest point in the stance."""
     if not any(len(leg.ends) for leg in found.legs):
         return found
     tree = parse_urdf(urdf)
@@ -80,7 +80,7 @@ def _at_their_lowest(urdf: str, found: FoundLegs) -> FoundLegs:
 
 
 def with_feet(urdf: str, legs: Sequence[FoundLeg]) -> tuple[str, list[str]]:
-    """Add a frame at the end of every leg that has none."""
+    """Add a frame at the end of every leg without one."""
     feet = [leg.foot or f"{leg.link}_foot" for leg in legs]
     missing = [(leg, foot) for leg, foot in zip(legs, feet, strict=True) if leg.foot is None]
     if not missing:
@@ -95,14 +95,13 @@ def with_feet(urdf: str, legs: Sequence[FoundLeg]) -> tuple[str, list[str]]:
 
 
 _PREFERENCE: Final = "C"
-"""The one without biases, whose size is that of one hexapod's objectives: it ranks walks of robots
-of any size alike."""
+"""Without biases, it ranks walks of robots of any size alike, though scaled to one hexapod."""
 
 _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _.-]{0,59}")
-"""Of a leg that may have gait parameters of its own."""
+"""Gait parameters that a single leg may have."""
 
 _PART: Final = re.compile(r"[_\-. ]")
-"""What parts of a name are told apart by."""
+"""Separators in names."""
 
 _TWO_LEGS: Final = (
     "two legs on point feet do not stand by themselves, and controllers here hold joints, not"
@@ -119,21 +118,23 @@ _SIDEWAYS: Final = (
 
 @dataclass(frozen=True, slots=True)
 class Proposal:
-    """A robot's folder."""
+    """A proposed robot's files."""
 
-    toml: str  # text of robot.toml.
+    toml: str
     urdf: str  # text of robot.urdf.
-    job: dict[str, Any]  # what a job of this robot has unless it says otherwise, as a spec
-    guesses: tuple[str, ...]  # what to look at, one sentence each, as robot.toml has them too.
-    problems: tuple[str, ...] = ()  # what no body has in the URDF, one sentence each
+    job: dict[str, Any]  # defaults of this robot's jobs, as a spec
+    guesses: tuple[str, ...]  # one sentence each, also in robot.toml
+    problems: tuple[
+        str, ...
+    ] = ()  # masses and inertias of the URDF that are impossible, one sentence each
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Guesses and problems."""
+        """Guesses, and problems as warnings."""
         return (*self.guesses, *(f"warning: {problem}" for problem in self.problems))
 
     def with_guesses(self, more: Sequence[str], **changed: Any) -> Proposal:
-        """The same robot with more guesses, in robot.toml too."""
+        """Return the robot with more guesses, also in robot.toml."""
         guesses = tuple(dict.fromkeys([*self.guesses, *more]))
         toml = self.toml.replace(_guesses(self.guesses), _guesses(guesses), 1)
         return replace(self, toml=toml, guesses=guesses, **changed)
@@ -146,7 +147,7 @@ def propose_robot(
     frame: Frame = AS_IT_IS,
     bounds: MeshBounds = no_meshes,
 ) -> Proposal:
-    """Make a robot of a URDF."""
+    """Propose a robot for a URDF."""
     with by_line(urdf):
         urdf, found, moved = stood_up(urdf, frame, bounds)
     text, feet = with_feet(urdf, found.legs)
@@ -194,13 +195,13 @@ def propose_robot(
 
 def _head(name: str, legs: int, mass: float) -> list[str]:
     return [
-        f"# {name}: made by `gaitswarm robot init` from its URDF, which is beside this file.",
-        "# What a URDF does not say is guessed here; a comment says how. All fields, with units:",
+        f"# {name}: made by `gaitswarm robot init` from the URDF next to this file.",
+        "# Comments explain how missing values are guessed. All fields, with units:",
         "# docs/robots.md.",
         "",
         f"name = {quoted(name)}",
         f"description = {quoted(f'{legs} legs of three joints, {mass:.3g} kg.')}",
-        "load_height = 0.05                  # m, of a load over the body's origin; guessed",
+        "load_height = 0.05                  # m, of a load above the body's origin; guessed",
         _guesses(()),
     ]
 
@@ -208,7 +209,7 @@ def _head(name: str, legs: int, mass: float) -> list[str]:
 def _guesses(sentences: Sequence[str]) -> str:
     return "\n".join(
         [
-            "# `gaitswarm robot check` tells these; take out what you know better.",
+            "# Shown by `gaitswarm robot check`; remove those you have verified.",
             "guesses = [",
             *(f"  {quoted(sentence)}," for sentence in sentences),
             "]",
@@ -256,14 +257,14 @@ def _legs(
 def _held(found: FoundLegs) -> list[str]:
     if not found.held:
         return []
-    lines = ["", "[held_joints]                       # of no leg; rad"]
+    lines = ["", "[held_joints]                       # belong to no leg; rad"]
     return lines + [f"{quoted(name)} = {float(at)}" for name, at in found.held.items()]
 
 
 def _leg_names(legs: Sequence[FoundLeg]) -> list[str]:
-    """What the names of each leg's joints begin with, less how all of these end; else numbers."""
+    """Name legs by the beginning of their joints' names without its common end, or by number."""
     begins = [_shared_beginning(leg.joints) for leg in legs]
-    # Of leg1_j and leg2_j, whose joints are leg1_j1, leg1_j2 ..., the end is of the joints.
+    # The end of leg1_j and leg2_j, with joints leg1_j1, leg1_j2 ..., belongs to the joints.
     end = _shared_beginning([begin[::-1] for begin in begins])[::-1]
     part = _PART.search(end)
     cut = len(end) - part.start() if part else 0

@@ -1,4 +1,4 @@
-"""Actuators and soles for a robot of which nothing but its URDF is known."""
+"""Proposed actuators and soles for a robot known only by its URDF."""
 
 from __future__ import annotations
 
@@ -19,51 +19,51 @@ GRAVITY: Final = 9.81
 """[m/s2]"""
 
 _ENOUGH, _PLAUSIBLE = 2.0, 60.0
-"""Torques of a file that are believed, in units of what standing on half the legs takes."""
+"""Plausible torques of a URDF, relative to what standing on half the legs takes."""
 
 _GUESSED_TORQUE: Final = 5.0
-"""Stall torque where the file's is not believed, in the same units."""
+"""Stall torque where the URDF's is implausible, in the same units."""
 
 _SLOWEST, _FASTEST = 2.0, 100.0
-"""Rates of a file that are believed [rad/s]."""
+"""Plausible speeds of a URDF [rad/s]."""
 
 _GUESSED_SPEED: Final = 20.0
-"""No-load rate where the file's is not believed [rad/s]."""
+"""No-load speed where the URDF's is implausible [rad/s]."""
 
 _ARMATURE: Final = 0.02
-"""Rotor inertia at a joint, as a share of a leg's part of the mass at the leg's length."""
+"""Rotor inertia at a joint, relative to a leg's share of the mass at the leg's length."""
 
 _SINKS: Final = 0.01
-"""How far soles yield when half the legs carry the robot, as a share of its height."""
+"""Deflection of soles when half the legs carry the robot, relative to its height."""
 
 _SOLE: Final = 0.05
-"""Sole where no sphere says it, as a share of the leg's length."""
+"""Length of soles without spheres, relative to the leg's length."""
 
 
 _DIRECT: Final = 12.0
-"""Rate of the slowest joint from which on drives are taken as quasi-direct: a gear of a hundred or
-more leaves less of a small motor's [rad/s]."""
+"""Speed of the slowest joint above which drives count as quasi-direct [rad/s]; small motors with a
+gear ratio of a hundred or more are slower."""
 
 ActuatorChoice = Literal["auto", "dc", "torque"]
-"""Kind of actuators to be proposed: that which the URDF's limits speak for, or a given one."""
+"""Kind of actuators to propose: as the URDF's limits suggest, or a given one."""
 
 ACTUATOR_CHOICES: Final[tuple[ActuatorChoice, ...]] = get_args(ActuatorChoice)
 
 
 @dataclass(frozen=True, slots=True)
 class DriveNumbers:
-    """What drives a joint, by what it does there."""
+    """A joint's drive, by its effect at the joint."""
 
-    torque: float  # at standstill, of a DC motor at full voltage [N m]
-    speed: float  # without load, of a DC motor at full voltage [rad/s]
-    armature: float  # inertia of the rotor, seen at the joint [kg m2]
-    note: str  # where the numbers come from
+    torque: float  # at standstill and a DC motor's full voltage [N m]
+    speed: float  # without load at a DC motor's full voltage [rad/s]
+    armature: float  # of the rotor at the joint [kg m2]
+    note: str  # source of the numbers
     believed: bool = False  # whether torque and speed are the URDF's
 
 
 @dataclass(frozen=True, slots=True)
 class SoleNumbers:
-    """Soles on ground."""
+    """Contact of soles with the ground."""
 
     length: float  # of the sole's spring beyond the leg's end [m]
     stiffness: float  # [N/m]
@@ -75,9 +75,8 @@ def propose_drives(
 ) -> list[list[DriveNumbers]]:
     """Propose a drive for every joint, by leg.
 
-    Torque and rate are the limits that the URDF gives (`effort`, `velocity`), where these could be
-    meant: a torque of 1000 N m stands in many files for "unknown". Else they are a multiple of what
-    the joint needs to stand on half the legs.
+    Torque and speed are the URDF's limits (`effort`, `velocity`) if they are plausible: many files
+    say 1000 N m for "unknown". Else they are multiples of what standing on half the legs takes.
     """
     joints = {joint.name: joint for joint in urdf.joints}
     force = urdf.total_mass * GRAVITY / (len(legs) / 2.0)
@@ -85,7 +84,7 @@ def propose_drives(
     for leg, angles in zip(legs, stance.angles, strict=True):
         _, slopes = leg.feet(np.array([angles]))
         needs.append(np.abs(slopes[0, 2, :]) * force)
-    # Of a leg in motion any joint may need what the worst one needs at rest.
+    # In motion any joint of a leg may need what its worst one needs at rest.
     worst = np.maximum(np.max(needs, axis=0), 0.5 * np.max(needs))
     share = urdf.total_mass / len(legs)
     return [
@@ -98,7 +97,7 @@ def propose_drives(
 
 
 def chosen_kind(choice: ActuatorChoice, drives: Sequence[Sequence[DriveNumbers]]) -> ActuatorKind:
-    """The kind of actuators to propose."""
+    """Choose the kind of actuators to propose."""
     if choice != "auto":
         return choice
     of_joints = [drive for of_leg in drives for drive in of_leg]
@@ -125,11 +124,7 @@ def _drive(joint: Joint, need: float, armature: float) -> DriveNumbers:
 def propose_sole(
     urdf: Urdf, legs: Sequence[ChainLeg], stance: Stance, spheres: Sequence[float | None]
 ) -> tuple[SoleNumbers, str]:
-    """Propose the soles' spring and damper.
-
-    Args:
-        spheres: Radius of each foot's sphere [m], None for none.
-    """
+    """Propose the soles' spring and damper, with feet's spheres by radius [m] (None: no sphere)."""
     known = [radius for radius in spheres if radius is not None]
     length = float(np.median(known)) if known else _SOLE * sum(legs[0].lengths)
     note = "radius of the feet's spheres" if known else "guessed from the legs' length"
@@ -140,5 +135,5 @@ def propose_sole(
 
 
 def _short(value: float) -> float:
-    """Three digits: more would claim a precision that a guess has not."""
+    """Round to three digits: a guess is no more precise."""
     return float(f"{value:.3g}")

@@ -1,4 +1,4 @@
-"""Where a leg of a URDF ends."""
+"""Ends of a URDF's legs."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from gaitswarm.sim.robot.urdf import Solid, Urdf
 Floats = NDArray[np.float64]
 
 MeshBounds = Callable[[str], Floats | None]
-"""Least and largest coordinates of a mesh by its name in the URDF, (2, 3), before it is scaled;
-None where it is not found or cannot be read."""
+"""Returns least and largest coordinates of a mesh by its name in the URDF, (2, 3), unscaled; None
+if it is missing or cannot be read."""
 
 
 def no_meshes(_name: str) -> None:
-    """Find no mesh: of a URDF that came alone."""
+    """Find no mesh, for a URDF without mesh files."""
 
 
 _FOOT_NAME: Final = re.compile(r"foot|toe|sole|ankle|tip|contact", re.IGNORECASE)
@@ -32,18 +32,18 @@ _FOOT_NAME: Final = re.compile(r"foot|toe|sole|ankle|tip|contact", re.IGNORECASE
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LegEnd:
-    """Where a leg ends, in its last link's frame."""
+    """End of a leg in its last link's frame."""
 
     at: Floats  # position, (3,) [m]
-    foot: str | None = None  # name of the frame there; None for none
-    sole: float | None = None  # radius of a sphere there [m]; None for none
-    notes: tuple[str, ...] = ()  # what was guessed
-    # where it ends as well as the shapes say, (n, 3) [m]; none if these were not asked
+    foot: str | None = None  # name of the frame there, if any
+    sole: float | None = None  # radius of a sphere there [m], if any
+    notes: tuple[str, ...] = ()  # guesses
+    # alternatives that fit the shapes equally well, (n, 3) [m]
     others: Floats = field(default_factory=lambda: np.empty((0, 3)))
 
 
 def end_of(urdf: Urdf, link: str, bounds: MeshBounds = no_meshes) -> LegEnd:
-    """Where a leg ends: at a frame that is fixed to its last link, a sphere, or the link's end."""
+    """Find a leg's end: a frame fixed to its last link, a sphere, or the end of its shapes."""
     parts = [name for name, place in urdf.places.items() if place.body == link]
     spheres = [(at, s.size[0]) for part in parts for at, s in _solids(urdf, part, "sphere")]
     others = [name for name in parts if name != link]
@@ -82,7 +82,7 @@ def _without_foot(urdf: Urdf, link: str, parts: Iterable[str]) -> str:
 
 
 def _mesh_ends(urdf: Urdf, part: str, bounds: MeshBounds) -> Iterable[Floats]:
-    """Middles of the faces of boxes around a link's meshes, in its body's frame."""
+    """Yield centres of the faces of boxes around a link's meshes, in its body's frame."""
     place = urdf.places[part]
     for mesh in visual_meshes(urdf.links[part], {}):
         found = bounds(mesh.name)
@@ -91,7 +91,7 @@ def _mesh_ends(urdf: Urdf, part: str, bounds: MeshBounds) -> Iterable[Floats]:
         ends = found * mesh.scale
         middle, half = ends.mean(axis=0), np.ptp(ends, axis=0) / 2.0
         faces = np.concatenate([middle + np.diag(half), middle - np.diag(half)])
-        # Slow to import; it has been by now, as origins are read by it.
+        # Slow to import, but already imported where origins are read.
         from scipy.spatial.transform import Rotation  # noqa: PLC0415
 
         turn = Rotation.from_quat(mesh.origin[3:]).as_matrix()

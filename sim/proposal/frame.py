@@ -1,4 +1,4 @@
-"""Which axes of a URDF point up and ahead, where these are not z and x."""
+"""Axes of a URDF that point up and ahead, if these are not z and x."""
 
 from __future__ import annotations
 
@@ -18,47 +18,43 @@ from gaitswarm.sim.robot.urdf import Urdf
 Floats = NDArray[np.float64]
 
 Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
-"""Of the frame of a URDF's first link."""
+"""Axis of the frame of a URDF's first link."""
 
 AXES: Final[tuple[Axis, ...]] = get_args(Axis)
 
 _ROOT: Final = "robot_frame"
-"""Link that is added before the first one of a URDF that is turned."""
+"""Name of the first link that is added to a rotated URDF."""
 
 _FLAT: Final = 3.0
-"""Hips lie in a plane whose spread across it is that much less than their spread along z."""
+"""How much less hips spread across their plane than along z."""
 
 _HANGS: Final = 0.1
-"""Mean place of a foot over all angles, as a share of the leg's length, from which on it speaks for
+"""Mean position of a foot over all angles, relative to the leg's length, beyond which it indicates
 the side that feet are on."""
 
 _SIDEWAYS: Final = 1.5
-"""Legs stand or swing that much more the one way than the other, if they speak for a side."""
+"""How much farther legs that indicate a direction stand or swing along it than across."""
 
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """Axes of a URDF's first link."""
+    """Directions of a URDF's first link."""
 
-    up: Axis | None = None  # that which points up; None for z, if the legs do not speak against it
-    forward: Axis | None = None  # that which points ahead, at right angles to it; None for x
+    up: Axis | None = None  # None: z, unless the legs contradict it
+    forward: Axis | None = None  # at right angles to `up`; None: x
 
     @property
     def right_angled(self) -> bool:
-        """Whether the two axes are not along the same line."""
+        """Whether the two axes are perpendicular."""
         return (self.up or "z")[-1] != (self.forward or "x")[-1]
 
 
 AS_IT_IS: Final = Frame()
-"""Nothing is known of it but what legs speak for."""
+"""Unknown directions, to be inferred from the legs."""
 
 
 def turned(urdf: str, root: str, links: Sequence[str], frame: Frame, level: float = 0.0) -> str:
-    """A URDF with z up and x ahead: a first link is added whose frame has them so.
-
-    Args:
-        level: Of the new origin above the first link's [m].
-    """
+    """Add a first link to a URDF that has z up and x ahead, its origin `level` higher [m]."""
     up, ahead = _vector(frame.up or "z"), _vector(frame.forward or "x")
     turn = np.array([ahead, np.cross(up, ahead), up])
     if (turn == np.eye(3)).all() and level == 0.0:
@@ -70,12 +66,10 @@ def turned(urdf: str, root: str, links: Sequence[str], frame: Frame, level: floa
 
 
 def check_upright(urdf: Urdf, hips: Floats, feet: Floats) -> None:
-    """Check that z can point up: hips lie about level, and feet are below more than above.
+    """Check that z can point up: hips are about level, and feet more below than above them.
 
-    Args:
-        hips: Of the legs, (n_legs, 3) [m].
-        feet: From each hip, the mean over all angles of the joints, in units of the leg's length,
-            (n_legs, 3).
+    `hips` are (n_legs, 3) [m]; `feet` are means over all joint angles, relative to the hip in units
+    of the leg's length, (n_legs, 3).
     """
     spread, mean = np.ptp(hips, axis=0), feet.mean(axis=0)
     across = int(spread.argmin())
@@ -92,13 +86,10 @@ def check_upright(urdf: Urdf, hips: Floats, feet: Floats) -> None:
 
 
 def sideways(legs: Sequence[ChainLeg], stance: Sequence[Sequence[float]]) -> bool:
-    """Whether a robot seems to face y, as its feet stand ahead of its hips and behind them.
+    """Infer that a robot faces y, from feet ahead of and behind their hips in the stance [rad].
 
-    Legs that hang swing about their knees' axes, ahead; legs whose hips turn about an upright axis
-    stand beside the body. Legs all round speak for nothing.
-
-    Args:
-        stance: Angles of each leg's joints [rad].
+    Hanging legs swing ahead, about their knees' axes; legs with vertical hip axes stand at the
+    body's sides. Legs all around indicate nothing.
     """
     beside, ahead = 0.0, 0.0
     for leg, angles in zip(legs, stance, strict=True):
@@ -119,7 +110,7 @@ def _vector(axis: Axis) -> Floats:
 
 
 def _roll_pitch_yaw(turn: Floats) -> tuple[float, float, float]:
-    """About fixed axes, of a rotation by right angles, (3, 3) [rad]."""
+    """Angles about fixed axes of a rotation by right angles, (3, 3) [rad]."""
     if turn[2, 0] == 0.0:
         return math.atan2(turn[2, 1], turn[2, 2]), 0.0, math.atan2(turn[1, 0], turn[0, 0])
     pitch = math.copysign(math.pi / 2.0, -turn[2, 0])

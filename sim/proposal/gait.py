@@ -1,4 +1,4 @@
-"""Phases and walks for a robot of unknown design, scaled by how it swings."""
+"""Proposed phases and scenarios, scaled by a robot's height."""
 
 from __future__ import annotations
 
@@ -19,43 +19,39 @@ from gaitswarm.sim.robot.legs import ChainLeg
 from gaitswarm.sim.scenario import Scenario
 
 _WALKS: Final = {"slow": (0.9, 0.25), "fast": (0.6, 0.35)}
-"""Cycle time in units of a pendulum's of the hips' height, stride in units of the height; of robots
-that half their legs hold upright, which are three and more."""
+"""Cycle time relative to a pendulum of the hips' height, stride relative to that height; for robots
+that stand on half their legs, at least three."""
 
 _TIPPING_WALKS: Final = {"slow": (0.4, 0.2), "fast": (0.4, 0.35)}
-"""The same of robots with fewer legs. While half of these swing, the body tips about the line
+"""The same for robots with fewer legs. While half of these swing, the body tips about the line
 between the others, by a factor e in sqrt(height/gravity), 0.16 of the pendulum's time: a swing of
 0.4 of the cycle ends by then."""
 
 _LIFT: Final = 0.2
-"""Height of the swing in units of the hips' height."""
+"""Height of the swing relative to the hips' height."""
 
 _DUTY: Final = 0.6
 
 _SHARES: Final = (1.0, 0.85, 0.7, 0.55, 0.4, 0.25)
-"""Of stride and lift that are tried, for legs that do not reach further."""
+"""Shares of stride and lift to try for legs of short reach."""
 
 _SAME: Final = 1e-4
-"""Difference of two feet's lateral distances that counts as none [m]."""
+"""Difference of two feet's lateral distances that counts as zero [m]."""
 
 
 def alternating_phases(legs: Sequence[ChainLeg]) -> list[float]:
-    """Phases of a gait in which neighbours alternate: trot on four legs, tripod on six."""
+    """Return phases of a gait in which neighbours alternate: trot on four legs, tripod on six."""
     return [(1.0 - lag) % 1.0 for lag in lags_of(GAITS["alternating"], legs)]
 
 
 def propose_scenarios(stance: Stance, sole: float, names: Sequence[str]) -> list[dict[str, Any]]:
-    """A slow and a fast walk on level ground.
-
-    Args:
-        sole: Length of the soles [m].
-    """
+    """Propose a slow and a fast scenario on level ground, for soles of a length [m]."""
     height = stance.height + sole
     walks = _WALKS if len(names) // 2 >= 3 else _TIPPING_WALKS
     own = {
         f"radius[{name}]": round(radius, 4)
         for name, radius in zip(names, stance.radii, strict=True)
-        # A foot on the body's long axis is there whatever its radius is.
+        # A foot on the body's long axis has no radius.
         if radius > _SAME and abs(radius - stance.radius) > _SAME
     }
     pendulum = 2.0 * math.pi * math.sqrt(height / GRAVITY)
@@ -75,7 +71,7 @@ def propose_scenarios(stance: Stance, sole: float, names: Sequence[str]) -> list
 
 
 def walk_within_reach(robot: Robot, values: Mapping[str, Any]) -> tuple[dict[str, Any], str]:
-    """A proposed walk with steps as long and high as the legs reach."""
+    """Shorten a proposed scenario's steps until the legs reach."""
     refused: UnreachablePose | BeyondJointLimit | None = None
     for share in _SHARES:
         steps = {name: round(share * values[name], 4) for name in ("stride", "height")}
@@ -103,7 +99,7 @@ def _no_room(robot: Robot, refused: UnreachablePose | BeyondJointLimit | None) -
 
 
 def walk_of_robot(values: Mapping[str, Any], file: str) -> Scenario:
-    """A scenario whose lengths are a robot's own."""
+    """Build a scenario with a robot's own lengths."""
     try:
         return Scenario.model_validate(dict(values))
     except ValidationError as error:

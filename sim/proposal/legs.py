@@ -1,4 +1,4 @@
-"""Which joints of a URDF are legs, and where these end."""
+"""Legs among the joints of a URDF, and their ends."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from gaitswarm.sim.robot.urdf import Urdf
 Floats = NDArray[np.float64]
 
 _ALIKE: Final = 0.01
-"""Difference of two distances that are meant to be the same, as a share of the chain's length."""
+"""Tolerance of equal distances, relative to the chain's length."""
 
 _BY_HAND: Final = "or write robot.toml by hand, as docs/robots.md says, if it is no leg"
 
 
 def check_look_alikes(urdf: Urdf, legs: Sequence[str]) -> None:
-    """Check that no chain of joints is built as a leg is and yet is none.
+    """Reject a chain of joints that looks like a leg, but is not recognized as one.
 
-    A robot with one leg that is held falls, and nothing but its author's mistake makes it so.
+    A robot with one rigid leg falls, and only mistakes in a URDF lead to that.
     """
     paths = {name: _path(urdf, name) for name in urdf.links}
     of_legs = [paths[link] for link in legs]
@@ -46,7 +46,7 @@ def check_look_alikes(urdf: Urdf, legs: Sequence[str]) -> None:
 
 
 def _path(urdf: Urdf, link: str) -> list[Joint]:
-    """Joints from the body to a link."""
+    """Return joints from the body to a link."""
     carriers = {joint.child: joint for joint in urdf.joints}
     path: list[Joint] = []
     while link in carriers:
@@ -56,7 +56,7 @@ def _path(urdf: Urdf, link: str) -> list[Joint]:
 
 
 def _distances(path: Sequence[Joint]) -> Floats:
-    """Of each joint from the one before, (n,) [m]: the same for legs on any side."""
+    """Distances between consecutive joints, (n,) [m]: equal for legs on any side."""
     return np.array([float(np.linalg.norm(joint.origin.xyz)) for joint in path])
 
 
@@ -82,39 +82,39 @@ def _difference(path: Sequence[Joint], leg: Sequence[Joint]) -> str:
 
 
 _STEPS: Final = 25
-"""Angles of each joint that are tried."""
+"""Number of angles to try for each joint."""
 
 _UNNAMED: Final = "-"
 
 _SHARE_OF_THE_LONGEST: Final = 0.5
-"""How far down a chain has to reach to be a leg, of what the one that reaches furthest does."""
+"""How far down a leg has to reach, relative to the chain that reaches furthest."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FoundLeg:
     """A leg of a URDF."""
 
-    joints: tuple[str, str, str]  # names, from the body on
-    link: str  # name of the last one
-    foot: str | None  # name of a link or fixed joint at the leg's end; None if there is none
+    joints: tuple[str, str, str]  # names, from the body outwards
+    link: str  # name of the last link
+    foot: str | None  # name of a link or fixed joint at the leg's end, if any
     end: tuple[float, float, float]  # of the leg in the last link's frame [m]
-    sole: float | None  # radius of the sphere at its end [m]; None if there is none
-    notes: tuple[str, ...] = ()  # what was guessed
-    # others that it may have, by its shapes, (n, 3) [m]
+    sole: float | None  # radius of the sphere at its end [m], if any
+    notes: tuple[str, ...] = ()  # guesses
+    # alternatives that fit its shapes equally well, (n, 3) [m]
     ends: Floats = field(default_factory=lambda: np.empty((0, 3)))
 
 
 @dataclass(frozen=True, slots=True)
 class FoundLegs:
-    """What the movable joints of a URDF are."""
+    """Legs and held joints among a URDF's movable joints."""
 
     legs: tuple[FoundLeg, ...]  # in the order of their first joints in the file
-    # all other movable joints, each with an angle within its limits [rad]
+    # all other movable joints, each at an angle within its limits [rad]
     held: Mapping[str, float] = field(default_factory=dict)
 
 
 def find_legs(urdf: Urdf, *, upright: bool = False, bounds: MeshBounds = no_meshes) -> FoundLegs:
-    """Find the legs: chains of three joints that turn, from the body to a foot that reaches down"""
+    """Find legs: chains of three revolute joints from the body to a foot that reaches down."""
     chains = list(_chains(urdf))
     threes = [chain for chain in chains if _is_candidate(chain)]
     if len(threes) < 2:
@@ -146,11 +146,7 @@ def find_legs(urdf: Urdf, *, upright: bool = False, bounds: MeshBounds = no_mesh
 
 
 def chain_leg(urdf: Urdf, joints: Sequence[str], end: Sequence[float] | Floats) -> ChainLeg:
-    """Kinematics of three joints, at rest in the middle of their limits.
-
-    Args:
-        end: Of the leg in the last link's frame, (3,) [m].
-    """
+    """Kinematics of three joints at mid-range, to an end in the last link's frame (3,) [m]."""
     last = next(joint.child for joint in urdf.joints if joint.name == joints[-1])
     first, second, third = joints
     chain = chain_of(
@@ -180,11 +176,7 @@ def _kinematics(name: str, chain: Chain, end: Floats) -> ChainLeg:
 
 
 def reach_below(robot: Robot, number: int) -> float:
-    """How far a leg's foot gets below the highest hip.
-
-    Returns:
-        The distance within the joints' limits [m].
-    """
+    """Return how far a leg's foot gets below the highest hip within the joints' limits [m]."""
     leg = robot.description.legs[number]
     kinematics = _kinematics(leg.name, (chain := chain_of(robot.urdf, leg)), chain.foot)
     feet = kinematics.ends(tried_angles(kinematics))
@@ -192,18 +184,14 @@ def reach_below(robot: Robot, number: int) -> float:
 
 
 def tried_angles(leg: ChainLeg) -> Floats:
-    """A grid of a leg's angles within their limits and one turn.
-
-    Returns:
-        (n, 3) [rad].
-    """
+    """Return a grid of a leg's angles within their limits and one turn, (n, 3) [rad]."""
     ends = np.clip(leg.limits, -np.pi, np.pi)
     axes = [np.linspace(lower, upper, _STEPS) for lower, upper in ends]
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, JOINTS_PER_LEG)
 
 
 def _chains(urdf: Urdf) -> Iterable[tuple[Joint, ...]]:
-    """Chains of movable joints that hang on the body, each as far as it does not branch."""
+    """Yield chains of movable joints from the body, each up to its first branching."""
     behind: dict[str, list[Joint]] = {}
     for joint in urdf.joints:
         if not joint.fixed:
@@ -212,7 +200,7 @@ def _chains(urdf: Urdf) -> Iterable[tuple[Joint, ...]]:
         chain = [first]
         while len(carried := behind.get(chain[-1].child, [])) == 1:
             chain.append(carried[0])
-        # What branches, such as an arm with fingers, ends in no foot.
+        # A branching end, such as an arm with fingers, is not a foot.
         yield (*chain, *carried) if carried else tuple(chain)
 
 
@@ -235,7 +223,7 @@ def _why_none(urdf: Urdf, chains: Sequence[Sequence[Joint]]) -> str:
 
 
 def _reached(urdf: Urdf, chain: Sequence[Joint], bounds: MeshBounds) -> tuple[ChainLeg, Floats]:
-    """A chain as a leg, and where its end gets, (n, 3) [m]."""
+    """Return a chain as a leg, and positions of its end over a grid of angles, (n, 3) [m]."""
     end = end_of(urdf, chain[-1].child, bounds).at
     leg = chain_leg(urdf, [joint.name for joint in chain], end)
     return leg, leg.ends(tried_angles(leg))

@@ -1,4 +1,4 @@
-"""At which angles a robot of unknown design stands well."""
+"""Choice of a stance for a robot of unknown design."""
 
 from __future__ import annotations
 
@@ -17,40 +17,39 @@ from gaitswarm.sim.robot.legs import ChainLeg
 Floats = NDArray[np.float64]
 
 _HEIGHT: Final = 0.75
-"""Height of the hips in the stance, as a share of what stretched legs would have."""
+"""Height of the hips in the stance, relative to stretched legs."""
 
 _MARGIN: Final = 0.15
-"""Angle to a joint's limits below which a stance loses worth [rad]."""
+"""Distance from a joint's limits below which a stance is penalized [rad]."""
 
 _BAND: Final = 0.06
-"""How far the feet that are compared may lie from the wanted height, as a share of it."""
+"""Accepted deviation of candidate feet from the intended height, relative to it."""
 
 _TURN, _SHIFT = 0.35, 0.15
-"""By which a hip may turn [rad], and a foot move as a share of its leg's length, for all feet to be
-as far from the body's long axis: of legs that are mounted about so."""
+"""Limits for moving all feet to one distance from the body's long axis: rotation of a hip [rad],
+and shift of a foot relative to its leg's length."""
 
 
 @dataclass(frozen=True, slots=True)
 class Stance:
-    """How a robot stands."""
+    """A stance of a robot."""
 
     angles: tuple[tuple[float, float, float], ...]  # of each leg's joints [rad]
-    height: float  # of the highest hip over the feet [m]
+    height: float  # of the highest hip above the feet [m]
     radii: tuple[float, ...]  # lateral distance of each foot from the body's long axis [m]
 
     @property
     def radius(self) -> float:
-        """Of the foot in the middle of all [m]."""
+        """Median of all radii [m]."""
         return float(np.median(self.radii))
 
 
 def choose_stance(legs: Sequence[ChainLeg]) -> Stance:
-    """Choose a stance: feet below or beside their hips, at three quarters of the legs' reach.
+    """Choose a stance: feet below or next to their hips, at three quarters of the legs' reach.
 
-    Of the angles that put a foot there those are taken that let it move freely in all directions,
-    with little torque, and away from the joints' limits. All feet are as far from the body's long
-    axis, unless legs are mounted so that this would twist them: those of a round robot stay where
-    they point.
+    Among angles that put a foot there, prefer those at which it moves freely in all directions,
+    with little torque, and away from the joints' limits. All feet get one distance from the body's long
+    axis, unless that would twist legs as they are mounted: those of a round robot point outwards.
     """
     tried = [(angles := tried_angles(leg), leg.ends(angles)) for leg in legs]
     hips = max(leg.hip[2] for leg in legs)
@@ -71,7 +70,7 @@ def choose_stance(legs: Sequence[ChainLeg]) -> Stance:
 
 
 def _best(leg: ChainLeg, angles: Floats, feet: Floats, ground: float, height: float) -> Floats:
-    """The best of the tried angles (3,)."""
+    """Return the best candidate angles (3,)."""
     near = np.abs(feet[:, 2] - ground) < _BAND * height
     if not near.any():
         raise RobotFileError(
@@ -82,14 +81,14 @@ def _best(leg: ChainLeg, angles: Floats, feet: Floats, ground: float, height: fl
     angles = angles[near]
     feet, slopes = leg.feet(angles)
     length = sum(leg.lengths)
-    # Freedom: the volume that small turns of all joints sweep; torque: of a vertical unit force.
+    # Freedom: volume swept by small rotations of all joints; torque: of a vertical unit force.
     freedom = np.log(np.maximum(np.abs(np.linalg.det(slopes)) / length**3, 1e-12))
     torque = (slopes[:, 2, :] ** 2).sum(axis=1) / length**2
     to_limits = np.minimum(angles - leg.limits[:, 0], leg.limits[:, 1] - angles).min(axis=1)
     tight = np.maximum(0.0, 1.0 - to_limits / _MARGIN)
-    # A leg whose hip turns about a vertical axis points where it is mounted.
+    # A leg with a vertical hip axis points where it is mounted.
     ahead = np.zeros(len(feet)) if leg.is_upright else ((feet[:, 0] - leg.hip[0]) / length) ** 2
-    # A hip that is turned from the file's own zero spreads or crosses the legs.
+    # A hip rotated from the file's zero spreads or crosses the legs.
     spread, folded = angles[:, 0] ** 2, (angles[:, 1:] ** 2).sum(axis=1)
     worth = freedom - 20.0 * torque - 5.0 * tight - 20.0 * ahead - 40.0 * spread - 0.02 * folded
     return np.asarray(angles[int(worth.argmax())])
@@ -98,20 +97,20 @@ def _best(leg: ChainLeg, angles: Floats, feet: Floats, ground: float, height: fl
 def _beside(
     leg: ChainLeg, angles: Floats, foot: Floats, radius: float, ground: float
 ) -> Floats | None:
-    """Angles that put a foot as far aside as all others; None of a leg not mounted for that."""
+    """Return angles with the foot at the common radius; None if the mounting forbids it."""
     if leg.is_upright and abs(abs(foot[1]) - radius) > _SHIFT * sum(leg.lengths):
         return None
-    # First below the hip, where the thesis's and most legs are at rest, else where it was found.
+    # First below the hip, where most legs are at rest, else where the foot is.
     for x in (leg.hip[0], foot[0]):
         found = _reached(leg, angles, np.array([x, np.copysign(radius, foot[1]), ground]))
         if found is not None and not (leg.is_upright and abs(found[0] - angles[0]) > _TURN):
             return found
-    # A leg that hangs keeps the angles that were found for it.
+    # A hanging leg keeps its angles.
     return None if leg.is_upright else angles
 
 
 def _reached(leg: ChainLeg, angles: Floats, target: Floats) -> Floats | None:
-    """The angles near others at which the foot is at a target; None if it cannot be there."""
+    """Return nearby angles with the foot at a target, or None if it is out of reach."""
     found, miss = chain_angles(replace(leg, stance=angles), target[None])
     within = (found >= leg.limits[:, 0]) & (found <= leg.limits[:, 1])
     return np.asarray(found[0]) if within.all() and not miss.any() else None

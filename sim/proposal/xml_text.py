@@ -1,4 +1,4 @@
-"""Elements that are added to a URDF's text, of which all else stays as its author has it."""
+"""Elements added to a URDF's text, which otherwise stays as its author wrote it."""
 
 from __future__ import annotations
 
@@ -8,12 +8,7 @@ from xml.sax.saxutils import quoteattr
 
 
 def fixed_joint(name: str, parent: str, child: str, xyz: str, rpy: str = "0 0 0") -> list[str]:
-    """A joint that never moves.
-
-    Args:
-        xyz: Where the child is in the parent's frame [m].
-        rpy: How it is turned there [rad].
-    """
+    """Return a fixed joint, with the child's position [m] and rotation [rad] in the parent."""
     return [
         f'  <joint name={quoteattr(name)} type="fixed">',
         f"    <parent link={quoteattr(parent)}/>",
@@ -24,8 +19,8 @@ def fixed_joint(name: str, parent: str, child: str, xyz: str, rpy: str = "0 0 0"
 
 
 def with_elements(urdf: str, lines: Sequence[str]) -> str:
-    """Add elements at the end of a URDF, so that the lines of all others stay."""
-    # Bytes as the parser counts them, whatever encoding the text says it once had.
+    """Add elements at the end of a URDF, so that all other lines keep their numbers."""
+    # Offsets count UTF-8 bytes, whatever encoding the text declares.
     content, end = urdf.encode(), 0
     parser = expat.ParserCreate("utf-8")
 

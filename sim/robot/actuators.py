@@ -1,8 +1,4 @@
-"""Actuators as data: what drives a joint, and by which numbers.
-
-Two kinds: a DC motor with gearhead whose voltage is controlled (`dc`), and an actuator whose torque
-is controlled (`torque`), as in quadrupeds with quasi-direct drives.
-"""
+"""Actuator models: DC motors with gearheads (`dc`) and torque-controlled actuators (`torque`)."""
 
 from __future__ import annotations
 
@@ -16,17 +12,17 @@ ActuatorKind = Literal["dc", "torque"]
 """What a controller commands: a DC motor's voltage, or an actuator's torque."""
 
 LARGEST_OUTPUT: Final = 32767
-"""Full scale of a controller's output, at most [counts]."""
+"""Largest full scale of a controller's output [counts]."""
 
 CONTROL_RATE: Final = 500
-"""Control ticks a second [Hz]."""
+"""Control frequency [Hz]."""
 
 FASTEST_INNER_RATE: Final = 40_000
-"""Of an actuator's own control [Hz]."""
+"""Largest frequency of an actuator's own control [Hz]."""
 
 
 class Data(BaseModel):
-    """Immutable, without unknown fields, infinities and NaN."""
+    """Base class: immutable, without unknown fields, infinities and NaN."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
@@ -35,7 +31,7 @@ class Motor(Data):
     """A DC motor (thesis 2.2.5)."""
 
     torque_constant: Number = Field(
-        gt=0.0, description="K_M [N m/A]; also the back-EMF's [V s/rad]"
+        gt=0.0, description="K_M [N m/A]; also the back-EMF constant [V s/rad]"
     )
     resistance: Number = Field(gt=0.0, description="R [ohm]")
     inductance: Number = Field(gt=0.0, description="L [H]")
@@ -53,7 +49,7 @@ class Gearhead(Data):
     static_friction: Number = Field(
         default=0.0,
         ge=0.0,
-        description="against the motion at the output, whatever its speed [N m]",
+        description="static friction at the output, independent of speed [N m]",
     )
 
 
@@ -62,28 +58,28 @@ def _is_default_kind(kind: str) -> bool:
 
 
 class Shaft(Data):
-    """Play between an actuator and its link."""
+    """Backlash between an actuator and its link."""
 
     backlash: Number = Field(
         default=0.0,
         ge=0.0,
         le=0.5,
-        description="play between gearhead and link, end to end, the thesis's gearlash [rad]",
+        description="backlash between gearhead and link, end to end (thesis: gearlash) [rad]",
     )
     shaft_stiffness: Number = Field(
         default=500.0,
         gt=0.0,
-        description="of the closed play, only with backlash [N m/rad]",
+        description="stiffness once backlash is closed; only with backlash [N m/rad]",
     )
     shaft_damping: Number = Field(
         default=0.5,
         ge=0.0,
-        description="of the closed play, only with backlash [N m s/rad]",
+        description="damping once backlash is closed; only with backlash [N m s/rad]",
     )
 
 
 class Actuator(Shaft):
-    """Motor, gearhead and bevel gear of one joint, by the names of its parts."""
+    """DC motor, gearhead and bevel gear of one joint."""
 
     kind: Literal["dc"] = Field(
         default="dc", exclude_if=_is_default_kind, description="dc: a motor's voltage is controlled"
@@ -94,19 +90,19 @@ class Actuator(Shaft):
 
 
 class TorqueActuator(Shaft):
-    """A torque-controlled actuator: a motor with field-oriented control behind a low gear ratio.
+    """A motor with field-oriented control behind a low gear ratio.
 
-    Torque and current are proportional, so its current loop is taken as perfect. The motor is its
-    equivalent DC circuit, all of it referred to the motor's side of the gear; limits and friction
-    are at the joint.
+    Torque is proportional to current, so the current loop is assumed perfect. The motor is its
+    equivalent DC circuit, referred to the motor's side of the gear; limits and friction are at the
+    joint.
     """
 
     kind: Literal["torque"] = Field(description="torque: the actuator's torque is controlled")
-    gear_ratio: Number = Field(gt=0.0, description="motor's turns for one of the joint [1]")
+    gear_ratio: Number = Field(gt=0.0, description="turns of the motor per turn of the joint [1]")
     torque_constant: Number = Field(
-        gt=0.0, description="k_t of the motor [N m/A]; also the back-EMF's [V s/rad]"
+        gt=0.0, description="k_t of the motor [N m/A]; also the back-EMF constant [V s/rad]"
     )
-    resistance: Number = Field(gt=0.0, description="R, of which the heat is R I^2 [ohm]")
+    resistance: Number = Field(gt=0.0, description="R, which heats with R I^2 [ohm]")
     rotor_inertia: Number = Field(gt=0.0, description="J_M of the rotor [kg m2]")
     torque_limit: Number = Field(
         gt=0.0, description="largest torque at the joint, full scale of a controller's output [N m]"
@@ -114,25 +110,25 @@ class TorqueActuator(Shaft):
     speed_limit: Number | None = Field(
         default=None,
         gt=0.0,
-        description="rate of the joint from which on there is no torque along the motion [rad/s];"
-        " left out: the one that the battery's voltage allows, R I + k_e omega <= U",
+        description="speed of the joint at which torque along the motion reaches zero [rad/s];"
+        " default: limited by the battery voltage, R I + k_e omega <= U",
     )
     knee_speed: Number | None = Field(
         default=None,
         ge=0.0,
-        description="rate of the joint up to which there is all of torque_limit, which falls from"
-        " there to none at speed_limit [rad/s]",
+        description="speed of the joint up to which torque_limit is available; beyond it torque"
+        " falls to zero at speed_limit [rad/s]",
     )
     viscous_friction: Number = Field(default=0.0, ge=0.0, description="at the joint [N m s/rad]")
     static_friction: Number = Field(
-        default=0.0, ge=0.0, description="against the motion of the joint, whatever its speed [N m]"
+        default=0.0, ge=0.0, description="static friction at the joint, independent of speed [N m]"
     )
 
     @model_validator(mode="after")
     def _limits_go_together(self) -> TorqueActuator:
         if (self.speed_limit is None) != (self.knee_speed is None):
             raise ValueError(
-                "speed_limit and knee_speed go together; without both the battery's voltage limits"
+                "give both speed_limit and knee_speed, or neither: the battery voltage then limits"
                 " the speed"
             )
         knee, top = self.knee_speed, self.speed_limit
@@ -144,28 +140,28 @@ class TorqueActuator(Shaft):
 
     @property
     def stall_torque(self) -> float:
-        """Of the line by which speed limits the torque, where it is given: at rest [N m]."""
+        """Torque at zero speed of the line that limits torque; 0 without speed_limit [N m]."""
         if self.speed_limit is None or self.knee_speed is None:
             return 0.0
         return self.torque_limit * self.speed_limit / (self.speed_limit - self.knee_speed)
 
     @property
     def stall_torque_per_volt(self) -> float:
-        """The same of the line that the battery's voltage makes [N m/V]."""
+        """Torque at zero speed per battery voltage; 0 with speed_limit [N m/V]."""
         if self.speed_limit is not None:
             return 0.0
         return self.gear_ratio * self.torque_constant / self.resistance
 
     @property
     def torque_drop(self) -> float:
-        """By which that line falls with the rate [N m s/rad]."""
+        """Slope of the line that limits torque by speed [N m s/rad]."""
         if self.speed_limit is None:
             return (self.gear_ratio * self.torque_constant) ** 2 / self.resistance
         return self.stall_torque / self.speed_limit
 
 
 def _kind_of(actuator: Any) -> str:
-    """The tag of an actuator; one without a kind is a DC motor."""
+    """Return an actuator's tag; the default kind is dc."""
     kind = actuator.get("kind", "dc") if isinstance(actuator, dict) else actuator.kind
     return kind if isinstance(kind, str) else repr(kind)
 
@@ -175,20 +171,20 @@ AnyActuator = Annotated[
     Discriminator(
         _kind_of,
         custom_error_type="kind",
-        custom_error_message="kind: must be dc (as without it) or torque",
+        custom_error_message="kind: must be dc (the default) or torque",
     ),
 ]
-"""Of either kind; a document's `kind` says which."""
+"""An actuator of either kind, which its `kind` selects."""
 
 
 class TorqueCommand(Data):
-    """How torque-controlled actuators are commanded."""
+    """Command interface of torque-controlled actuators."""
 
     counts: int = Field(
         default=2047,
         gt=0,
         le=LARGEST_OUTPUT,
-        description="full scale of a controller's output, which stands for torque_limit [counts]",
+        description="full scale of a controller's output, equal to torque_limit [counts]",
     )
     step: int = Field(default=1, ge=1, le=LARGEST_OUTPUT, description="resolution [counts]")
     rate: int = Field(
@@ -196,5 +192,5 @@ class TorqueCommand(Data):
         ge=CONTROL_RATE,
         le=FASTEST_INNER_RATE,
         multiple_of=CONTROL_RATE,
-        description="of the actuators' joint PD, whose torque is held from tick to tick [Hz]",
+        description="frequency of the actuators' joint PD, whose torque is held between ticks [Hz]",
     )

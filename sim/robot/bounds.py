@@ -1,7 +1,7 @@
-"""Bounds on the text of a robot's files, checked before anything is made of it.
+"""Size limits for the text of a robot's files, checked before parsing.
 
-The text may come from anybody. Each check reads it once, in time proportional to its length, so
-that what is costly or dangerous later (nesting, long chains, entities that multiply) never begins.
+The text is untrusted. Each check reads it once in linear time, so that costly input (deep nesting,
+long chains, entity expansion) is rejected before it is parsed.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ LONGEST_URDF: Final = 800_000
 MOST_LEGS: Final = 32
 
 MOST_LINKS: Final = 256
-"""Links of a URDF, and likewise its joints."""
+"""Links of a URDF, and also its joints."""
 
 LONGEST_NAME: Final = 100
 """Characters of a part's name."""
 
 LONGEST_LEG_NAME: Final = 60
-"""Characters of a leg's name, as scenarios may have it."""
+"""Characters of a leg's name, as in scenarios."""
 
 DEEPEST: Final = 16
-"""Arrays, tables or elements within each other, and parts of a dotted key."""
+"""Nested arrays, tables or elements, and parts of a dotted key."""
 
 MOST_VALUES: Final = 5000
 """Values of a robot.toml."""
@@ -41,13 +41,13 @@ MOST_ELEMENTS: Final = 10_000
 """Elements of a robot.urdf."""
 
 MOST_ATTRIBUTES: Final = 64
-"""Attributes of an element of a URDF: Pinocchio's reader looks at each pair of them."""
+"""Attributes of an element of a URDF; Pinocchio's reader compares every pair of them."""
 
 LONGEST_ATTRIBUTE: Final = 1000
 """Characters of an attribute of a URDF."""
 
 SMALLEST, LARGEST = 1e-15, 1e9
-"""Size of a number that is not 0, in the units of its field."""
+"""Magnitude of a nonzero number, in the units of its field."""
 
 _TOML: Final = re.compile(
     r"""
@@ -64,8 +64,8 @@ _TOML: Final = re.compile(
     """,
     re.DOTALL | re.VERBOSE,
 )
-"""What of TOML can nest or repeat. Comments and strings are passed over; every alternative matches
-wherever it begins, so that no character is looked at twice."""
+"""Tokens of TOML that nest or repeat. Comments and strings are skipped; alternatives do not
+backtrack, so that no character is read twice."""
 
 
 def _in_size(value: float) -> float:
@@ -81,7 +81,7 @@ def _printable(name: str) -> str:
 
 
 Number = Annotated[float, AfterValidator(_in_size)]
-"""A number of a robot.toml, of a size that formulas can take."""
+"""A number of a robot.toml, within the allowed magnitudes."""
 
 PartName = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME), AfterValidator(_printable)]
 """Name of a part of a robot."""
@@ -89,7 +89,7 @@ PartName = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME), AfterVal
 Sentence = Annotated[
     str, Field(min_length=1, max_length=LONGEST_ATTRIBUTE), AfterValidator(_printable)
 ]
-"""What people are told of a robot."""
+"""A sentence about a robot for users."""
 
 
 def check_toml(text: str) -> None:
@@ -105,7 +105,7 @@ def check_toml(text: str) -> None:
             depth = max(0, depth + (kind == "open") - (kind == "close"))
             values += kind == "value"
         if depth > DEEPEST or parts > DEEPEST:
-            problem = f"nested too deep; {DEEPEST} tables, arrays or parts of a key are the most"
+            problem = f"nested too deep: at most {DEEPEST} tables, arrays or parts of a key"
         elif values > MOST_VALUES:
             problem = f"has more than {MOST_VALUES} values"
         else:
@@ -115,7 +115,7 @@ def check_toml(text: str) -> None:
 
 
 def check_urdf(text: str) -> None:
-    """Check the size of a robot.urdf, and that it declares no document type, so no entities."""
+    """Check the size of a robot.urdf, and that it declares no document type, hence no entities."""
     _check_text("robot.urdf", text, LONGEST_URDF)
     if not text.strip():
         raise RobotFileError("robot.urdf: is empty; it must hold the URDF of a robot")
@@ -134,7 +134,7 @@ def check_urdf(text: str) -> None:
 
 
 class _UrdfScan:
-    """Counts what a parser meets, and breaks off where a bound is passed."""
+    """Counts parts of a URDF and raises RobotFileError when a limit is exceeded."""
 
     def __init__(self, parser: expat.XMLParserType) -> None:
         self._parser = parser
@@ -146,7 +146,7 @@ class _UrdfScan:
         self._depth += 1
         self._elements += 1
         if self._depth > DEEPEST:
-            raise self._error(f"nested too deep; {DEEPEST} elements within each other are the most")
+            raise self._error(f"nested too deep: at most {DEEPEST} elements within each other")
         if self._elements > MOST_ELEMENTS:
             raise self._error(f"has more than {MOST_ELEMENTS} elements")
         if len(attributes) > MOST_ATTRIBUTES:
@@ -175,7 +175,7 @@ class _UrdfScan:
 
 
 def shortened(text: str, longest: int = LONGEST_NAME) -> str:
-    """A text of any length, to be quoted in a message."""
+    """Shorten a text for a message."""
     return text if len(text) <= longest else f"{text[:longest]}..."
 
 

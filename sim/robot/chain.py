@@ -1,4 +1,4 @@
-"""A leg's joints in a URDF: a chain of three that turn, from the body to a foot."""
+"""Joint chains of legs in a URDF: three revolute joints from the body to a foot."""
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ Floats = NDArray[np.float64]
 _NAMED: Final = 6
 
 _MOST_DEGREES: Final = 720.0
-"""A limit beyond that is one that nobody expects to be met."""
+"""Larger limits mean a joint without limits; smaller ones may be degrees by mistake."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placement:
-    """Where a joint is, by any reader of a URDF."""
+    """Pose of a joint, and inertia of the link beyond it."""
 
-    axis: Floats  # of the joint, (3,)
-    rotation: Floats  # in the frame before it, (3, 3)
-    offset: Floats  # in the frame before it, (3,) [m]
-    inertia: BodyInertia  # of the link behind it
+    axis: Floats  # (3,)
+    rotation: Floats  # relative to the previous frame, (3, 3)
+    offset: Floats  # in the previous frame, (3,) [m]
+    inertia: BodyInertia  # of the link beyond the joint
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Chain:
     """A leg's joints and its foot."""
 
-    placements: tuple[Placement, ...]  # of the joints, from the body on
+    placements: tuple[Placement, ...]  # of the joints, from the body outwards
     foot: Floats  # in the last link's frame, (3,) [m]
     limits: Floats  # least and largest angle of each joint, (3, 2) [rad]
 
@@ -109,7 +109,7 @@ def _meant(name: str, known: Iterable[str]) -> str:
 
 
 def _check_limits(joint: Joint) -> None:
-    """Larger ones than any angle in degrees stand for none."""
+    """Reject limits in degrees; even larger ones mean a joint without limits."""
     if any(MOST_TURNED < abs(limit) <= _MOST_DEGREES for limit in joint.limits):
         lower, upper = joint.limits
         raise RobotFileError(

@@ -1,4 +1,4 @@
-"""Whether a robot by anybody can be used, tried in a process that may be ended."""
+"""Checks of untrusted robots in a limited process."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from gaitswarm.sim.robot.shapes import visible_links
 from gaitswarm.sim.robot.variant import PASSED, digest_of
 
 SECONDS: Final = 20.0
-"""That a check may take; it takes some hundredths of a second, the first a second."""
+"""Time limit of a check [s]; one takes hundredths of a second, the first one a second."""
 
 CPU_SECONDS: Final = 10
 
 MEMORY: Final = 2 << 30
-"""Address space of a process that checks [B]; it takes a tenth of that."""
+"""Address space of a checking process [B], of which it needs a tenth."""
 
 MOST_ROBOTS: Final = 16
-"""Robots of one's own in a document."""
+"""Robots given by files in one document, at most."""
 
 Location = tuple[str | int, ...]
 
@@ -32,7 +32,7 @@ PROCESSES: Final = LimitedProcesses(
 
 
 def check_files(toml: str, urdf: str) -> None:
-    """Check in another process that a robot's files can be used. Once a robot: it is remembered."""
+    """Check a robot's files in another process; files that passed are remembered."""
     bounds.check_toml(toml)
     bounds.check_urdf(urdf)
     digest = digest_of(toml, urdf)
@@ -48,7 +48,7 @@ def check_files(toml: str, urdf: str) -> None:
 
 
 def objects_in(document: Any) -> Iterator[tuple[Location, dict[str, Any]]]:
-    """Walk through a document of JSON."""
+    """Yield all objects of a JSON document with their locations."""
     waiting: list[tuple[Location, Any]] = [((), document)]
     while waiting:
         where, value = waiting.pop()
@@ -60,14 +60,14 @@ def objects_in(document: Any) -> Iterator[tuple[Location, dict[str, Any]]]:
 
 
 def files_of(part: dict[str, Any]) -> tuple[str, str] | None:
-    """A robot's files in an object of a document."""
+    """Return the robot files in an object of a document, if any."""
     toml, urdf = part.get("toml"), part.get("urdf")
     return (toml, urdf) if isinstance(toml, str) and isinstance(urdf, str) else None
 
 
 def _answer(request: Document) -> Document:
-    """All that is made of a robot's files but its kernel."""
-    # The first use: a process that has answered one request has it.
+    """Build everything from a robot's files except its kernel."""
+    # Imported at the first request.
     import pinocchio as pin  # noqa: PLC0415
 
     robot = parse_robot(request["toml"], request["urdf"])

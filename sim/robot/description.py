@@ -1,8 +1,4 @@
-"""The robot as typed data: legs, actuators, supply, sensors, contact.
-
-The numbers live in a TOML file beside the robot's URDF (see sim/robot/szabadka2); these classes
-say what they mean, in which unit, and what is refused.
-"""
+"""Robot description: legs, actuators, supply, sensors and contact, as in a robot.toml."""
 
 from __future__ import annotations
 
@@ -28,7 +24,7 @@ JOINTS_PER_LEG = 3
 """Coxa, femur, tibia."""
 
 MOST_COUNTS: Final = 10**8
-"""Counts of a unit, at most: codes of some units then fit into 32 bits."""
+"""Largest number of counts per unit; codes of some units then fit into 32 bits."""
 
 
 def _is_none(value: Any) -> bool:
@@ -36,8 +32,8 @@ def _is_none(value: Any) -> bool:
 
 
 EnergyConvention = Literal["signed", "positive", "absolute"]
-"""What of a motor's electrical power counts as spent: all of it, so that braking gives back; only
-where it is positive, so that what braking gives back is lost; or its absolute value."""
+"""Electrical power of a motor that counts as spent: all of it, so that braking returns energy;
+only where positive, so that braking energy is lost; or its absolute value."""
 
 
 class Supply(Data):
@@ -49,17 +45,17 @@ class Supply(Data):
         default=None,
         gt=0.0,
         exclude_if=_is_none,
-        description="supply at which the PWM's full scale is given [V]; for DC motors alone",
+        description="supply voltage at which the PWM's full scale applies [V]; DC motors only",
     )
     energy: EnergyConvention = Field(
         default="signed",
-        description="what of each motor's electrical power counts as spent: signed (braking gives"
-        " back), positive (what it gives back is lost) or absolute; the battery's load is the same",
+        description="electrical power of each motor that counts as spent and loads the battery:"
+        " signed (braking returns energy), positive (braking energy is lost) or absolute",
     )
 
 
 class Pwm(Data):
-    """Coded control signal: integer counts, full scale at the nominal supply."""
+    """Coded control signal: integer counts, full scale at the nominal supply voltage."""
 
     counts: int = Field(gt=0, le=LARGEST_OUTPUT, description="full scale [counts]")
     full_scale: Number = Field(gt=0.0, description="motor voltage at full scale [V]")
@@ -91,40 +87,40 @@ class Sensors(Data):
 
 
 ContactLaw = Literal["linear_zone", "karnopp", "stick", "dead_zone"]
-"""How a sole rubs on the ground; see `gaitswarm.sim.kernel.dynamics.contact`."""
+"""Friction law of soles; see `gaitswarm.sim.kernel.dynamics.contact`."""
 
 
 PlannedSoles = Literal["nominal", "own"]
-"""Soles that a gait is planned for: the robot's common one, or each leg's."""
+"""Sole lengths that a gait assumes: the robot's common one, or each leg's."""
 
 
 class Contact(Data):
-    """Sole on ground (thesis 2.2.6): spring and damper, and parameters of the friction laws."""
+    """Contact of sole and ground (thesis 2.2.6): spring, damper and friction parameters."""
 
     stiffness: Number = Field(gt=0.0, description="k [N/m]")
     damping: Number = Field(ge=0.0, description="c [N s/m]")
     sole: Number = Field(ge=0.0, description="length of the sole's spring below the tibia [m]")
     friction: Number = Field(ge=0.0, description="mu [1]")
     slip_velocity: Number = Field(
-        gt=0.0, description="linear_zone, dead_zone: v_lin, full friction from here on [m/s]"
+        gt=0.0, description="linear_zone, dead_zone: v_lin, full friction from this speed [m/s]"
     )
     stick_velocity: Number = Field(
         default=0.005, gt=0.0, description="karnopp, dead_zone: v_d, no friction below [m/s]"
     )
     stick_stiffness: Number = Field(
-        default=10000.0, gt=0.0, description="stick: of the sole along the ground [N/m]"
+        default=10000.0, gt=0.0, description="stick: stiffness of the sole along the ground [N/m]"
     )
     stick_damping: Number = Field(
-        default=100.0, ge=0.0, description="stick: of the sole along the ground [N s/m]"
+        default=100.0, ge=0.0, description="stick: damping of the sole along the ground [N s/m]"
     )
 
 
 GroupName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _.-]{0,59}$")]
-"""Name of a group of legs, as names of variables may have it."""
+"""Name of a group of legs, as in names of variables."""
 
 
 class Leg(Data):
-    """One leg: three joints of the URDF, from the body on, and the frame of its foot."""
+    """One leg: three joints of the URDF from the body outwards, and the frame of its foot."""
 
     model_config = ConfigDict(validate_by_name=True, validate_by_alias=True)
 
@@ -137,7 +133,7 @@ class Leg(Data):
         default=None,
         alias="joints",
         exclude_if=_is_none,
-        description="joints, from the body on; default `<name>_coxa`, `_femur` and `_tibia`",
+        description="joints, from the body outwards; default `<name>_coxa`, `_femur` and `_tibia`",
     )
     own_foot: PartName | None = Field(
         default=None,
@@ -148,19 +144,19 @@ class Leg(Data):
     stance: tuple[Number, Number, Number] | None = Field(
         default=None,
         exclude_if=_is_none,
-        description="angles at which the leg stands, from which its gait is planned [rad]; default"
-        " for legs as the thesis's, whose frames are parallel to the body's: knee up",
+        description="joint angles of the leg's stance, for which its gait is planned [rad]; default"
+        " for legs with all frames parallel to the body's: knee up",
     )
-    contact: Contact | None = Field(default=None, description="this foot's own contact")
+    contact: Contact | None = Field(default=None, description="contact parameters of this foot")
 
     @property
     def joints(self) -> tuple[str, str, str]:
-        """Names of the joints in the URDF."""
+        """Joint names in the URDF."""
         return self.own_joints or (f"{self.name}_coxa", f"{self.name}_femur", f"{self.name}_tibia")
 
     @property
     def foot(self) -> str:
-        """Name of the frame at the last link's end."""
+        """Frame at the end of the last link."""
         return self.own_foot or f"{self.name}_foot"
 
 
@@ -173,37 +169,37 @@ def _refuse(wrong: bool, field: str, why: str) -> None:
 
 
 class RobotDescription(Data):
-    """All of a robot that its URDF does not say."""
+    """Everything about a robot that its URDF does not contain."""
 
     name: PartName
     description: str = Field(default="", max_length=2000)
-    load_height: Number = Field(description="height of a load over the body's centre [m]")
-    contact_law: ContactLaw = Field(default="linear_zone", description="friction of all feet")
+    load_height: Number = Field(description="height of a load above the body's centre [m]")
+    contact_law: ContactLaw = Field(default="linear_zone", description="friction law of all feet")
     planned_soles: PlannedSoles = Field(
         default="nominal",
-        description="soles that the gait is planned for: nominal, the common contact's, since a"
-        " controller does not know them better; or own, each leg's",
+        description="sole lengths that the gait assumes: nominal, the common contact's, since a"
+        " controller does not know the true ones; or own, each leg's",
     )
     body_mass: Number | None = Field(
         default=None,
         gt=0.0,
-        description="body's mass in place of the URDF's, its inertia scaled alike [kg]",
+        description="mass that replaces the body's in the URDF and scales its inertia [kg]",
     )
     elastic_shafts: bool = Field(
         default=False,
-        description="whether shafts that yield join motors and links, also where there is no play",
+        description="model elastic shafts between motors and links, even without backlash",
     )
     motors: dict[PartName, Motor] = Field(default={}, description="of DC actuators, by name")
     gearheads: dict[PartName, Gearhead] = Field(default={}, description="likewise")
     actuators: dict[PartName, AnyActuator]
     supply: Supply
     pwm: Pwm | None = Field(
-        default=None, exclude_if=_is_none, description="for DC motors alone, which need it"
+        default=None, exclude_if=_is_none, description="required for DC motors, and only for them"
     )
     torque_command: TorqueCommand | None = Field(
         default=None,
         exclude_if=_is_none,
-        description="for torque-controlled actuators alone; default: all of its fields'",
+        description="only for torque-controlled actuators; default: the defaults of its fields",
     )
     sensors: Sensors
     contact: Contact
@@ -212,18 +208,18 @@ class RobotDescription(Data):
         default={},
         max_length=MOST_LEGS,
         exclude_if=operator.not_,
-        description="groups of legs for gait parameters, beside front, middle, hind, left, right,"
-        " all and each leg: names of their legs",
+        description="groups of legs for gait parameters, by the names of their legs, besides front,"
+        " middle, hind, left, right, all and each leg",
     )
     guesses: tuple[Sentence, ...] = Field(
         default=(),
         exclude_if=operator.not_,
-        description="what `robot init` guessed, which `robot check` tells; take out what you know",
+        description="guesses of `robot init`, shown by `robot check`; remove verified ones",
     )
     held_joints: dict[PartName, Number] = Field(
         default={},
         exclude_if=operator.not_,
-        description="movable joints that belong to no leg, each with the angle at which it is held"
+        description="movable joints that belong to no leg, each with the angle at which it is fixed"
         " [rad]",
     )
 
@@ -291,20 +287,21 @@ class RobotDescription(Data):
 
     @property
     def actuator_kind(self) -> ActuatorKind:
-        """Kind of all legs' actuators."""
+        """Kind of all actuators."""
         return self.actuators[self.legs[0].actuators[0]].kind
 
     @property
     def inner_rate(self) -> int:
-        """Ticks a second of the actuators' joint PD [Hz]; DC motors have none but the control's."""
+        """Frequency of the actuators' joint PD [Hz]; for DC motors that of the control."""
         if self.actuator_kind == "dc":
             return CONTROL_RATE
         return (self.torque_command or _DEFAULT_COMMAND).rate
 
     @property
     def output(self) -> tuple[int, int, float]:
-        """A controller's output: full scale [counts], resolution [counts], and the value of a
-        count, motor voltage per supply voltage or torque per torque limit [1].
+        """Full scale and resolution of a controller's output [counts], and the value of a count.
+
+        The value is motor voltage per supply voltage, or torque per torque limit [1].
         """
         if self.pwm is None or self.supply.nominal_voltage is None:
             command = self.torque_command or _DEFAULT_COMMAND

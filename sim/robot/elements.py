@@ -1,4 +1,4 @@
-"""Elements of a URDF: numbers with their bounds, and frames."""
+"""Numbers and frames of URDF elements."""
 
 from __future__ import annotations
 
@@ -20,26 +20,26 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 MOST_TURNED: Final = 4.0 * math.pi
-"""An angle beyond two turns is one in degrees, but for those that stand for none [rad]."""
+"""Largest plausible angle: two turns [rad]. Larger ones are degrees, or mean no limit."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Origin:
-    """Where a frame lies in another one."""
+    """Pose of a frame in another one."""
 
     xyz: Floats  # position, (3,) [m]
     rpy: Floats  # roll, pitch and yaw about the other frame's fixed axes, (3,) [rad]
 
     def matrix(self) -> Floats:
-        """Rotation from the frame to the other one, (3, 3); exact if it does not turn."""
+        """Rotation matrix to the other frame, (3, 3); exact without rotation."""
         return self._rotation().as_matrix() if self.rpy.any() else np.eye(3)
 
     def quaternion(self) -> Floats:
-        """Rotation from the frame to the other one as quaternion x y z w, (4,)."""
+        """Rotation to the other frame as quaternion x y z w, (4,)."""
         return self._rotation().as_quat()
 
     def _rotation(self) -> Rotation:
-        # Slow to import, and most robots have no turned frame.
+        # Slow to import, and seldom needed.
         require_room_for_scipy()
         from scipy.spatial.transform import Rotation  # noqa: PLC0415
 
@@ -47,7 +47,7 @@ class Origin:
 
 
 def origin_of(element: ET.Element, whose: str) -> Origin:
-    """Where an element's frame lies."""
+    """Read the pose of an element's frame."""
     origin = element.find("origin")
     if origin is None:
         return Origin(np.zeros(3), np.zeros(3))
@@ -63,11 +63,7 @@ def origin_of(element: ET.Element, whose: str) -> Origin:
 def numbers_of(
     element: ET.Element, attribute: str, whose: str, default: str = "", largest: float = LARGEST
 ) -> Floats:
-    """Numbers of an attribute: three of a vector, else one.
-
-    Returns:
-        (3,) of xyz, rpy and size, else (1,), in URDF's units.
-    """
+    """Read an attribute's numbers, (3,) of xyz, rpy and size, else (1,), in URDF's units."""
     text = element.get(attribute, default)
     count = 3 if attribute in ("xyz", "rpy", "size") else 1
     try:

@@ -1,7 +1,7 @@
-"""Parameters of a robot that walks can tell, and conventions of how it is modelled.
+"""Robot parameters that simulations can identify, and modelling conventions.
 
 Those of thesis table 2.7 (3 + 3 L efficiencies + 4 L of feet) are inputs of the compiled kernel, so
-designs that differ in them alone share one.
+that designs which differ only in them share one.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ CONVENTIONAL_VARIABLES: Final = (
         low=_EFFICIENCY.low,
         high=_EFFICIENCY.high,
         unit="1",
-        description="Efficiency of every gearhead; that of a single joint goes before it.",
+        description="Efficiency of every gearhead; that of a single joint takes precedence.",
     ),
     Variable(
         name="static_friction",
@@ -86,20 +86,20 @@ CONVENTIONAL_VARIABLES: Final = (
         name="energy",
         kind="categorical",
         choices=get_args(EnergyConvention),
-        description="What of a motor's electrical power counts as spent.",
+        description="Electrical power of each motor that counts as spent.",
     ),
     Variable(
         name="contact_law",
         kind="categorical",
         choices=get_args(ContactLaw),
-        description="How soles rub on the ground.",
+        description="Friction law of the soles.",
     ),
     Variable(
         name="slip_velocity",
         low=0.01,
         high=0.2,
         unit="m/s",
-        description="Velocity of every foot from which on friction is full (v_lin).",
+        description="Velocity from which friction of every foot is full (v_lin).",
     ),
     Variable(
         name="current_filter",
@@ -112,15 +112,15 @@ CONVENTIONAL_VARIABLES: Final = (
         name="planned_soles",
         kind="categorical",
         choices=get_args(PlannedSoles),
-        description="Soles that gaits are planned for: nominal, or each leg's own.",
+        description="Sole lengths that gaits assume: nominal, or each leg's own.",
     ),
 )
-"""Values for the whole robot that the thesis leaves open, or gives more than once."""
+"""Values for the whole robot that the thesis omits, or gives more than once."""
 
 
 @lru_cache(maxsize=32)
 def identifiable_variables(robot: Robot) -> tuple[Variable, ...]:
-    """All parameters in the order of table 2.7, bounds around its trial values and intervals."""
+    """Return all parameters in the order of table 2.7, with bounds around its values."""
     legs = robot.description.legs
     geared = () if robot.is_torque_controlled else robot.joint_names
     return (
@@ -150,19 +150,19 @@ def with_parameters(robot: Robot, values: Mapping[str, float | str]) -> Robot:
 
 
 def _check_gearheads(robot: Robot, values: Mapping[str, float | str]) -> None:
-    """Raises SimulationInputError for an efficiency of actuators that have none."""
+    """Reject efficiencies of actuators that have none."""
     if not robot.is_torque_controlled:
         return
     for name in ("efficiency", *(f"efficiency_{joint}" for joint in robot.joint_names)):
         if name in values:
             raise SimulationInputError(
-                f"{name}: torque-controlled actuators have friction, and no gearhead of that"
-                " efficiency"
+                f"{name}: torque-controlled actuators have no gearhead efficiency; set their"
+                " friction instead"
             )
 
 
 def _conventions(values: Mapping[str, float | str]) -> dict[str, float | str]:
-    """Those of `CONVENTIONAL_VARIABLES` that are given, choices by name."""
+    """Select values of `CONVENTIONAL_VARIABLES`, choices by name."""
     given = [variable for variable in CONVENTIONAL_VARIABLES if variable.name in values]
     try:
         return {v.name: v.shown(v.number(values[v.name])) for v in given}
@@ -171,7 +171,7 @@ def _conventions(values: Mapping[str, float | str]) -> dict[str, float | str]:
 
 
 def _numbers(values: Mapping[str, float | str]) -> dict[str, float]:
-    """Values of variables that have no choices."""
+    """Select values of variables without choices."""
     for name, value in values.items():
         if isinstance(value, str):
             raise SimulationInputError(f"{name}: {value!r} is not a number")
@@ -179,7 +179,7 @@ def _numbers(values: Mapping[str, float | str]) -> dict[str, float]:
 
 
 def _with_conventions(d: RobotDescription, values: Mapping[str, float | str]) -> RobotDescription:
-    """Every gearhead, every foot and the whole robot by `CONVENTIONAL_VARIABLES`."""
+    """Apply `CONVENTIONAL_VARIABLES` to all gearheads, all feet and the robot."""
     if not values:
         return d
 
@@ -217,7 +217,7 @@ def _with_conventions(d: RobotDescription, values: Mapping[str, float | str]) ->
 
 
 def _with_legs(d: RobotDescription, values: Mapping[str, float]) -> RobotDescription:
-    """Each joint that is named gets a gearhead of its own, each foot contact of its own."""
+    """Give each named joint its own gearhead and each foot its own contact."""
     gearheads, actuators, legs = dict(d.gearheads), dict(d.actuators), list[Leg]()
     for leg in d.legs:
         names = list(leg.actuators)
@@ -245,7 +245,7 @@ Part = TypeVar("Part", bound=BaseModel)
 
 
 def _changed(part: Part, variables: Mapping[str, str], values: Mapping[str, float | str]) -> Part:
-    """A part of the robot with fields set from those variables that have a value."""
+    """Set those fields of a part whose variables have a value."""
     update = {field: values[name] for field, name in variables.items() if name in values}
     if not update:
         return part

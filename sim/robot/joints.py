@@ -1,4 +1,4 @@
-"""Joints of a URDF, and those that are held or turn without end."""
+"""Joints of a URDF, including held and continuous ones."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _KINDS: Final = ("revolute", "continuous", "prismatic", "fixed", "floating", "pl
 
 
 TURNS: Final = frozenset({"revolute", "continuous"})
-"""Types of joints that turn."""
+"""Types of revolute joints."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,16 +33,16 @@ class Joint:
     kind: str  # its type: revolute, fixed, ...
     parent: str  # link that carries it
     child: str  # link that it carries
-    origin: Origin  # of the child's frame in the parent's, at rest
-    axis: Floats  # that it turns about in the child's frame, of unit length, (3,)
+    origin: Origin  # of the child's frame in the parent's, at angle 0
+    axis: Floats  # of rotation in the child's frame, of unit length, (3,)
     limits: tuple[float, float]  # least and largest position [rad]; infinite where there are none
     effort: float  # largest torque [N m]; 0 where the file gives none
     velocity: float  # largest rate [rad/s]; 0 where the file gives none
-    follows: str | None = None  # joint that it mimics, if it is moved by that alone
+    follows: str | None = None  # joint that it mimics
 
     @property
     def fixed(self) -> bool:
-        """Whether it never moves."""
+        """Whether the joint never moves."""
         return self.kind == "fixed"
 
 
@@ -83,13 +83,10 @@ def joint_of(element: ET.Element) -> Joint:
 
 
 def standardise(root: ET.Element, held: Mapping[str, float]) -> bool:
-    """Fix joints that are held and that of a free base, and let continuous ones be revolute.
+    """Fix held joints, at angles by name [rad], and a free base; make continuous joints revolute.
 
-    A robot's body is free to move anyhow: a floating joint from a massless first link, such as
-    `world`, to it says just that.
-
-    Args:
-        held: Joints that are held, by name at which angle [rad].
+    A robot's body moves freely anyway: a floating joint from a massless first link such as `world`
+    adds nothing.
     """
     changed = _free_base(root)
     missing = set(held)
@@ -99,7 +96,7 @@ def standardise(root: ET.Element, held: Mapping[str, float]) -> bool:
             missing.discard(name)
             _hold(element, kind, held[name])
         elif kind == "continuous":
-            # Pinocchio has two positions for a joint without ends.
+            # Pinocchio has two coordinates for a continuous joint.
             element.set("type", "revolute")
             for limit in element.findall("limit"):
                 element.remove(limit)
@@ -118,7 +115,7 @@ def standardise(root: ET.Element, held: Mapping[str, float]) -> bool:
 
 
 def _free_base(root: ET.Element) -> bool:
-    """Fix the floating joint before a body, if there is one; says whether there is."""
+    """Fix the floating joint of the body, if there is one; return whether there was."""
     links = {link.get("name", ""): link for link in root.findall("link")}
     joints = [(_linked(e, "parent"), _linked(e, "child"), e) for e in root.findall("joint")]
     children = {child for _, child, _ in joints}
@@ -130,7 +127,7 @@ def _free_base(root: ET.Element) -> bool:
         link, joint = after[0]
         if kind == "floating":
             joint.set("type", "fixed")
-            # Its place is where a simulator would drop the robot.
+            # Its position is only a simulator's initial position.
             for origin in joint.findall("origin"):
                 origin.set("xyz", "0 0 0")
             return True
@@ -144,7 +141,7 @@ def _linked(joint: ET.Element, end: str) -> str:
 
 
 def _hold(element: ET.Element, kind: str, angle: float) -> None:
-    """Let a joint be a fixed one, its frame turned by the angle."""
+    """Make a joint a fixed one, its frame rotated by the angle."""
     joint = joint_of(element)
     if kind not in (*TURNS, "fixed") and angle:
         raise RobotFileError(
@@ -169,7 +166,7 @@ def _hold(element: ET.Element, kind: str, angle: float) -> None:
 
 
 def _check_limit(limit: ET.Element | None, joint: str) -> None:
-    """Pinocchio's reader asks for it, and does not name the joint."""
+    """Check the limits that Pinocchio requires; its own error does not name the joint."""
     given = {} if limit is None else limit.attrib
     missing = [name for name in ("effort", "velocity") if name not in given]
     if missing:

@@ -1,4 +1,4 @@
-"""Kinematics of one leg: where its foot is, for the thesis's legs and for any of three joints."""
+"""Leg kinematics: legs as in the thesis, and legs of any three revolute joints."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ _MIDDLE: Final = 1e-6
 
 
 class LegKinematics(Protocol):
-    """What is known of every leg."""
+    """Kinematics of a leg."""
 
     @property
     def name(self) -> str:
-        """Of the leg."""
+        """Name of the leg."""
 
     @property
     def hip(self) -> tuple[float, float, float]:
@@ -41,19 +41,12 @@ class LegKinematics(Protocol):
         """Distances between the joints and from the last one to the foot [m]."""
 
     def foot(self, angles: Sequence[float]) -> tuple[float, float, float]:
-        """Where the leg ends.
-
-        Args:
-            angles: Of the joints, (3,) [rad].
-
-        Returns:
-            The foot's position in the body's frame [m].
-        """
+        """Return the foot in the body's frame [m] at joint angles (3,) [rad]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class KneeUpLeg:
-    """A leg as the thesis's: coxa about z, femur and tibia about x, all frames parallel."""
+    """A leg as in the thesis: coxa about z, femur and tibia about x, all frames parallel."""
 
     name: str  # of the leg
     hip: tuple[float, float, float]  # coxa axis in the body frame, (3,) [m]
@@ -62,7 +55,7 @@ class KneeUpLeg:
     limits: Floats  # of the joints, (3, 2) [rad]
 
     def foot(self, angles: Sequence[float]) -> tuple[float, float, float]:
-        """Where the tibia ends, in the body's frame."""
+        """Return the tibia's end in the body's frame."""
         (x, y, z), (coxa, femur, tibia) = self.hip, self.lengths
         alpha, theta1, theta2 = angles
         outward = coxa + femur * math.cos(theta1) + tibia * math.cos(theta1 + theta2)
@@ -75,14 +68,14 @@ class KneeUpLeg:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChainLeg:
-    """A leg of three revolute joints, however they are mounted."""
+    """A leg of three revolute joints with any axes."""
 
     name: str  # of the leg
     rotations: Floats  # of each joint's frame in the one before it, the body's first, (3, 3, 3)
     offsets: Floats  # of each joint's frame in the one before it, (3, 3) [m]
-    axes: Floats  # that the joints turn about, in their own frames, of unit length, (3, 3)
+    axes: Floats  # of rotation in the joints' own frames, of unit length, (3, 3)
     end: Floats  # the foot in the last joint's frame, (3,) [m]
-    stance: Floats  # angles at which the leg stands, (3,) [rad]
+    stance: Floats  # angles of the stance, (3,) [rad]
     limits: Floats  # of the joints, (3, 2) [rad]
 
     @property
@@ -93,13 +86,13 @@ class ChainLeg:
 
     @property
     def side(self) -> float:
-        """Where the foot is when the leg stands: 1 left, -1 right, 0 in the middle."""
+        """Side of the foot in the stance: 1 left, -1 right, 0 in the middle."""
         lateral = self.stand[1]
         return 0.0 if abs(lateral) < _MIDDLE else math.copysign(1.0, lateral)
 
     @property
     def is_upright(self) -> bool:
-        """Whether the first joint's axis is rather vertical than not."""
+        """Whether the first joint's axis is closer to vertical than to horizontal."""
         return bool(abs((self.rotations[0] @ self.axes[0])[2]) > np.sqrt(0.5))
 
     @property
@@ -112,46 +105,32 @@ class ChainLeg:
 
     @property
     def stand(self) -> tuple[float, float, float]:
-        """Where the foot is when the leg stands, in the body's frame [m]."""
+        """Foot in the stance, in the body's frame [m]."""
         return _stand_of(self)
 
     def foot(self, angles: Sequence[float]) -> tuple[float, float, float]:
-        """Where the leg ends, in the body's frame."""
+        """Return the foot in the body's frame."""
         x, y, z = self.ends(np.asarray([angles], dtype=np.float64))[0].tolist()
         return x, y, z
 
     def ends(self, angles: Floats) -> Floats:
-        """Where the leg ends.
-
-        Args:
-            angles: (T, 3) [rad].
-
-        Returns:
-            The foot in the body's frame, (T, 3) [m].
-        """
+        """Return the foot in the body's frame, (T, 3) [m], at joint angles (T, 3) [rad]."""
         return np.asarray(self._moved(angles, slopes=False)[0])
 
     def feet(self, angles: Floats) -> tuple[Floats, Floats]:
-        """Where the leg ends, and how that changes with the angles.
+        """Return the foot in the body's frame (T, 3) [m] and its derivatives (T, 3, 3) [m].
 
-        Args:
-            angles: (T, 3) [rad].
-
-        Returns:
-            The foot in the body's frame, (T, 3) [m]; and its derivatives by angle, (T, 3, 3) [m],
-            a joint's in the last index.
+        The last index of the derivatives is the joint.
         """
         moved = self._moved(angles, slopes=True)
         return moved[0], np.stack(tuple(moved[:0:-1]), axis=-1)
 
     def _moved(self, angles: Floats, *, slopes: bool) -> Floats:
-        """The foot, (1, T, 3) [m], and if asked for its derivatives by angle, the last joint's
-        first, (4, T, 3) [m].
-        """
+        """Return the foot (1, T, 3) [m], followed by its slopes from last joint to first."""
         sines, cosines = np.sin(angles), np.cos(angles)
         moved = np.empty((1 + slopes * len(self.axes), len(angles), 3))
         seen = np.broadcast_to(self.end, moved[:1].shape)
-        # From the foot inwards: each joint turns all that is behind it.
+        # From the foot inwards: each joint rotates everything beyond it.
         for k in (2, 1, 0):
             behind = turned(seen, self.axes[k], sines[:, k], cosines[:, k])
             if slopes:
@@ -168,18 +147,8 @@ def _stand_of(leg: ChainLeg) -> tuple[float, float, float]:
 
 
 def turned(vector: Floats, axis: Floats, sine: Floats, cosine: Floats) -> Floats:
-    """Turn vectors about an axis, by Rodrigues' formula.
-
-    Args:
-        vector: (..., T, 3).
-        axis: Of unit length, (3,).
-        sine: Of the angles, (T,).
-        cosine: Of the angles, (T,).
-
-    Returns:
-        (..., T, 3).
-    """
-    # One factor for each number: numpy is slow to take each of three numbers at a time.
+    """Rotate vectors (..., T, 3) by angles (T,) about a unit axis (3,): Rodrigues' formula."""
+    # Scalar factors: numpy is slow on a last axis of three.
     sine, cosine = (np.repeat(factor, 3).reshape(-1, 3) for factor in (sine, cosine))
     along = (vector @ axis)[..., None] * axis
     turned = cosine * (vector - along)
@@ -189,7 +158,7 @@ def turned(vector: Floats, axis: Floats, sine: Floats, cosine: Floats) -> Floats
 
 
 def _across(axis: Floats, vector: Floats) -> Floats:
-    """Cross product of one vector and many: `numpy.cross` to the bit, but much faster."""
+    """Cross product of one vector with many: bit for bit `numpy.cross`, but much faster."""
     x, y, z = axis.tolist()
     a, b, c = vector[..., 0], vector[..., 1], vector[..., 2]
     found = np.empty(vector.shape)

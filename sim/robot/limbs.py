@@ -1,4 +1,4 @@
-"""A robot's limbs as numbers: geometry, inertias and motors of every leg."""
+"""Limbs as numbers: geometry, inertias and motors of every leg."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ Matrix = tuple[Vector, Vector, Vector]
 
 @dataclass(frozen=True, slots=True)
 class LimbJoint:
-    """A joint, the link behind it and the motor that drives it."""
+    """A joint, the link beyond it and its motor."""
 
-    axis: Vector  # in the link's frame; one of the frame's own axes is counted along it
-    sign: float  # 1, or -1 if the joint turns against `axis`
-    rotation: Matrix  # of the joint in the frame before it, at rest
-    offset: Vector  # of the joint in the frame before it [m]
+    axis: Vector  # in the link's frame; parallel to one of its axes, it points along that
+    sign: float  # -1 if the joint rotates against `axis`, else 1
+    rotation: Matrix  # of the joint in the previous frame, at angle 0
+    offset: Vector  # of the joint in the previous frame [m]
     mass: float  # of the link [kg]
     moment: Vector  # first moment of the link's mass [kg m]
     # of the link about its origin: xx, yy, zz, xy, xz, yz [kg m2]
@@ -64,7 +64,7 @@ class Limb:
 
 @lru_cache(maxsize=64)
 def limbs_of(robot: Robot) -> tuple[Limb, ...]:
-    """The legs of a robot, in its order."""
+    """Return the legs of a robot, in its order."""
     chains = [chain_of(robot.urdf, leg) for leg in robot.description.legs]
     check_joints(robot.urdf, robot.description.legs)
     return tuple(
@@ -73,11 +73,7 @@ def limbs_of(robot: Robot) -> tuple[Limb, ...]:
 
 
 def limb_of(robot: Robot, number: int, placements: Sequence[Placement], foot: Floats) -> Limb:
-    """A limb from its placements and its motors.
-
-    Args:
-        foot: In the last link's frame, (3,) [m].
-    """
+    """Build a limb from placements, motors and the foot (3,) [m] in the last link's frame."""
     actuators = robot.actuators()
     joints = []
     for index, place in enumerate(placements, start=JOINTS_PER_LEG * number):
@@ -121,17 +117,16 @@ def limb_of(robot: Robot, number: int, placements: Sequence[Placement], foot: Fl
 
 
 def is_torque_controlled(joint: LimbJoint) -> bool:
-    """Whether a joint, of numbers or symbols, is driven by a torque-controlled actuator."""
+    """Check whether a joint, of numbers or symbols, has a torque-controlled actuator."""
     limit: object = joint.torque_limit
     return not (isinstance(limit, float) and limit == 0.0)
 
 
 def electrical_constants(joints: Sequence[LimbJoint]) -> list[float]:
-    """What the battery's voltage needs of the actuators.
+    """Return what the battery voltage depends on: two numbers by joint.
 
-    Returns:
-        By joint, of DC motors the conductance [1/ohm], of others R / k^2 [W/(N m)^2]; then by joint
-        r K_M [N m/A], or the torque limit [N m].
+    First the conductance of DC motors [1/ohm] or R / k^2 of others [W/(N m)^2]; then r K_M [N m/A]
+    or the torque limit [N m].
     """
     if is_torque_controlled(joints[0]):
         loss = [joint.resistance * joint.inverse_torque * joint.inverse_torque for joint in joints]
@@ -145,6 +140,6 @@ def _triple(values: Floats) -> Vector:
 
 
 def _without_noise(values: Floats) -> Floats:
-    """Numbers that are whole but for rounding become so: structural zeros and ones."""
+    """Round numbers that are integers up to rounding errors: structural zeros and ones."""
     nearest = np.rint(values)
     return np.where(np.abs(values - nearest) < _NOISE, nearest, values) + 0.0

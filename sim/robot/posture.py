@@ -1,4 +1,4 @@
-"""A robot at rest: where its feet and its centre of mass are, and at which height it stands."""
+"""Postures of a robot: feet, centre of mass and height at rest."""
 
 from __future__ import annotations
 
@@ -16,39 +16,18 @@ Floats = NDArray[np.float64]
 
 
 def feet_in_body(robot: Robot, joints: Floats) -> Floats:
-    """Where every foot is in the body's frame.
-
-    Args:
-        joints: Angles, (J,) [rad].
-
-    Returns:
-        (L, 3) [m].
-    """
+    """Return all feet in the body's frame, (L, 3) [m], at joint angles (J,) [rad]."""
     angles = joints.reshape(-1, 3).tolist()
     return np.array([leg.foot(of) for leg, of in zip(robot.legs, angles, strict=True)])
 
 
 def feet_below_body(robot: Robot, joints: Floats) -> Floats:
-    """Height of every foot in the body's frame.
-
-    Args:
-        joints: Angles, (J,) [rad].
-
-    Returns:
-        (L,) [m], mostly negative.
-    """
+    """Return the height of all feet in the body's frame, (L,) [m], mostly negative."""
     return np.asarray(feet_in_body(robot, joints)[:, 2])
 
 
 def leg_points(robot: Robot, joints: Floats) -> Floats:
-    """Where every leg's joints and its foot are in the body's frame.
-
-    Args:
-        joints: Angles, (J,) [rad].
-
-    Returns:
-        (L, 4, 3) [m]: three joints from the body on, and the foot.
-    """
+    """Return three joints and the foot of each leg in the body's frame, (L, 4, 3) [m]."""
     legs = []
     for leg, angles in zip(robot.description.legs, joints.reshape(-1, 3), strict=True):
         chain = chain_of(robot.urdf, leg)
@@ -62,14 +41,9 @@ def leg_points(robot: Robot, joints: Floats) -> Floats:
 
 
 def feet_and_centre_of_mass(robot: Robot, joints: Floats, load: float) -> tuple[Floats, Floats]:
-    """Where feet and centre of mass are in many postures.
+    """Return feet (T, L, 3) and centre of mass (T, 3) in the body's frame [m].
 
-    Args:
-        joints: Angles, (T, J) [rad].
-        load: Mass carried on the body [kg].
-
-    Returns:
-        In the body's frame: the feet (T, L, 3) and the centre of mass (T, 3) [m].
+    `joints` are angles (T, J) [rad], `load` is carried on the body [kg].
     """
     body = robot.body
     at_load = np.array([0.0, 0.0, robot.description.load_height])
@@ -79,7 +53,7 @@ def feet_and_centre_of_mass(robot: Robot, joints: Floats, load: float) -> tuple[
         angles = joints[:, 3 * number : 3 * number + 3]
         foot = np.tile(np.array(limb.foot), (len(joints), 1))
         mass, of_leg = 0.0, np.zeros_like(foot)
-        # From the foot inwards: each joint turns all that is behind it.
+        # From the foot inwards: each joint rotates everything beyond it.
         for joint, angle in zip(reversed(limb.joints), reversed(angles.T), strict=True):
             mass, of_leg = mass + joint.mass, of_leg + np.array(joint.moment)
             axis, rotation, offset = map(np.array, (joint.axis, joint.rotation, joint.offset))
@@ -92,7 +66,7 @@ def feet_and_centre_of_mass(robot: Robot, joints: Floats, load: float) -> tuple[
 
 
 def _turn(axis: Floats, angle: float) -> Floats:
-    """Rotation about a unit vector, by Rodrigues' formula."""
+    """Rotation matrix about a unit vector, by Rodrigues' formula."""
     x, y, z = axis.tolist()
     across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     turn = np.eye(3) + math.sin(angle) * across + (1.0 - math.cos(angle)) * (across @ across)
@@ -100,33 +74,18 @@ def _turn(axis: Floats, angle: float) -> Floats:
 
 
 def resting_height(robot: Robot, joints: Floats, weight: float) -> float:
-    """Height of a level body at which the feet's springs carry a weight.
-
-    Args:
-        joints: Angles, (J,) [rad].
-        weight: To be carried [N].
-
-    Returns:
-        [m].
-    """
+    """Return the height [m] of a level body at which the feet's springs carry a weight [N]."""
     contacts = robot.contacts()
     reach = np.array([c.sole for c in contacts]) - feet_below_body(robot, joints)
     return height_on_soles(reach, np.array([c.stiffness for c in contacts]), weight)
 
 
 def height_on_soles(reach: Floats, stiffness: Floats, weight: float) -> float:
-    """Height of a body at which springs under it carry a weight.
+    """Return the height [m] of a body at which springs below it carry a weight [N].
 
-    The springs' force is piecewise linear in height; feet are loaded from the lowest up until the
-    balance leaves the next one in the air.
-
-    Args:
-        reach: How far the soles' unloaded ends lie below the body, (L,) [m].
-        stiffness: Of the soles, (L,) [N/m].
-        weight: To be carried [N].
-
-    Returns:
-        [m].
+    The force is piecewise linear in height; feet are loaded from the lowest up until the next one
+    stays in the air. `reach` is how far the unloaded soles lie below the body, (L,) [m], and
+    `stiffness` theirs, (L,) [N/m].
     """
     order = np.argsort(-reach)
     reach, stiffness = reach[order], stiffness[order]

@@ -1,4 +1,4 @@
-"""A robot ready to be simulated: description, leg geometry, and numbers by joint and by foot."""
+"""Robots ready for simulation: description, leg geometry, and values by joint and foot."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ from gaitswarm.sim.robot.urdf_errors import by_line
 
 _TABLE: Final = re.compile(r"(\[\[?)([^\[\]]++)\]\]?(?:\s*+#.*)?")
 _KEY: Final = re.compile(r"([^=#\[\]\s][^=]*+)=")
-"""Of a line without blanks around it. Possessive: no line takes longer than its length asks for."""
+"""Matches a line without surrounding blanks in linear time (possessive quantifiers)."""
 
 _FIELD: Final = re.compile(r"`(\w+)`")
-"""Of a leg, as messages name it."""
+"""Field of a leg in a message."""
 
 _PARTS: Final[tuple[type[BaseModel], ...]] = (
     RobotDescription,
@@ -58,7 +58,7 @@ _PARTS: Final[tuple[type[BaseModel], ...]] = (
 
 
 def first_problem(error: ValidationError, text: str) -> str:
-    """The first thing that is wrong."""
+    """Describe the first validation error."""
     first = with_known_keys(error.errors(), RobotDescription)[0]
     location = _without_kind(first["loc"])
     where = shortened(".".join(str(part) for part in location))
@@ -76,7 +76,7 @@ def first_problem(error: ValidationError, text: str) -> str:
 
 @contextmanager
 def by_leg(text: str, legs: Sequence[str]) -> Iterator[None]:
-    """Add the line to errors that name a leg or the held joints of a robot.toml."""
+    """Add line numbers to errors about a leg or the held joints of a robot.toml."""
     try:
         yield
     except RobotFileError as error:
@@ -95,11 +95,7 @@ def by_leg(text: str, legs: Sequence[str]) -> Iterator[None]:
 
 
 def line_of(text: str, path: Sequence[str | int]) -> int | None:
-    """Line of a field in a TOML file.
-
-    Follows tables, arrays of tables and dotted keys as robot files use them; inline tables count
-    as one line.
-    """
+    """Return the line of a field in a TOML file; an inline table counts as one line."""
     found, depth = None, 0
     table: list[str | int] = []
     counts: dict[str, int] = {}
@@ -126,19 +122,19 @@ def _split(key: str) -> list[str]:
 
 
 def _without_kind(location: tuple[str | int, ...]) -> tuple[str | int, ...]:
-    """Pydantic names the kind of an actuator behind its name."""
+    """Remove the kind that pydantic adds after an actuator's name."""
     if len(location) > 2 and location[0] == "actuators":
         return (*location[:2], *location[3:])
     return location
 
 
 def _is_class(part: str | int) -> bool:
-    """Pydantic names the members of unions among the keys."""
+    """Recognize members of unions, which pydantic adds to locations."""
     return isinstance(part, str) and part[:1].isupper() and part.isidentifier()
 
 
 def _meaning(location: tuple[str | int, ...]) -> str | None:
-    """Description, with unit, of a field of any part of a robot description."""
+    """Return description and unit of a field of a robot description."""
     own = (TorqueActuator,) if "torque" in location[2:3] else ()
     field = str(location[-1]) if location else ""
     parts: tuple[type[BaseModel], ...] = (*own, *_PARTS)
@@ -150,15 +146,12 @@ def _meaning(location: tuple[str | int, ...]) -> str | None:
 
 Floats = NDArray[np.float64]
 
-_DEGREES: Final = "; it is in degrees, it seems: 45 degrees are 0.7854 rad"
+_DEGREES: Final = "; it seems to be in degrees: 45 degrees are 0.7854 rad"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointActuators:
-    """Motors and gears in joint order, referred to the joint; arrays (J,), read-only.
-
-    What a kind of actuator does not have is 0.
-    """
+    """Motors and gears in joint order, referred to joints; read-only arrays (J,), 0 if absent."""
 
     torque: Floats  # r K_M [N m/A], also the back-EMF [V s/rad]
     resistance: Floats  # [ohm]
@@ -178,7 +171,7 @@ class JointActuators:
 
     @property
     def viscous(self) -> Floats:
-        """Viscous friction at the joint, eq. 2.8 and the gearhead's, (J,) [N m s/rad]."""
+        """Viscous friction at the joint: eq. 2.8 and the gearhead's, (J,) [N m s/rad]."""
         return self.motor_friction + (1.0 - self.efficiency) * self.gear_friction
 
 
@@ -190,8 +183,7 @@ class Robot:
         description: its robot.toml.
         urdf: its robot.urdf.
         legs: geometry of the description's legs, in its order.
-        ships: whether its kinematic tree ships with gaitswarm; that of another robot may come from
-            anybody.
+            ships: whether its kinematic tree ships with gaitswarm; others are untrusted.
     """
 
     description: RobotDescription
@@ -201,7 +193,7 @@ class Robot:
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Joints in the order of every joint array: leg by leg, coxa, femur, tibia."""
+        """Joints in the order of all joint arrays: leg by leg; coxa, femur, tibia."""
         return tuple(name for leg in self.description.legs for name in leg.joints)
 
     @property
@@ -211,7 +203,7 @@ class Robot:
 
     @property
     def has_backlash(self) -> bool:
-        """Whether motors and links move apart: any joint has play, or shafts yield."""
+        """Whether motors and links can move apart: with backlash or elastic shafts."""
         return self.description.elastic_shafts or any(
             self.description.actuators[name].backlash > 0.0
             for leg in self.description.legs
@@ -220,7 +212,7 @@ class Robot:
 
     @property
     def is_torque_controlled(self) -> bool:
-        """Whether controllers command its joints' torques, not its motors' voltages."""
+        """Whether controllers command joint torques instead of motor voltages."""
         return self.description.actuator_kind == "torque"
 
     @property
@@ -230,11 +222,7 @@ class Robot:
 
     @property
     def body(self) -> BodyInertia:
-        """Inertia of the unloaded body; with the description's own mass its shape stays.
-
-        Raises:
-            RobotFileError: The description has a mass of the body, but the URDF's has none.
-        """
+        """Inertia of the unloaded body; `body_mass` scales it."""
         mass, own = self.description.body_mass, self.urdf.body
         if mass is None:
             return own
@@ -248,22 +236,22 @@ class Robot:
         return self.urdf.total_mass - self.urdf.body.mass + self.body.mass
 
     def contacts(self) -> tuple[Contact, ...]:
-        """Each foot's contact parameters, its own or the robot's."""
+        """Return each foot's contact parameters, its own or the robot's."""
         return tuple(leg.contact or self.description.contact for leg in self.description.legs)
 
     def planned_soles(self) -> tuple[float, ...]:
-        """Length of the sole that each leg's gait is planned for [m]."""
+        """Return the sole length that each leg's gait assumes [m]."""
         if self.description.planned_soles == "own":
             return tuple(contact.sole for contact in self.contacts())
         return (self.description.contact.sole,) * len(self.legs)
 
     def actuators(self) -> JointActuators:
-        """Motor and gear numbers by joint."""
+        """Return motor and gear values by joint."""
         return self._actuators
 
     @cached_property
     def _actuators(self) -> JointActuators:
-        """Made once: every walk asks for it several times."""
+        """Cached: each simulation needs it several times."""
         d = self.description
         rows = []
         for leg in d.legs:
@@ -280,7 +268,7 @@ class Robot:
 
 
 def _dc_row(d: RobotDescription, actuator: Actuator) -> tuple[float, ...]:
-    """Of `JointActuators`, by a motor and a gearhead."""
+    """Row of `JointActuators` for a motor with gearhead."""
     motor, gear = d.motors[actuator.motor], d.gearheads[actuator.gearhead]
     ratio = gear.ratio * actuator.bevel
     return (
@@ -300,7 +288,7 @@ def _dc_row(d: RobotDescription, actuator: Actuator) -> tuple[float, ...]:
 
 
 def _torque_row(actuator: TorqueActuator) -> tuple[float, ...]:
-    """Of `JointActuators`; friction is the joint's, so no gearhead has any."""
+    """Row of `JointActuators`; friction is at the joint, so the gearhead has none."""
     return (
         actuator.gear_ratio * actuator.torque_constant,
         actuator.resistance,
@@ -321,7 +309,7 @@ def _torque_row(actuator: TorqueActuator) -> tuple[float, ...]:
 
 
 def with_shafts(robot: Robot) -> Robot:
-    """Return the robot with elastic shafts between motors and links, also where there is no play.
+    """Return the robot with elastic shafts between motors and links, even without backlash.
 
     Args:
         robot: Robot to start from.
@@ -333,7 +321,7 @@ def with_shafts(robot: Robot) -> Robot:
 
 
 def parse_robot(toml: str, urdf: str) -> Robot:
-    """A robot from its two files."""
+    """Build a robot from its two files."""
     check_toml(toml)
     try:
         document = tomllib.loads(toml)
@@ -348,7 +336,7 @@ def parse_robot(toml: str, urdf: str) -> Robot:
 
 
 def assembled(description: RobotDescription, urdf: str) -> Robot:
-    """A robot from its description and the text of its URDF."""
+    """Build a robot from its description and the text of its URDF."""
     check_owners(description.legs)
     tree = parse_urdf(urdf, description.held_joints)
     with by_line(urdf):
@@ -403,7 +391,7 @@ def _check_stance(leg: Leg, stance: Floats, limits: Floats) -> None:
 
 
 def rows_of(legs: Sequence[LegKinematics]) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Legs of both sides."""
+    """Return the legs of each side."""
     of_sides: tuple[list[int], list[int]] = [], []
     for number, leg in enumerate(legs):
         of_sides[leg.side < 0.0].append(number)
@@ -412,7 +400,7 @@ def rows_of(legs: Sequence[LegKinematics]) -> tuple[tuple[int, ...], tuple[int, 
 
 
 def leg_groups(robot: Robot) -> dict[str, tuple[int, ...]]:
-    """The groups that a robot's legs are in."""
+    """Return a robot's groups of legs."""
     rows = rows_of(robot.legs)
     first = {row[0] for row in rows if row}
     last = {row[-1] for row in rows if row} - first
@@ -433,7 +421,7 @@ def leg_groups(robot: Robot) -> dict[str, tuple[int, ...]]:
 
 
 def values_by_leg(robot: Robot, values: Mapping[str, float], parameter: str) -> dict[int, float]:
-    """What single legs have of a parameter that groups have values of."""
+    """Resolve values of groups of legs to values of legs."""
     groups = leg_groups(robot)
     for name in values:
         if name not in groups:

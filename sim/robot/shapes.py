@@ -1,4 +1,4 @@
-"""What a robot looks like: solids on its links, from its URDF or else from its kinematic tree."""
+"""Shapes of a robot's links for display, from its URDF or from its kinematic tree."""
 
 from __future__ import annotations
 
@@ -28,48 +28,45 @@ Role = Literal["body", "coxa", "femur", "tibia", "foot", "load"]
 _PARTS: Final[tuple[Role, Role, Role]] = ("coxa", "femur", "tibia")
 
 _THICKNESS: Final[Mapping[Role, float]] = {"coxa": 0.07, "femur": 0.06, "tibia": 0.045}
-"""Radius of a drawn part as a share of the stretched leg's length."""
+"""Radius of a drawn part relative to the stretched leg's length."""
 
 _LOAD_DENSITY: Final = 2000.0
-"""Of a drawn load [kg/m3]; to the simulator it is a point."""
+"""Density of a drawn load [kg/m3], which is a point mass in simulations."""
 
 _UPRIGHT: Final = np.array([0.0, 0.0, 0.0, 1.0])
-"""Quaternion x y z w of a solid that is not turned."""
+"""Identity rotation as quaternion x y z w."""
 
 
 @dataclass(frozen=True, slots=True)
 class Shape:
     """One solid, fixed to a link."""
 
-    type: SolidKind  # what it is
+    type: SolidKind
     # edges x, y, z of a box; radius of a sphere; radius and length of a cylinder or a capsule along
     # its own z, a capsule's between the centres of its hemispheres [m]
     size: tuple[float, ...]
-    # of its centre in the link's frame, position [m] and quaternion x y z w
+    # pose of its centre in the link's frame: position [m], quaternion x y z w
     origin: tuple[float, float, float, float, float, float, float]
-    role: Role  # part of the robot that it belongs to
+    role: Role  # part of the robot
 
 
 @dataclass(frozen=True, slots=True)
 class VisibleLink:
-    """A link of the URDF, fixed ones too."""
+    """A link of the URDF; fixed ones are included."""
 
     name: str  # as in the URDF
     parent: str | None  # name of the link that carries it, None for the body
-    shapes: tuple[Shape, ...]  # what it looks like, in simple solids
-    # what it looks like in the URDF's own meshes, if that has any
+    shapes: tuple[Shape, ...]
+    # meshes of the URDF, if any
     meshes: tuple[VisualMesh, ...] = ()
 
 
 def visible_links(robot: Robot, load: float = 0.0) -> tuple[VisibleLink, ...]:
-    """Every link with its shapes, parents before their children, the body first.
+    """Return every link with its shapes, parents before their children, the body first.
 
-    A link looks like its visual geometry, or its collision geometry; where the URDF has neither
-    (or only meshes), legs are capsules from joint to joint with soles as spheres, and the body is
-    a box that spans the hips.
-
-    Args:
-        load: Mass carried on the body [kg], drawn as a cube.
+    A link has its visual or else its collision geometry. Without either (or with meshes only), legs
+    are capsules from joint to joint with spheres as soles, and the body is a box that spans the
+    hips. A load [kg] on the body is a cube.
     """
     carriers = {joint.child: joint.parent for joint in robot.urdf.joints}
     derived = _derived(robot)
@@ -79,7 +76,7 @@ def visible_links(robot: Robot, load: float = 0.0) -> tuple[VisibleLink, ...]:
     for name, link in robot.urdf.links.items():
         parent = carriers.get(name)
         own = derived.get(name)
-        # What is fixed to a part is of that part: a camera of the body, a cover of a tibia.
+        # A link fixed to a part belongs to it: a camera to the body, a cover to a tibia.
         role = roles[name] = own.role if own else "body" if parent is None else roles[parent]
         shapes = tuple(
             _shape(solid.kind, solid.size, solid.origin.xyz, solid.origin.quaternion(), role)
@@ -92,8 +89,8 @@ def visible_links(robot: Robot, load: float = 0.0) -> tuple[VisibleLink, ...]:
 
 
 def _derived(robot: Robot) -> dict[str, Shape]:
-    """By link, what the kinematic tree suggests: the body, and the parts of every leg."""
-    # A foot may be named by its fixed joint or by its link.
+    """Derive shapes of body and legs from the kinematic tree, by link."""
+    # A foot is named by its fixed joint or by its link.
     carried = {joint.name: joint.child for joint in robot.urdf.joints}
     shapes = {next(iter(robot.urdf.links)): _trunk(robot)}
     for geometry, leg in zip(robot.legs, robot.description.legs, strict=True):
@@ -112,7 +109,7 @@ def _radii(leg: LegKinematics) -> dict[Role, float]:
 
 
 def _trunk(robot: Robot) -> Shape:
-    """A box from hip to hip, half as high as it is narrow."""
+    """A box from hip to hip, half as high as its shorter side."""
     hips = np.array([leg.hip for leg in robot.legs])
     low, high = hips.min(axis=0), hips.max(axis=0)
     widest = 2.0 * max(_radii(leg)["coxa"] for leg in robot.legs)
@@ -122,8 +119,8 @@ def _trunk(robot: Robot) -> Shape:
 
 
 def _capsule(end: Floats, radius: float, role: Role) -> Shape:
-    """From the link's origin to `end`."""
-    # Slow to import, and only pictures need it.
+    """A capsule from the link's origin to `end`."""
+    # Slow to import, and only needed for display.
     require_room_for_scipy()
     from scipy.spatial.transform import Rotation  # noqa: PLC0415
 
@@ -160,17 +157,17 @@ _LARGEST_SCALE: Final = 1e6
 
 @dataclass(frozen=True, slots=True)
 class VisualMesh:
-    """A mesh on a link. Only pictures have it; nothing of it is simulated."""
+    """A mesh on a link, for display only."""
 
     name: str  # of its file, as the URDF has it
-    # of its frame in the link's, position [m] and quaternion x y z w
+    # pose of its frame in the link's: position [m], quaternion x y z w
     origin: tuple[float, float, float, float, float, float, float]
     scale: tuple[float, float, float]  # along its own x, y and z [1]
-    colour: Colour | None  # of its material in the URDF; None if that says none
+    colour: Colour | None  # None if its material has none
 
 
 def material_colours(urdf: str) -> Mapping[str, Colour]:
-    """Colours of a URDF's materials, which any link may name."""
+    """Return the colours of a URDF's materials, which any link may name."""
     root = ET.fromstring(urdf)  # noqa: S314 - it was checked when it was parsed
     found: dict[str, Colour] = {}
     for material in root.iter("material"):
@@ -181,10 +178,7 @@ def material_colours(urdf: str) -> Mapping[str, Colour]:
 
 
 def visual_meshes(link: Link, colours: Mapping[str, Colour]) -> tuple[VisualMesh, ...]:
-    """Meshes of a link's visual geometry.
-
-    What cannot be read is left out, or has its default: no walk fails for a picture.
-    """
+    """Return meshes of a link's visual geometry; unreadable parts are omitted or get defaults."""
     meshes = []
     for part in link.element.findall("visual"):
         for mesh in part.findall("geometry/mesh"):
@@ -234,12 +228,11 @@ def _numbers(text: str, count: int, largest: float) -> list[float] | None:
 
 
 def mesh_bounds(path: Path) -> Floats | None:
-    """Least and largest coordinates of a mesh's vertices.
+    """Return least and largest coordinates of a mesh's vertices (2, 3), in the file's units.
 
-    Returns:
-        (2, 3) in the file's units, which a URDF scales to metres; None if it is no mesh.
+    None if the file is not a mesh.
     """
-    # The first use: most robots' feet are known without meshes.
+    # Slow to import, and seldom needed.
     import coal  # noqa: PLC0415
 
     try:

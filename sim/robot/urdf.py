@@ -1,4 +1,4 @@
-"""A robot's URDF: its kinematic tree, inertias and geometry."""
+"""URDF parsing: kinematic tree, inertias and geometry."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ _SIZES: Final[Mapping[str, tuple[str, ...]]] = {
     "cylinder": ("radius", "length"),
     "capsule": ("radius", "length"),
 }
-"""URDF's attributes of each solid, in the order of `Solid.size`."""
+"""Attributes of each solid in a URDF, in the order of `Solid.size`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solid:
-    """A simple solid that a link looks like."""
+    """A simple solid of a link's geometry."""
 
-    kind: SolidKind  # what it is
+    kind: SolidKind
     # edges x, y, z of a box; radius of a sphere; radius and length of a cylinder or a capsule, a
     # capsule's between the centres of its hemispheres [m]
     size: Floats
@@ -48,14 +48,14 @@ class Solid:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Link:
-    """A link."""
+    """A link of a URDF."""
 
     name: str  # as in the file
     inertia: BodyInertia  # in the link's frame; `NO_INERTIA` if the file gives none
-    element: ET.Element  # of the file
+    element: ET.Element
 
     def solids(self, use: GeometryUse = "visual") -> tuple[Solid, ...]:
-        """Simple solids of its geometry; meshes are left out."""
+        """Return simple solids of its geometry, without meshes."""
         for part_use in (use, "collision" if use == "visual" else "visual"):
             solids = [
                 self._solid(part, element)
@@ -75,7 +75,7 @@ class Link:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Place:
-    """Where a link is in its rigid body."""
+    """Pose of a link in its rigid body."""
 
     body: str  # name of the rigid body's first link, in whose frame it is
     rotation: Floats  # from the link's frame, (3, 3)
@@ -84,9 +84,9 @@ class Place:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Urdf:
-    """A URDF that has been read."""
+    """A parsed URDF."""
 
-    text: str  # of the file; with held joints fixed and continuous ones revolute
+    text: str  # of the file, with held joints fixed and continuous ones revolute
     links: Mapping[str, Link]  # by name, parents before their children, the robot's body first
     joints: tuple[Joint, ...]  # in the file's order
     # inertia of every rigid body in the frame of its first link, by this link's name, the robot's
@@ -96,11 +96,11 @@ class Urdf:
 
     @property
     def body(self) -> BodyInertia:
-        """Inertia of the robot's body with all that is fixed to it."""
+        """Inertia of the robot's body and everything fixed to it."""
         return next(iter(self.bodies.values()))
 
     def place(self, name: str) -> Place:
-        """Where a frame is."""
+        """Return the pose of a link or of a fixed joint's frame."""
         carried = {joint.name: joint.child for joint in self.joints if joint.fixed}
         link = name if name in self.places else carried.get(name)
         if link is None:
@@ -114,24 +114,20 @@ class Urdf:
 
 
 def parse_urdf(text: str, held: Mapping[str, float] = _NONE_HELD) -> Urdf:
-    """Read a URDF.
-
-    Args:
-        held: Joints that are held and so are fixed, by name at which angle [rad].
-    """
+    """Parse a URDF. `held` maps joints to the angle at which they are fixed [rad]."""
     return _read(text, tuple(held.items()))
 
 
 @lru_cache(maxsize=4)
 def _read(text: str, held: tuple[tuple[str, float], ...]) -> Urdf:
-    """Whoever proposes a robot reads its file several times."""
+    """Cached: a proposal parses its file several times."""
     check_urdf(text)
     with by_line(text):
         return _parsed(text, dict(held))
 
 
 def _parsed(text: str, held: Mapping[str, float]) -> Urdf:
-    """The text has kept all bounds, and so is XML."""
+    """Parse a text that has passed the size checks, which make sure that it is XML."""
     root = ET.fromstring(text)  # noqa: S314 - it has no entities of its own
     if root.tag != "robot":
         raise RobotFileError(
@@ -168,7 +164,7 @@ def _parsed(text: str, held: Mapping[str, float]) -> Urdf:
 
 
 def _from_the_body(links: Mapping[str, Link], joints: Sequence[Joint]) -> Iterator[str]:
-    """Names of the links, parents before children, each generation in the file's order."""
+    """Yield names of links, parents before children, each generation in the file's order."""
     children: dict[str, list[str]] = {name: [] for name in links}
     carried: set[str] = set()
     for joint in joints:
@@ -211,7 +207,7 @@ def _from_the_body(links: Mapping[str, Link], joints: Sequence[Joint]) -> Iterat
 def _rigid_bodies(
     links: Mapping[str, Link], joints: Sequence[Joint]
 ) -> tuple[Mapping[str, BodyInertia], Mapping[str, Place]]:
-    """Depth first in the order of the joints' names, as Pinocchio numbers its joints."""
+    """Collect rigid bodies depth first in the order of joint names, as Pinocchio numbers joints."""
     carried: dict[str, list[Joint]] = {name: [] for name in links}
     for joint in sorted(joints, key=lambda joint: joint.name, reverse=True):
         carried[joint.parent].append(joint)
@@ -255,18 +251,18 @@ def _inertia(link: ET.Element, whose: str) -> BodyInertia:
 
 
 _ROUNDED: Final = 1e-6
-"""Share of the largest moment by which a file's digits may be off."""
+"""Rounding errors of a file's digits, relative to the largest moment."""
 
 _NONE: Final = 1e-9
-"""Share of the largest moment that is no moment at all: a rod's about its own axis is more."""
+"""Moments below this share of the largest count as zero; a rod's about its axis is larger."""
 
 
 def unphysical(urdf: Urdf, text: str) -> Iterator[str]:
-    """Look for masses and inertias that no body has.
+    """Yield warnings about masses and inertias that are physically impossible.
 
-    Links that are fixed to one another are one body, and only that is simulated: a camera with
-    filled-in moments is no matter on a trunk that has its own. Where the whole is wrong, those of
-    its links are named that are.
+    Links that are fixed to one another are simulated as one body: placeholder moments of a camera
+    do not matter on a trunk with its own. If the whole is impossible, its impossible
+    links are named.
     """
     parts: dict[str, list[str]] = {name: [] for name in urdf.bodies}
     for link, place in urdf.places.items():
@@ -299,5 +295,5 @@ def _possible(inertia: BodyInertia) -> bool:
 
 
 def _moments(inertia: BodyInertia) -> Floats:
-    """Principal ones, the least first, (3,) [kg m2]."""
+    """Principal moments in ascending order, (3,) [kg m2]."""
     return np.asarray(np.linalg.eigvalsh(inertia.rotational), dtype=np.float64)

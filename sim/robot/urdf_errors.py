@@ -1,4 +1,4 @@
-"""What is wrong with a robot.urdf, told by the line of the link or joint that is to blame."""
+"""Line numbers for errors about a robot.urdf."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _INNER: Final = re.compile(r"(?P<attribute>\w+)=(?P<value>'[^']*'|\"[^\"]*\") of
 
 @contextmanager
 def by_line(text: str) -> Iterator[None]:
-    """Add the line to errors that name a link or a joint of a URDF."""
+    """Add line numbers to errors that name a link or a joint of a URDF."""
     try:
         yield
     except RobotFileError as error:
@@ -29,7 +29,7 @@ def by_line(text: str) -> Iterator[None]:
 
 
 def with_line(text: str, said: str) -> str:
-    """Add the line to a sentence that begins with a link or a joint of a URDF."""
+    """Add the line number to a message that begins with a link or a joint of a URDF."""
     line = _line(text, said)
     if line is None:
         return said
@@ -37,10 +37,7 @@ def with_line(text: str, said: str) -> str:
 
 
 def _line(text: str, said: str) -> int | None:
-    """Line of the last part of that name, which is the one too many of two, or of a number of it.
-
-    None if the message names none that is in the text.
-    """
+    """Find the line of the last part with that name, the duplicate of two, or of its attribute."""
     part = _PART.match(said)
     if part is None:
         return None

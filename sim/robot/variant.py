@@ -1,4 +1,4 @@
-"""Robots as jobs name them: shipped, a variant of a shipped one, or one's own files."""
+"""Robots in jobs: shipped ones, variants of them, and robot files."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ _REMEMBERED: Final = 1024
 
 
 def digest_of(toml: str, urdf: str) -> bytes:
-    """What two files are told from others by."""
-    # Texts that are no Unicode are refused later, by name.
+    """Return the digest that identifies two files."""
+    # Invalid Unicode is rejected later, by name.
     texts = (text.encode(errors="surrogatepass") for text in (toml, urdf))
     return hashlib.sha256(b"%d " % len(toml) + b"".join(texts)).digest()
 
 
 class _Digests:
-    """Digests, those that were asked for last at the end. Thread-safe."""
+    """Set of digests that drops the least recently used. Thread-safe."""
 
     def __init__(self) -> None:
         self._digests: OrderedDict[bytes, None] = OrderedDict()
@@ -62,26 +62,26 @@ class _Digests:
 
 
 PASSED: Final = _Digests()
-"""Files that passed `gaitswarm.sim.robot.check.check_files`, in this process."""
+"""Files that passed `gaitswarm.sim.robot.check.check_files` in this process."""
 
 READ: Final = _Digests()
-"""Files that this process has made a robot of."""
+"""Files that this process has built a robot from."""
 
 RobotName = Literal["szabadka2", "szabadka2-identified", "szabadka2-reconstructed"]
-"""Robots that ship with gaitswarm."""
+"""Robots shipped with gaitswarm."""
 
 DEFAULT_ROBOT: Final[RobotName] = "szabadka2-reconstructed"
-"""The robot that walks where none is named: the one that published results speak of."""
+"""Default robot, on which published results are based."""
 
 SHIPPED: Final[tuple[RobotName, ...]] = get_args(RobotName)
 
 
 @lru_cache(maxsize=8)
 def shipped_robot(name: str) -> Robot:
-    """A robot that ships with gaitswarm.
+    """Load a robot that ships with gaitswarm.
 
-    Its folder holds robot.toml and robot.urdf; or parameters.toml, which names another shipped
-    robot as its base and gives some of `identifiable_variables` other values.
+    Its folder contains robot.toml and robot.urdf, or parameters.toml with another shipped robot as
+    base and values of some of its `identifiable_variables`.
     """
     if name not in SHIPPED:
         raise SimulationInputError(f"robot: unknown {name!r}; known are {', '.join(SHIPPED)}")
@@ -145,7 +145,7 @@ class RobotFiles(BaseModel):
     @model_validator(mode="after")
     def _is_a_robot(self) -> RobotFiles:
         digest = digest_of(self.toml, self.urdf)
-        # A list of jobs reads all their robots, each time that it is asked for.
+        # Listing jobs validates their robots every time.
         if not (PASSED.has(digest) or READ.has(digest)):
             _load_files(self)
             READ.add(digest)
@@ -172,25 +172,22 @@ RobotSource = Annotated[
         among_own=_variant_or_files,
     ),
 ]
-"""How jobs and requests name a robot."""
+"""A robot in jobs and requests."""
 
 
 RobotChoice = str | RobotVariant | RobotFiles | Robot
-"""How a robot is named to the simulator."""
+"""A robot as an argument of the simulator."""
 
 
 def load_robot(robot: RobotChoice) -> Robot:
-    """A robot by its name, variant or files.
+    """Load a robot by its name, variant or files.
 
     Args:
-        robot: A shipped robot's name, a variant of one, files of one's own, or a robot, which is
-            returned as it is.
-
-    Returns:
-        The robot.
+        robot: A shipped robot's name, a variant of one, robot files, or a robot, which is returned
+            unchanged.
 
     Raises:
-        SimulationInputError: There is no such robot, or its files cannot be used.
+        SimulationInputError: The robot is unknown, or its files cannot be used.
     """
     if isinstance(robot, Robot):
         return robot

@@ -1,4 +1,4 @@
-"""Designs in worlds that differ from the model, and where they walk."""
+"""Simulation in worlds that differ from the model."""
 
 from __future__ import annotations
 

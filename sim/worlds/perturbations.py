@@ -1,4 +1,4 @@
-"""What may be wrong with a model of a robot, as data: one world is one value of each."""
+"""Perturbations of a robot's model; a world is one value of each."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from gaitswarm.sim.variables import Variable
 Floats = NDArray[np.float64]
 
 _SEEDS: Final = 2.0**31
-"""Number of seeds that worlds are drawn with."""
+"""Number of seeds that worlds are drawn from."""
 
 _Limits = tuple[float, float]
 
@@ -33,7 +33,7 @@ def _perturbation(
     nominal: float = 0.0,
     kind: Literal["continuous", "integer"] = "continuous",
 ) -> tuple[Variable, _Limits]:
-    """A variable that is drawn within its bounds, and can be simulated within its limits."""
+    """Define a variable that is drawn within its bounds, and can be simulated within its limits."""
     low, high = bounds
     variable = Variable(
         name=name,
@@ -79,21 +79,21 @@ _TABLE: Final = (
         "load_ahead",
         (-0.05, 0.05),
         "m",
-        "How far the whole load is before its place (assumed).",
+        "Forward offset of the whole load (assumed).",
         limits=(-1.0, 1.0),
     ),
     _perturbation(
         "load_left",
         (-0.03, 0.03),
         "m",
-        "How far the whole load is left of its place (assumed).",
+        "Offset of the whole load to the left (assumed).",
         limits=(-1.0, 1.0),
     ),
     _perturbation(
         "load_raised",
         (0.0, 0.05),
         "m",
-        "How far the whole load is over its place (assumed).",
+        "Upward offset of the whole load (assumed).",
         limits=(-1.0, 1.0),
     ),
     _factor(
@@ -105,12 +105,12 @@ _TABLE: Final = (
     _factor(
         "battery_resistance_factor",
         (0.96, 1.09),
-        "the battery's internal resistance, by which its voltage sags (table 2.7).",
+        "the battery's internal resistance (table 2.7).",
     ),
     _factor(
         "efficiency_factor",
         (0.41, 1.22),
-        "the efficiency of all gearheads, which stays 1 at most (table 2.7).",
+        "the efficiency of all gearheads, limited to 1 (table 2.7).",
         (0.01, 100.0),
     ),
     _factor(
@@ -121,27 +121,27 @@ _TABLE: Final = (
     _factor(
         "backlash_factor",
         (0.8, 1.2),
-        "the play of all gears, of 2 to 3 degrees as measured; nothing on a robot without play.",
+        "the backlash of all gears, 2 to 3 degrees as measured; no effect without backlash.",
     ),
     _perturbation(
         "angle_noise",
         (0.0, 1e-3),
         "rad",
-        "Standard deviation of white noise on the encoders: some ten counts (assumed).",
+        "Standard deviation of white noise on the encoders: about ten counts (assumed).",
         limits=(0.0, 1.0),
     ),
     _perturbation(
         "current_noise",
         (0.0, 0.05),
         "A",
-        "Standard deviation of white noise on the current sensors: some six steps (assumed).",
+        "Standard deviation of white noise on the current sensors: about six steps (assumed).",
         limits=(0.0, 10.0),
     ),
     _perturbation(
         "angle_delay",
         (0.0, 2.0),
         "ticks",
-        "How late the controller learns angles, in control ticks of 2 ms (assumed).",
+        "Delay of the controller's angle readings in control ticks of 2 ms (assumed).",
         limits=(0.0, LARGEST_DELAY),
         kind="integer",
     ),
@@ -149,7 +149,7 @@ _TABLE: Final = (
         "current_delay",
         (0.0, 2.0),
         "ticks",
-        "How late the controller learns currents, in control ticks of 2 ms (assumed).",
+        "Delay of the controller's current readings in control ticks of 2 ms (assumed).",
         limits=(0.0, LARGEST_DELAY),
         kind="integer",
     ),
@@ -157,14 +157,14 @@ _TABLE: Final = (
         "slope_added",
         (0.0, 3.0),
         "deg",
-        "Slope beside the scenario's (assumed).",
+        "Slope in addition to the scenario's (assumed).",
         limits=(0.0, 45.0),
     ),
     _perturbation(
         "slope_added_direction",
         (-180.0, 180.0),
         "deg",
-        "Where that slope rises, from straight ahead towards the left.",
+        "Direction in which that slope rises, from straight ahead towards the left.",
         limits=(-180.0, 180.0),
     ),
     _perturbation(
@@ -199,38 +199,34 @@ _TABLE: Final = (
         "world_seed",
         (0.0, _SEEDS - 1.0),
         "1",
-        "Of what is random within the world: sensors' noise, angles at the start.",
+        "Seed of the randomness within the world: sensor noise, start angles.",
         limits=(0.0, 2.0**53),
         kind="integer",
     ),
 )
 
 PERTURBATIONS: Final[tuple[Variable, ...]] = tuple(variable for variable, _ in _TABLE)
-"""What a world may vary: `default` is nominal, what the model has without it.
+"""Quantities that a world may vary; `default` is the nominal value.
 
-Bounds are those that worlds are drawn from where nobody gives others. Factors of table 2.7 span the
-widest of its intervals, each over its optimum, among all legs."""
+Bounds are the default ranges to draw worlds from. Factors of table 2.7 span the widest of its
+intervals, relative to the optimum, among all legs."""
 
 NOMINAL: Final[Mapping[str, float]] = MappingProxyType(
     {v.name: v.default for v in PERTURBATIONS if v.default is not None}
 )
-"""Value of each in the world that the model knows."""
+"""Nominal value of each perturbation."""
 
 LIMITS: Final[Mapping[str, tuple[float, float]]] = MappingProxyType(
     {variable.name: limits for variable, limits in _TABLE}
 )
-"""Least and largest value of each that can be simulated: others' bounds must lie within."""
+"""Least and largest value of each that can be simulated; other bounds must lie within."""
 
 
 _WHOLE: Final = frozenset(v.name for v in PERTURBATIONS if v.kind == "integer")
 
 
 def check_worlds(variables: Sequence[str], worlds: Floats) -> None:
-    """Refuse worlds that cannot be simulated.
-
-    Args:
-        worlds: (n, len(variables)), in the variables' units.
-    """
+    """Reject worlds (n, len(variables)) that cannot be simulated."""
     for name in variables:
         if name not in LIMITS:
             raise SimulationInputError(f"{name}: no perturbation; {instead_of(name, LIMITS)}")
@@ -251,19 +247,16 @@ def check_worlds(variables: Sequence[str], worlds: Floats) -> None:
 
 
 def _first(wrong: NDArray[np.bool_], column: Floats) -> str:
-    """The first value that is wrong, and where if there are several worlds."""
+    """Describe the first wrong value, with its world if there are several."""
     world = int(np.argmax(wrong))
     return f"{column[world]:g}" + (f" in world {world}" if len(column) > 1 else "")
 
 
 def sample_worlds(count: int, seed: int, choice: Sequence[Variable] = PERTURBATIONS) -> Floats:
-    """Draw worlds, each variable uniformly between its bounds.
+    """Draw worlds (count, len(choice)), each variable uniformly between its bounds.
 
-    Each variable has a Philox stream of its own, so a world has the same values however many are
-    drawn and whatever else is varied, and bounds that are moved move its value alone.
-
-    Returns:
-        (count, len(choice)), columns in the order of the choice.
+    Each variable has its own Philox stream, so its values depend neither on the number of worlds
+    nor on other variables, and changed bounds affect it alone.
     """
     worlds = np.empty((count, len(choice)))
     for column, variable in zip(worlds.T, choice, strict=True):

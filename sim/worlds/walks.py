@@ -1,4 +1,4 @@
-"""Designs in perturbed worlds, by our engine and by others"""
+"""Simulation of designs in perturbed worlds, by the kernel or another engine."""
 
 from __future__ import annotations
 
@@ -54,10 +54,10 @@ _SCALED: Final[Mapping[str, tuple[str, ...]]] = {
     "battery_voltage_factor": ("supply_voltage",),
     "battery_resistance_factor": ("supply_resistance",),
 }
-"""Fields of the kernel's parameters that are a factor's, where a robot has them."""
+"""Kernel parameters scaled by a factor, where a robot has them."""
 
 _START: Final = 1
-"""Stream of a world's seed for the angles at the start."""
+"""Stream of a world's seed for start angles."""
 
 
 def perturbed_setups(
@@ -67,11 +67,7 @@ def perturbed_setups(
     variables: Sequence[str],
     worlds: Floats,
 ) -> list[WalkSetup]:
-    """What walks in every world; the robot's controller and gait know nothing of it.
-
-    Args:
-        worlds: (n, len(variables)), as `check_worlds` wants them.
-    """
+    """Set up simulations of worlds (n, len(variables)); controller and gait stay nominal."""
     columns = dict(zip(variables, worlds.T, strict=True))
     values = {
         name: columns.get(name, np.full(len(worlds), default)) for name, default in NOMINAL.items()
@@ -100,7 +96,7 @@ def perturbed_setups(
 def _parameters(
     robot: Robot, scenario: Scenario, nominal: Floats, values: Mapping[str, Floats]
 ) -> Floats:
-    """The kernel's parameters in every world, (n, P)."""
+    """Kernel parameters of every world, (n, P)."""
     slices = Layout(robot).slices
     packed = np.tile(nominal, (len(values["load_added"]), 1))
     for factor, fields in _SCALED.items():
@@ -123,7 +119,7 @@ def _parameters(
 def _add_masses(
     robot: Robot, scenario: Scenario, packed: Floats, values: Mapping[str, Floats]
 ) -> None:
-    """The body's other mass and the load's other mass and place, in place."""
+    """Add the changes of body mass, load mass and load position in place."""
     slices, body = Layout(robot).slices, robot.body
     further = values["body_mass_factor"][:, np.newaxis] - 1.0
     load = (scenario.load + values["load_added"])[:, np.newaxis]
@@ -140,7 +136,7 @@ def _add_masses(
 
 
 _ROWS, _COLUMNS = [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]
-"""Of an inertia xx, yy, zz, xy, xz, yz."""
+"""Order of an inertia: xx, yy, zz, xy, xz, yz."""
 
 
 def _parallel_axes(offset: Floats) -> Floats:
@@ -150,7 +146,7 @@ def _parallel_axes(offset: Floats) -> Floats:
 
 
 def _gravity(scenario: Scenario, slope: float, direction: float) -> Floats:
-    """On two slopes at once, which add as vectors along which the ground rises, (3,) [m/s2]."""
+    """Gravity on two slopes (3,) [m/s2], which add as vectors of steepest ascent."""
     x = y = 0.0
     for angle, towards in ((scenario.slope, scenario.slope_direction), (slope, direction)):
         x += angle * math.cos(math.radians(towards))
@@ -165,14 +161,14 @@ def _starts(
     parameters: Floats,
     values: Mapping[str, Floats],
 ) -> Floats:
-    """Positions at which the world's soles carry its weight, and above, (n, 7+J)."""
+    """Start positions (n, 7+J), at which each world's soles carry its weight, or above."""
     slices = Layout(robot).slices
     starts = np.tile(nominal.start, (len(parameters), 1))
     seeds = values["world_seed"].astype(np.uint64)
     deviates = byte_sums(seeds, 0, robot.n_joints, _START)[..., 0] / DEVIATION
     offsets = values["start_angle"][:, np.newaxis] * deviates
     starts[:, 7:] += offsets
-    # A jammed leg is held where it begins.
+    # A jammed leg stays at its initial angles.
     jammed = parameters[:, slices["jam_stiffness"]] > 0.0
     parameters[:, slices["jam_angle"]] += jammed * offsets
     further = (values["body_mass_factor"] - 1.0) * robot.body.mass
@@ -190,7 +186,7 @@ def _starts(
 
 
 def _attitude(roll: float, pitch: float) -> tuple[Floats, Floats]:
-    """Rolled, then pitched [rad]: quaternion x y z w, and the world's z in the body's frame."""
+    """Roll, then pitch [rad]: quaternion x y z w, and the world's z in the body's frame."""
     x, a = math.sin(0.5 * roll), math.cos(0.5 * roll)
     y, b = math.sin(0.5 * pitch), math.cos(0.5 * pitch)
     up = [-math.sin(pitch), math.cos(pitch) * math.sin(roll), math.cos(pitch) * math.cos(roll)]
@@ -207,21 +203,21 @@ def _sensor_errors(values: Mapping[str, Floats]) -> list[SensorErrors]:
 
 
 _PLANS_KEPT: Final = 16
-"""Scenarios whose walks are planned once for all worlds of them."""
+"""Number of scenarios whose plans for all worlds are cached."""
 
 
 @dataclass(frozen=True, slots=True)
 class PerturbedWalk:
-    """Designs of a controller walk through a scenario of one world, of which they know nothing."""
+    """Designs of a controller in a scenario of one world, unknown to the controller."""
 
     name: str  # unique in its job
     robot: RobotSource  # as described
-    controller: ControllerName  # name of the motor controller
-    scenario: Scenario  # that is walked through
-    # names and values of perturbations; what is not named is nominal
+    controller: ControllerName
+    scenario: Scenario
+    # perturbations by name; others are nominal
     world: tuple[tuple[str, float], ...]
     variables: tuple[str, ...]  # columns of the designs
-    precision: Precision = "double"  # of the physics' numbers
+    precision: Precision = "double"
 
     @property
     def robots(self) -> tuple[RobotSource, ...]:
@@ -239,21 +235,17 @@ class PerturbedWalk:
         return OBJECTIVES
 
     def run(self, designs: Floats) -> Outcome:
-        """Let every design walk."""
+        """Simulate every design."""
         (outcome,) = walk_together([self.walking(designs)])
         return outcome
 
     def walking(self, designs: Floats) -> Walking[Outcome]:
-        """Let every design walk, beside walks of other cases."""
+        """Simulate every design together with other cases."""
         walked = yield from self._simulating(designs, log=False)
         return walked.outcome
 
     def simulate(self, designs: Floats, *, log: bool = False) -> Simulation:
-        """Let every design walk, to be looked at.
-
-        Args:
-            designs: (n, len(variables)), in the variables' units.
-        """
+        """Simulate designs (n, len(variables)) with full results."""
         (simulation,) = walk_together([self._simulating(designs, log=log)])
         return simulation
 
@@ -277,7 +269,7 @@ class PerturbedWalk:
         )
 
     def _setups(self, robot: Robot, designs: Floats, timestep: float) -> dict[int, WalkSetup]:
-        """By index of the design; without those whose gait is out of the legs' reach."""
+        """Setups by index of the design, without gaits out of the legs' reach."""
         of_gait: dict[tuple[float, ...], WalkSetup | None] = {}
         setups = {}
         for index, row in enumerate(designs.tolist()):
@@ -295,7 +287,7 @@ class PerturbedWalk:
     def _in_world(
         self, robot: Robot, gait: dict[str, float], law: ControlLaw, timestep: float
     ) -> WalkSetup | None:
-        """What all designs of one gait walk in, but for their control laws."""
+        """Return the setup that all designs of one gait share, without control laws."""
         scenario = with_gait(self.scenario, gait)
         plan = (plan_walk if gait else _plan_of_scenario)(robot, scenario, timestep)
         if plan is None:
@@ -309,7 +301,7 @@ class PerturbedWalk:
 
 @dataclass(frozen=True, slots=True)
 class MeasuredPerturbedWalk(PerturbedWalk):
-    """The same walk with its measurements, as further columns behind its objectives."""
+    """The same simulation with measurements as additional columns after the objectives."""
 
     @property
     def objectives(self) -> tuple[Objective, ...]:
@@ -318,7 +310,7 @@ class MeasuredPerturbedWalk(PerturbedWalk):
         return (*OBJECTIVES, *measured)
 
     def walking(self, designs: Floats) -> Walking[Outcome]:
-        """Let every design walk, beside walks of other cases."""
+        """Simulate every design together with other cases."""
         walked = yield from self._simulating(designs, log=False)
         columns = [walked.outcome.objectives, walked.measurements.array()]
         return Outcome(np.concatenate(columns, axis=1), walked.outcome.statuses)
@@ -333,19 +325,19 @@ def _plan_of_scenario(
 
 @dataclass(frozen=True, slots=True)
 class WorldWalk:
-    """One design walks through one scenario; what is varied is the world.
+    """One design in one scenario; the world varies.
 
-    Desired angles and control law are those of the robot as described: its controller knows
-    nothing of the world. All worlds share the robot's kernel.
+    Desired angles and control law are those of the robot as described: the controller does not know
+    the world. All worlds share the robot's kernel.
     """
 
     robot: RobotSource  # as described
-    controller: ControllerName  # name of the motor controller
-    design: tuple[tuple[str, float], ...]  # names and numbers of the design
-    scenario: Scenario  # that is walked through
-    # columns of the worlds, names of `PERTURBATIONS`; what is not named is nominal
+    controller: ControllerName
+    design: tuple[tuple[str, float], ...]
+    scenario: Scenario
+    # columns of the worlds, names of `PERTURBATIONS`; others are nominal
     variables: tuple[str, ...]
-    precision: Precision = "double"  # of the physics' numbers
+    precision: Precision = "double"
 
     @property
     def name(self) -> str:
@@ -359,7 +351,7 @@ class WorldWalk:
 
     @property
     def duration(self) -> float:
-        """Simulated time of one world [s], with the design's cycle time if it gives one."""
+        """Simulated time of one world [s], with the design's cycle time if it has one."""
         cycle_time = dict(self.design).get("cycle_time", self.scenario.cycle_time)
         return self.scenario.cycles * cycle_time
 
@@ -369,30 +361,22 @@ class WorldWalk:
         return OBJECTIVES
 
     def run(self, designs: Floats) -> Outcome:
-        """Let the design walk in every world."""
+        """Simulate the design in every world."""
         (outcome,) = walk_together([self.walking(designs)])
         return outcome
 
     def run_with(self, kernel: Kernel | None, worlds: Floats) -> Outcome:
-        """Let the design walk in every world, by a kernel of one's choice.
-
-        Args:
-            worlds: (n, len(variables)), in the variables' units.
-        """
+        """Simulate the design in worlds (n, len(variables)) with a given kernel."""
         (simulation,) = walk_together([self._simulating(worlds, log=False, kernel=kernel)])
         return simulation.outcome
 
     def walking(self, designs: Floats) -> Walking[Outcome]:
-        """Let the design walk in every world, beside walks of other cases."""
+        """Simulate the design in every world together with other cases."""
         walked = yield from self._simulating(designs, log=False)
         return walked.outcome
 
     def simulate(self, worlds: Floats, *, log: bool = False) -> Simulation:
-        """Let the design walk in every world, to be looked at.
-
-        Args:
-            worlds: (n, len(variables)), in the variables' units.
-        """
+        """Simulate the design in worlds (n, len(variables)) with full results."""
         (simulation,) = walk_together([self._simulating(worlds, log=log)])
         return simulation
 
@@ -419,7 +403,7 @@ class WorldWalk:
         )
 
     def _setups(self, worlds: Floats, timestep: float) -> list[WalkSetup]:
-        """One a world; none at all for a gait out of the legs' reach."""
+        """One setup per world; none for a gait out of the legs' reach."""
         robot = load_robot(self.robot)
         gait = {name: value for name, value in self.design if name in GAIT_CATALOGUE}
         gains = tuple((n, value) for n, value in self.design if n not in GAIT_CATALOGUE)
@@ -433,13 +417,13 @@ class WorldWalk:
 
 @dataclass(frozen=True, slots=True)
 class EngineWalk:
-    """Worlds that say which engine computes them.
+    """Worlds with a column that selects the engine.
 
-    A walk in another engine takes some hundred times as long, so that it can be broken off.
+    Other engines take some hundred times as long, so that their simulations can be stopped.
     """
 
-    walk: WorldWalk  # that is walked, whose worlds are without the column of the engine
-    engine_column: int  # index of that column: 0 for our own engine, k for the k-th of `ENGINES`
+    walk: WorldWalk  # its worlds are without the engine's column
+    engine_column: int  # index of that column: 0 for the kernel, k for the k-th of `ENGINES`
 
     @property
     def name(self) -> str:
@@ -458,7 +442,7 @@ class EngineWalk:
 
     @property
     def precision(self) -> Precision:
-        """Of our own engine's numbers; the others have double precision alone."""
+        """Precision of the kernel; other engines have double precision only."""
         return self.walk.precision
 
     @property
@@ -467,15 +451,11 @@ class EngineWalk:
         return self.walk.objectives
 
     def run(self, designs: Floats) -> Outcome:
-        """Let the design walk in every world."""
+        """Simulate the design in every world."""
         return self.run_until(designs, lambda: False)
 
     def run_until(self, designs: Floats, should_stop: Callable[[], bool]) -> Outcome:
-        """Let the design walk in every world, unless nobody waits for it any more.
-
-        Args:
-            designs: (n, v) worlds, with the column of the engine.
-        """
+        """Simulate worlds (n, v), including the engine's column, until `should_stop`."""
         engines = designs[:, self.engine_column].astype(np.intp)
         worlds = np.delete(designs, self.engine_column, axis=1)
         objectives = np.full((len(designs), N_OBJECTIVES), np.nan)
@@ -489,7 +469,7 @@ class EngineWalk:
 
     def _kernel(self, engine: int, should_stop: Callable[[], bool]) -> Kernel:
         check_installed()
-        # Whoever has none of these walks need not have MuJoCo.
+        # MuJoCo is only needed for these simulations.
         from gaitswarm.sim.mujoco.kernel import MujocoKernel  # noqa: PLC0415
 
         robot = load_robot(self.walk.robot)

@@ -48,8 +48,9 @@ def choose_stance(legs: Sequence[ChainLeg]) -> Stance:
     """Choose a stance: feet below or next to their hips, at three quarters of the legs' reach.
 
     Among angles that put a foot there, prefer those at which it moves freely in all directions,
-    with little torque, and away from the joints' limits. All feet get one distance from the body's long
-    axis, unless that would twist legs as they are mounted: those of a round robot point outwards.
+    with little torque, and away from the joints' limits. All feet get one distance from the body's
+    long axis, unless that would twist legs as they are mounted: those of a round robot point
+    outwards.
     """
     tried = [(angles := tried_angles(leg), leg.ends(angles)) for leg in legs]
     hips = max(leg.hip[2] for leg in legs)

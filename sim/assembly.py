@@ -1,4 +1,4 @@
-"""Between the entry point and the kernels: which one runs, what it walks, what a walk is worth."""
+"""Choice of the kernel, setup of simulations, and objectives of their results."""
 
 from __future__ import annotations
 
@@ -40,35 +40,34 @@ from gaitswarm.sim.robot.posture import resting_height
 from gaitswarm.sim.scenario import Scenario
 
 Backend = Literal["auto", "native", "reference"]
-"""`native` is the compiled kernel, `reference` the CasADi interpreter, `auto` the first that works
-here."""
+"""`native` is the compiled kernel, `reference` the CasADi interpreter, `auto` either."""
 
 PHYSICS_RATE: Final = 2500
-"""Physics steps a second [Hz]; the control rate is 500 Hz."""
+"""Physics steps per second [Hz]; the control rate is 500 Hz."""
 
 LANDING_RATE: Final = 40_000
-"""Physics steps a second [Hz] at least in control ticks in which a foot may come down."""
+"""Least physics steps per second [Hz] in control ticks in which a foot may land."""
 
 KARNOPP_PHYSICS_RATE: Final = 5000
-"""Rate [Hz] for robots whose friction jumps at v_d: steps decide when it does."""
+"""Rate [Hz] for robots with discontinuous friction at v_d, whose switching depends on the step."""
 
 BACKLASH_PHYSICS_RATE: Final = 40_000
-"""Rate [Hz] for robots with backlash: without their rotors, tibias answer soles as damped as those
-of table 2.7 too fast for 20 kHz."""
+"""Rate [Hz] for robots with backlash: without their rotors, tibias are too stiff for 20 kHz on
+soles with the damping of table 2.7."""
 
 _SHOVE_TICKS: Final = round(SHOVE_DURATION / CONTROL_PERIOD)
 
 SHORTEST_WALK: Final = 1e-3
-"""Distance [m] under which a robot counts as not walking: energy per metre has no value."""
+"""Distance [m] below which a robot counts as not walking: energy per metre is undefined."""
 
 
 def kernel_of(
     robot: Robot, backend: Backend = "auto", *, precision: Precision = "double"
 ) -> Kernel:
-    """The robot's kernel, built if there is none yet."""
+    """Return the robot's kernel; build it if necessary."""
     if backend == "reference" and precision != "double":
         raise SimulationInputError(
-            f"precision: the reference kernel has double precision alone, not {precision}"
+            f"precision: the reference kernel supports double only, not {precision}"
         )
     native = None if backend == "reference" else native_kernel(robot, precision)
     if native is not None:
@@ -82,19 +81,19 @@ def kernel_of(
             RuntimeWarning,
             stacklevel=3,
         )
-    # The native kernel does without CasADi and Pinocchio, which are slow to import.
+    # The native kernel does not need CasADi and Pinocchio, which are slow to import.
     from gaitswarm.sim.kernel.reference import reference_kernel  # noqa: PLC0415
 
     return reference_kernel(robot)
 
 
 def has_native_kernel(robot: Robot, precision: Precision = "double") -> bool:
-    """Whether a robot walks with a compiled kernel here; nothing is compiled for the answer."""
+    """Check whether a compiled kernel is available for a robot, without compiling it."""
     return find_compiler() is not None or native_kernel(robot, precision) is not None
 
 
 def check_precision(robot: Robot, precision: Precision) -> None:
-    """Check that a robot can walk in a precision on this machine."""
+    """Check that a robot can be simulated in a precision on this machine."""
     if precision != "double" and not has_native_kernel(robot, precision):
         raise SimulationInputError(
             f"precision: {precision} needs the compiled kernel; {without_compiler()},"
@@ -103,14 +102,7 @@ def check_precision(robot: Robot, precision: Precision) -> None:
 
 
 def control_steps(robot: Robot, physics_rate: int = PHYSICS_RATE) -> tuple[Coding, float]:
-    """How a control tick is divided.
-
-    Args:
-        physics_rate: Physics steps a second [Hz].
-
-    Returns:
-        What a kernel wants to know of sensors, PWM and rates, and the length of a step [s].
-    """
+    """Return how a control tick is divided at a physics rate [Hz], and the step length [s]."""
     if robot.has_backlash:
         physics_rate = max(physics_rate, BACKLASH_PHYSICS_RATE)
     if robot.description.contact_law == "karnopp":
@@ -123,7 +115,7 @@ def control_steps(robot: Robot, physics_rate: int = PHYSICS_RATE) -> tuple[Codin
 
 
 def check_stuck_leg(robot: Robot, scenario: Scenario) -> None:
-    """Check that the leg that a scenario jams is one of the robot's."""
+    """Check that the scenario's stuck leg exists."""
     legs = [leg.name for leg in robot.legs]
     if scenario.stuck_leg is not None and scenario.stuck_leg not in legs:
         raise SimulationInputError(
@@ -140,11 +132,7 @@ def plan_walk(
     *,
     trajectory: Trajectory | None = None,
 ) -> Callable[[ControlLaw], WalkSetup] | None:
-    """All of a walk but its control law, which designs of one gait share.
-
-    Args:
-        timestep: Of the physics [s].
-    """
+    """Set up all of a simulation but its control law, for all designs of one gait."""
     check_stuck_leg(robot, scenario)
     trajectory = trajectory or desired_angles(robot, scenario)
     if not trajectory.reachable:
@@ -189,14 +177,7 @@ def plan_walk(
 def judge(
     setup: WalkSetup, result: WalkResult, substeps: int, timestep: float
 ) -> tuple[Status, NDArray[np.float64]]:
-    """What a walk is worth (table 4.1).
-
-    Args:
-        timestep: Of the physics [s].
-
-    Returns:
-        Status, and objectives f1 to f6, (6,), NaN where they do not exist.
-    """
+    """Return status and objectives f1 to f6 (table 4.1), (6,), NaN where undefined."""
     objectives = np.full(N_OBJECTIVES, np.nan)
     if result.status is not Status.OK:
         return result.status, objectives
@@ -212,11 +193,7 @@ def judge(
 
 
 def measure(setup: WalkSetup, result: WalkResult, substeps: int) -> NDArray[np.float64]:
-    """What a walk tells beside its objectives.
-
-    Returns:
-        (5,) in the order of `gaitswarm.sim.outcome.MEASUREMENTS`, NaN for a walk that ended early.
-    """
+    """Return `gaitswarm.sim.outcome.MEASUREMENTS` (5,), NaN for a walk that ended early."""
     if result.status is not Status.OK:
         return np.full(N_MEASUREMENTS, np.nan)
     steps, motors = setup.ticks * substeps, setup.desired.shape[1]

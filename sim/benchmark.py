@@ -1,4 +1,4 @@
-"""How fast this machine simulates: one core, the physics of the main Fuzzy-PI job."""
+"""Benchmark of this machine: one core, the physics of the main Fuzzy-PI job."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from gaitswarm.sim.simulate import simulating
 
 @dataclass(frozen=True, slots=True)
 class BenchmarkResult:
-    """How fast a pass was."""
+    """Speed of a pass."""
 
-    us_per_step_per_walker: float  # wall time of a physics step of one walker [us]
-    real_time_factor_per_core: float  # simulated over elapsed seconds [1]
-    lanes: int  # walkers that are stepped together
-    lane_use: float  # share of the lanes' time that was walked [1]
+    us_per_step_per_walker: float  # wall time per physics step and walker [us]
+    real_time_factor_per_core: float  # simulated per elapsed time [1]
+    lanes: int  # walkers stepped together
+    lane_use: float  # share of the lanes' time spent walking [1]
     backend: str  # `native` or `reference`
-    precision: Precision  # of the physics' numbers
-    # machine code of the kernel [B]; None where it has none that can be measured
+    precision: Precision
+    # machine code of the kernel [B]; None if it cannot be measured
     bytes_of_code: int | None
-    walkers: int  # walks of every scenario
-    simulated_seconds: float  # of all walks together [s]
+    walkers: int  # per scenario
+    simulated_seconds: float  # of all walks [s]
     elapsed_seconds: float  # wall time of the pass [s]
 
 
@@ -42,10 +42,10 @@ def measure(
     robot: str = DEFAULT_ROBOT,
     precision: Precision = "double",
 ) -> BenchmarkResult:
-    """Time whole walks (control, physics, objectives) of the six scenarios in this thread.
+    """Time whole simulations (control, physics, objectives) of the six scenarios in this thread.
 
-    The walkers are the published optimum A; every scenario counts with its share of the job. All
-    walks are computed in one call of the kernel, as in a worker's task.
+    The walkers are the published optimum A; each scenario counts with its share of the job. All
+    simulations run in one call of the kernel, as in a worker's task.
     """
     kernel = kernel_of(load_robot(robot), backend, precision=precision)
     native = isinstance(kernel, NativeKernel)
@@ -79,7 +79,7 @@ def _walk(
     robot: str,
     precision: Precision,
 ) -> tuple[float, KernelTime]:
-    """Wall time of a pass [s], and what of it the kernel took."""
+    """Return the wall time of a pass [s], and the kernel's share of it."""
     design = CONTROLLERS["fuzzy-pi"].published["A"]
     designs = np.tile(np.array(list(design.values())), (walkers, 1))
     spent = KernelTime()

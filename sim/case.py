@@ -1,4 +1,4 @@
-"""What every design of a job is put to, as it is sent to whoever runs it."""
+"""Cases: evaluations of designs, as they are sent to workers."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from gaitswarm.sim.simulate import Simulation, simulating
 
 @runtime_checkable
 class Case(Protocol):
-    """One test of designs, with all that it depends on; immutable, and fit for another process.
+    """A test of designs with everything that it depends on; immutable and picklable.
 
     A design's result depends on the case and the design alone, bit for bit.
     """
@@ -33,24 +33,21 @@ class Case(Protocol):
 
     @property
     def robots(self) -> tuple[RobotSource, ...]:
-        """The robots, whose kernels should be ready before many processes need them."""
+        """Robots whose kernels should be built before many processes need them."""
 
     @property
     def precision(self) -> Precision:
-        """Of the physics' numbers."""
+        """Precision of the physics."""
 
     @property
     def objectives(self) -> tuple[Objective, ...]:
-        """Columns of its outcomes' objectives, in order."""
+        """Columns of its outcomes' objectives."""
 
     def run(self, designs: NDArray[np.float64]) -> Outcome:
-        """Put designs to the test.
+        """Evaluate designs.
 
         Args:
             designs: (n, v), columns as the case names them.
-
-        Returns:
-            Objectives and statuses in the order of the designs.
 
         Raises:
             SimulationInputError: A design cannot be simulated.
@@ -59,34 +56,28 @@ class Case(Protocol):
 
 @runtime_checkable
 class WalkingCase(Case, Protocol):
-    """A case whose walks can be computed together with those of other cases.
-
-    `run` computes the same, alone.
-    """
+    """A case whose simulations can run together with those of other cases; `run` gives the same."""
 
     def walking(self, designs: NDArray[np.float64]) -> Walking[Outcome]:
-        """Put designs to the test, beside others."""
+        """Prepare the evaluation of designs together with other cases."""
 
 
 @runtime_checkable
 class LongCase(Case, Protocol):
-    """A case that may take minutes of a single design, and can be broken off on the way.
+    """A case that may take minutes for one design, and can be stopped.
 
     Designs share nothing, so that each may be a task of its own.
     """
 
     def run_until(self, designs: NDArray[np.float64], should_stop: Callable[[], bool]) -> Outcome:
-        """As `run`, to the bit, unless it is broken off.
+        """Evaluate designs as `run` does, bit for bit, unless it is stopped.
 
         Args:
             designs: As for `run`.
-            should_stop: Polled every few seconds at least.
-
-        Returns:
-            As of `run`.
+            should_stop: To be polled every few seconds at least.
 
         Raises:
-            Exception: Of any kind, when `should_stop` has said so; nobody waits for an outcome.
+            Exception: Of any kind, after `should_stop` returned True; the outcome is not needed.
         """
 
 
@@ -96,7 +87,7 @@ def run_together(
     kernel_time: KernelTime | None = None,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> tuple[Outcome, ...]:
-    """Put designs to several cases, whose walks share calls of kernels where they can."""
+    """Evaluate designs in several cases, which share calls of kernels where possible."""
     pairs = list(zip(cases, designs, strict=True))
     walking = {
         index: case.walking(rows)
@@ -118,15 +109,7 @@ def _run(case: Case, designs: NDArray[np.float64], should_stop: Callable[[], boo
 
 @dataclass(frozen=True, slots=True)
 class Walk:
-    """Designs of a controller walk through a scenario.
-
-    Attributes:
-        robot: that walks.
-        controller: name of its motor controller.
-        scenario: that it walks through.
-        variables: columns of the designs.
-        precision: of the physics' numbers.
-    """
+    """Designs of a controller in a scenario; `variables` are the columns of the designs."""
 
     robot: RobotSource
     controller: str
@@ -141,12 +124,12 @@ class Walk:
 
     @property
     def robots(self) -> tuple[RobotSource, ...]:
-        """The robot that walks."""
+        """The simulated robot."""
         return (self.robot,)
 
     @property
     def duration(self) -> float:
-        """Simulated time of one walk [s]."""
+        """Simulated time of one design [s]."""
         return self.scenario.duration
 
     @property
@@ -155,32 +138,17 @@ class Walk:
         return OBJECTIVES
 
     def run(self, designs: NDArray[np.float64]) -> Outcome:
-        """Let every design walk."""
+        """Simulate every design."""
         (outcome,) = walk_together([self.walking(designs)])
         return outcome
 
     def run_with(self, kernel: Kernel, designs: NDArray[np.float64]) -> Outcome:
-        """Let every design walk, by a kernel of one's choice.
-
-        Args:
-            kernel: Of the robot: another engine's, for one.
-            designs: As for `run`.
-
-        Returns:
-            Objectives and statuses.
-
-        Raises:
-            SimulationInputError: A design cannot be simulated; names the variable.
-        """
+        """Simulate every design with a given kernel of the robot, such as another engine's."""
         (simulation,) = walk_together([self._simulating(designs, kernel)])
         return simulation.outcome
 
     def walking(self, designs: NDArray[np.float64]) -> Walking[Outcome]:
-        """Simulate all designs together with those of other cases.
-
-        Args:
-            designs: As for `run`.
-        """
+        """Prepare the simulation of all designs together with other cases."""
         walked = yield from self._simulating(designs)
         return walked.outcome
 
@@ -200,7 +168,7 @@ class Walk:
 
 @dataclass(frozen=True, slots=True)
 class MeasuredWalk(Walk):
-    """The same walk with its measurements, as further columns behind its objectives."""
+    """The same simulation with measurements as additional columns after the objectives."""
 
     @property
     def objectives(self) -> tuple[Objective, ...]:
@@ -209,7 +177,7 @@ class MeasuredWalk(Walk):
         return (*OBJECTIVES, *told)
 
     def walking(self, designs: NDArray[np.float64]) -> Walking[Outcome]:
-        """Let every design walk, beside walks of other cases."""
+        """Prepare the simulation of all designs together with other cases."""
         walked = yield from self._simulating(designs)
         columns = [walked.outcome.objectives, walked.measurements.array()]
         return Outcome(np.concatenate(columns, axis=1), walked.outcome.statuses)

@@ -1,4 +1,4 @@
-"""Cases by name: what a job's designs are put to in place of a walk in the built-in simulator."""
+"""Cases by name, which evaluate a job's designs in place of the built-in simulator."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from gaitswarm.sim.plugins import MISSING, Plugin, Registry, check_is, check_nam
 
 
 class CaseSettings(BaseModel):
-    """What the settings of every case have."""
+    """Base class of cases' settings."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
@@ -23,19 +23,19 @@ class CaseSettings(BaseModel):
 
 
 CreateCase = Callable[[Any, Walk], Case]
-"""(settings, walk) -> what evaluates designs in place of that walk, with its `variables`."""
+"""(settings, walk) -> case that evaluates designs in place of that walk, with its `variables`."""
 
 
 @dataclass(frozen=True, slots=True)
 class CaseFamily:
-    """Cases of one kind: for each walk of a job one that evaluates designs in its place.
+    """A kind of cases, each of which evaluates designs in place of a walk.
 
     Attributes:
         settings: Model of its settings.
-        summary: What it is, for people.
-        create: Makes one for a walk.
-        libraries: Distributions that it computes with beside its own; a job goes on with the same
-            versions only, and workers need them.
+        summary: Description for users.
+        create: Makes a case for a walk.
+        libraries: Further distributions that it computes with; workers need them, and a job resumes
+            with the same versions only.
     """
 
     settings: type[CaseSettings]
@@ -45,7 +45,7 @@ class CaseFamily:
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """Those of its libraries that are not installed here."""
+        """Libraries that are not installed."""
         return tuple(name for name in self.libraries if version_of(name) == MISSING)
 
 
@@ -56,11 +56,11 @@ def _accepted(plugin: Plugin, brought: object) -> CaseFamily:
 
 
 CASES: Final = Registry[CaseFamily]("case", {}, _accepted)
-"""By name, as in job specs; gaitswarm's own is what a job has that names none."""
+"""By name, as in job specs; the built-in simulator is the default of jobs."""
 
 
 def create_case(settings: CaseSettings, walk: Walk) -> Case:
-    """What evaluates designs in place of a walk."""
+    """Create the case that evaluates designs in place of a walk."""
     family = CASES[settings.name]
     if family.missing:
         needed = " ".join(family.missing)

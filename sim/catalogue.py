@@ -1,4 +1,4 @@
-"""All that a walk's design may give, and its values by name: numbers, and choices by name."""
+"""Values of designs by name: variables of controllers and gaits."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from gaitswarm.sim.variables import VariableCatalogue
 
 
 def design_catalogue(controller: str) -> VariableCatalogue:
-    """Everything that a design of a controller may give."""
+    """Return all variables that a design of a controller may set."""
     family = CONTROLLERS[controller]
     known = (*family.variables, *family.conventions, *GAIT_VARIABLES)
     return VariableCatalogue(known)
 
 
 def check_design(controller: str, design: Mapping[str, float | str]) -> None:
-    """Check that a design gives all variables of a controller and otherwise optional ones only."""
+    """Check that a design sets all variables of a controller, and otherwise only optional ones."""
     known = design_catalogue(controller)
     for name in design:
         if name not in known:
@@ -37,7 +37,7 @@ def check_design(controller: str, design: Mapping[str, float | str]) -> None:
 
 
 def design_numbers(controller: str, design: Mapping[str, float | str]) -> dict[str, float]:
-    """A design as the simulator takes it."""
+    """Convert a design's choices to numbers."""
     catalogue = design_catalogue(controller)
     numbers = {}
     for name, value in design.items():
@@ -50,7 +50,7 @@ def design_numbers(controller: str, design: Mapping[str, float | str]) -> dict[s
 
 
 def design_shown(controller: str, design: Mapping[str, float]) -> dict[str, float | str]:
-    """A design as people read it; the inverse of `design_numbers`."""
+    """Convert numbers of a design to choices; the inverse of `design_numbers`."""
     catalogue = design_catalogue(controller)
     return {
         name: catalogue[name].shown(value) if name in catalogue else value

@@ -6,18 +6,17 @@ SimulationError
 │   ├── BeyondJointLimit    a gait turns a joint too far; names scenario, leg, joint, excess in rad
 │   ├── MeasuredLogError    a log that cannot be read; names line, column and unit
 │   └── RobotFileError      a robot description that cannot be used; names file and field
-├── ProcessEnded            work in a process of its own took too much, or ended it
+├── ProcessEnded            a limited process exceeded a limit or ended
 └── KernelBuildError        a kernel cannot be compiled, stored or loaded on this machine
 
-What a walk may legitimately end in (divergence, a fall) is a `sim.outcome.Status`, never one of
-these.
+Legitimate ends of a simulation (divergence, a fall) are a `sim.outcome.Status` instead.
 """
 
 from __future__ import annotations
 
 
 class SimulationError(Exception):
-    """Base of everything that the simulator raises on purpose."""
+    """Base of all errors that the simulator raises."""
 
 
 class SimulationInputError(SimulationError, ValueError):
@@ -25,11 +24,7 @@ class SimulationInputError(SimulationError, ValueError):
 
 
 class UnreachablePose(SimulationInputError):
-    """A foot target lies outside the reach of its leg.
-
-    Args:
-        miss: Distance between target and reach [m].
-    """
+    """A foot target lies outside the reach of its leg, by `miss` [m]."""
 
     def __init__(self, scenario: str, leg: str, miss: float) -> None:
         self.scenario = scenario
@@ -41,16 +36,12 @@ class UnreachablePose(SimulationInputError):
         )
 
     def __reduce__(self) -> tuple[type[UnreachablePose], tuple[str, str, float]]:
-        """Pickle by the arguments, so that it comes back from another process as itself."""
+        """Pickle by the arguments, so that the error keeps its type across processes."""
         return type(self), (self.scenario, self.leg, self.miss)
 
 
 class BeyondJointLimit(SimulationInputError):
-    """A gait would turn a joint further than its URDF allows.
-
-    Args:
-        excess: Angle by which it leaves its limits [rad].
-    """
+    """A gait rotates a joint beyond its URDF's limits, by `excess` [rad]."""
 
     def __init__(self, scenario: str, leg: str, joint: str, excess: float) -> None:
         self.scenario = scenario
@@ -64,7 +55,7 @@ class BeyondJointLimit(SimulationInputError):
         )
 
     def __reduce__(self) -> tuple[type[BeyondJointLimit], tuple[str, str, str, float]]:
-        """Pickle by the arguments, so that it comes back from another process as itself."""
+        """Pickle by the arguments, so that the error keeps its type across processes."""
         return type(self), (self.scenario, self.leg, self.joint, self.excess)
 
 
@@ -84,8 +75,8 @@ class RobotFileError(SimulationInputError):
 
 
 class ProcessEnded(SimulationError):
-    """Work in a process of its own came to no end; says why, as the rest of a sentence."""
+    """A limited process did not finish; the message continues a sentence."""
 
 
 class KernelBuildError(SimulationError):
-    """Compiled code cannot be had here: the compiler, the cache or the system refused it."""
+    """Compiled code is not available: the compiler, the cache or the system refused it."""

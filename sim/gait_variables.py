@@ -1,4 +1,4 @@
-"""Gait parameters that a design may set, for all legs or for groups of them."""
+"""Gait parameters that a design may set, for all legs or groups of them."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ GAIT_VARIABLES: Final[tuple[Variable, ...]] = (
         high=0.75,
         unit="1",
         by_leg_group=True,
-        description="Share of the cycle of the phase that duty_phase names.",
+        description="Share of the cycle of the phase selected by duty_phase.",
     ),
     Variable(
         name="duty_phase",
         kind="categorical",
         choices=("support", "swing"),
-        description="Phase whose share of the cycle duty_factor is.",
+        description="Phase to which duty_factor applies.",
     ),
     Variable(
         name="start_phase",
@@ -50,7 +50,7 @@ GAIT_VARIABLES: Final[tuple[Variable, ...]] = (
         high=0.95,
         unit="1",
         by_leg_group=True,
-        description="Share of the cycle at which the gait begins: which legs swing first.",
+        description="Share of the cycle at which the gait starts: which legs swing first.",
     ),
     Variable(
         name="curve",
@@ -83,14 +83,14 @@ GAIT_VARIABLES: Final[tuple[Variable, ...]] = (
         name="gait",
         kind="categorical",
         choices=GAIT_NAMES,
-        description="Order of the legs' steps; own is that of the robot's description.",
+        description="Order of the legs' steps; own is the order in the robot's description.",
     ),
     Variable(
         name="hip_height",
         low=0.10,
         high=0.20,
         unit="m",
-        description="Height of the coxa axes over the ground.",
+        description="Height of the coxa axes above the ground.",
     ),
     Variable(
         name="radius",
@@ -105,14 +105,14 @@ GAIT_VARIABLES: Final[tuple[Variable, ...]] = (
         low=0.0,
         high=0.04,
         unit="m",
-        description="Amplitude of the body's sway to the left and right, once a cycle.",
+        description="Amplitude of the body's sway to the left and right, once per cycle.",
     ),
     Variable(
         name="sway_longitudinal",
         low=0.0,
         high=0.04,
         unit="m",
-        description="Amplitude of the body's sway along its way, twice a cycle.",
+        description="Amplitude of the body's sway along the walk, twice per cycle.",
     ),
     Variable(
         name="sway_phase",
@@ -122,24 +122,24 @@ GAIT_VARIABLES: Final[tuple[Variable, ...]] = (
         description="Share of the cycle at which the body is furthest to the left.",
     ),
 )
-"""Gait parameters that a design may set beside the controller's, the first after thesis table 3.2.
+"""Gait parameters that a design may set besides the controller's, the first as in thesis table 3.2.
 
 A value set by a design replaces the scenario's own in every scenario. Bounds suit Szabad(ka)-II.
 """
 
 GAIT_CATALOGUE: Final = VariableCatalogue(GAIT_VARIABLES)
-"""The same by name, `stride[front]` and its like among them."""
+"""The same by name, including those of groups, such as `stride[front]`."""
 
 
 def orders_searched(searched: Iterable[Variable]) -> list[dict[str, float]]:
-    """Every order of footfalls that a search may choose."""
+    """Return every order of footfalls that a search may choose."""
     known = GAIT_CATALOGUE["gait"]
     choices = [choice for v in searched if v.name == known.name for choice in v.choices]
     return [{known.name: known.number(choice)} for choice in choices] or [{}]
 
 
 def with_gait(scenario: Scenario, gait: Mapping[str, float]) -> Scenario:
-    """A scenario with other gait parameters."""
+    """Return a scenario with other gait parameters."""
     if not gait:
         return scenario
     values: dict[str, Any] = {name: v for name, v in gait.items() if split_name(name)[1] is None}

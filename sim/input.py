@@ -1,4 +1,4 @@
-"""What people write: choices, names and fields, and what they are told where one is wrong."""
+"""Validation of user input: alternatives, keys and error messages."""
 
 from __future__ import annotations
 
@@ -11,24 +11,19 @@ from pydantic import BaseModel, Discriminator, Tag
 
 from gaitswarm.sim.near_names import instead_of, nearest
 
-"""That is compared with the known ones; comparing takes time by its length."""
-
-"""Share of their characters that a name and the one that may be meant have in common, at least."""
-
-
 Location = Sequence[str | int]
 
 NAME: Final = "<name>"
 OWN: Final = "<own>"
 
 _KEY: Final = "[key]"
-"""What pydantic appends where the key of a dictionary is wrong, not its value."""
+"""Appended by pydantic if the key of a dictionary is wrong, not its value."""
 
 
 def alternatives(
     expected: str, *, among_own: Callable[[Any], str] = lambda _: OWN
 ) -> Discriminator:
-    """A discriminator between a name and objects."""
+    """Discriminate between a name and objects."""
 
     def tag(value: Any) -> str | None:
         if isinstance(value, str):
@@ -39,12 +34,12 @@ def alternatives(
 
 
 def without_tags(location: Location) -> tuple[str | int, ...]:
-    """The part of a location of a validation error that is in the document."""
+    """Return the part of a validation error's location that is in the document."""
     return tuple(part for part in location if not is_tag(part))
 
 
 def is_tag(part: str | int) -> bool:
-    """Whether a part of a location says which alternative was validated."""
+    """Check whether a part of a location is the tag of an alternative."""
     return isinstance(part, str) and (part == _KEY or (part[:1] == "<" and part[-1:] == ">"))
 
 
@@ -85,11 +80,11 @@ _PLAIN: Final = {
     "literal_error": "must be {expected}",
     "enum": "must be {expected}",
 }
-"""By pydantic's type of error; in braces what its context holds."""
+"""Messages by pydantic's type of error, with placeholders from its context."""
 
 
 def message_of(error: Mapping[str, Any]) -> str:
-    """What is wrong with a value, and what it must be."""
+    """Return what is wrong with a value, and what it must be."""
     kind, context = error["type"], error.get("ctx", {})
     if kind == "extra_forbidden" and "known" in context:
         key, inner = str(error["loc"][-1]), context["inner"]
@@ -110,7 +105,7 @@ def message_of(error: Mapping[str, Any]) -> str:
 def with_known_keys(
     errors: Sequence[Mapping[str, Any]], model: Any
 ) -> tuple[Mapping[str, Any], ...]:
-    """Errors that tell, where a key is unknown, which ones are known there."""
+    """Add the known keys to errors about unknown keys."""
     return tuple(
         {**error, "ctx": {"known": [*known], "inner": _inner_keys(known)}}
         if error["type"] == "extra_forbidden" and (known := _known_keys(model, error["loc"]))
@@ -124,7 +119,7 @@ def _number(value: object) -> object:
 
 
 def _known_keys(model: Any, location: Sequence[str | int]) -> dict[str, Any]:
-    """Fields of the models that hold the last part of a location, with what they are."""
+    """Fields, with annotations, of the models that contain the last part of a location."""
     reached = [model]
     for part in location[:-1]:
         reached = [inner for one in reached for inner in _inner(one, part)]
@@ -132,7 +127,7 @@ def _known_keys(model: Any, location: Sequence[str | int]) -> dict[str, Any]:
 
 
 def _inner_keys(known: Mapping[str, Any]) -> dict[str, str]:
-    """Paths of the fields of fields that are objects, by their names; of some with a name one."""
+    """Paths of the fields of nested objects by their names; the first of duplicates."""
     found: dict[str, str] = {}
     for outer, annotation in known.items():
         for name, _ in _fields(annotation):
@@ -141,14 +136,14 @@ def _inner_keys(known: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _fields(annotation: Any) -> Iterator[tuple[str, Any]]:
-    """(name, annotation) of the fields of a model, or of every model of a union."""
+    """Yield (name, annotation) of the fields of a model, or of every model of a union."""
     for _, one in _alternatives(annotation):
         if _is_model(one):
             yield from ((name, field.annotation) for name, field in one.model_fields.items())
 
 
 def _inner(annotation: Any, part: str | int) -> Iterator[Any]:
-    """What an annotation has at one part of a location."""
+    """Yield the annotations of one part of a location."""
     for tag, one in _alternatives(annotation):
         if tag is not None and tag == part:
             yield one
@@ -156,12 +151,12 @@ def _inner(annotation: Any, part: str | int) -> Iterator[Any]:
             if part in one.model_fields:
                 yield one.model_fields[part].annotation
         elif get_args(one) and not (isinstance(part, str) and is_tag(part)):
-            # Of a mapping the last argument is the value's, of a list or tuple the items'.
+            # The last argument is a mapping's value, or the items of a list or tuple.
             yield [kind for kind in get_args(one) if kind is not ...][-1]
 
 
 def _alternatives(annotation: Any, tag: str | None = None) -> Iterator[tuple[str | None, Any]]:
-    """(tag, annotation) of every member of a union, or of what is none."""
+    """Yield (tag, annotation) of every member of a union, or of the annotation itself."""
     origin = get_origin(annotation)
     if origin is Annotated:
         inner, *extra = get_args(annotation)

@@ -1,7 +1,7 @@
-"""Processes for work on what comes from outside: each is ended when it takes too much.
+"""Processes with limits, for work on untrusted input.
 
-A program that is run so calls `serve`. Requests and answers are JSON, a line each: nothing that
-comes back is run. A process is kept for the next request, unless it had to be ended.
+Their program calls `serve`. Requests and answers are lines of JSON, so that no code comes back. A
+process is reused for the next request, unless it had to be killed.
 """
 
 from __future__ import annotations
@@ -26,16 +26,13 @@ Document = Mapping[str, Any]
 _ROOT: Final = Path(__file__).parents[2]
 
 _LONGEST_ANSWER: Final = 64 << 20
-"""Characters of an answer; C text of a kernel takes a tenth of a million."""
+"""Largest answer [characters]; C text of a kernel takes a tenth of it."""
 
 
 class LimitedProcesses:
-    """Processes of one program, started when they are first needed. Thread-safe.
+    """Processes of one program with an address space of `memory` [B]. Thread-safe.
 
-    They end with this process, as their stdin does.
-
-    Args:
-        memory: Address space that a process may have [B].
+    They start when needed, and end with this process, which closes their stdin.
     """
 
     def __init__(
@@ -58,7 +55,7 @@ class LimitedProcesses:
         atexit.register(self.close)
 
     def ask(self, request: Document) -> dict[str, Any]:
-        """Have a request answered."""
+        """Answer a request in a process; raise ProcessEnded if it exceeds a limit."""
         process = self._idle.get()
         try:
             if process is None or process.poll() is not None:
@@ -80,7 +77,7 @@ class LimitedProcesses:
         return answer
 
     def close(self) -> None:
-        """End all processes that wait for a request."""
+        """End all idle processes."""
         for _ in range(self._idle.qsize()):
             process = self._idle.get()
             if process is not None:
@@ -89,7 +86,7 @@ class LimitedProcesses:
 
     def _started(self) -> subprocess.Popen[str]:
         path = os.pathsep.join(filter(None, (str(_ROOT), os.environ.get("PYTHONPATH"))))
-        # Threads of linear algebra would take address space, and are of no use.
+        # Threads of linear algebra would only take address space.
         threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
         try:
             return subprocess.Popen(
@@ -100,7 +97,7 @@ class LimitedProcesses:
                 text=True,
                 encoding="utf-8",
                 env=os.environ | {"PYTHONPATH": path} | threads,
-                # Ctrl-C is this process's to hear: a job must not fail by it.
+                # Ctrl-C must reach this process only: a job must not fail by it.
                 start_new_session=True,
             )
         except OSError as error:
@@ -142,9 +139,9 @@ class LimitedProcesses:
 
 
 def serve(answer: Callable[[Document], Document]) -> None:
-    """Answer requests until stdin ends, each within the limits that the command line gives."""
+    """Answer requests until stdin ends, with the limits of the command line."""
     cpu_seconds, memory = map(int, sys.argv[1:3])
-    # Libraries may print what they like; answers get a copy of stdout.
+    # Libraries may print to stdout; answers use a copy of it.
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     _limit("RLIMIT_AS", memory)
@@ -158,14 +155,14 @@ def serve(answer: Callable[[Document], Document]) -> None:
             said = {"refused": str(error)}
         except MemoryError:
             said = {"ended": f"took more than {memory >> 20} MiB of memory"}
-        except Exception as error:  # noqa: BLE001 - whatever it is, the process that asks lives on
+        except Exception as error:  # noqa: BLE001 - the calling process must survive any error
             said = {"ended": f"failed: {type(error).__name__}: {error}"[:1000]}
         answers.write(json.dumps(said) + "\n")
         answers.flush()
 
 
 def _limit(name: str, value: int) -> None:
-    """Set a soft limit, where the system has it."""
+    """Set a soft limit if the system supports it."""
     with suppress(ImportError, AttributeError, ValueError, OSError):
         import resource  # noqa: PLC0415  not on every system
 

@@ -1,4 +1,4 @@
-"""Room in memory for libraries that do not say when they find none."""
+"""Memory check for libraries that hang without enough of it."""
 
 from __future__ import annotations
 
@@ -7,18 +7,17 @@ import sys
 from typing import Final
 
 _NEEDED: Final = 192 << 20
-"""Address space [B] with which SciPy and its OpenBLAS are loaded: with less than a half of it the
-latter tries for ever to map its buffers."""
+"""Address space [B] to load SciPy and its OpenBLAS; with less than half of it, OpenBLAS hangs."""
 
 _WITH_OPENBLAS: Final = ("scipy.special._ufuncs", "scipy.linalg._fblas")
-"""Modules of SciPy of which each has loaded its OpenBLAS."""
+"""Modules of SciPy that each load its OpenBLAS."""
 
 
 def require_room_for_scipy() -> None:
-    """Check, before SciPy is loaded, that it can be; to be called before an import of it.
+    """Check the address space before SciPy is imported.
 
-    Its OpenBLAS maps buffers while it is loaded and, where it gets none, tries again without end.
-    That would stop all threads of the process, as the interpreter's lock is held.
+    If OpenBLAS cannot map its buffers while it is loaded, it retries forever. That blocks all
+    threads of the process, as it holds the interpreter's lock.
     """
     if sys.platform == "win32" or any(name in sys.modules for name in _WITH_OPENBLAS):
         return

@@ -1,4 +1,4 @@
-"""Names that are none: which one may have been meant, or which there are."""
+"""Suggestions for unknown names."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from difflib import get_close_matches
 from typing import Final
 
 _LONGEST_NAME: Final = 100
-"""That is compared with the known ones; comparing takes time by its length."""
+"""Longest name to compare; comparing takes time by its length."""
 
 _ALIKE: Final = 0.7
-"""Share of their characters that a name and the one that may be meant have in common, at least."""
+"""Least share of characters that a suggestion has in common with a name."""
 
 
 def nearest(name: str, known: Iterable[str]) -> str | None:
-    """The name that may have been meant."""
+    """Return the most similar known name."""
     if len(name) > _LONGEST_NAME or name.isdigit():
         return None
     plain = {one.lower(): one for one in known}
@@ -23,7 +23,7 @@ def nearest(name: str, known: Iterable[str]) -> str | None:
 
 
 def instead_of(name: str, known: Iterable[str], listed: Iterable[str] | None = None) -> str:
-    """What to write in place of a name that is none."""
+    """Suggest a name, or list the known ones."""
     names = list(known)
     near = nearest(name, names)
     if near is not None:

@@ -11,14 +11,14 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from gaitswarm.sim.robot.description import JOINTS_PER_LEG
 
 LARGEST_ANGLE: Final = 0.5
-"""Of the noise's standard deviations [rad]."""
+"""Largest standard deviation [rad]."""
 
 
 class LinkNoise(BaseModel):
     """White noise between gearhead and link of all links of one kind, new at every control tick.
 
-    An angle displaces the link against its gearhead, so the robot needs elastic shafts between the
-    two (`sim.robot.robot.with_shafts`); `sim.simulate.simulate` gives them to a robot without.
+    An angle displaces the link against its gearhead, so the robot needs elastic shafts
+    (`sim.robot.robot.with_shafts`); `sim.simulate.simulate` adds them.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -31,26 +31,23 @@ class LinkNoise(BaseModel):
         default="torque",
         description="A torque on the links, or an angle between gearheads and links.",
     )
-    seed: int = Field(default=1, ge=0, lt=2**63, description="Same seed, same noise.")
+    seed: int = Field(default=1, ge=0, lt=2**63, description="Seed of the noise.")
 
     @model_validator(mode="after")
     def _angles_are_small(self) -> LinkNoise:
         if self.kind == "angle" and self.deviation > LARGEST_ANGLE:
             raise ValueError(
-                f"deviation: {self.deviation:g} rad is more than {LARGEST_ANGLE:g} rad; noise on an"
-                " angle is given in rad"
+                f"deviation: {self.deviation:g} rad is more than {LARGEST_ANGLE:g} rad; noise of an"
+                " angle is in rad"
             )
         return self
 
     def samples(self, ticks: int, joints: int) -> NDArray[np.float64]:
-        """Noise of a whole walk; a longer one has the same noise as a shorter one, and more.
+        """Return noise (ticks, joints) [N m] or [rad]; a longer walk begins with the same noise.
 
         Args:
             ticks: Control ticks of the walk.
             joints: Joints of the robot.
-
-        Returns:
-            (ticks, joints) [N m], of an angle [rad].
         """
         generator = np.random.Generator(np.random.Philox(key=[self.seed, self.link]))
         kind = np.arange(joints) % JOINTS_PER_LEG == self.link - 1

@@ -1,4 +1,4 @@
-"""What one simulated walk is worth: objectives and a status."""
+"""Outcomes of simulations: objectives, measurements and statuses."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from gaitswarm.sim.errors import SimulationInputError
 
 
 class Status(IntEnum):
-    """How a walk ended. A result like any other: a bad design is not an error.
+    """End of a simulation, a result like any other: a bad design is not an error.
 
-    The integer is what arrays and the kernel carry, `label` is what people and JSON see.
+    Arrays and the kernel use the integer, people and JSON its `label`.
     """
 
     OK = 0
@@ -31,22 +31,12 @@ class Status(IntEnum):
 
     @property
     def phrase(self) -> str:
-        """One sentence that a user can act on."""
+        """Explanation for users, with a remedy."""
         return _PHRASES[self]
 
     @classmethod
     def from_label(cls, label: str) -> Status:
-        """Inverse of `label`.
-
-        Args:
-            label: As printed and stored.
-
-        Returns:
-            The status.
-
-        Raises:
-            KeyError: There is none of that label.
-        """
+        """Return the status of a label; raise KeyError if there is none."""
         return cls[label.upper()]
 
 
@@ -61,13 +51,7 @@ _PHRASES: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Objective:
-    """One thing to be minimized.
-
-    Attributes:
-        name: as in tables and JSON.
-        unit: of its values.
-        description: for people.
-    """
+    """A quantity to be minimized: name in tables and JSON, unit, and description."""
 
     name: str
     unit: str
@@ -83,25 +67,19 @@ OBJECTIVES: Final[tuple[Objective, ...]] = (
     Objective(
         "height_loss",
         "m",
-        "f6: height of the body at the start less that at the end, positive when it sinks",
+        "f6: loss of height of the body from start to end, positive when it sinks",
     ),
 )
-"""Objectives of a walk (thesis table 4.1): columns of its objectives array, in order.
+"""Objectives of a walk (thesis table 4.1), in the order of an objectives array's columns.
 
 f6 has the opposite sign of table 4.1, whose loss of height is z(t_end) - z(0): here less is better
-of every column. Preferences weigh its absolute value (eq. 3.1), so no fitness depends on the sign.
+in every column. Preferences weigh its absolute value (eq. 3.1), so fitness ignores the sign.
 """
 
 
 @dataclass(frozen=True, slots=True)
 class Measurement:
-    """One thing that a walk tells beside its objectives.
-
-    Attributes:
-        name: as in tables and JSON.
-        unit: of its values.
-        description: for people.
-    """
+    """A quantity besides the objectives: name in tables and JSON, unit, and description."""
 
     name: str
     unit: str
@@ -111,17 +89,17 @@ class Measurement:
 MEASUREMENTS: Final[tuple[Measurement, ...]] = (
     Measurement("peak_current", "A", "largest absolute current of any motor at any physics step"),
     Measurement("mean_current", "A", "mean over time and motors of the absolute current"),
-    Measurement("motor_heat", "W", "mean of what all windings turn to heat, R I^2"),
-    Measurement("power", "W", "mean electrical power of all motors, what f4 counts as spent"),
+    Measurement("motor_heat", "W", "mean heat of all windings, R I^2"),
+    Measurement("power", "W", "mean electrical power of all motors, as counted by f4"),
     Measurement("speed", "m/s", "mean speed in the direction of the walk"),
 )
-"""What a walk tells beside its objectives: columns of a measurements array, in order."""
+"""Further results of a walk, in the order of a measurements array's columns."""
 
 MEASUREMENT_NAMES: Final = tuple(measurement.name for measurement in MEASUREMENTS)
 N_MEASUREMENTS: Final = len(MEASUREMENTS)
 
 OBJECTIVES_VERSION: Final = 2
-"""Of what `OBJECTIVES` mean, in provenances. Of 1, f6 was the height at the end less the first."""
+"""Version of `OBJECTIVES` in provenances. In version 1, f6 was end height less start height."""
 
 OBJECTIVE_NAMES: Final = tuple(objective.name for objective in OBJECTIVES)
 N_OBJECTIVES: Final = len(OBJECTIVES)
@@ -151,16 +129,7 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Measurements:
-    """What the walks of n designs tell beside their objectives, NaN where a walk ended early.
-
-    Attributes:
-        peak_current: largest absolute current of any motor at any physics step, (n,) [A].
-        mean_current: mean over time and motors of the absolute current, (n,) [A].
-        motor_heat: mean of what all windings turn to heat, R I^2, (n,) [W].
-        power: mean electrical power of all motors, as far as it counts as spent
-            (`gaitswarm.sim.robot.description.Supply.energy`), (n,) [W].
-        speed: mean, in the direction of the walk, (n,) [m/s].
-    """
+    """Measurements of n designs, each (n,), NaN where a walk ended early; see `MEASUREMENTS`."""
 
     peak_current: NDArray[np.float64]
     mean_current: NDArray[np.float64]
@@ -170,13 +139,9 @@ class Measurements:
 
     @classmethod
     def of(cls, rows: NDArray[np.float64]) -> Measurements:
-        """Measurements from an array.
-
-        Args:
-            rows: (n, 5), columns as in `MEASUREMENTS`.
-        """
+        """Create measurements from rows (n, 5), columns as in `MEASUREMENTS`."""
         return cls(**dict(zip(MEASUREMENT_NAMES, rows.T.copy(), strict=True)))
 
     def array(self) -> NDArray[np.float64]:
-        """All of them, (n, 5), columns as in `MEASUREMENTS`."""
+        """Return an array (n, 5), columns as in `MEASUREMENTS`."""
         return np.stack([getattr(self, name) for name in MEASUREMENT_NAMES], axis=1)

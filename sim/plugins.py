@@ -1,4 +1,4 @@
-"""What other packages bring: found by entry points, loaded when it is named."""
+"""Plug-ins of other packages, found by entry points and loaded on demand."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final, Generic, Literal, Protocol, TypeVar, get_args
+from typing import Any, Final, Generic, Literal, Protocol, TypeVar, get_args
 
 from pydantic import BaseModel, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
@@ -19,15 +19,12 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from gaitswarm.sim.near_names import instead_of, nearest
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
 Kind = Literal["controller", "case", "optimizer"]
 
 KINDS: Final[tuple[Kind, ...]] = get_args(Kind)
 
 GROUPS: Final[Mapping[Kind, str]] = MappingProxyType({kind: f"gaitswarm.{kind}s" for kind in KINDS})
-"""Group of entry points by what they bring."""
+"""Group of entry points by kind."""
 
 
 class PluginError(Exception):
@@ -36,24 +33,24 @@ class PluginError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Plugin:
-    """One entry point."""
+    """An entry point."""
 
-    kind: Kind  # What it brings
-    name: str  # By which jobs name it
-    distribution: str  # That brings it
-    version: str  # Of the distribution
-    place: str  # `module:attribute` of what it brings
+    kind: Kind
+    name: str  # in job specs
+    distribution: str  # package that contains it
+    version: str  # of the distribution
+    place: str  # `module:attribute`
 
     @property
     def module(self) -> str:
-        """The module that is imported for it."""
+        """The module to import."""
         return self.place.partition(":")[0].strip()
 
     def __str__(self) -> str:
         return f"{self.kind} {self.name!r} of {self.distribution} {self.version}"
 
     def load(self) -> object:
-        """Import what it brings."""
+        """Import the plug-in."""
         try:
             return metadata.EntryPoint(self.name, self.place, GROUPS[self.kind]).load()
         except (Exception, SystemExit) as error:
@@ -64,8 +61,8 @@ class Plugin:
 
 @lru_cache(maxsize=1)
 def find_plugins() -> tuple[Plugin, ...]:
-    """All entry points for gaitswarm that are installed, as they are at the first call."""
-    # Asked for at once: each question reads the metadata of all distributions.
+    """Return all installed entry points for gaitswarm, as of the first call."""
+    # Query once: each query reads the metadata of all distributions.
     points = metadata.entry_points()
     found = {
         Plugin(
@@ -82,18 +79,18 @@ def find_plugins() -> tuple[Plugin, ...]:
 
 
 MISSING: Final = "none"
-"""In place of the version of a distribution that is not installed."""
+"""Version of a distribution that is not installed."""
 
 _DIGITS: Final = 32
 
 _SHOWN: Final = 12
-"""Digits of the digest of a plug-in's code."""
+"""Digits of the digest of a plug-in's code that are shown."""
 
 _SUFFIXES: Final = (".py", ".c", ".h", ".so")
 
 
 def source_digest(root: Path, files: Iterable[Path]) -> str:
-    """Digest of source files."""
+    """Return a digest of source files."""
     digest = hashlib.sha256()
     for file in files:
         content = file.read_bytes()
@@ -103,7 +100,7 @@ def source_digest(root: Path, files: Iterable[Path]) -> str:
 
 
 def version_of(distribution: str) -> str:
-    """The version of a distribution here."""
+    """Return a distribution's installed version."""
     known = plugin_versions()
     if distribution in known:
         return known[distribution]
@@ -115,13 +112,13 @@ def version_of(distribution: str) -> str:
 
 @lru_cache(maxsize=256)
 def _installed(distribution: str) -> str:
-    """As it is at the first call: every job asks, and to read it takes a millisecond."""
+    """Cached: every job needs it, and reading it takes a millisecond."""
     return metadata.version(distribution)
 
 
 @lru_cache(maxsize=1)
 def plugin_versions() -> dict[str, str]:
-    """Versions of all distributions with plug-ins, by name, as they are at the first call."""
+    """Return versions of all distributions with plug-ins by name, as of the first call."""
     by_name: dict[str, list[Plugin]] = {}
     for plugin in find_plugins():
         by_name.setdefault(plugin.distribution, []).append(plugin)
@@ -132,7 +129,7 @@ def plugin_versions() -> dict[str, str]:
 
 
 def _code(plugins: Iterable[Plugin]) -> str:
-    """Digest of the top-level packages that plug-ins lie in; nothing is imported for it."""
+    """Digest of the top-level packages of plug-ins, without importing them."""
     digest = hashlib.sha256()
     for package in sorted({plugin.module.partition(".")[0] for plugin in plugins}):
         try:
@@ -141,13 +138,13 @@ def _code(plugins: Iterable[Plugin]) -> str:
                 sources = [f for f in files if f.suffix in _SUFFIXES and f.is_file()]
                 digest.update(source_digest(root.parent, sources).encode())
         except (ImportError, OSError, ValueError):
-            # Whoever loads it is told why it cannot be read.
+            # Loading the plug-in reports the reason.
             digest.update(b"unreadable")
     return digest.hexdigest()[:_SHOWN]
 
 
 def _roots(package: str) -> tuple[Path, ...]:
-    """The folders of a package, or the file of a module."""
+    """Return the folders of a package, or the file of a module."""
     spec = find_spec(package)
     if spec is None:
         return ()
@@ -162,11 +159,10 @@ _LOG = logging.getLogger(__name__)
 
 
 class Registry(MutableMapping[str, T]):
-    """Things by name. A plug-in is imported when it is looked up, or when all are listed.
+    """Built-in and plugged-in objects by name; plug-ins are imported when looked up or listed.
 
-    A name of gaitswarm's is answered without a look at what is installed. A plug-in that is broken,
-    or whose name is taken, is logged and left out: to its users it is an unknown name, with the
-    reason beside it.
+    Built-in names do not need the installed entry points. A plug-in that is broken or whose name is
+    taken is logged and omitted: its name is unknown, and the error message says why.
     """
 
     def __init__(
@@ -185,12 +181,12 @@ class Registry(MutableMapping[str, T]):
 
     @property
     def kind(self) -> Kind:
-        """Of the things."""
+        """Kind of the objects."""
         return self._kind
 
     @property
     def built_in(self) -> Mapping[str, T]:
-        """Those of gaitswarm, by name."""
+        """Built-in objects by name."""
         return self._built_in
 
     def __getitem__(self, name: str) -> T:
@@ -215,11 +211,11 @@ class Registry(MutableMapping[str, T]):
         return sum(1 for _ in self)
 
     def plugins(self) -> tuple[Plugin, ...]:
-        """Entry points of this kind that are installed, those that cannot be used among them."""
+        """Installed entry points of this kind, including unusable ones."""
         return tuple(plugin for plugin in find_plugins() if plugin.kind == self._kind)
 
     def problem(self, plugin: Plugin) -> str | None:
-        """Why a plug-in cannot be used; it is imported to find out, once."""
+        """Return why a plug-in cannot be used; the first call imports it."""
         if plugin not in self._loaded and plugin not in self._broken:
             try:
                 self._check_name(plugin)
@@ -230,7 +226,7 @@ class Registry(MutableMapping[str, T]):
         return self._broken.get(plugin)
 
     def distribution(self, name: str) -> tuple[str, ...]:
-        """The distribution that a name's plug-in is of."""
+        """Return the distribution of a plug-in's name, if any."""
         if name in self._built_in:
             return ()
         return tuple(
@@ -238,11 +234,11 @@ class Registry(MutableMapping[str, T]):
         )
 
     def unknown(self, name: str) -> str:
-        """Say that a name is none."""
+        """Return an error message about an unknown name."""
         return f"unknown {self._kind} {name!r}; {self.instead_of(name, self)}"
 
     def instead_of(self, name: str, known: Iterable[str]) -> str:
-        """Say how an unknown name can be corrected, or which package brings it."""
+        """Suggest how to correct an unknown name, or which package provides it."""
         if name in self._elsewhere and not any(p.name == name for p in self.plugins()):
             return self._elsewhere[name]
         known = list(known)
@@ -259,7 +255,7 @@ class Registry(MutableMapping[str, T]):
             raise PluginError(f"{plugin} is left out: the name is one of gaitswarm's own")
         others = [o for o in self.plugins() if o.name == plugin.name and o != plugin]
         if others:
-            # None of them: which one is first depends on the order of sys.path.
+            # Omit both: which one comes first depends on the order of sys.path.
             named = ", ".join(f"{o.distribution} {o.version}" for o in others)
             raise PluginError(f"{plugin} is left out: {named} has one of that name, too")
 
@@ -276,18 +272,18 @@ class Registry(MutableMapping[str, T]):
 
 
 class Names(Protocol):
-    """Names that there are, which may become more when plug-ins are looked at."""
+    """Known names, which may grow when plug-ins are loaded."""
 
     def __contains__(self, name: object, /) -> bool: ...
 
     def __iter__(self) -> Iterator[str]: ...
 
     def unknown(self, name: str) -> str:
-        """Say that a name is none."""
+        """Return an error message about an unknown name."""
 
 
 class KnownName:
-    """Annotation of a `str` that is to be a known name, a plug-in's among them."""
+    """Annotation of a `str` that must be a known name; plug-ins' names included."""
 
     def __init__(self, names: Names) -> None:
         self._names = names
@@ -295,13 +291,13 @@ class KnownName:
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        """Checks a name when it is read."""
+        """Validate a name."""
         return core_schema.no_info_after_validator_function(self._known, handler(source))
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
-        """The names that there are where the schema is asked for."""
+        """List the known names."""
         return {**handler(schema), "enum": list(self._names)}
 
     def _known(self, name: str) -> str:
@@ -311,7 +307,7 @@ class KnownName:
 
 
 def check_is(plugin: Plugin, brought: object, wanted: type[T]) -> T:
-    """Check the type of what a plug-in brings, and that its own name is the entry point's."""
+    """Check the type of a plug-in's object."""
     if isinstance(brought, type) or not isinstance(brought, wanted):
         raise PluginError(
             f"{plugin} cannot be used: {plugin.place} is a {type(brought).__name__},"
@@ -321,13 +317,13 @@ def check_is(plugin: Plugin, brought: object, wanted: type[T]) -> T:
 
 
 def check_name(plugin: Plugin, own: object) -> None:
-    """Check that a thing has the name that its entry point gives it."""
+    """Check that an object has the name of its entry point."""
     if own != plugin.name:
         raise PluginError(f"{plugin} cannot be used: it calls itself {own!r}")
 
 
 class PluginSettings(Generic[T]):
-    """Annotation of settings that may be a plug-in's: what is annotated is read if they are not."""
+    """Annotation of settings that may be a plug-in's; others are read as annotated."""
 
     def __init__(
         self, registry: Registry[T], model: Callable[[T], type[BaseModel]], seen: str
@@ -337,7 +333,7 @@ class PluginSettings(Generic[T]):
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        """Reads settings by the model of their name; writes all that a model has."""
+        """Read settings by the model of their name; write all fields."""
         return core_schema.no_info_wrap_validator_function(
             self._read, handler(source), serialization=core_schema.simple_ser_schema("any")
         )
@@ -345,7 +341,7 @@ class PluginSettings(Generic[T]):
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
-        """What is annotated, or settings with one of the names that plug-ins have here."""
+        """Add settings with the names of installed plug-ins."""
         found = handler(schema)
         names = [name for name in self._registry if name not in self._registry.built_in]
         if not names:

@@ -1,7 +1,7 @@
-"""Provenance: what the outcome of a case depends on, beside the case itself and its designs.
+"""Provenance: everything that a case's outcome depends on besides the case and its designs.
 
-A job keeps the provenance of its numbers, and every task answers with that of the process that ran
-it, so that a robot file, code or a compiler that changed meanwhile is noticed.
+A job stores the provenance of its numbers, and every task returns that of its process, so that
+changes of robot files, code or compiler are noticed.
 """
 
 from __future__ import annotations
@@ -34,25 +34,25 @@ _NOT_IN_A_CASE: Final = (
     "robot/shapes.py",
     "validation.py",
 )
-"""Modules and packages of `sim` that no case runs through."""
+"""Modules and packages of `sim` that no case uses."""
 
 LIBRARIES: Final = ("casadi", "numpy", "pin")
-"""Distributions that compute: of the kernel's source, of trajectories and of controllers."""
+"""Distributions that compute: the kernel's source, trajectories and controllers."""
 
 _DIGITS: Final = 32
 
 
 class Provenance(BaseModel):
-    """What the outcome of a robot's cases depends on. Equal ones may be mixed, others not."""
+    """Everything that outcomes for a robot depend on. Only results with equal ones may be mixed."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     robot: str = Field(
-        description="Name that the robot's file gives it; several separated by commas.",
+        description="Name in the robot's file; several separated by commas.",
         examples=["szabadka2"],
     )
     robot_digest: str = Field(
-        description="Digest of the robot's parameters, as they were resolved, and of its URDF.",
+        description="Digest of the robot's resolved parameters and of its URDF.",
         examples=["6a09e667f3bcc908b2fb1366ea957d3e"],
     )
     code_digest: str = Field(
@@ -69,7 +69,7 @@ class Provenance(BaseModel):
     )
     precision: Precision = Field(
         default="double",
-        description="Of the physics' numbers. Numbers of one are never mixed with the other's.",
+        description="Precision of the physics. Results of different precisions are never mixed.",
         examples=["double"],
     )
     objectives: int = Field(
@@ -80,7 +80,7 @@ class Provenance(BaseModel):
     )
 
     def changes(self, now: Provenance) -> tuple[str, ...]:
-        """What is different now, in words for people."""
+        """Describe the changes since."""
         found: list[str] = []
         if now.robot != self.robot:
             found.append(f"the robot {now.robot} instead of {self.robot}")
@@ -98,7 +98,7 @@ class Provenance(BaseModel):
 
 
 def version_changes(before: Mapping[str, str], now: Mapping[str, str]) -> list[str]:
-    """What is different of libraries, in words for people."""
+    """Describe changes of libraries."""
     return [
         f"{name} {now.get(name, MISSING)} instead of {before.get(name, MISSING)}"
         for name in sorted(before.keys() | now.keys())
@@ -112,10 +112,10 @@ def provenance_of(
     precision: Precision = "double",
     libraries: tuple[str, ...] = LIBRARIES,
 ) -> Provenance:
-    """The provenance of what this process computes of robots; nothing is compiled for it."""
+    """Return the provenance of this process's results for robots, without compiling."""
     machines = [load_robot(robot) for robot in robots]
     content = "".join(m.description.model_dump_json() + m.urdf.text for m in machines)
-    # With a compiler, a kernel is compiled or an error is raised: never replaced by the reference.
+    # With a compiler, the kernel is compiled or fails; the reference never replaces it.
     native = all(has_native_kernel(machine, precision) for machine in machines)
     return Provenance(
         robot=", ".join(machine.description.name for machine in machines),
@@ -129,7 +129,7 @@ def provenance_of(
 
 
 def simulator_files() -> tuple[Path, ...]:
-    """The source files of `sim` that a case may run through, in order."""
+    """Return the source files of `sim` that a case may use, sorted."""
     left_out = [_ROOT / name for name in _NOT_IN_A_CASE]
     return tuple(
         sorted(
@@ -142,8 +142,8 @@ def simulator_files() -> tuple[Path, ...]:
 
 @lru_cache(maxsize=1)
 def simulator_digest() -> str:
-    """Digest of the source files of `sim`, as they are when it is called first.
+    """Return the digest of the source files of `sim` as of the first call.
 
-    A process that lives long calls it early, while they are still those that it has imported.
+    A long-lived process calls it early, while the files are still those that it has imported.
     """
     return source_digest(_ROOT, simulator_files())

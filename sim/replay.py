@@ -1,4 +1,4 @@
-"""A walk to look at again: where every link was, at a rate for the eye."""
+"""Replays: poses of all links over a walk, at a rate for display."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from gaitswarm.sim.robot.shapes import VisibleLink, visible_links
 Floats = NDArray[np.float64]
 
 CONTROL_RATE: Final = round(1.0 / CONTROL_PERIOD)
-"""Ticks of a log per second [Hz], and so the highest rate of a replay."""
+"""Ticks of a log per second [Hz], the highest rate of a replay."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Replay:
-    """A walk up to its end, F frames of B links, J joints, L legs; arrays by frame."""
+    """A walk up to its end; arrays by frame: F frames of B links, J joints, L legs."""
 
-    duration: float  # walked [s]
+    duration: float  # [s]
     links: tuple[VisibleLink, ...]  # in the order of `link_pose`
     time: Floats  # (F,) [s], exact
-    # in the world, (F, B, 7): position [m], quaternion x y z w, whose sign never jumps
+    # in the world, (F, B, 7): position [m], quaternion x y z w with continuous sign
     link_pose: Floats
     # the tibia's end, a sole's length above the ground where it stands, (F, L, 3) [m]
     foot_position: Floats
@@ -44,12 +44,7 @@ class Replay:
 
 
 def replay(robot: Robot, log: WalkLog, *, rate: float, load: float = 0.0) -> Replay:
-    """The ticks of a walk nearest to a rate.
-
-    Args:
-        rate: Frames a second, `CONTROL_RATE` at most [Hz].
-        load: Mass carried on the body, to be seen [kg].
-    """
+    """Sample a walk at a rate [Hz], at most `CONTROL_RATE`, with a load to be shown [kg]."""
     walked = log.until_end()
     ticks = ticks_at(rate, len(walked.time))
     links = visible_links(robot, load)
@@ -85,14 +80,7 @@ def replay(robot: Robot, log: WalkLog, *, rate: float, load: float = 0.0) -> Rep
 
 
 def ticks_at(rate: float, ticks: int) -> NDArray[np.int64]:
-    """Control ticks that are nearest to multiples of 1 / rate, from 0 on.
-
-    Args:
-        rate: [Hz].
-
-    Returns:
-        (F,), all less than `ticks`.
-    """
+    """Return control ticks (F,) below `ticks` that are nearest to multiples of 1 / rate [Hz]."""
     frames = np.rint(np.arange(ticks * rate / CONTROL_RATE + 1.0) * (CONTROL_RATE / rate))
     nearest: NDArray[np.int64] = frames[frames < ticks].astype(np.int64)
     return nearest
@@ -103,9 +91,9 @@ def _placements(
 ) -> tuple[Floats, Floats]:
     """Forward kinematics: poses of links (F, B, 7) and positions of feet (F, L, 3) in the world.
 
-    configurations: (F, 7+J) position, quaternion x y z w, joints in the robot's order.
+    `configurations` (F, 7+J) are position, quaternion x y z w, joints in the robot's order.
     """
-    # As slow to import as it is for the kernel, which may come from the cache.
+    # Slow to import; a kernel from the cache does not need it.
     import pinocchio as pin  # noqa: PLC0415
 
     model = _model(robot)
@@ -129,14 +117,14 @@ def _placements(
 
 @lru_cache(maxsize=8)
 def _model(robot: Robot) -> Any:
-    """Read by many threads at once; what they compute is in data of their own."""
+    """Shared by threads: their data are separate."""
     import pinocchio as pin  # noqa: PLC0415
 
     return pin.buildModelFromXML(robot.urdf.text, pin.JointModelFreeFlyer())
 
 
 def _without_jumps(poses: Floats) -> Floats:
-    """Of the two quaternions of an attitude, the one nearer to the frame before."""
+    """Choose the quaternions' signs continuously from frame to frame."""
     turns = poses[:, :, 3:]
     flips = np.sum(turns[1:] * turns[:-1], axis=-1) < 0.0
     turns[1:] *= np.cumprod(np.where(flips, -1.0, 1.0), axis=0)[:, :, np.newaxis]

@@ -1,4 +1,4 @@
-"""Duty factors of gaits for which the default of a scenario is too little."""
+"""Scenarios: gait, posture, load and ground of a walk; presets."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ from gaitswarm.sim.variables import VariableName, split_name
 USUAL_SUPPORT: Final[Mapping[str, float]] = MappingProxyType(
     {"wave": 0.85, "ripple": 0.7, "crawl": 0.85}
 )
-"""Support's share of the cycle by gait [1]: on four or six legs, a little more than that at which a
-foot leaves the ground as soon as another one has come down."""
+"""Default share of support in the cycle by gait [1], so that on four or six legs a foot leaves the
+ground a little after another one has landed."""
 
 
 def with_duty_factor(document: Any) -> Any:
-    """Add the duty factor that a scenario's gait has unless one is given."""
+    """Add the default duty factor of a scenario's gait."""
     if not isinstance(document, Mapping) or "duty_factor" in document:
         return document
     support = USUAL_SUPPORT.get(str(document.get("gait")))
@@ -56,7 +56,7 @@ ScenarioName = Annotated[
 GaitName = Literal[
     "own", "alternating", "tripod", "wave", "ripple", "trot", "pace", "bound", "crawl"
 ]
-"""Order of the legs' steps; `own` is that of the robot's description. See `sim.gait.gaits`."""
+"""Order of the legs' steps; `own` is the order in the robot's description. See `sim.gait.gaits`."""
 
 GAIT_NAMES: Final[tuple[GaitName, ...]] = get_args(GaitName)
 
@@ -64,11 +64,11 @@ CurveName = Literal["quadratic_spline", "half_ellipse", "cycloid"]
 """Shape of the swing; each is a module of `gaitswarm.sim.gait`."""
 
 BY_LEG_GROUP: Final = ("stride", "height", "duty_factor", "start_phase", "radius")
-"""Fields of which groups of legs may have values of their own."""
+"""Fields that can be set for groups of legs."""
 
 
 class ValuesByName(dict[str, float]):
-    """Numbers by name that are not changed, so that what has them can be the key of a cache."""
+    """Numbers by name, hashable because they never change."""
 
     def __hash__(self) -> int:  # type: ignore[override]
         return hash(frozenset(self.items()))
@@ -79,9 +79,9 @@ LegName = Annotated[str, Field(min_length=1, max_length=60)]
 
 
 class Scenario(BaseModel):
-    """One walk to be judged: gait, posture, load and ground. All fields have units.
+    """A walk to be simulated: gait, posture, load and ground.
 
-    Fields that table 4.2 does not give have the defaults that docs/model.md explains.
+    docs/model.md explains the defaults of fields that are not in table 4.2.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -99,7 +99,7 @@ class Scenario(BaseModel):
     hip_height: float = Field(
         gt=0.0,
         le=1.0,
-        description="Height of the coxa axes over the ground, the thesis's withers [m].",
+        description="Height of the coxa axes above the ground, the thesis's withers [m].",
         examples=[0.15],
     )
     load: float = Field(
@@ -107,7 +107,7 @@ class Scenario(BaseModel):
     )
     direction: Literal["forward", "backward"] = Field(
         default="forward",
-        description="Way that the robot walks; distance and speed count along it.",
+        description="Direction of the walk; distance and speed count along it.",
     )
     turn: float = Field(
         default=0.0,
@@ -117,8 +117,8 @@ class Scenario(BaseModel):
     )
     turn_mode: Literal["inner", "both"] = Field(
         default="inner",
-        description="Whether a turn shortens the inner legs' stride alone, or lengthens that of the"
-        " outer ones by the same share as well.",
+        description="Whether a turn only shortens the inner legs' stride, or also lengthens that of"
+        " the outer legs by the same share.",
     )
     slope: float = Field(
         default=0.0,
@@ -130,7 +130,7 @@ class Scenario(BaseModel):
         default=0.0,
         ge=-180.0,
         le=180.0,
-        description="Where the ground rises, from straight ahead towards the left [deg].",
+        description="Direction in which the ground rises, from straight ahead to the left [deg].",
     )
     stride: float = Field(
         default=0.06,
@@ -148,29 +148,29 @@ class Scenario(BaseModel):
         default=0.56,
         ge=0.1,
         le=0.95,
-        description="Share of the cycle of the phase that `duty_phase` names; the default is"
+        description="Share of the cycle of the phase selected by `duty_phase`; the default is"
         f" {', '.join(f'{share:g} in a {gait}' for gait, share in USUAL_SUPPORT.items())} [1].",
     )
     duty_phase: Literal["support", "swing"] = Field(
-        default="support", description="Phase whose share of the cycle `duty_factor` is."
+        default="support", description="Phase to which `duty_factor` applies."
     )
     start_phase: float = Field(
         default=0.0,
         ge=0.0,
         lt=1.0,
-        description="Share of the cycle at which the gait begins [1]; 0.5 exchanges the tripods.",
+        description="Share of the cycle at which the gait starts [1]; 0.5 swaps the tripods.",
     )
     gait: GaitName = Field(
         default="own",
-        description="Order of the legs' steps: own is that of the robot's description; see"
+        description="Order of the legs' steps: own is the order in the robot's description; see"
         " `gaitswarm gaits`.",
     )
     phases: (
         Annotated[dict[LegName, Phase], Field(max_length=32), AfterValidator(ValuesByName)] | None
     ) = Field(
         default=None,
-        description="In place of a gait's name: by leg, the share of the cycle since the start of"
-        " its support, when the gait begins [1].",
+        description="Instead of `gait`: share of the cycle since the start of support when the gait"
+        " starts, by leg [1].",
         examples=[{"FL": 0.0, "FR": 0.5, "RL": 0.5, "RR": 0.0}],
     )
     by_group: (
@@ -178,8 +178,8 @@ class Scenario(BaseModel):
         | None
     ) = Field(
         default=None,
-        description="Values of groups of legs in place of the scenario's: stride, height,"
-        " duty_factor, start_phase and radius, each as `stride[front]`.",
+        description="Values of stride, height, duty_factor, start_phase and radius for leg groups,"
+        " such as `stride[front]`; they override the scenario's.",
         examples=[{"stride[front]": 0.05, "height[hind]": 0.03}],
     )
     fir_ms: int = Field(
@@ -196,26 +196,26 @@ class Scenario(BaseModel):
         description="Rate at which the desired angles are updated [Hz].",
     )
     curve: CurveName = Field(
-        default="quadratic_spline", description="Shape of the swing; the spline is appendix .2.1's."
+        default="quadratic_spline",
+        description="Shape of the swing; the spline is that of appendix .2.1.",
     )
     sway_lateral: float = Field(
         default=0.0,
         ge=-0.3,
         le=0.3,
-        description="Amplitude of the body's sway to the left and right, once a cycle [m].",
+        description="Amplitude of the body's sway to the left and right, once per cycle [m].",
     )
     sway_longitudinal: float = Field(
         default=0.0,
         ge=-0.3,
         le=0.3,
-        description="Amplitude of the body's sway along its way, twice a cycle [m].",
+        description="Amplitude of the body's sway along the walk, twice per cycle [m].",
     )
     sway_phase: float = Field(
         default=0.5,
         ge=0.0,
         lt=1.0,
-        description="Share of the gait's cycle at which the body is furthest to the left and goes"
-        " back [1].",
+        description="Share of the gait's cycle at which the body is furthest to the left [1].",
     )
     cycles: float = Field(
         default=3.0, ge=1.0, le=100.0, description="Number of cycles to walk [1]."
@@ -224,8 +224,7 @@ class Scenario(BaseModel):
         default=None,
         min_length=1,
         max_length=60,
-        description="Name of the leg whose joints are jammed at their first angles; none by"
-        " default.",
+        description="Name of the leg whose joints are jammed at their start angles; default: none.",
         examples=["right_middle"],
     )
     drop: float = Field(
@@ -245,15 +244,13 @@ class Scenario(BaseModel):
         default=90.0,
         ge=-180.0,
         le=180.0,
-        description="Where the shove pushes, from straight ahead at the start towards the left"
-        " [deg].",
+        description="Direction of the shove, from straight ahead at the start to the left [deg].",
     )
     shove_at: float = Field(
         default=0.5,
         ge=0.0,
         lt=1.0,
-        description="Share of the walk at which the shove begins, 0.1 s before its end at the"
-        " latest [1].",
+        description="Share of the walk at which the shove starts, 0.1 s before the end at latest [1].",
     )
 
     @model_validator(mode="before")
@@ -285,29 +282,17 @@ class Scenario(BaseModel):
 
     @property
     def support_share(self) -> float:
-        """Support's share of the cycle, of legs whose group has no duty factor of its own [1]."""
+        """Share of support in the cycle for legs without a duty factor of their group [1]."""
         return self.support_share_of(self.duty_factor)
 
     def support_share_of(self, duty_factor: float) -> float:
-        """Support's share of the cycle [1].
-
-        Args:
-            duty_factor: Share of the phase that `duty_phase` names.
-
-        Returns:
-            The share of the support.
-        """
+        """Return the share of support in the cycle [1] for a duty factor of `duty_phase`."""
         return duty_factor if self.duty_phase == "support" else 1.0 - duty_factor
 
     def stride_of(self, side: float, stride: float | None = None) -> float:
-        """Stride of the legs of one side [m].
+        """Return the stride of the legs of a side (1 left, -1 right) in the scenario's turn [m].
 
-        Args:
-            side: 1 for the left legs, -1 for the right ones.
-            stride: Straight ahead [m]; None for the scenario's.
-
-        Returns:
-            The stride, shortened or lengthened by the scenario's turn.
+        `stride` is the stride straight ahead [m], by default the scenario's.
         """
         shortened = -side * self.turn
         if self.turn_mode == "inner":
@@ -317,7 +302,7 @@ class Scenario(BaseModel):
 
 @lru_cache
 def _bounds_of(field: str) -> TypeAdapter[float]:
-    """What a field of a scenario may be."""
+    """Return the allowed values of a scenario's field."""
     return TypeAdapter(Annotated[float, Scenario.model_fields[field]])
 
 
@@ -329,7 +314,7 @@ SCENARIOS: Final[tuple[Scenario, ...]] = (
     Scenario(name="slope-fast", cycle_time=1.5, radius=0.20, hip_height=0.14, slope=10.0),
     Scenario(name="turn-right-fast", cycle_time=1.5, radius=0.16, hip_height=0.15, turn=0.5),
 )
-"""The six scenarios of table 4.2, in its order: those that a job has unless it names others."""
+"""The six scenarios of table 4.2 in its order, the default of jobs."""
 
 _BACKWARD: Final = Scenario(
     name="backward", cycle_time=1.5, radius=0.16, hip_height=0.15, direction="backward"
@@ -359,8 +344,8 @@ HELD_OUT: Final[tuple[Scenario, ...]] = (
     _BACKWARD,
     Scenario(name="shove-fast", cycle_time=1.5, radius=0.16, hip_height=0.15, shove=6.0),
 )
-"""Walks beside those of table 4.2, for which no design of the thesis was optimized: what a design
-is worth in them shows whether it was made for its scenarios alone."""
+"""Scenarios for which no design of the thesis was optimized: they show whether a design is good
+only in its own scenarios."""
 
 PRESETS: Final[tuple[Scenario, ...]] = (
     *SCENARIOS,
@@ -372,15 +357,15 @@ PRESETS: Final[tuple[Scenario, ...]] = (
     ),
     *(scenario for scenario in HELD_OUT if scenario is not _BACKWARD),
 )
-"""All scenarios that have a name and, by their order, a number from 1 on.
+"""All named scenarios; their position from 1 is their number.
 
-`straight` is the walk of chapter 3 (section 3.1), whose designs bring a gait of their own, and
+`straight` is the walk of chapter 3 (section 3.1), whose designs set their own gait, and
 `backward` that of figs. 2.7 and 2.8; `drop` and `stuck-leg` are the protection's cases (4.3.2).
 """
 
 
 def find_scenario(name: str) -> Scenario:
-    """A preset."""
+    """Return a preset."""
     for number, scenario in enumerate(PRESETS, start=1):
         if name in (scenario.name, str(number)):
             return scenario
@@ -395,14 +380,14 @@ def _preset_exists(name: str) -> str:
 
 
 def _number_as_name(value: object) -> object:
-    """1 as "1", which `find_scenario` knows."""
+    """Convert 1 to "1", which `find_scenario` accepts."""
     return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
 
 
 ScenarioChoice = Annotated[
     Annotated[ScenarioName, AfterValidator(_preset_exists), Tag(NAME)]
     | Annotated[Scenario, Tag(OWN)],
-    alternatives("must be the name or number of a preset, or an object: a scenario of your own"),
+    alternatives("must be the name or number of a preset, or an object: a custom scenario"),
     BeforeValidator(_number_as_name),
 ]
-"""How jobs and requests choose a walk."""
+"""A scenario in jobs and requests."""

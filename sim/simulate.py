@@ -1,4 +1,4 @@
-"""The entry point: designs in one scenario -> objectives, statuses, measurements."""
+"""Entry point: designs in one scenario -> objectives, statuses, measurements."""
 
 from __future__ import annotations
 
@@ -45,17 +45,16 @@ from gaitswarm.sim.robot.robot import with_shafts
 from gaitswarm.sim.scenario import Scenario
 
 _PLANS_KEPT: Final = 16
-"""Scenarios whose walks are planned once; most take a quarter of a megabyte."""
+"""Number of scenarios whose plans are cached; most take a quarter of a megabyte."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Simulation:
-    """What designs came to, in their order."""
+    """Results of designs, in their order."""
 
-    outcome: Outcome  # of all designs
-    measurements: Measurements  # of all designs: currents, heat, power and speed
-    # of every walk, if they were asked for. A design that was never simulated (unreachable) has
-    # none; one that ended early has NaN after its end.
+    outcome: Outcome
+    measurements: Measurements  # currents, heat, power and speed
+    # if requested; None for designs that were not simulated (unreachable), NaN after an early end
     logs: tuple[WalkLog | None, ...] = ()
 
 
@@ -127,11 +126,7 @@ def simulating(
     precision: Precision = "double",
     kernel: Kernel | None = None,
 ) -> Walking[Simulation]:
-    """What `simulate` does, for `walk_together` to run beside others.
-
-    Args:
-        designs: (n, len(variables)), in the variables' units.
-    """
+    """Prepare `simulate` for `walk_together`, with designs (n, len(variables))."""
     return _simulating(
         scenario,
         controller,
@@ -223,7 +218,7 @@ def check_reach(
     *,
     robot: RobotChoice,
 ) -> None:
-    """Check that a robot can begin a walk: it has the leg that is jammed, and its legs reach all"""
+    """Check that a robot can start a walk: the stuck leg exists, and legs reach all targets."""
     machine = load_robot(robot)
     check_stuck_leg(machine, scenario)
     gait = {
@@ -235,7 +230,7 @@ def check_reach(
 def check_gait(
     scenario: Scenario, design: Mapping[str, float], *, robot: RobotChoice
 ) -> tuple[LegGait, ...]:
-    """Check that a gait is one for a robot's legs, whether or not they reach it."""
+    """Check that a gait suits a robot's legs, whether or not they reach it."""
     gait = {name: value for name, value in design.items() if name in GAIT_CATALOGUE}
     return leg_gaits(load_robot(robot), with_gait(scenario, gait))
 
@@ -252,12 +247,12 @@ def prepare(
     backend: Backend = "auto",
     precision: Precision = "double",
 ) -> str:
-    """Build a robot's kernel, or find it in the cache."""
+    """Build a robot's kernel, or load it from the cache."""
     return kernel_of(load_robot(robot), backend, precision=precision).backend
 
 
 def lanes(precision: Precision = "double") -> int:
-    """How many walkers the compiled kernel steps together."""
+    """Return the number of walkers that the compiled kernel steps together."""
     return target().lanes * (2 if precision == "single" else 1)
 
 

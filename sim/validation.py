@@ -1,4 +1,7 @@
-"""Validation: how far a simulated walk is from a measured one (thesis 2.3)."""
+"""Validation: deviation of a simulated walk from a measured one (thesis 2.3).
+
+Signals are X (measured) and Y (simulated), (T,) or (T, C).
+"""
 
 from __future__ import annotations
 
@@ -21,54 +24,28 @@ Floats = NDArray[np.float64]
 
 
 def root_mean_square_error(measured: Floats, simulated: Floats) -> float:
-    """MSE, eq. 2.15: sqrt(mean (X - Y)^2).
-
-    Args:
-        measured: X, (T,) or (T, C).
-    """
+    """MSE, eq. 2.15: sqrt(mean (X - Y)^2)."""
     return math.sqrt(float(np.mean(_error(measured, simulated) ** 2)))
 
 
 def mean_absolute_error(measured: Floats, simulated: Floats) -> float:
-    """MAE, eq. 2.16: mean |X - Y|.
-
-    Args:
-        measured: X, (T,) or (T, C).
-    """
+    """MAE, eq. 2.16: mean |X - Y|."""
     return mean_absolute(_error(measured, simulated))
 
 
 def relative_mean_absolute_error(measured: Floats, simulated: Floats) -> float:
-    """RMAE, eq. 2.17: MAE / mean |X|. (The thesis prints RAM on its left side.)
-
-    Args:
-        measured: X, (T,) or (T, C).
-
-    Returns:
-        [1].
-    """
+    """RMAE, eq. 2.17: MAE / mean |X| [1]. (The thesis prints RAM on its left side.)"""
     return _relative(mean_absolute_error(measured, simulated), measured)
 
 
 def difference_of_absolute_means(measured: Floats, simulated: Floats) -> float:
-    """DAM, eq. 2.18: | mean |X| - mean |Y| |; blind to time.
-
-    Args:
-        measured: X, (T,) or (T, C).
-    """
+    """DAM, eq. 2.18: | mean |X| - mean |Y| |, independent of timing."""
     _error(measured, simulated)
     return abs(mean_absolute(measured) - mean_absolute(simulated))
 
 
 def relative_difference_of_absolute_means(measured: Floats, simulated: Floats) -> float:
-    """RAM, eq. 2.19: DAM / mean |X|.
-
-    Args:
-        measured: X, (T,) or (T, C).
-
-    Returns:
-        [1].
-    """
+    """RAM, eq. 2.19: DAM / mean |X| [1]."""
     return _relative(difference_of_absolute_means(measured, simulated), measured)
 
 
@@ -81,13 +58,9 @@ def confidence_interval(repeats: Sequence[Floats]) -> tuple[float, float]:
 
 
 def intensity(signal: Floats, timestep: float) -> float:
-    """Eq. 2.22: sqrt(mean |X| std X (max X - min X) mean |dX/dt|), how lively a signal is.
+    """Eq. 2.22: sqrt(mean |X| std X (max X - min X) mean |dX/dt|), a signal's liveliness.
 
-    dX/dt is the difference of neighbouring rows over the timestep.
-
-    Args:
-        signal: X, (T,) or (T, C).
-        timestep: Between rows [s].
+    dX/dt is the difference of neighbouring rows over the timestep [s].
     """
     columns = _samples(signal).reshape(len(signal), -1)
     if len(columns) < 2:
@@ -99,26 +72,15 @@ def intensity(signal: Floats, timestep: float) -> float:
 
 
 def mean_absolute(signal: Floats) -> float:
-    """Mean |X| over all samples.
-
-    Args:
-        signal: X, (T,) or (T, C).
-    """
+    """Mean |X| over all samples."""
     return float(np.mean(np.abs(_samples(signal))))
 
 
 def amplitude_spectrum(signal: Floats, timestep: float) -> tuple[Floats, Floats]:
-    """One-sided amplitudes.
+    """Return frequencies (F,) [Hz] and one-sided amplitudes (F,) or (F, C), F = T // 2 + 1.
 
     A sine of amplitude A that fits the T rows a whole number of times shows as A in its own bin
     and nowhere else, hence signals must span whole walking cycles; bin 0 is the absolute mean.
-
-    Args:
-        signal: (T,) or (T, C).
-        timestep: Between rows [s].
-
-    Returns:
-        Frequencies (F,) [Hz] and amplitudes (F,) or (F, C), in the signal's unit; F = T // 2 + 1.
     """
     rows = len(_samples(signal))
     amplitude = np.abs(np.fft.rfft(signal, axis=0)) * (2.0 / rows)
@@ -129,17 +91,10 @@ def amplitude_spectrum(signal: Floats, timestep: float) -> tuple[Floats, Floats]
 
 
 def spectral_error(measured: Floats, simulated: Floats, timestep: float) -> float:
-    """|| A - B || / || A || of the amplitude spectra A, B: blind to phase, 0 for a pure delay.
+    """|| A - B || / || A || [1] of the amplitude spectra A, B: 0 for a pure delay.
 
     Norms run over frequencies and signals, so that strong oscillations weigh more than the many
-    bins of noise. The mean value (bin 0) is left out: it is no oscillation, and MAE tells it.
-
-    Args:
-        measured: (T,) or (T, C), whose spectrum is A.
-        timestep: Between rows [s].
-
-    Returns:
-        [1].
+    bins of noise. The mean value (bin 0) is excluded, as MAE covers it.
     """
     _error(measured, simulated)
     of_measured, of_simulated = (
@@ -175,7 +130,7 @@ def _samples(signal: Floats) -> Floats:
 
 
 class Tolerance(StrEnum):
-    """What an RMAE means, by the colour that the thesis gives it; from good to bad."""
+    """Classes of RMAE by their colours in the thesis, from good to bad."""
 
     GREEN = "green"
     YELLOW = "yellow"
@@ -190,18 +145,15 @@ class Tolerance(StrEnum):
 
     @property
     def phrase(self) -> str:
-        """What to think of it."""
+        """Meaning of the class."""
         return _PHRASES[self]
 
     @classmethod
     def of(cls, rmae: float) -> Tolerance:
-        """Class of a relative mean absolute error.
+        """Classify a relative mean absolute error [1]; NaN belongs to the worst class.
 
         >>> [Tolerance.of(x).value for x in (0.02, 0.021, 0.31)]
         ['green', 'yellow', 'red']
-
-        Args:
-            rmae: [1]; NaN is as bad as can be.
         """
         return next((known for known in cls if rmae <= known.limit), cls.PURPLE)
 
@@ -234,7 +186,7 @@ class _Data(BaseModel):
 
 
 class Agreement(_Data):
-    """The measures of one signal, or of several judged together; units are the quantity's."""
+    """Measures of one signal, or of several together; units are the quantity's."""
 
     name: str = Field(description="Joint, leg or axis; `link 1` to `link 3`; or `all`.")
     mean_absolute_measured: float = Field(description="mean |X|")
@@ -253,7 +205,7 @@ class Agreement(_Data):
 
     @property
     def within_confidence(self) -> bool | None:
-        """Whether the simulated mean |Y| lies among the measured ones; None without repeats."""
+        """Whether the simulated mean |Y| lies within the measured ones; None without repeats."""
         if self.confidence is None:
             return None
         low, high = self.confidence
@@ -278,22 +230,22 @@ class QuantityComparison(_Data):
     quantity: Quantity
     unit: str
     meaning: str
-    whole: Agreement = Field(description="all channels judged together")
-    links: tuple[Agreement, ...] = Field(description="by link; empty if it is not by joint")
+    whole: Agreement = Field(description="all channels together")
+    links: tuple[Agreement, ...] = Field(description="by link; empty if not measured at joints")
     channels: tuple[Agreement, ...] = Field(description="by joint, leg or axis")
     spectra: tuple[Harmonics, ...] = Field(default=(), description="of currents, by link")
 
 
 class Comparison(_Data):
-    """A measured against a simulated walk, over the same whole walking cycles."""
+    """Comparison of a measured with a simulated walk over the same whole walking cycles."""
 
-    lag: float = Field(description="by which the walk begins later in the measured log [s]")
+    lag: float = Field(description="delay of the walk in the measured log [s]")
     correlation: float = Field(description="of the desired angles at this lag [1]")
     cycles: int = Field(description="walking cycles compared")
     cycle_time: float = Field(description="[s]")
-    samples: int = Field(description="rows compared, 500 a second")
-    repeats: int = Field(description="measurements beside the first, for CONF")
-    synthetic: bool = Field(description="whether the measured log says that it was computed")
+    samples: int = Field(description="rows compared, 500 per second")
+    repeats: int = Field(description="further measurements, for CONF")
+    synthetic: bool = Field(description="whether the measured log was computed, as it says")
     quantities: tuple[QuantityComparison, ...]
 
     def quantity(self, quantity: Quantity) -> QuantityComparison:
@@ -311,18 +263,14 @@ def compare(
     *,
     repeats: Sequence[MeasuredLog] = (),
 ) -> Comparison:
-    """Synchronise two logs and judge all quantities that were measured.
-
-    Args:
-        cycle_time: Of a walking cycle [s].
-    """
+    """Synchronise two logs, and compare all quantities that were measured."""
     pair = synchronise(measured, simulated, cycle_time)
     others = [synchronise(repeat, simulated, cycle_time).measured for repeat in repeats]
     return compare_synchronised(pair, others)
 
 
 def compare_synchronised(pair: Synchronised, repeats: Sequence[MeasuredLog] = ()) -> Comparison:
-    """Judge logs that have been synchronised."""
+    """Compare synchronised logs."""
     return Comparison(
         lag=pair.lag_seconds,
         correlation=pair.correlation,
@@ -340,17 +288,13 @@ def compare_synchronised(pair: Synchronised, repeats: Sequence[MeasuredLog] = ()
 
 
 def columns_of(log: MeasuredLog, quantity: Quantity, channels: Sequence[str]) -> Floats:
-    """Some columns of a log.
-
-    Returns:
-        (T, channels).
-    """
+    """Return some columns of a log, (T, channels)."""
     there = log.channels(quantity)
     return log.values(quantity)[:, [there.index(channel) for channel in channels]]
 
 
 def channels_of_link(log: MeasuredLog, quantity: Quantity, link: int) -> tuple[str, ...]:
-    """Joints at which a quantity of one link was measured."""
+    """Return the joints at which a quantity of one link was measured."""
     return tuple(joint for joint in log.channels(quantity) if log.link_of(joint) == link)
 
 
@@ -360,7 +304,7 @@ def _judge(
     channels = pair.measured.channels(quantity)
 
     def agreement(name: str, chosen: Sequence[str]) -> Agreement:
-        # A repeat need not have the supplementary channels of the first.
+        # Repeats may lack supplementary channels of the first measurement.
         there = [r for r in repeats if set(chosen) <= set(r.channels(quantity))]
         return _agreement(
             name,

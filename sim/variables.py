@@ -1,7 +1,7 @@
-"""What an optimizer may choose, a number or one of several names: its bounds, unit or choices.
+"""Design variables: numbers and choices with bounds and units.
 
-Controllers and gaits declare theirs as data, so the design space of a job, the
-form that asks for one and the check of a design file all read the same list.
+Controllers and gaits declare theirs as data, which a job's design space, the page's form and the
+check of design files all use.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ VariableName = Annotated[
         min_length=1,
         max_length=102,
         pattern=r"^[A-Za-z][A-Za-z0-9_]{0,39}(\[[A-Za-z0-9][A-Za-z0-9 _.-]{0,59}\])?$",
-        description="Name of the variable, as in the tables of the thesis; of a gait variable for"
-        " some of the legs with their group, as `stride[front]`.",
+        description="Name of the variable, as in the tables of the thesis; gait variables of some"
+        " legs include their group, such as `stride[front]`.",
         examples=["FI1R"],
     ),
 ]
@@ -41,13 +41,13 @@ ChoiceName = Annotated[
     str,
     Field(min_length=1, max_length=60, pattern=r"^[A-Za-z][A-Za-z0-9_.-]*$", examples=["stick"]),
 ]
-"""Name of one of a categorical variable's choices."""
+"""Name of a choice of a categorical variable."""
 
 _NUMBER: Final = "<number>"
 
 
 def _number_or_name(value: Any) -> str:
-    """The tag of a value. Text that reads as a number is one."""
+    """Return the tag of a value; numeric text is a number."""
     if not isinstance(value, str):
         return _NUMBER
     try:
@@ -61,11 +61,11 @@ VariableValue = Annotated[
     Annotated[FiniteFloat, Tag(_NUMBER)] | Annotated[ChoiceName, Tag(NAME)],
     Discriminator(_number_or_name),
 ]
-"""A variable's value as people give it: a number, or the name of a categorical one's choice."""
+"""A variable's value in user input: a number, or the name of a choice."""
 
 
 def _with_bounds(schema: dict[str, Any]) -> None:
-    """Every variable that is shown has bounds; that a categorical one may omit them is in words."""
+    """Require bounds in the schema; descriptions say that a categorical variable may omit them."""
     schema["required"] = ["name", "low", "high"]
     for bound in ("low", "high"):
         del schema["properties"][bound]["default"]
@@ -80,34 +80,32 @@ class Variable(BaseModel):
     low: FiniteFloat = Field(
         default=None,
         validate_default=True,
-        description="Lower bound, in `unit`. A categorical variable's is 0, and may be left out.",
+        description="Lower bound, in `unit`; 0 for a categorical variable, which may omit it.",
         examples=[1500.0],
     )
     high: FiniteFloat = Field(
         default=None,
         validate_default=True,
-        description="Upper bound, in `unit`. A categorical variable's is its last index, and may be"
-        " left out.",
+        description="Upper bound, in `unit`; the last index for a categorical variable, which may"
+        " omit it.",
         examples=[6000.0],
     )
     unit: str = Field(default="1", description="Unit of value and bounds.", examples=["counts"])
     kind: Literal["continuous", "integer", "categorical"] = Field(
         default="continuous",
-        description="An `integer` variable is rounded to the nearest integer when it is evaluated."
-        " A `categorical` one is one of `choices`, each with an equal share of the range that is"
-        " searched.",
+        description="An `integer` variable is rounded to the nearest integer for evaluation. A"
+        " `categorical` one is one of `choices`, each with an equal share of the search range.",
     )
     choices: tuple[ChoiceName, ...] = Field(
         default=(),
         max_length=64,
-        description="Of a categorical variable: what it may be. Its number is the choice's index,"
-        " from 0.",
+        description="Choices of a categorical variable. Its number is the index, from 0.",
         examples=[["linear_zone", "karnopp", "stick"]],
     )
     default: FiniteFloat | None = Field(
         default=None,
-        description="Used where a design does not give the variable; null if a design must, or if"
-        " the default depends on something else.",
+        description="Value if a design omits the variable; null if it is required, or if the"
+        " default depends on something else.",
     )
     by_leg_group: bool = Field(
         default=False,
@@ -166,7 +164,7 @@ class Variable(BaseModel):
 
     @property
     def range_in_words(self) -> str:
-        """Bounds and unit, `1500 to 6000 counts`; of a categorical variable its choices."""
+        """Bounds and unit, as in `1500 to 6000 counts`, or choices."""
         if self.kind == "categorical":
             return ", ".join(self.choices)
         whole = "integers, " if self.kind == "integer" else ""
@@ -174,17 +172,16 @@ class Variable(BaseModel):
         return f"{whole}{self.low:g} to {self.high:g}{unit}"
 
     def number(self, value: float | str) -> float:
-        """A value as arrays of designs hold it.
+        """Convert a value to a number in arrays of designs.
 
         Args:
-            value: A number in the variable's unit; of a categorical variable a choice's name, or
-                its index.
+            value: A number in the variable's unit; of a categorical variable a choice or its index.
 
         Returns:
-            The number; of a categorical variable the index of the choice.
+            The number; for a categorical variable the index of the choice.
 
         Raises:
-            ValueError: A name of no choice, or an index of none; names the choices.
+            ValueError: Unknown choice; names the choices.
         """
         if self.kind == "categorical":
             if value in self.choices:
@@ -200,14 +197,7 @@ class Variable(BaseModel):
         return float(value)
 
     def shown(self, number: float) -> float | str:
-        """A number of an array of designs as people read it; the inverse of `number`.
-
-        Args:
-            number: In the variable's unit; of a categorical variable the index of a choice.
-
-        Returns:
-            The choice's name of a categorical variable, else the number.
-        """
+        """Convert a number of a design array to a value: a categorical one's choice, or itself."""
         if self.kind != "categorical" or math.isnan(number):
             return number
         return self.choices[round(number)]
@@ -220,9 +210,9 @@ def split_name(name: str) -> tuple[str, str | None]:
 
 
 class VariableCatalogue(Mapping[str, Variable]):
-    """Variables by name. Those that groups of legs may have are found under `NAME[GROUP]`, too.
+    """Variables by name; those of groups are found as `NAME[GROUP]`, too.
 
-    Iterates over the names without groups. Which groups there are only a robot tells.
+    Iterates over the names without groups, since groups depend on the robot.
     """
 
     def __init__(self, variables: Iterable[Variable]) -> None:
@@ -253,6 +243,6 @@ class VariableCatalogue(Mapping[str, Variable]):
 
 VariableChoice = Annotated[
     Annotated[VariableName, Tag(NAME)] | Annotated[Variable, Tag(OWN)],
-    alternatives("must be a variable's name, or an object: a variable with bounds of your own"),
+    alternatives("must be a variable's name, or an object: a variable with custom bounds"),
 ]
-"""How jobs choose what is searched."""
+"""A variable to be searched, as in jobs."""

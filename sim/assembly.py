@@ -73,7 +73,7 @@ def kernel_of(
     if native is not None:
         return native
     if backend == "native":
-        raise SimulationInputError(f"backend: no native kernel here; {without_compiler()}")
+        raise SimulationInputError(f"backend: no native kernel available; {without_compiler()}")
     if backend == "auto":
         check_precision(robot, precision)
         warnings.warn(

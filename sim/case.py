@@ -173,8 +173,8 @@ class MeasuredWalk(Walk):
     @property
     def objectives(self) -> tuple[Objective, ...]:
         """f1 to f6 of table 4.1, then `MEASUREMENTS`."""
-        told = (Objective(m.name, m.unit, m.description) for m in MEASUREMENTS)
-        return (*OBJECTIVES, *told)
+        measured = (Objective(m.name, m.unit, m.description) for m in MEASUREMENTS)
+        return (*OBJECTIVES, *measured)
 
     def walking(self, designs: NDArray[np.float64]) -> Walking[Outcome]:
         """Prepare the simulation of all designs together with other cases."""

@@ -65,7 +65,7 @@ def create_case(settings: CaseSettings, walk: Walk) -> Case:
     if family.missing:
         needed = " ".join(family.missing)
         raise SimulationInputError(
-            f"{settings.name} needs what is not installed here: pip install {needed}"
+            f"{settings.name} needs packages that are not installed: pip install {needed}"
         )
     case = family.create(settings, walk)
     if case.objectives != OBJECTIVES:

@@ -25,7 +25,7 @@ def require_room_for_scipy() -> None:
         room = mmap.mmap(-1, _NEEDED, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
     except OSError as error:
         raise MemoryError(
-            f"SciPy needs {_NEEDED >> 20} MiB of address space to be loaded, and there is less;"
-            " raise the limit (ulimit -v), or make room"
+            f"SciPy needs {_NEEDED >> 20} MiB of address space, and there is less;"
+            " raise the limit (ulimit -v), or free memory"
         ) from error
     room.close()

@@ -245,19 +245,17 @@ class Registry(MutableMapping[str, T]):
         found = [self.problem(plugin) for plugin in self.plugins() if plugin.name == name]
         reasons = [reason for reason in found if reason is not None]
         if not reasons and nearest(name, known) is None:
-            reasons = [
-                "that of a plug-in is known where its package is installed (gaitswarm plugins)"
-            ]
+            reasons = ["a plug-in's name is known if its package is installed (gaitswarm plugins)"]
         return "; ".join([instead_of(name, known), *reasons])
 
     def _check_name(self, plugin: Plugin) -> None:
         if plugin.name in self._built_in:
-            raise PluginError(f"{plugin} is left out: the name is one of gaitswarm's own")
+            raise PluginError(f"{plugin} is ignored: gaitswarm itself uses the name")
         others = [o for o in self.plugins() if o.name == plugin.name and o != plugin]
         if others:
             # Omit both: which one comes first depends on the order of sys.path.
             named = ", ".join(f"{o.distribution} {o.version}" for o in others)
-            raise PluginError(f"{plugin} is left out: {named} has one of that name, too")
+            raise PluginError(f"{plugin} is ignored: {named} uses the name, too")
 
     def _accepted(self, plugin: Plugin) -> T:
         brought = plugin.load()
@@ -319,7 +317,7 @@ def check_is(plugin: Plugin, brought: object, wanted: type[T]) -> T:
 def check_name(plugin: Plugin, own: object) -> None:
     """Check that an object has the name of its entry point."""
     if own != plugin.name:
-        raise PluginError(f"{plugin} cannot be used: it calls itself {own!r}")
+        raise PluginError(f"{plugin} cannot be used: its own name is {own!r}")
 
 
 class PluginSettings(Generic[T]):
@@ -351,7 +349,7 @@ class PluginSettings(Generic[T]):
             "type": "object",
             "properties": {"name": {"type": "string", "enum": names}},
             "required": ["name"],
-            "description": f"Settings of a plug-in's {self._registry.kind}; {self._seen} has them.",
+            "description": f"Settings of a plug-in's {self._registry.kind}; see {self._seen}.",
         }
         for union in ("oneOf", "anyOf"):
             if union in found:

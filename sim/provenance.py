@@ -85,9 +85,9 @@ class Provenance(BaseModel):
         if now.robot != self.robot:
             found.append(f"the robot {now.robot} instead of {self.robot}")
         elif now.robot_digest != self.robot_digest:
-            found.append(f"the robot {self.robot} has other contents")
+            found.append(f"the robot {self.robot} has changed")
         if now.code_digest != self.code_digest:
-            found.append("other simulation code")
+            found.append("changed simulation code")
         found += version_changes(self.libraries, now.libraries)
         if now.backend != self.backend:
             cause = "no C compiler: " if now.backend == "reference" else ""

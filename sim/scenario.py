@@ -250,7 +250,7 @@ class Scenario(BaseModel):
         default=0.5,
         ge=0.0,
         lt=1.0,
-        description="Share of the walk at which the shove starts, 0.1 s before the end at latest [1].",
+        description="Share of the walk at which the shove starts, 0.1 s before the end at latest.",
     )
 
     @model_validator(mode="before")
@@ -261,12 +261,12 @@ class Scenario(BaseModel):
     @model_validator(mode="after")
     def _gait_is_one(self) -> Scenario:
         if self.phases is not None and self.gait != "own":
-            raise ValueError(f"phases: the gait {self.gait} has its own; leave one of both out")
+            raise ValueError(f"phases: the gait {self.gait} has its own; set one of them only")
         for name, value in (self.by_group or {}).items():
             base, group = split_name(name)
             if base not in BY_LEG_GROUP or group is None:
                 raise ValueError(
-                    f"by_group.{name}: not of a group of legs; those are"
+                    f"by_group.{name}: not a value of leg groups; those are"
                     f" {', '.join(f'{known}[GROUP]' for known in BY_LEG_GROUP)}"
                 )
             try:

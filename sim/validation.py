@@ -125,7 +125,7 @@ def _error(measured: Floats, simulated: Floats) -> Floats:
 
 def _samples(signal: Floats) -> Floats:
     if signal.size == 0:
-        raise SimulationInputError("a signal without samples cannot be judged")
+        raise SimulationInputError("a signal needs at least one sample")
     return signal
 
 

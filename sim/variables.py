@@ -140,7 +140,7 @@ class Variable(BaseModel):
         if not self.low < self.high:
             raise ValueError(
                 f"bounds of {self.name} are inverted or empty: low {self.low:g} must be less than"
-                f" high {self.high:g}; to hold it at one value, name it in `fixed` instead"
+                f" high {self.high:g}; to hold it at one value, use `fixed` instead"
             )
         if self.kind == "integer" and not (self.low.is_integer() and self.high.is_integer()):
             raise ValueError(f"bounds of the integer variable {self.name} must be integers")
@@ -149,16 +149,15 @@ class Variable(BaseModel):
     def _has_choices(self) -> Variable:
         if len(self.choices) < 2:
             raise ValueError(
-                f"choices of {self.name}: two at least; to hold it at one, name it in `fixed`"
-                " instead"
+                f"choices of {self.name}: at least two; to hold it at one, use `fixed` instead"
             )
         for choice in self.choices:
             if self.choices.count(choice) > 1:
-                raise ValueError(f"choices of {self.name}: {choice!r} is named twice")
+                raise ValueError(f"choices of {self.name}: {choice!r} is listed twice")
         if (self.low, self.high) != (0.0, len(self.choices) - 1.0):
             raise ValueError(
                 f"bounds of the categorical variable {self.name} are 0 and {len(self.choices) - 1},"
-                " or left out; to search fewer choices, name those in `choices`"
+                " or left out; to search fewer choices, shorten `choices`"
             )
         return self
 
@@ -190,7 +189,7 @@ class Variable(BaseModel):
                 return float(value)
             shown = repr(value) if isinstance(value, str) else f"{value:g}"
             raise ValueError(
-                f"{self.name}: {shown} is none of its choices {', '.join(self.choices)}"
+                f"{self.name}: {shown} is not one of its choices {', '.join(self.choices)}"
             )
         if isinstance(value, str):
             raise ValueError(f"{self.name}: {value!r} is not a number")  # noqa: TRY004

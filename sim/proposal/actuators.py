@@ -25,8 +25,8 @@ _LARGEST_CODE: Final = 26000.0
 
 ACTUATOR_NOTES: Final[Mapping[ActuatorKind, str]] = MappingProxyType(
     {
-        "dc": "actuators are DC motors with gearheads; choose actuator torque for others",
-        "torque": "actuators are torque-controlled; choose actuator dc for DC motors",
+        "dc": "actuators are assumed to be DC motors with gearheads; else choose actuator torque",
+        "torque": "actuators are assumed to be torque-controlled; choose actuator dc for DC motors",
     }
 )
 

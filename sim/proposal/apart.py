@@ -58,8 +58,8 @@ def propose_apart(
         )
     except ProcessEnded as error:
         raise RobotFileError(
-            f"robot.urdf: no robot.toml can be proposed: that {error}; write one by hand, as"
-            " docs/robots.md says"
+            f"robot.urdf: cannot propose a robot.toml: this {error}; write one by hand, as"
+            " docs/robots.md explains"
         ) from error
     except SimulationInputError as error:
         raise RobotFileError(str(error)) from error

@@ -56,7 +56,7 @@ def stood_up(urdf: str, frame: Frame, bounds: MeshBounds) -> tuple[str, FoundLeg
     if abs(level) <= _LEVEL * max(sum(leg.lengths) for leg in legs):
         return text, _at_their_lowest(text, found), []
     side = "above" if level > 0.0 else "below"
-    note = f"the body's frame is {abs(level):g} m {side} that of {root!r}, as high as the hips"
+    note = f"the body's frame is {abs(level):g} m {side} that of {root!r}, level with the hips"
     text = turned(urdf, root, [root, *others], frame, level)
     return text, _at_their_lowest(text, found), [note]
 
@@ -104,14 +104,14 @@ _PART: Final = re.compile(r"[_\-. ]")
 """Separators in names."""
 
 _TWO_LEGS: Final = (
-    "two legs on point feet do not stand by themselves, and controllers here hold joints, not"
-    " balance: expect it to fall"
+    "two legs with point feet do not balance by themselves, and controllers hold joints, not"
+    " balance: expect falls"
 )
 
-_ELSE: Final = "battery, rotors, sensors, ground and load are guessed as robot.toml says"
+_ELSE: Final = "battery, rotors, sensors, ground and load are guesses, explained in robot.toml"
 
 _SIDEWAYS: Final = (
-    "warning: it faces y, it seems, and would walk sideways: name the axis that points ahead as"
+    "warning: it seems to face y and would walk sideways: set the axis that points ahead as"
     " `forward` (`--forward=y` or `--forward=-y`), or x if it does"
 )
 

@@ -111,11 +111,11 @@ def _drive(joint: Joint, need: float, armature: float) -> DriveNumbers:
     fast = _SLOWEST <= joint.velocity <= _FASTEST
     speed = joint.velocity if fast else _GUESSED_SPEED
     sources = [
-        "torque of the URDF's effort"
+        "torque from the URDF's effort"
         if given
-        else f"torque guessed, {_GUESSED_TORQUE:g} times what standing takes"
+        else f"torque guessed, {_GUESSED_TORQUE:g} times the torque to stand"
         + (f" (the URDF's {joint.effort:g} N m is not plausible)" if joint.effort else ""),
-        "speed of its velocity" if fast else "speed guessed",
+        "speed from its velocity" if fast else "speed guessed",
     ]
     numbers = _short(torque), _short(speed), _short(armature)
     return DriveNumbers(*numbers, "; ".join(sources), believed=given and fast)

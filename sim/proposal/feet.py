@@ -71,13 +71,13 @@ def end_of(urdf: Urdf, link: str, bounds: MeshBounds = no_meshes) -> LegEnd:
 
 def _without_foot(urdf: Urdf, link: str, parts: Iterable[str]) -> str:
     meshes = [mesh.name for part in parts for mesh in visual_meshes(urdf.links[part], {})]
-    lost = f", and no mesh {meshes[0]!r} is found (`--package-path`)" if meshes else ""
+    lost = f", and its mesh {meshes[0]!r} was not found (`--package-path`)" if meshes else ""
     foot = f"{link}_foot"
     joint = fixed_joint(f"{foot}_fixed", link, foot, "0 0 -0.2")
     example = "".join([f"<link name={quoteattr(foot)}/>", *map(str.strip, joint)])
     return (
-        f"robot.urdf: link {link!r} has no foot{lost}: add a link at its end, joined by a fixed"
-        f" joint with its place in the frame of {link!r} [m]: {example}"
+        f"robot.urdf: link {link!r} has no foot{lost}: add a link at its end with a fixed"
+        f" joint at its position in the frame of {link!r} [m]: {example}"
     )
 
 

@@ -78,10 +78,14 @@ def check_upright(urdf: Urdf, hips: Floats, feet: Floats) -> None:
         return
     axis = 2 if level else across
     seen = ("" if mean[axis] < 0.0 else "-") + "xyz"[axis]
-    why = "feet reach above the hips" if level else f"hips lie in a plane across {'xyz'[axis]}"
+    why = (
+        "feet reach above the hips"
+        if level
+        else f"the hips' plane is perpendicular to {'xyz'[axis]}"
+    )
     raise RobotFileError(
-        f"robot.urdf: link {next(iter(urdf.links))!r}: {seen} points up in its frame, it seems, as"
-        f" {why}; z must: name the axis that does as `up` (`--up={seen}`), or z if it does"
+        f"robot.urdf: link {next(iter(urdf.links))!r}: {seen} seems to point up in its frame, as"
+        f" {why}; set `up` to the axis that does (`--up={seen}`), or to z"
     )
 
 

@@ -92,8 +92,8 @@ def _no_room(robot: Robot, refused: UnreachablePose | BeyondJointLimit | None) -
     else:
         joint, mend = leg.joints[0], "the limits and lengths of the leg that it begins"
     return (
-        f"robot.urdf: joint {joint!r}: legs stand, but have no room for steps around their stance,"
-        f" not even of a quarter of the usual length: {refused.reason if refused else ''}; look at"
+        f"robot.urdf: joint {joint!r}: legs cannot step around their stance,"
+        f" not even with a quarter of the usual length: {refused.reason if refused else ''}; check"
         f" {mend}"
     )
 
@@ -112,6 +112,6 @@ def walk_of_robot(values: Mapping[str, Any], file: str) -> Scenario:
                 f" {first['msg'].removeprefix('Input ')}"
             )
         raise RobotFileError(
-            f"{file}: {said}; lengths are metres: look at those of the legs, at the stance and at"
+            f"{file}: {said}; lengths are in metres: check those of the legs, the stance and"
             " contact.sole"
         ) from error

@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 _ALIKE: Final = 0.01
 """Tolerance of equal distances, relative to the chain's length."""
 
-_BY_HAND: Final = "or write robot.toml by hand, as docs/robots.md says, if it is no leg"
+_BY_HAND: Final = "or write robot.toml by hand, as docs/robots.md explains, if it is no leg"
 
 
 def check_look_alikes(urdf: Urdf, legs: Sequence[str]) -> None:
@@ -69,15 +69,15 @@ def _difference(path: Sequence[Joint], leg: Sequence[Joint]) -> str:
     for joint, its in zip(path, leg, strict=True):
         if joint.kind != its.kind and not (joint.kind in TURNS and its.kind in TURNS):
             return (
-                f"robot.urdf: joint {joint.name!r} is {joint.kind}, but its chain is built as the"
-                f" leg of joint {first.name!r}, where {its.name!r} is {its.kind}: make it so,"
+                f"robot.urdf: joint {joint.name!r} is {joint.kind}, but its chain is built like the"
+                f" leg of joint {first.name!r}, where {its.name!r} is {its.kind}: change it,"
                 f" {_BY_HAND}"
             )
     own = next(joint for joint in path if not joint.fixed)
     return (
-        f"robot.urdf: joint {own.name!r} begins a chain that is built as the leg of joint"
-        f" {first.name!r}, but has other joints beyond that or does not reach as far down within"
-        f" its limits; look at these, and at how it is turned, {_BY_HAND}"
+        f"robot.urdf: joint {own.name!r} begins a chain that is built like the leg of joint"
+        f" {first.name!r}, but has more joints or does not reach as far down within"
+        f" its limits; check these and its orientation, {_BY_HAND}"
     )
 
 
@@ -133,7 +133,7 @@ def find_legs(urdf: Urdf, *, upright: bool = False, bounds: MeshBounds = no_mesh
     if len(legs) < 2:
         raise RobotFileError(
             "robot.urdf: fewer than two chains of three joints reach below the body; z must point"
-            " up in the frame of its first link, or `up` name the axis that does (`--up=y`)"
+            " up in the frame of its first link, or set `up` to the axis that does"
         )
     check_look_alikes(urdf, [leg.link for leg in legs])
     owned = {name for leg in legs for name in leg.joints}
@@ -210,15 +210,15 @@ def _is_candidate(chain: Sequence[Joint]) -> bool:
 
 def _why_none(urdf: Urdf, chains: Sequence[Sequence[Joint]]) -> str:
     if not chains:
-        return "robot.urdf: no joint of it moves; legs have three joints that turn"
+        return "robot.urdf: it has no movable joint; legs need three revolute joints"
     counts = sorted({len(chain) for chain in chains})
     kinds = sorted({j.kind for chain in chains for j in chain} - TURNS)
     found = f"{len(chains)} chain{'s' * (len(chains) > 1)} of {', '.join(map(str, counts))} joints"
     if kinds:
         found += f", some of them {', '.join(kinds)}"
     return (
-        f"robot.urdf: legs of three joints that turn are what can be simulated, but on"
-        f" {next(iter(urdf.links))!r} hang {found}"
+        f"robot.urdf: legs need three revolute joints, but"
+        f" {next(iter(urdf.links))!r} carries {found}"
     )
 
 

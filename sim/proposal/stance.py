@@ -75,9 +75,9 @@ def _best(leg: ChainLeg, angles: Floats, feet: Floats, ground: float, height: fl
     near = np.abs(feet[:, 2] - ground) < _BAND * height
     if not near.any():
         raise RobotFileError(
-            f"robot.urdf: joint {leg.name!r} begins a leg whose foot cannot be put on one level"
+            f"robot.urdf: joint {leg.name!r} begins a leg whose foot cannot be level"
             f" with the others: its joint limits keep it from {height:.3f} m below the highest hip,"
-            " three quarters of what all legs reach; look at these, and at where it is mounted"
+            " three quarters of all legs' reach; check these and where it is mounted"
         )
     angles = angles[near]
     feet, slopes = leg.feet(angles)

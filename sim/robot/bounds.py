@@ -70,13 +70,13 @@ backtrack, so that no character is read twice."""
 
 def _in_size(value: float) -> float:
     if value != 0.0 and not SMALLEST <= abs(value) <= LARGEST:
-        raise ValueError(f"must be 0 or from {SMALLEST:g} to {LARGEST:g} in size")
+        raise ValueError(f"must be 0, or from {SMALLEST:g} to {LARGEST:g} in magnitude")
     return value
 
 
 def _printable(name: str) -> str:
     if not name.isprintable():
-        raise ValueError("must be of printable characters")
+        raise ValueError("must contain only printable characters")
     return name
 
 
@@ -118,7 +118,7 @@ def check_urdf(text: str) -> None:
     """Check the size of a robot.urdf, and that it declares no document type, hence no entities."""
     _check_text("robot.urdf", text, LONGEST_URDF)
     if not text.strip():
-        raise RobotFileError("robot.urdf: is empty; it must hold the URDF of a robot")
+        raise RobotFileError("robot.urdf: is empty; it must contain the URDF of a robot")
     parser = expat.ParserCreate()
     scan = _UrdfScan(parser)
     parser.StartElementHandler = scan.start
@@ -158,7 +158,7 @@ class _UrdfScan:
                     f"{shortened(name)} of <{shortened(tag)}> is longer than {longest} characters"
                 )
         if not attributes.get("name", "").isprintable():
-            raise self._error(f"name of <{shortened(tag)}> must be of printable characters")
+            raise self._error(f"name of <{shortened(tag)}> must contain only printable characters")
         if self._depth == 2 and tag in self._parts:
             self._parts[tag] += 1
             if self._parts[tag] > MOST_LINKS:
@@ -168,7 +168,7 @@ class _UrdfScan:
         self._depth -= 1
 
     def doctype(self, *_: object) -> None:
-        raise self._error("declares a document type; a URDF needs none, leave it out")
+        raise self._error("declares a document type, which a URDF must not; remove <!DOCTYPE>")
 
     def _error(self, problem: str) -> RobotFileError:
         return RobotFileError(f"robot.urdf, line {self._parser.CurrentLineNumber}: {problem}")
@@ -185,4 +185,6 @@ def _check_text(file: str, text: str, longest: int) -> None:
     try:
         text.encode()
     except UnicodeEncodeError as error:
-        raise RobotFileError(f"{file}: character {error.start} is no Unicode character") from error
+        raise RobotFileError(
+            f"{file}: character {error.start} is not a valid Unicode character"
+        ) from error

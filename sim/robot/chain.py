@@ -57,14 +57,14 @@ def chain_of(urdf: Urdf, leg: Leg) -> Chain:
             )
         if joint.kind != "revolute":
             raise RobotFileError(
-                f"robot.urdf: joint {name!r} of leg {leg.name!r} is not revolute but"
-                f" {joint.kind}; a leg has three joints that turn"
+                f"robot.urdf: joint {name!r} of leg {leg.name!r} is {joint.kind},"
+                " not revolute; a leg needs three revolute joints"
             )
         if joint.follows is not None:
             raise RobotFileError(
-                f"robot.urdf: joint {name!r} of a leg follows the joint {joint.follows!r}"
-                f" (<mimic>), but here each joint of a leg has an actuator of its own: take <mimic>"
-                " out if it has; legs with coupled joints cannot be simulated"
+                f"robot.urdf: joint {name!r} of a leg mimics joint {joint.follows!r}"
+                f" (<mimic>), but legs with coupled joints cannot be simulated; remove <mimic> if"
+                " the joint has an actuator of its own"
             )
         parent = urdf.place(joint.parent)
         if parent.body != before:
@@ -113,8 +113,8 @@ def _check_limits(joint: Joint) -> None:
     if any(MOST_TURNED < abs(limit) <= _MOST_DEGREES for limit in joint.limits):
         lower, upper = joint.limits
         raise RobotFileError(
-            f"robot.urdf: joint {joint.name!r}: its limits of {lower:g} and {upper:g} are degrees,"
-            " it seems; a URDF has radians: 45 degrees are 0.7854. A joint without ends is of"
+            f"robot.urdf: joint {joint.name!r}: its limits {lower:g} and {upper:g} seem to be"
+            " in degrees; a URDF uses radians (45 degrees are 0.7854); a joint without limits has"
             ' type="continuous"'
         )
 
@@ -125,7 +125,7 @@ def check_owners(legs: tuple[Leg, ...]) -> None:
     twice = sorted({name for name in owned if owned.count(name) > 1})
     if twice:
         raise RobotFileError(
-            f"robot.toml: joint {twice[0]!r} belongs to more than one leg; name it in one"
+            f"robot.toml: joint {twice[0]!r} belongs to more than one leg; list it in one"
         )
 
 
@@ -137,6 +137,6 @@ def check_joints(urdf: Urdf, legs: tuple[Leg, ...]) -> None:
         more = f" and {len(others) - _NAMED} more" if len(others) > _NAMED else ""
         raise RobotFileError(
             "robot.urdf: these movable joints belong to no leg:"
-            f" {', '.join(map(repr, others[:_NAMED]))}{more}; name them under [held_joints] of"
+            f" {', '.join(map(repr, others[:_NAMED]))}{more}; list them under [held_joints] of"
             " robot.toml, each with the angle [rad] at which it is held"
         )

@@ -253,7 +253,7 @@ class RobotDescription(Data):
             if unknown:
                 raise ValueError(f"leg_groups.{group}: no leg {unknown[0]!r} is described")
             if not members or len(set(members)) < len(members):
-                raise ValueError(f"leg_groups.{group}: name one leg at least, and none twice")
+                raise ValueError(f"leg_groups.{group}: name at least one leg, and each leg once")
         return self
 
     @model_validator(mode="after")
@@ -261,27 +261,27 @@ class RobotDescription(Data):
         kinds = {self.actuators[name].kind: name for leg in self.legs for name in leg.actuators}
         if len(kinds) > 1:
             raise ValueError(
-                f"actuators: {kinds['dc']!r} is of the kind dc and {kinds['torque']!r} of the kind"
-                " torque; a robot's legs have actuators of one kind"
+                f"actuators: {kinds['dc']!r} is of kind dc and {kinds['torque']!r} of kind"
+                " torque; all legs must have actuators of one kind"
             )
         if self.actuator_kind == "torque":
-            _refuse(self.pwm is not None, "pwm", "is for DC motors; torque_command has its place")
+            _refuse(self.pwm is not None, "pwm", "applies to DC motors only; use torque_command")
             _refuse(
                 self.supply.nominal_voltage is not None,
                 "supply.nominal_voltage",
-                "is what the PWM of DC motors is given at; leave it out with torque actuators",
+                "applies to the PWM of DC motors only; remove it",
             )
         else:
-            _refuse(self.pwm is None, "pwm", "missing; DC motors need it")
+            _refuse(self.pwm is None, "pwm", "required for DC motors")
             _refuse(
                 self.supply.nominal_voltage is None,
                 "supply.nominal_voltage",
-                "missing; DC motors need it",
+                "required for DC motors",
             )
             _refuse(
                 self.torque_command is not None,
                 "torque_command",
-                'is for actuators of kind = "torque"',
+                'applies to actuators of kind = "torque" only',
             )
         return self
 

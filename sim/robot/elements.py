@@ -54,8 +54,8 @@ def origin_of(element: ET.Element, whose: str) -> Origin:
     xyz, rpy = (numbers_of(origin, name, whose, "0 0 0") for name in ("xyz", "rpy"))
     if (np.abs(rpy) > MOST_TURNED).any():
         raise RobotFileError(
-            f"robot.urdf: {whose}: rpy={shortened(origin.get('rpy', ''))!r} of <origin> are"
-            " degrees, it seems; a URDF has radians: 90 degrees are 1.5708"
+            f"robot.urdf: {whose}: rpy={shortened(origin.get('rpy', ''))!r} of <origin> seems to be"
+            " in degrees; a URDF uses radians: 90 degrees are 1.5708"
         )
     return Origin(xyz, rpy)
 

@@ -56,10 +56,12 @@ def joint_of(element: ET.Element) -> Joint:
     length = math.hypot(*axis.tolist())
     kind = element.get("type", "")
     if length == 0.0 and kind != "fixed":
-        raise RobotFileError(f"robot.urdf: {whose}: its axis needs a direction, as 0 1 0")
+        raise RobotFileError(
+            f"robot.urdf: {whose}: its axis must not be zero; use 0 1 0, for example"
+        )
     if kind and kind not in _KINDS:
         raise RobotFileError(
-            f"robot.urdf: {whose}: type={shortened(kind)!r} of <joint> is none of"
+            f"robot.urdf: {whose}: type={shortened(kind)!r} of <joint> must be one of"
             f" {', '.join(_KINDS)}"
         )
     origin = origin_of(element, whose)
@@ -109,7 +111,7 @@ def standardise(root: ET.Element, held: Mapping[str, float]) -> bool:
         changed = True
     if missing:
         raise RobotFileError(
-            f"robot.toml: held_joints: robot.urdf has no joint {min(missing)!r}; take it out"
+            f"robot.toml: held_joints: robot.urdf has no joint {min(missing)!r}; remove it"
         )
     return changed
 
@@ -172,8 +174,8 @@ def _check_limit(limit: ET.Element | None, joint: str) -> None:
     if missing:
         raise RobotFileError(
             f"robot.urdf: joint {joint!r} has no <limit> with {' and '.join(missing)}, which URDF"
-            ' asks for: <limit lower="-1" upper="1" effort="10" velocity="10"/> [rad, N m, rad/s];'
-            ' a joint without ends is of type="continuous"'
+            ' requires: <limit lower="-1" upper="1" effort="10" velocity="10"/> [rad, N m, rad/s];'
+            ' a joint without limits has type="continuous"'
         )
 
 
@@ -186,6 +188,6 @@ def _limits(limit: ET.Element | None, kind: str, whose: str) -> tuple[float, flo
     if lower > upper:
         raise RobotFileError(
             f"robot.urdf: {whose}: its lower limit {lower:g} lies above the upper one {upper:g};"
-            " exchange them"
+            " swap them"
         )
     return lower, upper

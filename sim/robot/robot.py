@@ -363,7 +363,7 @@ def _kinematics(leg: Leg, urdf: Urdf) -> LegKinematics:
     for name, place in zip(leg.joints, places, strict=True):
         if (place.rotation != np.eye(3)).any():
             raise RobotFileError(
-                f"robot.urdf: joint {name!r}: its frame is turned against the body's; give leg"
+                f"robot.urdf: joint {name!r}: its frame is rotated against the body's; give leg"
                 f" {leg.name!r} of robot.toml a stance, the angles at which it stands"
             )
     x, y, z = places[0].offset.tolist()
@@ -436,8 +436,8 @@ def values_by_leg(robot: Robot, values: Mapping[str, float], parameter: str) -> 
             size, other = found.setdefault(leg, (len(group), name))
             if size == len(group) and other != name:
                 raise SimulationInputError(
-                    f"{parameter}[{name}]: leg {robot.legs[leg].name!r} is in {other!r}, too, and"
-                    " both are of one size; give the leg a value of its own, or name a smaller"
+                    f"{parameter}[{name}]: leg {robot.legs[leg].name!r} is also in {other!r},"
+                    " of the same size; set a value for the leg, or for a smaller"
                     " group"
                 )
     return {leg: values[name] for leg, (_, name) in found.items()}

@@ -104,7 +104,7 @@ class Urdf:
         carried = {joint.name: joint.child for joint in self.joints if joint.fixed}
         link = name if name in self.places else carried.get(name)
         if link is None:
-            raise RobotFileError(f"robot.urdf: there is no link or fixed joint {name!r}")
+            raise RobotFileError(f"robot.urdf: no link or fixed joint {name!r}")
         return self.places[link]
 
     @property
@@ -131,7 +131,7 @@ def _parsed(text: str, held: Mapping[str, float]) -> Urdf:
     root = ET.fromstring(text)  # noqa: S314 - it has no entities of its own
     if root.tag != "robot":
         raise RobotFileError(
-            f"robot.urdf: its root is <{shortened(root.tag)}>, but a URDF's is <robot>;"
+            f"robot.urdf: its root element is <{shortened(root.tag)}>, not <robot>;"
             " convert SDF, MJCF or another format to URDF first"
         )
     if standardise(root, held):
@@ -140,25 +140,25 @@ def _parsed(text: str, held: Mapping[str, float]) -> Urdf:
     for element in root.findall("joint"):
         joint = joint_of(element)
         if joint.name in joints:
-            raise RobotFileError(f"robot.urdf: joint {joint.name!r} is there twice; rename one")
+            raise RobotFileError(f"robot.urdf: joint {joint.name!r} is defined twice; rename one")
         joints[joint.name] = joint
     links: dict[str, Link] = {}
     for element in root.findall("link"):
         name = element.get("name", "")
         if name in links:
-            raise RobotFileError(f"robot.urdf: link {name!r} is there twice; rename one")
+            raise RobotFileError(f"robot.urdf: link {name!r} is defined twice; rename one")
         links[name] = Link(name, _inertia(element, f"link {name!r}"), element)
     if not links:
         raise RobotFileError(
-            "robot.urdf: there is no <link> in it; of a xacro file, make a URDF first"
+            "robot.urdf: it has no <link>; convert a xacro file to a URDF first"
             " (`xacro FILE.xacro > FILE.urdf`)"
         )
     in_order = {name: links[name] for name in _from_the_body(links, list(joints.values()))}
     bodies, places = _rigid_bodies(in_order, list(joints.values()))
     if not any(body.mass for body in bodies.values()):
         raise RobotFileError(
-            f"robot.urdf: link {next(iter(in_order))!r} and all that hangs on it have no mass; give"
-            " links an <inertial> with <mass> [kg] and <inertia> [kg m2]"
+            f"robot.urdf: link {next(iter(in_order))!r} and everything attached to it have no mass;"
+            " give links an <inertial> with <mass> [kg] and <inertia> [kg m2]"
         )
     return Urdf(text, in_order, tuple(joints.values()), bodies, places)
 
@@ -171,23 +171,23 @@ def _from_the_body(links: Mapping[str, Link], joints: Sequence[Joint]) -> Iterat
         for end in (joint.parent, joint.child):
             if end not in links:
                 raise RobotFileError(
-                    f"robot.urdf: joint {joint.name!r} joins a link {end!r} that is not there;"
-                    " add the link, or name another one as <parent> and <child>"
+                    f"robot.urdf: joint {joint.name!r} refers to a missing link {end!r};"
+                    " add the link, or correct <parent> or <child>"
                 )
         if joint.child in carried:
             raise RobotFileError(
-                f"robot.urdf: joint {joint.name!r} carries the link {joint.child!r}, which another"
-                " joint carries already; a URDF is a tree, so cut a closed loop open at one joint"
+                f"robot.urdf: joint {joint.name!r} carries link {joint.child!r}, which another"
+                " joint already carries; a URDF is a tree: open closed loops at one joint"
             )
         carried.add(joint.child)
         children[joint.parent].append(joint.child)
     generation = [name for name in links if name not in carried]
     if len(generation) != 1:
         raise RobotFileError(
-            "robot.urdf: one link, the body, must hang on no joint; these do:"
+            "robot.urdf: exactly one link, the body, must have no parent joint; found:"
             f" {', '.join(map(repr, generation[:5])) or 'none'}"
             + (f" and {len(generation) - 5} more" if len(generation) > 5 else "")
-            + "; a URDF is one tree: join the others to it, cut a closed loop open"
+            + "; a URDF is one tree: attach the others to it, and open closed loops"
         )
     place = {name: k for k, name in enumerate(links)}
     left = set(links)
@@ -199,8 +199,8 @@ def _from_the_body(links: Mapping[str, Link], joints: Sequence[Joint]) -> Iterat
         )
     if left:
         raise RobotFileError(
-            f"robot.urdf: link {min(left)!r} hangs on no body: its joints are a closed loop; a URDF"
-            " is a tree, so cut it open at one joint"
+            f"robot.urdf: link {min(left)!r} is not attached to the body: its joints form a closed"
+            " loop; a URDF is a tree: open the loop at one joint"
         )
 
 
@@ -246,7 +246,7 @@ def _inertia(link: ET.Element, whose: str) -> BodyInertia:
     rotational = product(product(turn, about_own_axes), turn.T)
     kilograms = float(numbers_of(mass, "value", whose)[0])
     if kilograms < 0.0:
-        raise RobotFileError(f"robot.urdf: {whose}: a mass must not be less than 0 [kg]")
+        raise RobotFileError(f"robot.urdf: {whose}: <mass> must not be negative [kg]")
     return BodyInertia(kilograms, origin.xyz, rotational)
 
 
@@ -270,8 +270,8 @@ def unphysical(urdf: Urdf, text: str) -> Iterator[str]:
     for name, body in urdf.bodies.items():
         if body.mass == 0.0:
             said = (
-                f"link {name!r} and what is fixed to it have no mass: give it an <inertial>, or"
-                " joints beyond it are moved by nothing but their rotors' inertia"
+                f"link {name!r} and the links fixed to it have no mass: give it an <inertial>, or"
+                " only the rotors' inertia resists its joints"
             )
             yield with_line(text, f"robot.urdf: {said}")
             continue
@@ -282,8 +282,8 @@ def unphysical(urdf: Urdf, text: str) -> Iterator[str]:
         for link, inertia in (wrong or {name: body}).items():
             moments = ", ".join(f"{moment:.3g}" for moment in _moments(inertia))
             said = (
-                f"link {link!r}: no body of {inertia.mass:g} kg has the principal moments {moments}"
-                " kg m2: all must be above 0, and none larger than both others together; look at"
+                f"link {link!r}: a body of {inertia.mass:g} kg cannot have the principal moments"
+                f" {moments} kg m2: each must be positive and at most the sum of the others; check"
                 " its <inertia>"
             )
             yield with_line(text, f"robot.urdf: {said}")

@@ -110,36 +110,36 @@ class RobotVariant(BaseModel):
     name: RobotName = Field(default=DEFAULT_ROBOT, description="Robot to start from.")
     contact_law: ContactLaw | None = Field(
         default=None,
-        description="How soles rub: linear_zone, karnopp, stick or dead_zone; null is the robot's"
-        " own law.",
+        description="Friction law of the soles: linear_zone, karnopp, stick or dead_zone; null is"
+        " the robot's own law.",
     )
     backlash: Degrees = Field(
         default=(0.0, 0.0, 0.0),
-        description="Play between gearhead and link of coxa, femur and tibia, end to end [deg];"
-        " measured at 2 to 3 on the robot. Simulated at 40 kHz, so eight times as slow.",
+        description="Backlash between gearhead and link of coxa, femur and tibia, end to end [deg];"
+        " measured at 2 to 3 on the robot. Simulated at 40 kHz, so eight times slower.",
         examples=[(2.5, 1.0, 1.0)],
     )
     planned_soles: PlannedSoles | None = Field(
         default=None,
-        description="Soles that the gait is planned for: nominal, all as the datasheet has them, or"
-        " own, each leg's; null is the robot's own choice, nominal.",
+        description="Sole lengths that the gait assumes: nominal, as in the datasheet for all legs,"
+        " or own, each leg's; null is the robot's default, nominal.",
     )
 
 
 class RobotFiles(BaseModel):
-    """A robot of one's own: the text of its two files, as those in sim/robot/szabadka2."""
+    """A custom robot: the text of its two files, like those in sim/robot/szabadka2."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     toml: str = Field(
         max_length=LONGEST_TOML,
-        description=f"robot.toml: legs ({MOST_LEGS} at most), actuators, contact, supply;"
-        f" {MOST_VALUES} values at most, nested {DEEPEST} deep at most.",
+        description=f"robot.toml: legs (at most {MOST_LEGS}), actuators, contact, supply;"
+        f" at most {MOST_VALUES} values, nested at most {DEEPEST} deep.",
     )
     urdf: str = Field(
         max_length=LONGEST_URDF,
-        description=f"robot.urdf: kinematic tree and inertias; {MOST_LINKS} links and as many"
-        f" joints at most, {MOST_ELEMENTS} elements at most, no document type.",
+        description=f"robot.urdf: kinematic tree and inertias; at most {MOST_LINKS} links and as"
+        f" many joints, at most {MOST_ELEMENTS} elements, no document type.",
     )
 
     @model_validator(mode="after")
@@ -167,8 +167,7 @@ RobotSource = Annotated[
     | Annotated[RobotVariant, Tag(_VARIANT)]
     | Annotated[RobotFiles, Tag(_FILES)],
     alternatives(
-        "must be a robot's name, or an object: a variant of it, or the text of the files of your"
-        " own",
+        "must be a robot's name, or an object: a variant of a robot, or the text of your files",
         among_own=_variant_or_files,
     ),
 ]

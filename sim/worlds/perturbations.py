@@ -73,7 +73,11 @@ _TABLE: Final = (
         (0.01, 100.0),
     ),
     _perturbation(
-        "load_added", (0.0, 0.5), "kg", "Load beside the scenario's (assumed).", limits=(0.0, 50.0)
+        "load_added",
+        (0.0, 0.5),
+        "kg",
+        "Load in addition to the scenario's (assumed).",
+        limits=(0.0, 50.0),
     ),
     _perturbation(
         "load_ahead",
@@ -229,7 +233,7 @@ def check_worlds(variables: Sequence[str], worlds: Floats) -> None:
     """Reject worlds (n, len(variables)) that cannot be simulated."""
     for name in variables:
         if name not in LIMITS:
-            raise SimulationInputError(f"{name}: no perturbation; {instead_of(name, LIMITS)}")
+            raise SimulationInputError(f"{name}: unknown perturbation; {instead_of(name, LIMITS)}")
     if worlds.ndim != 2 or worlds.shape[1] != len(variables):
         raise SimulationInputError(
             f"worlds: shape {worlds.shape} does not match {len(variables)} perturbations"
@@ -243,7 +247,7 @@ def check_worlds(variables: Sequence[str], worlds: Floats) -> None:
             )
         broken = column != np.rint(column)
         if name in _WHOLE and broken.any():
-            raise SimulationInputError(f"{name}: {_first(broken, column)} is no whole number")
+            raise SimulationInputError(f"{name}: {_first(broken, column)} is not a whole number")
 
 
 def _first(wrong: NDArray[np.bool_], column: Floats) -> str:

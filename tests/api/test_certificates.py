@@ -82,7 +82,7 @@ def test_a_world_is_looked_at_by_its_values(client: httpx2.Client, store: SqlSto
 @pytest.mark.parametrize(
     ("world", "field", "words"),
     [
-        ({"gravity": 3.0}, "world", "gravity: no perturbation; known are friction_factor"),
+        ({"gravity": 3.0}, "world", "gravity: unknown perturbation; known are friction_factor"),
         ({"friction_factor": -1.0}, "world", "friction_factor: -1 must lie in 0 to 100"),
     ],
 )

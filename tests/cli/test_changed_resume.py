@@ -74,8 +74,8 @@ def history(job: Finished, gaitswarm: Gaitswarm) -> Any:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (other_kernel_code, "other simulation code"),
-        (another_robot_file, f"the robot {DEFAULT_ROBOT} has other contents"),
+        (other_kernel_code, "changed simulation code"),
+        (another_robot_file, f"the robot {DEFAULT_ROBOT} has changed"),
         (no_compiler, "no C compiler: backend reference instead of native"),
     ],
 )

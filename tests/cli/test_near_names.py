@@ -61,7 +61,7 @@ def test_in_a_spec(gaitswarm: Gaitswarm, write_json: WriteJson, spec: Any, said:
         ),
         (
             ("simulate", "--design", "published:A", "--world", '{"friction_facto": 1}'),
-            "world.friction_facto: no perturbation; did you mean 'friction_factor'?",
+            "world.friction_facto: unknown perturbation; did you mean 'friction_factor'?",
         ),
         (("compare", "fuzzy-pi3"), "drive: unknown 'fuzzy-pi3'; did you mean 'fuzzy-pi-3'?"),
         (("gaits", "crwl"), "gait: unknown gait 'crwl'; did you mean 'crawl'?"),

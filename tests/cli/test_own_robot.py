@@ -135,4 +135,4 @@ def test_a_leg_joint_with_a_turned_frame_is_named(
     turned = '<origin rpy="0 0 0.5" xyz='
     folder = edited(tmp_path, "robot.urdf", "<origin xyz=", turned)
     assert run([*SIMULATE, "--robot", str(folder), "--scenario", CRAWL]) == 2
-    assert "its frame is turned against the body's; give leg" in capsys.readouterr().err
+    assert "its frame is rotated against the body's; give leg" in capsys.readouterr().err

@@ -227,7 +227,7 @@ def test_a_design_walks_in_a_world_that_a_certificate_names(
     ("world", "said"),
     [
         ('{"friction_factor": 200}', "world.friction_factor: 200 must lie in 0 to 100"),
-        ('{"gravity": 3}', "world.gravity: no perturbation; known are friction_factor"),
+        ('{"gravity": 3}', "world.gravity: unknown perturbation; known are friction_factor"),
         ("{", "world: is not valid JSON"),
         ("nowhere.json", "world: cannot read nowhere.json"),
     ],

@@ -202,7 +202,7 @@ def test_other_code_is_reported_and_equal_bits_verify_all_the_same(
     monkeypatch.setattr("gaitswarm.evidence.verify.job_provenance", other)
     found = gaitswarm.verify(proved.content, replay=2, seed=1)
     assert found.verified
-    assert found.provenance[0] == "from iteration 0 on: other simulation code"
+    assert found.provenance[0] == "from iteration 0 on: changed simulation code"
     assert "physics and control loop are the same" in found.provenance[1]
 
 

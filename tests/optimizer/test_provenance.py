@@ -51,8 +51,8 @@ def simulated(**fields: object) -> JobProvenance:
 OTHER_CODE = simulated(code_digest="other")
 
 CHANGES = [
-    (OTHER_CODE, "other simulation code"),
-    (simulated(robot_digest="other"), "the robot szabadka2 has other contents"),
+    (OTHER_CODE, "changed simulation code"),
+    (simulated(robot_digest="other"), "the robot szabadka2 has changed"),
     (simulated(robot="hexapod", robot_digest="x"), "the robot hexapod instead of szabadka2"),
     (simulated(backend="reference"), "no C compiler: backend reference instead of native"),
     (simulated(precision="single"), "precision single instead of double"),
@@ -105,7 +105,7 @@ def test_a_job_does_not_go_on_with_something_else_and_says_how_it_would(store: S
     store.command(job_id, Command.RESUME)
     refused = run(store, OTHER_CODE)
     assert (refused.state, refused.progress.iterations) == (JobState.FAILED, 2)
-    assert refused.error is not None and "other simulation code" in refused.error
+    assert refused.error is not None and "changed simulation code" in refused.error
     assert f"gaitswarm resume {job_id} --accept-changes" in refused.error
     assert recorded(store, job_id) == [(0, HERE)]
     store.command(job_id, Command.RESUME)
@@ -196,7 +196,7 @@ def test_a_submitted_job_has_the_provenance_of_the_process_that_submits_it(store
 def test_whoever_goes_on_with_a_job_can_ask_before_it_is_queued(store: Store) -> None:
     found = paused(store)
     JobService(store, provenance=lambda _: HERE).check_unchanged(found)
-    with pytest.raises(ProvenanceChanged, match="other simulation code"):
+    with pytest.raises(ProvenanceChanged, match="changed simulation code"):
         JobService(store, provenance=lambda _: OTHER_CODE).check_unchanged(found)
     assert store.job(found.id).state is JobState.PAUSED
 

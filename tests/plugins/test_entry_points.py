@@ -83,7 +83,7 @@ def test_a_name_of_gaitswarms_stays_gaitswarms(site: Path) -> None:
         assert METHODS["pso"] is own
         (view,) = plugin_views()
     assert view.reason == (
-        "optimizer 'pso' of taker 1.0 is left out: the name is one of gaitswarm's own"
+        "optimizer 'pso' of taker 1.0 is ignored: gaitswarm itself uses the name"
     )
 
 
@@ -95,8 +95,8 @@ def test_of_two_plug_ins_of_one_name_neither_is_used(site: Path) -> None:
         assert "twin" not in METHODS
         reasons = [view.reason for view in plugin_views()]
     assert reasons == [
-        "optimizer 'twin' of first 1.0 is left out: second 1.0 has one of that name, too",
-        "optimizer 'twin' of second 1.0 is left out: first 1.0 has one of that name, too",
+        "optimizer 'twin' of first 1.0 is ignored: second 1.0 uses the name, too",
+        "optimizer 'twin' of second 1.0 is ignored: first 1.0 uses the name, too",
     ]
 
 

@@ -116,7 +116,7 @@ def test_a_mesh_that_is_not_at_hand_is_named_with_what_to_add(
     source.write_text(with_mesh(f'filename="{NAME}"'), encoding="utf-8")
     assert run(["robot", "init", str(source), "--output", str(tmp_path / "made")]) == 2
     said = " ".join(capsys.readouterr().err.split())
-    assert f"'FL_calf' has no foot, and no mesh '{NAME}' is found (`--package-path`)" in said
+    assert f"'FL_calf' has no foot, and its mesh '{NAME}' was not found (`--package-path`)" in said
     assert not (tmp_path / "made").exists()
 
 

@@ -234,7 +234,7 @@ def test_every_guess_has_a_comment(actuator: ActuatorChoice, fields: list[str]) 
 @pytest.mark.parametrize(
     ("urdf", "said"),
     [
-        (dog(joints=2), r"legs of three joints.*on 'trunk' hang 4 chains of 2 joints"),
+        (dog(joints=2), r"legs need three revolute joints.*'trunk' carries 4 chains of 2 joints"),
         (dog(foot="none"), r"link 'FL_calf' has no foot: add a link at its end"),
         (STATUE, "no joint of it moves"),
         (dog().replace('value="0.3"', 'value="nan"', 1), r"link 'FL_hip': value='nan' of <mass>"),
@@ -244,7 +244,7 @@ def test_every_guess_has_a_comment(actuator: ActuatorChoice, fields: list[str]) 
             .replace('<origin xyz="0 0 -0.2"/><geometry>', '<origin xyz="0 0 0.2"/><geometry>')
             .replace('lower="-2.7" upper="-0.8"', 'lower="-0.1" upper="0.1"')
             .replace('lower="-1.0" upper="3.5"', 'lower="-0.1" upper="0.1"'),
-            r"-z points up in its frame, it seems, as feet reach above the hips",
+            r"-z seems to point up in its frame, as feet reach above the hips",
         ),
     ],
     ids=["two joints", "no foot", "no joints", "mass of NaN", "upside down"],

@@ -241,7 +241,7 @@ def test_init_overwrites_nothing(folder: Path, capsys: pytest.CaptureFixture[str
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (dog(joints=2), "legs.urdf: legs of three joints"),
+        (dog(joints=2), "legs.urdf: legs need three revolute joints"),
         ("<robot>", "legs.urdf, line 1: not well-formed XML: no element found"),
         (None, "cannot read"),
     ],

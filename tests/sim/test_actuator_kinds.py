@@ -56,7 +56,7 @@ def test_a_torque_controlled_robot_is_read_and_written() -> None:
         ("gear_ratio = 12.0", "gear_ratio = 12.0\nknee_sped = 1.0",
          "tibia.knee_sped: unknown key; did you mean .knee_speed"),
         ('kind = "torque"', 'kind = "hydraulic"', "actuators.coxa: kind: must be dc"),
-        ("knee_speed = 12.0", "", "speed_limit and knee_speed go together"),
+        ("knee_speed = 12.0", "", "give both speed_limit and knee_speed, or neither"),
         ("knee_speed = 12.0", "knee_speed = 40.0", "knee_speed: 40 rad/s must be less than"),
         ("rate = 1000", "rate = 750", "torque_command.rate: must be a multiple of 500"),
         ("[torque_command]", "[pwm]\ncounts = 9\nfull_scale = 9\n[torque_command]",
@@ -78,8 +78,8 @@ def test_the_message_has_the_meaning_of_the_kinds_own_field() -> None:
 @pytest.mark.parametrize(
     ("begin", "end", "said"),
     [
-        ("[pwm]", "[sensors]", "pwm: missing; DC motors need it"),
-        ("nominal_voltage", "\n", "supply.nominal_voltage: missing; DC motors need it"),
+        ("[pwm]", "[sensors]", "pwm: required for DC motors"),
+        ("nominal_voltage", "\n", "supply.nominal_voltage: required for DC motors"),
     ],
 )
 def test_dc_motors_require_the_same_fields_as_before_kinds(begin: str, end: str, said: str) -> None:
@@ -91,7 +91,7 @@ def test_kinds_cannot_be_mixed() -> None:
     torque = TORQUE.toml[TORQUE.toml.index("[actuators.tibia]") : TORQUE.toml.index("[supply]")]
     start = DC.toml.index("[actuators.tibia]")
     mixed = DC.toml[:start] + torque + DC.toml[DC.toml.index("[supply]") :]
-    assert "a robot's legs have actuators of one kind" in refusal(mixed)
+    assert "all legs must have actuators of one kind" in refusal(mixed)
 
 
 def job(robot: RobotFiles, controller: str) -> WalksSpec:

@@ -264,7 +264,7 @@ def test_two_groups_of_one_size_that_share_a_leg_are_refused(quadruped: Robot) -
 @pytest.mark.parametrize(
     ("entry", "said"),
     [
-        ({"fir_ms[front]": 12}, "not of a group of legs; those are stride"),
+        ({"fir_ms[front]": 12}, "not a value of leg groups; those are stride"),
         ({"stride": 0.05}, "not of a group of legs"),
         ({"stride[front]": -1.0}, r"by_group.stride\[front\]: .*greater than 0"),
         ({"duty_factor[front]": float("nan")}, "duty_factor"),

@@ -215,7 +215,7 @@ def test_a_held_joint_is_part_of_what_carries_it() -> None:
 @pytest.mark.parametrize(
     ("kind", "held", "said"),
     [
-        ("revolute", "", r"belong to no leg: 'neck'; name them under \[held_joints\]"),
+        ("revolute", "", r"belong to no leg: 'neck'; list them under \[held_joints\]"),
         ("revolute", "arm = 0.0", r"held_joints: robot\.urdf has no joint 'arm'"),
         ("prismatic", "neck = 0.1", r"'neck' is prismatic and does not turn; hold it at 0"),
     ],

@@ -145,16 +145,16 @@ FEMUR = '<joint name="right_front_femur" type="revolute">\n    <parent link="'
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("</robot>", PAN, "these movable joints belong to no leg: 'pan'; name them under"),
+        ("</robot>", PAN, "these movable joints belong to no leg: 'pan'; list them under"),
         (
             '"right_front_coxa" type="revolute"',
             '"right_front_coxa" type="fixed"',
-            "joint 'right_front_coxa' of leg 'right_front' is not revolute but fixed",
+            "joint 'right_front_coxa' of leg 'right_front' is fixed, not revolute",
         ),
         (
             '"right_front_tibia" type="revolute"',
             '"right_front_tibia" type="prismatic"',
-            "joint 'right_front_tibia' of leg 'right_front' is not revolute but prismatic",
+            "joint 'right_front_tibia' of leg 'right_front' is prismatic, not revolute",
         ),
         (
             FEMUR + "right_front_coxa_link",

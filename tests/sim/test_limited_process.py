@@ -120,7 +120,8 @@ def test_a_request_is_answered_beside_one_that_takes_long() -> None:
 def test_a_robot_is_checked_in_another_process_once(monkeypatch: pytest.MonkeyPatch) -> None:
     toml = f"# {time.time_ns()}\n{TOML}"
     with pytest.raises(
-        RobotFileError, match=r"robot\.urdf, line \d+: joint '\w+' of leg '\w+' is not revolute"
+        RobotFileError,
+        match=r"robot\.urdf, line \d+: joint '\w+' of leg '\w+' is \w+, not revolute",
     ):
         check_files(toml, URDF.replace("revolute", "prismatic"))
     check_files(toml, URDF)

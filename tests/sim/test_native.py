@@ -122,7 +122,9 @@ def test_without_a_compiler_single_precision_is_refused_rather_than_computed_in_
 
 
 def test_the_interpreter_has_double_precision_alone() -> None:
-    with pytest.raises(SimulationInputError, match="precision: the reference kernel has double"):
+    with pytest.raises(
+        SimulationInputError, match="precision: the reference kernel supports double"
+    ):
         prepare("szabadka2", backend="reference", precision="single")
 
 

@@ -98,20 +98,20 @@ def inertial(inside: str) -> str:
     [
         ("", "there is no <link> in it"),
         (A + B, "these do: 'a', 'b'"),
-        (A + A, "link 'a' is there twice; rename one"),
+        (A + A, "link 'a' is defined twice; rename one"),
         (A + joint("j", "a", "b"), "joint 'j' joins a link 'b' that is not there"),
         (A + B + C + joint("j", "b", "c") + joint("k", "c", "b"), "link 'b' hangs on no body"),
         (
             A + B + joint("j", "a", "b") + joint("k", "a", "b"),
-            "joint 'k' carries the link 'b', which another joint carries already",
+            "joint 'k' carries link 'b', which another joint already carries",
         ),
         (
             A + B + C + joint("j", "a", "b") + joint("j", "b", "c"),
-            "joint 'j' is there twice; rename one",
+            "joint 'j' is defined twice; rename one",
         ),
         (
             A + B + joint("j", "a", "b", '<origin rpy="0 90 0"/>'),
-            "joint 'j': rpy='0 90 0' of <origin> are degrees, it seems",
+            "joint 'j': rpy='0 90 0' of <origin> seems to be in degrees",
         ),
         (
             A + B + joint("j", "a", "b").replace("<joint", '<joint type="revolute"'),
@@ -132,7 +132,7 @@ def inertial(inside: str) -> str:
         ),
         (
             A + B + joint("j", "a", "b", '<axis xyz="0 0 0"/>'),
-            "joint 'j': its axis needs a direction",
+            "joint 'j': its axis must not be zero",
         ),
         (
             A + B + joint("j", "a", "b", '<axis xyz="0 1"/>'),

@@ -36,7 +36,11 @@ class Status(IntEnum):
 
     @classmethod
     def from_label(cls, label: str) -> Status:
-        """Return the status of a label; raise KeyError if there is none."""
+        """Return the status of a label; raise KeyError if there is none.
+
+        Args:
+            label: As printed and stored.
+        """
         return cls[label.upper()]
 
 

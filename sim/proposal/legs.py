@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 _ALIKE: Final = 0.01
 """Tolerance of equal distances, relative to the chain's length."""
 
-_BY_HAND: Final = "or write robot.toml by hand, as docs/robots.md explains, if it is no leg"
+_BY_HAND: Final = "or write robot.toml by hand, as docs/robots.md explains, if it is not a leg"
 
 
 def check_look_alikes(urdf: Urdf, legs: Sequence[str]) -> None:

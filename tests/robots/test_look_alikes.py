@@ -32,7 +32,7 @@ def changed(urdf: str, old: str, new: str) -> str:
     [
         (
             changed(SOURCE, CALF, CALF.replace("revolute", "prismatic")),
-            r"'FL_calf_joint' is prismatic, .* 'FR_calf_joint' is revolute: make it so, or .* hand",
+            r"'FL_calf_joint' is prismatic, .* 'FR_calf_joint' is revolute: change it, or .* hand",
         ),
         (changed(SOURCE, CALF, CALF.replace("revolute", "fixed")), "'FL_calf_joint' is fixed"),
         (changed(SOURCE, "</robot>", ANKLE), "'FL_hip_joint' begins a chain .* more joints"),

@@ -79,7 +79,7 @@ WRONG_URDFS: Final = (
         'link name="trunk"',
     ),
     _urdf("mass of NaN", 'value="0.3"', 'value="nan"', "'nan' of <mass> is not a number", "<mass"),
-    _urdf("mass below 0", 'value="0.3"', 'value="-1"', "must not be less than 0", "FL_hip"),
+    _urdf("mass below 0", 'value="0.3"', 'value="-1"', "must not be negative", "FL_hip"),
     _urdf("decimal comma", 'value="0.3"', 'value="0,3"', "'0,3' of <mass> is not a num", "<mass"),
     _urdf("no ixx", '<inertia ixx="1e-3"', "<inertia", "ixx='' of <inertia> is not a number"),
     _more("two roots", _SPARE, r"found: 'trunk', 'spare'; .* attach the others"),
@@ -92,13 +92,13 @@ WRONG_URDFS: Final = (
     _more(
         "loop",
         f"{_SPARE}\n{_WELD.format('w', 'spare', 'spare')}",
-        "'spare' hangs on no body: .* cut it open",
+        "'spare' is not attached to the body: .* open the loop",
         '<link name="spare"/>',
     ),
     _more(
         "no such link",
         _WELD.format("w", "trunk", "moon"),
-        "'w' joins a link 'moon' that is not there; add the link",
+        "'w' refers to a missing link 'moon'; add the link",
         '"moon"',
     ),
     _more("link twice", '<link name="FL_hip"/>', "'FL_hip' is defined twice; rename", '"FL_hip"/>'),
@@ -130,9 +130,7 @@ WRONG_URDFS: Final = (
         "has no <limit> with effort",
         "FL_thigh_joint",
     ),
-    _urdf(
-        "limits exchanged", 'lower="-0.8"', 'lower="1.8"', "above the upper one .* exchange", "FL_h"
-    ),
+    _urdf("limits exchanged", 'lower="-0.8"', 'lower="1.8"', "above the upper one .* swap", "FL_h"),
     _urdf(
         "coupled joints",
         _LIMIT,
@@ -140,7 +138,9 @@ WRONG_URDFS: Final = (
         r"mimics joint 'FL_hip_joint' \(<mimic>\), .* remove <mimic> if",
         "FL_thigh_joint",
     ),
-    _urdf("no axis", 'axis xyz="1 0 0"', 'axis xyz="0 0 0"', "needs a direction", "FL_hip_joint"),
+    _urdf(
+        "no axis", 'axis xyz="1 0 0"', 'axis xyz="0 0 0"', "axis must not be zero", "FL_hip_joint"
+    ),
     Wrong("sliders", SOURCE.replace('"revolute"', '"prismatic"'), "prismatic"),
     _urdf(
         "unknown type",
@@ -149,15 +149,17 @@ WRONG_URDFS: Final = (
         "type='hinge' of <joint> must be one of revolute",
         "hinge",
     ),
-    Wrong("two joints a leg", dog(joints=2), "three joints"),
+    Wrong("two joints a leg", dog(joints=2), "three revolute joints"),
     _urdf("nested", "</robot>", "\n" + "<a>" * 99 + "</a>" * 99 + "</robot>", "16 elements", "<a>"),
-    _urdf("entity", "<robot", '<!DOCTYPE robot [<!ENTITY a "b">]><robot', "leave it out", "DOCT"),
+    _urdf(
+        "entity", "<robot", '<!DOCTYPE robot [<!ENTITY a "b">]><robot', "remove <!DOCTYPE>", "DOCT"
+    ),
     Wrong("4 500 links", chain(4500), "has more than 256 links", "<link"),
     Wrong("too long", SOURCE + " " * 800_000, "800000 characters"),
     Wrong("JSON", '{"links": []}', "line 1: not well-formed XML: "),
     Wrong("broken off", SOURCE[: len(SOURCE) // 2], "line "),
-    Wrong("empty", "", "is empty; it must hold the URDF of a robot"),
-    Wrong("SDF", "<sdf><model/></sdf>", "its root is <sdf>.*convert SDF"),
+    Wrong("empty", "", "is empty; it must contain the URDF of a robot"),
+    Wrong("SDF", "<sdf><model/></sdf>", "its root element is <sdf>.*convert SDF"),
     Wrong("xacro", '<robot><link_of name="a"/></robot>', "no <link>.*xacro FILE.xacro"),
     _urdf(
         "name of two lines",

@@ -98,7 +98,7 @@ def test_a_toml_beyond_the_bounds_is_refused_with_the_way_out(toml: str, said: s
             URDF.replace('name="body"', 'name="bo&#x202e;dy"'),
             "must contain only printable characters",
         ),
-        (URDF.replace('<mass value="', '<mass value="-', 1), "a mass must not be less than 0"),
+        (URDF.replace('<mass value="', '<mass value="-', 1), "a mass must not be negative"),
         (URDF.replace('<mass value="', '<mass value="1e99" was="', 1), "a number of 1e+09 at most"),
         (URDF.replace('<mass value="', '<mass value="nan" was="', 1), "is not a number"),
     ],

@@ -126,4 +126,4 @@ def test_a_job_searches_choices_of_the_gait_and_holds_them_by_name(client: httpx
     spec["fixed"] = {"I": 0.1, "duty_phase": "flight"}
     refused = client.post("/v1/jobs", json=spec)
     assert refused.status_code == 422
-    assert "duty_phase: 'flight' is none of its choices support, swing" in refused.text
+    assert "duty_phase: 'flight' is not one of its choices support, swing" in refused.text

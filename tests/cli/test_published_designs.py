@@ -130,5 +130,5 @@ def test_a_design_file_may_name_the_choice_of_a_convention(write_json: WriteJson
     expected = {**gains, "integrator_unit": 1.0}
     assert read_design(str(named), "pi") == read_design(str(indexed), "pi") == expected
     unknown = write_json({**gains, "integrator_unit": "volts"}, "unknown.json")
-    with pytest.raises(InvalidRequest, match="'volts' is none of its choices counts, "):
+    with pytest.raises(InvalidRequest, match="'volts' is not one of its choices counts, "):
         read_design(str(unknown), "pi")

@@ -105,8 +105,8 @@ def test_fewer_choices_are_searched_in_their_own_order_and_simulated_by_the_cata
             {},
             "'glue' is none of the choices of law; they are linear, stick, jump",
         ),
-        (None, {"law": "glue"}, "fixed: law: 'glue' is none of its choices linear, stick, jump"),
-        (None, {"law": 3.0}, "fixed: law: 3 is none of its choices"),
+        (None, {"law": "glue"}, "fixed: law: 'glue' is not one of its choices linear, stick, jump"),
+        (None, {"law": 3.0}, "fixed: law: 3 is not one of its choices"),
         (None, {"gain": "stick"}, "fixed: gain: 'stick' is not a number"),
     ],
 )

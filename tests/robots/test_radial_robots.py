@@ -107,7 +107,7 @@ def test_steps_are_as_long_as_narrow_joints_allow_and_that_is_told() -> None:
 
 def test_legs_without_room_for_steps_are_refused_by_joint() -> None:
     said = (
-        r"robot\.urdf, line (\d+): joint ('leg\d_coxa'): legs cannot step around their stance"
+        r"robot\.urdf, line (\d+): joint ('leg\d_coxa'): legs cannot step around their stance,"
         r" .*: joint '\w+' of leg 'leg\d' would turn 0\.\d+ rad beyond its limit; check this"
     )
     with pytest.raises(RobotFileError, match=said) as refused:

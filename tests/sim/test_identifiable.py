@@ -200,8 +200,8 @@ def test_conventions_leave_all_else(name: str) -> None:
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"contact_law": "ice"}, "contact_law: 'ice' is none of its choices linear_zone, "),
-        ({"energy": 9.0}, "energy: 9 is none of its choices signed, positive, absolute"),
+        ({"contact_law": "ice"}, "contact_law: 'ice' is not one of its choices linear_zone, "),
+        ({"energy": 9.0}, "energy: 9 is not one of its choices signed, positive, absolute"),
         ({"efficiency": 1.5}, "efficiency: "),
         ({"slip_velocity": 0.0}, "slip_velocity: "),
         (

@@ -96,11 +96,14 @@ def inertial(inside: str) -> str:
 @pytest.mark.parametrize(
     ("robot", "said"),
     [
-        ("", "there is no <link> in it"),
-        (A + B, "these do: 'a', 'b'"),
+        ("", "it has no <link>"),
+        (A + B, "found: 'a', 'b'"),
         (A + A, "link 'a' is defined twice; rename one"),
-        (A + joint("j", "a", "b"), "joint 'j' joins a link 'b' that is not there"),
-        (A + B + C + joint("j", "b", "c") + joint("k", "c", "b"), "link 'b' hangs on no body"),
+        (A + joint("j", "a", "b"), "joint 'j' refers to a missing link 'b'"),
+        (
+            A + B + C + joint("j", "b", "c") + joint("k", "c", "b"),
+            "link 'b' is not attached to the body",
+        ),
         (
             A + B + joint("j", "a", "b") + joint("k", "a", "b"),
             "joint 'k' carries link 'b', which another joint already carries",

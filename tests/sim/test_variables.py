@@ -30,7 +30,7 @@ def test_numbers_of_other_variables_are_shown_as_they_are() -> None:
 
 @pytest.mark.parametrize("value", ["glue", 3, -1, 0.5])
 def test_what_is_no_choice_is_refused_with_the_choices(value: float | str) -> None:
-    with pytest.raises(ValueError, match="is none of its choices linear, stick, jump"):
+    with pytest.raises(ValueError, match="is not one of its choices linear, stick, jump"):
         LAW.number(value)
 
 

@@ -36,7 +36,7 @@ def said(document: Any, model: Any = Leg) -> list[str]:
 @pytest.mark.parametrize(
     ("document", "message"),
     [
-        ({"name": 3}, "must be a text"),
+        ({"name": 3}, "must be a string"),
         ({"name": "x"}, "must have at least 2 characters"),
         ({"name": "x" * 9}, "must have at most 8 characters"),
         ({"name": "LEFT"}, "must match the pattern ^[a-z]+$"),

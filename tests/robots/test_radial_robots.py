@@ -115,7 +115,7 @@ def test_legs_without_room_for_steps_are_refused_by_joint() -> None:
     found = re.search(said, str(refused.value))
     assert found and f"joint name={found[2]}".replace("'", '"') in _line(found[1])
     raised = radial_robot(6).replace('xyz="0.12 0.0 0"', 'xyz="0.12 0.0 0.4"', 1)
-    level = r"joint 'leg\d_coxa' begins a leg whose foot cannot be put on one level with the others"
+    level = r"joint 'leg\d_coxa' begins a leg whose foot cannot be level with the others"
     with pytest.raises(RobotFileError, match=rf"line \d+: {level}"):
         walking_proposal(raised, "round")
 

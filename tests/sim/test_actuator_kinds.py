@@ -60,9 +60,9 @@ def test_a_torque_controlled_robot_is_read_and_written() -> None:
         ("knee_speed = 12.0", "knee_speed = 40.0", "knee_speed: 40 rad/s must be less than"),
         ("rate = 1000", "rate = 750", "torque_command.rate: must be a multiple of 500"),
         ("[torque_command]", "[pwm]\ncounts = 9\nfull_scale = 9\n[torque_command]",
-         "pwm: is for DC motors"),
+         "pwm: applies to DC motors"),
         ("voltage = 24.0", "voltage = 24.0\nnominal_voltage = 24.0",
-         "supply.nominal_voltage: is what the PWM"),
+         "supply.nominal_voltage: applies to the PWM"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_named(old: str, new: str, said: str) -> None:

@@ -143,12 +143,21 @@ class Walk:
         return outcome
 
     def run_with(self, kernel: Kernel, designs: NDArray[np.float64]) -> Outcome:
-        """Simulate every design with a given kernel of the robot, such as another engine's."""
+        """Simulate every design with a given kernel.
+
+        Args:
+            kernel: Kernel of the robot, such as another engine's.
+            designs: As for `run`.
+        """
         (simulation,) = walk_together([self._simulating(designs, kernel)])
         return simulation.outcome
 
     def walking(self, designs: NDArray[np.float64]) -> Walking[Outcome]:
-        """Prepare the simulation of all designs together with other cases."""
+        """Prepare the simulation of all designs together with other cases.
+
+        Args:
+            designs: As for `run`.
+        """
         walked = yield from self._simulating(designs)
         return walked.outcome
 

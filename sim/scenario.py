@@ -286,13 +286,19 @@ class Scenario(BaseModel):
         return self.support_share_of(self.duty_factor)
 
     def support_share_of(self, duty_factor: float) -> float:
-        """Return the share of support in the cycle [1] for a duty factor of `duty_phase`."""
+        """Return the share of support in the cycle [1].
+
+        Args:
+            duty_factor: Share of the phase that `duty_phase` selects.
+        """
         return duty_factor if self.duty_phase == "support" else 1.0 - duty_factor
 
     def stride_of(self, side: float, stride: float | None = None) -> float:
-        """Return the stride of the legs of a side (1 left, -1 right) in the scenario's turn [m].
+        """Return the stride of the legs of one side in the scenario's turn [m].
 
-        `stride` is the stride straight ahead [m], by default the scenario's.
+        Args:
+            side: 1 for the left legs, -1 for the right ones.
+            stride: Stride straight ahead [m]; default: the scenario's.
         """
         shortened = -side * self.turn
         if self.turn_mode == "inner":

@@ -196,7 +196,11 @@ class Variable(BaseModel):
         return float(value)
 
     def shown(self, number: float) -> float | str:
-        """Convert a number of a design array to a value: a categorical one's choice, or itself."""
+        """Convert a number of a design array to a value; the inverse of `number`.
+
+        Args:
+            number: In the variable's unit; of a categorical variable the index of a choice.
+        """
         if self.kind != "categorical" or math.isnan(number):
             return number
         return self.choices[round(number)]

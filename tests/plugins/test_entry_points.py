@@ -39,7 +39,7 @@ BROKEN = {
     "other": (
         {"other": METHOD.format(name="another")},
         "other:METHOD",
-        "calls itself 'another'",
+        "its own name is 'another'",
     ),
 }
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from gaitswarm.services.optimizer.jobs.iteration import Ask, CompletedIteration
 from gaitswarm.services.optimizer.jobs.job import Claim, Command, Job
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.spec import create_optimizer, judge_outcomes
+from gaitswarm.services.optimizer.jobs.spec import judge_outcomes
 from gaitswarm.services.optimizer.search.optimizer import Optimizer
 from gaitswarm.services.optimizer.store.port.base import Store
 from gaitswarm.services.optimizer.store.sql_store import open_store
@@ -77,7 +77,7 @@ def run(store: Store, job: Job) -> None:
     """Run a queued job to its end, with walks by formula."""
     claim = store.claim("large-store", lease_seconds=_LEASE, job_id=job.id)
     assert claim is not None
-    optimizer = create_optimizer(job.spec)
+    optimizer = job.spec.create_search()
     following: Ask | None = _ask(optimizer)
     assert following is not None
     store.begin(claim, following)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from gaitswarm.requests.simulations import SimulationRequest, run_simulation
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.reference import on_the_jobs_terms, published_study
+from gaitswarm.services.optimizer.jobs.reference import adapted_to_job, published_study
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.views import SimulationView
@@ -31,7 +31,7 @@ def published_walk(spec: JobSpec, study: str) -> SimulationView:
     request = SimulationRequest(
         robot=spec.robot,
         controller=spec.controller,
-        design=on_the_jobs_terms(published, spec),
+        design=adapted_to_job(published, spec),
         scenarios=spec.scenarios,
         preference=spec.preference,
     )

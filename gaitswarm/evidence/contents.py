@@ -123,7 +123,7 @@ def _run(service: JobService, job: Job) -> _Run:
         files[REEVALUATIONS] = b"".join(encoded_table("parquet", spec.in_double(), parts))
     for name in spec.recording_ids:
         files[f"recordings/{name}.json"] = service.recording(name).model_dump_json().encode()
-    for number, robot in enumerate(spec.described):
+    for number, robot in enumerate(spec.robot_sources):
         files |= _robot(f"robots/{number}", robot)
     return _Run(files, columns, iterations, provenance, view, certified)
 
@@ -132,7 +132,8 @@ def provenance_document(job: Job) -> dict[str, Any]:
     """Provenance of a job's numbers and of this file."""
     here = job_provenance(job.spec)
     kernels = [
-        kernel_identity(load_robot(robot), job.spec.precision).hex() for robot in job.spec.described
+        kernel_identity(load_robot(robot), job.spec.precision).hex()
+        for robot in job.spec.robot_sources
     ]
     return {
         "records": [record.model_dump(mode="json") for record in job.provenance],

@@ -30,7 +30,7 @@ def why_no_replay(spec: AnySpec) -> tuple[bool | None, str] | None:
             None,
             f"designs were evaluated by the plug-in {spec.case.name}, which may give other bits",
         )
-    if provenance_of(*spec.described, precision=spec.precision).backend == "reference":
+    if provenance_of(*spec.robot_sources, precision=spec.precision).backend == "reference":
         return False, (
             "there is no C compiler here: the interpreter gives other bits, and takes some hundred"
             " times as long"
@@ -61,7 +61,7 @@ def simulated_differences(
                 job_id="evidence",
                 cases=spec.cases(recordings),
                 designs=spec.design_space().simulated(columns.designs),
-                provenance=provenance_of(*spec.described, precision=spec.precision),
+                provenance=provenance_of(*spec.robot_sources, precision=spec.precision),
             )
             outcomes = evaluator.evaluate(request, lambda: False)
             for number, (case, outcome) in enumerate(zip(spec.case_names, outcomes, strict=True)):

@@ -84,7 +84,7 @@ def _tables(evidence: Evidence) -> Iterator[tuple[AnySpec, EvaluationColumns]]:
 def _robot(evidence: Evidence, members: Mapping[str, bytes]) -> Answer:
     """Check the robots' files against the digests of the provenance."""
     content = b""
-    for number in range(len(evidence.spec.described)):
+    for number in range(len(evidence.spec.robot_sources)):
         folder = f"robots/{number}"
         for name in (f"{folder}/description.json", f"{folder}/robot.urdf"):
             if name not in members:
@@ -146,7 +146,7 @@ def _search(evidence: Evidence) -> Answer:
     if method.missing:
         return None, f"{spec.search.name} needs {', '.join(method.missing)}, not installed here"
     columns = evidence.columns
-    results = spec.told(columns.objectives, columns.failed, columns.fitness)
+    results = spec.search_feedback(columns.objectives, columns.failed, columns.fitness)
     feedback = by_iteration(evidence, results)
     try:
         retraced(spec, evidence.job.budgets, evidence.asked, feedback)
@@ -229,7 +229,9 @@ def changes_of_provenance(evidence: Evidence) -> Iterator[str]:
     yield from found
     if not found:
         return
-    kernels = tuple(kernel_identity(load_robot(r), spec.precision).hex() for r in spec.described)
+    kernels = tuple(
+        kernel_identity(load_robot(r), spec.precision).hex() for r in spec.robot_sources
+    )
     if kernels == evidence.provenance.kernels:
         yield (
             "the kernels' source is the same as when the file was written: physics and"

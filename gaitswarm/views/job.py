@@ -79,7 +79,7 @@ class EstimateView(View):
     )
     basis: str = Field(
         description="Basis of the estimate.",
-        examples=["the rate of 2 earlier jobs with the same kind of walks: 942 simulated s/s"],
+        examples=["the rate of 2 earlier jobs with similar simulations: 942 simulated s/s"],
     )
 
     @classmethod
@@ -210,7 +210,7 @@ class JobSummaryView(View):
     eta_basis: str = Field(
         default="",
         description="Basis of `eta_seconds`, or why it is unknown.",
-        examples=["at the pace of its last iterations, 1.23 s each"],
+        examples=["at the pace of the last iterations, 1.23 s each"],
     )
     lineage: Lineage | None = Field(
         default=None,

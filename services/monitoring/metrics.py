@@ -26,7 +26,7 @@ _CAUSES: Final = (
     ("died, one after the other, of the same task", "killed_worker"),
     ("the simulation failed", "simulation"),
     ("internal error", "internal"),
-    ("what its numbers depend on", "provenance"),
+    ("the provenance of its results", "provenance"),
     ("what this job's numbers depend on", "provenance"),
 )
 """What an error says, and the cause that it is counted under."""

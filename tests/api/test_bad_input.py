@@ -55,7 +55,11 @@ def nothing_is_written(store: SqlStore) -> Iterator[None]:
         ({"controller": "telepathy"}, "controller", "fuzzy-pi"),
         ({"robot": "octopus"}, "robot", "szabadka2"),
         ({"preference": "Z"}, "preference", "'A', 'B', 'C' or 'chapter-3'"),
-        ({"preference": {"bias": BIASES, "exponent": [0.0] * 5}}, "preference", "all zero"),
+        (
+            {"preference": {"bias": BIASES, "exponent": [0.0] * 5}},
+            "preference",
+            "exponents are zero",
+        ),
         ({"iterations": 0}, "iterations", "at least 1"),
         ({"iterations": 2.5}, "iterations", "whole number"),
         ({"optimizer": {"particles": 0}}, "optimizer.particles", "at least 1"),

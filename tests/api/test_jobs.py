@@ -86,7 +86,7 @@ def test_progress_rates_and_estimate_follow_from_committed_iterations(
     assert view["evaluations_per_second"] == 8.0
     assert view["simulations_per_second"] == 16.0
     assert 0.0 <= view["eta_seconds"] <= 0.5
-    assert view["eta_basis"].startswith("at the pace of its last iterations")
+    assert view["eta_basis"].startswith("at the pace of the last iterations")
     assert view["best_fitness"] == view["best"]["fitness"] == 100.0
 
 
@@ -97,7 +97,7 @@ def test_a_job_that_has_not_begun_has_no_estimate_and_no_best(
 
     assert view["iterations"] == view["evaluations"] == 0
     assert view["best"] is view["eta_seconds"] is view["evaluations_per_second"] is None
-    assert view["eta_basis"] == "not known of a job that is queued"
+    assert view["eta_basis"] == "unknown: the job is queued"
 
 
 def test_a_failed_job_says_why(client: httpx2.Client, store: SqlStore, job: Job) -> None:

@@ -126,20 +126,20 @@ def test_a_stored_spec_reads_as_it_was_and_names_its_choices() -> None:
         ({"targets": [target("speed", relative_to="stiff")]}, "the walk itself"),
         ({"targets": [target("height_loss", walk="fuzzy", relative_to="stiff")]}, "has no ratio"),
         ({"targets": [target("speed", value=-0.1)]}, "speed is greater than 0"),
-        ({"targets": [target("speed", use="predict")]}, "one at least is to be fitted"),
+        ({"targets": [target("speed", use="predict")]}, "at least one must be fitted"),
         ({"walks": [WALKS[0], WALKS[0]]}, "two of them have the same name"),
         (
             {"walks": [WALKS[0] | {"scenarios": [SHORT_WALK, UPHILL_WALK]}]},
-            "speed is of one scenario, and the walk stiff has 2",
+            "speed requires one scenario; the walk stiff has 2",
         ),
         ({"walks": [WALKS[0] | {"design": {"P": 1.0}}]}, "I missing; pi needs it"),
         ({"walks": [WALKS[0] | {"design": PI | {"Q": 1.0}}]}, "unknown variable 'Q'"),
         ({"variables": ["P"]}, "unknown variable 'P'; known are efficiency, "),
         (
             {"walks": [WALKS[0] | {"design": PI | {"stride": 0.1}}], "variables": ["stride"]},
-            "stride changes nothing",
+            "stride has no effect",
         ),
-        ({"robots": ["szabadka2"]}, "two different ones at least"),
+        ({"robots": ["szabadka2"]}, "at least two different ones"),
     ],
 )
 def test_inconsistent_specs_are_refused(change: dict[str, Any], message: str) -> None:

@@ -198,7 +198,7 @@ def test_a_job_that_succeeded_is_extended_and_queued(
     assert gaitswarm("status", finished.id, *where, "--json").json["iterations_planned"] == 4
     refused = gaitswarm("extend", finished.id, "--iterations", "2", *where)
     assert refused.code == 2
-    assert "iterations: must be more than the 2" in refused.err
+    assert "iterations: must exceed the 2" in refused.err
     done = gaitswarm(
         *("optimize", "--resume", finished.id, "--db", db, "--evaluator", "in-process", "--json")
     ).json

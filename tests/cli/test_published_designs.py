@@ -8,7 +8,7 @@ from gaitswarm.cli.comparison import published_beside
 from gaitswarm.cli.inputs.design_file import read_design
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.reference import on_the_jobs_terms
+from gaitswarm.services.optimizer.jobs.reference import adapted_to_job
 from gaitswarm.services.optimizer.search.pso import PsoSettings
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
 from gaitswarm.sim.gait_variables import GAIT_CATALOGUE
@@ -80,16 +80,16 @@ def test_a_published_design_walks_in_its_own_gait_and_in_anothers_on_request(
 
 def test_beside_a_job_a_published_design_walks_in_the_gait_of_the_jobs_designs() -> None:
     published = CONTROLLERS["pi"].published["pi-pso-ps"]
-    assert on_the_jobs_terms(published, job("pi")) == {"P": 0.454, "I": 0.147}
+    assert adapted_to_job(published, job("pi")) == {"P": 0.454, "I": 0.147}
     held = job("pi", fixed={"stride": 0.1, "integrator_unit": 1.0})
-    assert on_the_jobs_terms(published, held) == {
+    assert adapted_to_job(published, held) == {
         "P": 0.454,
         "I": 0.147,
         "stride": 0.1,
         "integrator_unit": 1.0,
     }
     gains = job("pi", variables=("P", "I", "cycle_time", "stride"))
-    assert on_the_jobs_terms(published, gains) == {
+    assert adapted_to_job(published, gains) == {
         "P": 0.454,
         "I": 0.147,
         "cycle_time": 1.808,
@@ -99,7 +99,7 @@ def test_beside_a_job_a_published_design_walks_in_the_gait_of_the_jobs_designs()
 
 def test_a_held_gain_of_a_job_is_not_put_into_the_published_design() -> None:
     published = CONTROLLERS["pi"].published["pi-pso-ps"]
-    assert on_the_jobs_terms(published, job("pi", fixed={"I": 0.0})) == {"P": 0.454, "I": 0.147}
+    assert adapted_to_job(published, job("pi", fixed={"I": 0.0})) == {"P": 0.454, "I": 0.147}
 
 
 @pytest.mark.slow

@@ -9,7 +9,6 @@ from pydantic import ValidationError
 
 from gaitswarm.services.optimizer.jobs.documents import SPECS
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.spec import create_optimizer
 from gaitswarm.services.optimizer.search.automatic import RULES, AutoSettings, Rule, chosen_method
 from gaitswarm.services.optimizer.search.pso import PsoSettings
 from gaitswarm.services.optimizer.search.random_search import RandomSearchSettings
@@ -79,8 +78,8 @@ def test_the_size_of_iterations_stays_and_with_it_the_budget() -> None:
 
 def test_a_spec_that_is_not_resolved_yet_searches_by_the_same_method() -> None:
     spec = JobSpec.model_validate({"optimizer": "auto", "seed": 5})
-    expected = create_optimizer(spec.resolved()).ask()
-    assert create_optimizer(spec).ask().tobytes() == expected.tobytes()
+    expected = spec.resolved().create_search().ask()
+    assert spec.create_search().ask().tobytes() == expected.tobytes()
 
 
 def test_a_job_of_any_kind_is_resolved_to_the_method() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gaitswarm.services.optimizer.errors import StoreUnavailable
-from gaitswarm.services.optimizer.jobs.iteration import Known
+from gaitswarm.services.optimizer.jobs.iteration import CachedOutcome
 from gaitswarm.services.optimizer.jobs.job import Job, JobState
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
@@ -71,10 +71,10 @@ def bits(outcomes: tuple[Outcome, ...]) -> list[tuple[bytes, bytes]]:
 class Knows(SqlStore):
     """A store that knows what it is told to."""
 
-    def __init__(self, known: dict[bytes, Known]) -> None:
+    def __init__(self, known: dict[bytes, CachedOutcome]) -> None:
         self.told = known
 
-    def known(self, keys: Any) -> dict[bytes, Known]:
+    def known(self, keys: Any) -> dict[bytes, CachedOutcome]:
         return {key: self.told[key] for key in keys if key in self.told}
 
 
@@ -171,7 +171,7 @@ def test_a_design_that_is_asked_for_twice_walks_once() -> None:
 def test_known_and_unknown_designs_come_in_the_order_of_the_request() -> None:
     asked = request([[0.5, 0.1], [0.2, 0.3], [0.7, 0.2]])
     keys, outcomes = keys_of(asked), walk(asked)
-    known = Known(
+    known = CachedOutcome(
         np.stack([outcome.objectives[1] for outcome in outcomes]),
         np.array([outcome.statuses[1] for outcome in outcomes], dtype=np.uint8),
     )
@@ -186,7 +186,7 @@ def test_an_outcome_that_lost_a_number_when_it_was_stored_is_walked_again() -> N
     (key,) = keys_of(asked)
     objectives = np.stack([outcome.objectives[0] for outcome in walk(asked)])
     for damaged in (np.where(objectives == objectives[0, 0], np.nan, objectives), objectives[:1]):
-        known = Known(damaged, np.zeros(2, dtype=np.uint8))
+        known = CachedOutcome(damaged, np.zeros(2, dtype=np.uint8))
         evaluator = CountingEvaluator()
         outcomes, _ = evaluate_unknown(evaluator, Knows({key: known}), asked, (key,), lambda: False)
         assert evaluator.walked == 1
@@ -195,7 +195,7 @@ def test_an_outcome_that_lost_a_number_when_it_was_stored_is_walked_again() -> N
 
 def test_a_store_that_does_not_answer_knows_nothing() -> None:
     class Gone(Knows):
-        def known(self, keys: Any) -> dict[bytes, Known]:
+        def known(self, keys: Any) -> dict[bytes, CachedOutcome]:
             raise StoreUnavailable("gone")
 
     asked = request([[0.5, 0.1], [0.2, 0.3]])

@@ -218,6 +218,6 @@ def test_a_job_that_was_cancelled_cannot_be_extended() -> None:
 
 @pytest.mark.parametrize("iterations", [-1, 0, 4, 5, LARGEST_BUDGET + 1])
 def test_a_budget_that_is_spent_or_beyond_reason_is_refused_by_name(iterations: int) -> None:
-    with pytest.raises(InvalidRequest, match="in all") as refused:
+    with pytest.raises(InvalidRequest, match="it is the total") as refused:
         extended(JobState.PAUSED, 5, iterations)
     assert refused.value.field == "iterations"

@@ -74,7 +74,7 @@ def test_the_search_is_told_geometric_means_of_each_objective_without_biases(sto
     assert columns.failed.any()
     vectors = np.exp(np.log(columns.objectives[:, :, :5]).mean(axis=1))
     vectors[columns.failed.any(axis=1)] = math.inf
-    told = spec().told(columns.objectives, columns.failed, columns.fitness)
+    told = spec().search_feedback(columns.objectives, columns.failed, columns.fitness)
     np.testing.assert_allclose(told, vectors, rtol=1e-12)
     asked = store.asked(job.id, 0, job.progress.iterations)
     retraced(job.spec, [job.spec.iterations], asked, by_iteration(store, job, told))
@@ -160,7 +160,7 @@ def test_in_worlds_an_objective_is_worth_what_a_preference_for_it_alone_would_sa
     failed[0] = True
     failed[1, 3] = True
     robust = spec(worlds=worlds)
-    told = robust.told(objectives, failed, np.zeros(6))
+    told = robust.search_feedback(objectives, failed, np.zeros(6))
     assert told.shape == (6, 5)
     for m in range(5):
         alone = {"bias": [0.0] * 5, "exponent": np.eye(5)[m].tolist()}
@@ -177,7 +177,9 @@ def test_an_objective_that_is_missing_or_infinite_makes_a_failed_design() -> Non
     objectives[2, 1, 4] = math.nan
     for worlds in (None, {"count": 2, "aggregate": "mean"}):
         cases = objectives if worlds is None else np.repeat(objectives, 2, axis=1)
-        told = spec(worlds=worlds).told(cases, np.zeros(cases.shape[:2], bool), np.ones(3))
+        told = spec(worlds=worlds).search_feedback(
+            cases, np.zeros(cases.shape[:2], bool), np.ones(3)
+        )
         assert told.tolist() == [[1.0] * 5, [math.inf] * 5, [math.inf] * 5]
 
 

@@ -114,8 +114,8 @@ def test_integers_are_whole_and_fixed_variables_keep_their_value() -> None:
     } | {"FOR": 1000.0}
     assert JobSpec.model_validate({**fuzzy.model_dump(), "start": [middle]}).start == (middle,)
     for name, value, message in (
-        ("FOMF", 1.5, r"start\.0\.FOMF: 1.5 is no whole number"),
-        ("FOR", 999.0, r"start\.0\.FOR: 999.* is not what this job holds it at, 1000"),
+        ("FOMF", 1.5, r"start\.0\.FOMF: 1.5 is not an integer"),
+        ("FOR", 999.0, r"start\.0\.FOR: 999.* is not the job.s fixed value, 1000"),
     ):
         with pytest.raises(ValueError, match=message):
             JobSpec.model_validate({**fuzzy.model_dump(), "start": [{**middle, name: value}]})

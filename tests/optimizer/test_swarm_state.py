@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.spec import create_optimizer
 from gaitswarm.services.optimizer.search.optimizer import Optimizer
 
 
@@ -25,7 +24,7 @@ SPEC = job({"particles": 6})
 
 
 def asked(iterations: int, spec: JobSpec = SPEC) -> Optimizer:
-    optimizer = create_optimizer(spec)
+    optimizer = spec.create_search()
     for _ in range(iterations):
         optimizer.tell(np.log1p(np.abs(optimizer.ask())).sum(axis=1))
     optimizer.ask()
@@ -45,7 +44,7 @@ def test_a_refused_state_leaves_the_state_before() -> None:
 def test_a_state_of_another_swarm_size_is_refused() -> None:
     larger = asked(0, job({"particles": 7}))
     with pytest.raises(ValueError, match="positions: expected 6 rows"):
-        create_optimizer(SPEC).load(larger.dump())
+        SPEC.create_search().load(larger.dump())
 
 
 @given(
@@ -72,12 +71,12 @@ def test_no_settings_and_no_fitness_lead_out_of_the_box_or_off_the_bits(
         seed=seed,
     )
     space = spec.design_space()
-    straight, reloaded = create_optimizer(spec), create_optimizer(spec)
+    straight, reloaded = spec.create_search(), spec.create_search()
     for k in range(5):
         positions = straight.ask()
         assert (positions >= space.low).all() and (positions <= space.high).all()
         state = json.loads(json.dumps(reloaded.dump(), allow_nan=False))
-        reloaded = create_optimizer(spec)
+        reloaded = spec.create_search()
         reloaded.load(state)
         assert reloaded.ask().tobytes() == positions.tobytes()
         told = np.roll(np.array(fitness), k)[:particles]

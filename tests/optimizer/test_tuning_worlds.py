@@ -153,7 +153,7 @@ def test_worlds_are_all_perturbations_by_default_and_stored_with_their_bounds() 
 @pytest.mark.parametrize(
     ("worlds", "words"),
     [
-        ({"ranges": ["gravity"]}, "ranges: no perturbation 'gravity'; known are"),
+        ({"ranges": ["gravity"]}, "ranges: unknown perturbation 'gravity'; known are"),
         ({"ranges": ["friction_factor", "friction_factor"]}, "'friction_factor' is named twice"),
         (
             {"ranges": [{"name": "angle_delay", "low": 0.5, "high": 1.5}]},

@@ -48,10 +48,10 @@ def test_a_late_iteration_counts_for_no_more_than_one() -> None:
 
 def test_an_iteration_that_is_far_too_late_is_told() -> None:
     running = job(JobState.RUNNING, iterations=4)
-    assert "under way" not in time_left(running, NOW + timedelta(seconds=3.9)).basis
+    assert "the current one" not in time_left(running, NOW + timedelta(seconds=3.9)).basis
     late = time_left(running, NOW + timedelta(seconds=60.0))
     assert late.basis == (
-        "at the pace of its last iterations, 2 s each; the one under way has taken 60 s"
+        "at the pace of the last iterations, 2 s each; the current one has taken 60 s"
     )
 
 
@@ -72,14 +72,14 @@ def test_the_rest_takes_as_long_as_the_last_iterations_where_their_pace_is_anoth
     [
         (job(JobState.QUEUED, iterations=4), "queued"),
         (job(JobState.PAUSED, iterations=4), "paused"),
-        (replace(job(JobState.RUNNING, iterations=4), waiting="no route"), "while it waits"),
+        (replace(job(JobState.RUNNING, iterations=4), waiting="no route"), "while the job waits"),
         (job(JobState.RUNNING, iterations=0, seconds=0.0), "first iteration"),
     ],
     ids=["queued", "paused", "waiting", "nothing committed"],
 )
 def test_a_job_whose_end_is_not_known_says_why(found: Job, why: str) -> None:
     left = time_left(found, NOW)
-    assert left.eta_seconds is None and left.basis.startswith("not known") and why in left.basis
+    assert left.eta_seconds is None and left.basis.startswith("unknown") and why in left.basis
 
 
 def test_a_clock_that_lags_behind_the_database_adds_nothing() -> None:
@@ -148,7 +148,7 @@ def test_a_job_longer_than_is_taken_is_refused_however_it_is_asked_for(store: Sq
     taken = JobService(store, longest_job=1111.0)
     service = JobService(store, longest_job=1109.0)
     job, _ = taken.submit(asked)
-    said = r"iterations: .* last 1\.11e\+03 s together, more than the .*; give it fewer iterations"
+    said = r"iterations: .* last 1\.11e\+03 s together, more than the .*; use fewer iterations"
     for refused in (
         lambda: service.submit(asked),
         lambda: service.submit_embedded(asked),

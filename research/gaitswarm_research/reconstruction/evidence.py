@@ -206,7 +206,7 @@ class ResultsFile:
 
     def __init__(self, folder: Path, spec: CalibrationSpec, calibration: JobView) -> None:
         self._path = folder / RESULTS_FILE
-        self._robots = [str(robot) for robot in spec.described]
+        self._robots = [str(robot) for robot in spec.robot_sources]
         code = Path(str(optimality_module.__file__)).read_bytes()
         self._dependencies = {
             "robots": self._robots,

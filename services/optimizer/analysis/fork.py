@@ -43,7 +43,7 @@ from gaitswarm.services.optimizer.jobs.fork import (
 )
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, changes_since
-from gaitswarm.services.optimizer.jobs.spec import Spec, create_optimizer
+from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.jobs.start import EarlierJobs
 from gaitswarm.services.optimizer.search.optimizer import Optimizer, Rejudging
 
@@ -64,7 +64,7 @@ def retraced(
         asked: (n, d) positions of every iteration, at least one.
         until: When `time.monotonic` is past this, it is given up [s].
     """
-    searches = [create_optimizer(spec.model_copy(update={"iterations": n})) for n in budgets]
+    searches = [spec.model_copy(update={"iterations": n}).create_search() for n in budgets]
     search = searches.pop(0)
     for index, positions in enumerate(asked):
         if index:
@@ -184,7 +184,7 @@ class Parent:
         Args:
             fitness: (r,) of every evaluation, by its measure.
         """
-        told = spec.told(self.columns.objectives, self.columns.failed, fitness)
+        told = spec.search_feedback(self.columns.objectives, self.columns.failed, fitness)
         return self.by_iteration(told)
 
 

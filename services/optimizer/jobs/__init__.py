@@ -1,1 +1,1 @@
-"""The domain: what a job is, and what its designs are worth."""
+"""The domain: jobs, their specs, iterations and documents"""

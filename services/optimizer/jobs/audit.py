@@ -1,4 +1,4 @@
-"""What is kept of who did what: entries of the audit log."""
+"""Entries of the audit log"""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from enum import StrEnum
 from typing import Any, Final
 
 LOCAL: Final = "local"
-"""Whoever asks without a token: on the command line, or a server that listens to its machine alone.
-No token has this name."""
+"""Actor without a token: the command line, or a server bound to loopback. No token has this name.
+"""
 
 
 RETENTION: Final = "retention"
-"""Whatever deletes jobs that ended long ago. No token has this name, either."""
+"""Actor that deletes expired jobs. No token has this name."""
 
 
 class AuditAction(StrEnum):
-    """What was done."""
+    """Audited action."""
 
     SUBMIT = "submit"
     FORK = "fork"
@@ -40,12 +40,11 @@ class AuditEntry:
     """One change, written in the transaction that made it.
 
     Attributes:
-        index: the later, the greater.
-        at: when, UTC, by the database's clock.
-        actor: name of the token that asked for it, or `LOCAL`.
-        action: what was done.
-        job_id: to which job; None for what is about no job. The job may be gone since.
-        details: what else tells the change from others like it, such as the new budget.
+        index: ascending with time.
+        at: UTC, by the database's clock.
+        actor: name of the token, or `LOCAL`, or `RETENTION`.
+        job_id: None for an action on no job; the job may have been deleted since.
+        details: further content, such as the new budget.
     """
 
     index: int

@@ -1,14 +1,14 @@
-"""The chain of a job's history: one digest an iteration, over the one before.
+"""Digest chain of a job's history
 
 digest of      is the SHA-256 of
 a job          ["gaitswarm job", 1, spec, lineage]
 an ask         ["gaitswarm ask", 1, positions, the optimizer's state]
-an iteration   ["gaitswarm iteration", 1, digest before, index, positions, designs, objectives,
+an iteration   ["gaitswarm iteration", 1, previous digest, index, positions, designs, objectives,
                statuses, fitness, digest of the ask, provenance in force, reevaluation]
 
-"Before" the first iteration is the job. All of it is encoded as CBOR (RFC 8949) with the choices
-that docs/reference/evidence-file.md names, so that equal contents are equal bytes wherever they
-were stored. A digest of another version than 1 is to begin with that version and a colon.
+The digest of the job precedes the first iteration. Contents are encoded as CBOR (RFC 8949) with the
+choices listed in docs/reference/evidence-file.md, so that equal contents are equal bytes wherever
+they were stored. A digest of another version than 1 is to begin with that version and a colon.
 """
 
 from __future__ import annotations
@@ -28,22 +28,22 @@ from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration, Reev
 from gaitswarm.sim.outcome import Status
 
 VERSION: Final = 1
-"""Of the encoding, in every digest."""
+"""Of the encoding; part of every digest."""
 
 Floats = NDArray[np.float64]
 
 _DIMENSIONS, _UINT8, _FLOAT64 = 40, 64, 86
-"""Tags of arrays, RFC 8746."""
+"""Array tags of RFC 8746."""
 
 
 @dataclass(frozen=True, slots=True)
 class ChainDocuments:
-    """What a job's chain depends on beside its iterations: JSON documents as they are stored.
+    """Documents other than iterations that a job's chain depends on, as stored in JSON.
 
     Attributes:
-        spec: As it was submitted.
-        lineage: Of a fork; None for any other job.
-        provenance: Records, each with its `from_iteration`; None where there are none.
+        spec: as submitted.
+        lineage: of a fork; None for other jobs.
+        provenance: records, each with its `from_iteration`; None if there are none.
     """
 
     spec: Any
@@ -52,24 +52,24 @@ class ChainDocuments:
 
     @property
     def digest(self) -> str:
-        """Of the job, before its first iteration."""
+        """Digest of the job, before its first iteration."""
         return _digest(["gaitswarm job", VERSION, self.spec, self.lineage])
 
     def provenance_of(self, iteration: int) -> Any:
-        """Find what an iteration depends on."""
-        found = [r for r in self.provenance or () if r["from_iteration"] <= iteration]
-        return found[-1] if found else None
+        """Return the provenance in force at an iteration."""
+        records = [r for r in self.provenance or () if r["from_iteration"] <= iteration]
+        return records[-1] if records else None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Link:
-    """What is stored of an iteration beside its evaluations.
+    """What is stored of an iteration besides its evaluations.
 
     Attributes:
-        iteration: Its index, from 0.
-        positions: (n, d) that the search asked for.
-        ask_digest: Of the positions with the optimizer's state; None where that is not known.
-        digest: Of the iteration; None before it is committed.
+        iteration: index, from 0.
+        positions: (n, d) asked for by the search.
+        ask_digest: of the positions and the optimizer's state; None if unknown.
+        digest: of the iteration; None before it is committed.
     """
 
     iteration: int
@@ -80,14 +80,14 @@ class Link:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outcomes:
-    """What the designs of an iteration came to.
+    """Results of an iteration's designs.
 
     Attributes:
         designs: (n, v).
-        objectives: (n, K, m), NaN or infinite where there is none.
+        objectives: (n, K, m), NaN or infinite if missing.
         statuses: (n, K) values of `gaitswarm.sim.outcome.Status`.
-        fitness: (n,), +inf for a design that failed.
-        reevaluation: Of its best design in double precision, if there is one.
+        fitness: (n,), +inf for a failed design.
+        reevaluation: of the best design in double precision, if any.
     """
 
     designs: Floats
@@ -98,7 +98,7 @@ class Outcomes:
 
     @classmethod
     def of(cls, done: CompletedIteration) -> Outcomes:
-        """Take them from an iteration that is about to be stored."""
+        """Build from an iteration to be stored."""
         return cls(
             done.designs,
             np.stack([outcome.objectives for outcome in done.outcomes], axis=1),
@@ -109,14 +109,13 @@ class Outcomes:
 
     @classmethod
     def read(cls, columns: EvaluationColumns, reevaluation: Reevaluation | None) -> Outcomes:
-        """Take them from what was stored."""
+        """Build from stored columns."""
         stored = (columns.designs, columns.objectives, columns.statuses, columns.fitness)
         return cls(*stored, reevaluation)
 
 
 def iteration_digest(before: str, documents: ChainDocuments, link: Link, outcomes: Outcomes) -> str:
-    """Compute the digest of an iteration."""
-    anew = outcomes.reevaluation
+    reevaluation = outcomes.reevaluation
     content = [
         "gaitswarm iteration",
         VERSION,
@@ -129,25 +128,25 @@ def iteration_digest(before: str, documents: ChainDocuments, link: Link, outcome
         outcomes.fitness,
         link.ask_digest,
         documents.provenance_of(link.iteration),
-        anew
+        reevaluation
         and [
-            anew.particle,
-            anew.objectives,
-            _Statuses(anew.statuses),
-            np.array([anew.fitness]),
+            reevaluation.particle,
+            reevaluation.objectives,
+            _Statuses(reevaluation.statuses),
+            np.array([reevaluation.fitness]),
         ],
     ]
     return _digest(content)
 
 
 def ask_digest(positions: Floats, state: Mapping[str, Any]) -> str:
-    """Compute the digest of an ask, which stays when the state is cleared."""
+    """Compute the digest of an ask; it outlives the state, which is cleared later."""
     return _digest(["gaitswarm ask", VERSION, positions, state])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Statuses:
-    """(...,) values of `Status`: hashed by their labels, which are what is stored."""
+    """(...,) values of `Status`; hashed by label, as stored."""
 
     values: NDArray[np.uint8]
 
@@ -157,23 +156,23 @@ def _digest(value: Any) -> str:
 
 
 def encoded(value: Any) -> bytes:
-    """Encode as CBOR: equal values are equal bytes."""
+    """Encode as CBOR; equal values are equal bytes."""
     return cbor2.dumps(value, encoders=_ENCODERS)
 
 
 def _encode_map(encoder: CBOREncoder, value: dict[str, Any]) -> None:
-    """In the order of the keys' bytes."""
+    """Sorted by the encoded keys."""
     encoder.encode_map(dict(sorted(value.items(), key=lambda item: cbor2.dumps(item[0]))))
 
 
 def _encode_floats(encoder: CBOREncoder, values: Floats) -> None:
-    """All that is not finite is one NaN, as all of it is stored as none."""
+    """All non-finite values become one NaN, as they are stored as null."""
     numbers = np.where(np.isfinite(values), values, np.nan).astype("<f8")
     encoder.encode(_array(numbers.shape, _FLOAT64, numbers.tobytes()))
 
 
 def _encode_statuses(encoder: CBOREncoder, statuses: _Statuses) -> None:
-    """Labels that occur, sorted, and for each status its place among them."""
+    """The sorted labels that occur, and for each status its index among them."""
     values = statuses.values
     labels = {value: Status(value).label for value in np.unique(values).tolist()}
     ranked = sorted(labels.values())

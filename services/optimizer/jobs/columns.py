@@ -1,4 +1,4 @@
-"""Evaluations of a job as columns, for arithmetic over thousands of them at once."""
+"""Evaluations of a job as columns of arrays"""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EvaluationColumns:
-    """Evaluations, one row each, in order of iteration and particle; never written to.
+    """Evaluations, one per row, ordered by iteration and particle; read-only.
 
     Attributes:
-        iteration: (r,) index of the iteration, from 0.
-        particle: (r,) particle of the swarm, from 0.
+        iteration: (r,) from 0.
+        particle: (r,) from 0.
         designs: (r, v) values of `Spec.design_space().names`, in the variables' units.
-        objectives: (r, K, m) raw objectives, cases and objectives in the spec's order, in their
-            units, NaN where there is none.
+        objectives: (r, K, m) raw objectives, cases and objectives in the spec's order, NaN if
+            missing.
         statuses: (r, K) values of `gaitswarm.sim.outcome.Status`.
         fitness: (r,) by the job's own measure, minimized, +inf if a case failed.
     """
@@ -38,7 +38,7 @@ class EvaluationColumns:
 
     @property
     def arrays(self) -> tuple[NDArray[np.generic], ...]:
-        """All columns, in the order of the constructor's arguments."""
+        """All columns, in the order of the constructor."""
         return (
             self.iteration,
             self.particle,
@@ -54,7 +54,6 @@ class EvaluationColumns:
         return np.asarray(self.statuses != Status.OK)
 
     def rows(self, chosen: slice | NDArray[np.intp]) -> EvaluationColumns:
-        """Choose rows."""
         return EvaluationColumns(
             self.iteration[chosen],
             self.particle[chosen],
@@ -65,11 +64,10 @@ class EvaluationColumns:
         )
 
     def of_iteration(self, iteration: int) -> EvaluationColumns:
-        """Choose one iteration."""
         return self.rows(slice(*np.searchsorted(self.iteration, [iteration, iteration + 1])))
 
     def after(self, iteration: int | None) -> EvaluationColumns:
-        """Leave out the first iterations."""
+        """Return the rows of the iterations after one; all for None."""
         if iteration is None:
             return self
         return self.rows(slice(int(np.searchsorted(self.iteration, iteration, "right")), None))

@@ -1,4 +1,4 @@
-"""The box in which an optimizer searches, and the designs that its points stand for."""
+"""The search space, and the mapping between its points and designs"""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from gaitswarm.sim.variables import Variable, VariableCatalogue
 
 @dataclass(frozen=True, slots=True)
 class DesignSpace:
-    """Variables with bounds, and values held fixed.
+    """Searched variables with their bounds, and fixed values.
 
-    A *position* is a point of the box, (d,) in the variables' own units. A *design* is what is
-    judged and stored: integer variables rounded, of categorical ones the index of a choice, fixed
-    values appended; its columns are `names`.
+    A *position* is a point of the box, (d,) in the variables' units. A *design* is what is judged
+    and stored: integer variables rounded, categorical ones as the index of a choice, fixed values
+    appended; its columns are `names`.
 
     Attributes:
-        variables: the d that are searched.
+        variables: the d searched variables.
         fixed: names and values of the others.
-        catalogue: all of these as the simulator knows them, in the order of `names`; of a
-            categorical variable with all of its choices.
+        catalogue: all of these in the simulator's catalogue, ordered as `names`, categorical ones
+            with all of their choices.
     """
 
     variables: tuple[Variable, ...]
@@ -43,9 +43,9 @@ class DesignSpace:
         chosen: Sequence[str | Variable] | None,
         fixed: Mapping[str, float | str],
     ) -> DesignSpace:
-        """Combine a catalogue with a user's choice."""
+        """Combine a catalogue with a user's choice. Raises ValueError."""
         catalogue = VariableCatalogue((*required, *optional))
-        held = _held(fixed, catalogue)
+        fixed_values = _fixed_values(fixed, catalogue)
         if chosen is None:
             chosen = [variable for variable in required if variable.name not in fixed]
         variables: list[Variable] = []
@@ -58,30 +58,30 @@ class DesignSpace:
             if any(variable.name == name for variable in variables):
                 raise ValueError(f"variables: {name!r} is named twice")
             if name in fixed:
-                raise ValueError(f"fixed: {name!r} is also among the variables; choose one")
+                raise ValueError(f"fixed: {name!r} is also among the variables; remove one")
             variables.append(_checked(entry, catalogue[name]))
         covered = {variable.name for variable in variables} | set(fixed)
         missing = [variable.name for variable in required if variable.name not in covered]
         if missing:
             raise ValueError(
-                f"variables: {', '.join(missing)} neither searched nor fixed; the controller"
-                " needs every one of its variables"
+                f"variables: {', '.join(missing)} neither searched nor fixed; give every variable"
+                " of the controller"
             )
         if not variables:
-            raise ValueError("variables: nothing is left to search, every variable is fixed")
+            raise ValueError("variables: every variable is fixed; leave at least one to search")
         names = (*(variable.name for variable in variables), *fixed)
-        return cls(tuple(variables), held, tuple(catalogue[name] for name in names))
+        return cls(tuple(variables), fixed_values, tuple(catalogue[name] for name in names))
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Columns of a design array: the variables, then the fixed values."""
+        """Columns of a design array: searched variables, then fixed ones."""
         return tuple(variable.name for variable in self.variables) + tuple(
             name for name, _ in self.fixed
         )
 
     @property
     def box(self) -> Space:
-        """The box of the variables that are searched."""
+        """The box of the searched variables."""
         return Space([Axis(v.low, v.high, v.kind) for v in self.variables])
 
     @property
@@ -96,22 +96,24 @@ class DesignSpace:
 
     @property
     def columns(self) -> tuple[Variable, ...]:
-        """The variable of each column of a design array, as `names`."""
+        """The variable of each column of a design array."""
         return (*self.variables, *self.catalogue[len(self.variables) :])
 
     def designs(self, positions: NDArray[np.float64]) -> NDArray[np.float64]:
-        """What is judged and stored for points of the box."""
+        """Return the (n, v) designs of (n, d) positions."""
         held = np.array([value for _, value in self.fixed], dtype=np.float64)
         return np.hstack([self.box.designs(positions), np.tile(held, (len(positions), 1))])
 
     def positions(self, designs: Sequence[Mapping[str, float | str]]) -> NDArray[np.float64]:
-        """Points of the box for designs as people give them, of which `designs` gives them back."""
-        held = {v.name: value for v, (_, value) in zip(self._held, self.fixed, strict=True)}
+        """Return the positions of designs given by name. Raises ValueError."""
+        held = {
+            v.name: value for v, (_, value) in zip(self._fixed_variables, self.fixed, strict=True)
+        }
         rows = []
         for index, design in enumerate(designs):
             for name, value in design.items():
                 if name in held:
-                    self._check_held(f"{index}.{name}", name, value, held[name])
+                    self._check_fixed_value(f"{index}.{name}", name, value, held[name])
                 elif name not in self.names:
                     raise ValueError(
                         f"{index}.{name}: no variable of this job, which searches"
@@ -121,29 +123,29 @@ class DesignSpace:
         return self.box.positions(np.array(rows).reshape(len(rows), len(self.variables)))
 
     @property
-    def _held(self) -> tuple[Variable, ...]:
-        """The variables that are fixed, with all of their choices."""
+    def _fixed_variables(self) -> tuple[Variable, ...]:
+        """The fixed variables, with all of their choices."""
         return self.catalogue[len(self.variables) :]
 
-    def _check_held(self, where: str, name: str, value: float | str, held: float) -> None:
-        known = next(variable for variable in self._held if variable.name == name)
-        if _number(where, known, value) != held:
+    def _check_fixed_value(self, where: str, name: str, value: float | str, fixed: float) -> None:
+        variable = next(variable for variable in self._fixed_variables if variable.name == name)
+        if _number(where, variable, value) != fixed:
             raise ValueError(
-                f"{where}: {value} is not what this job holds it at, {known.shown(held)}; leave it"
-                " out, or change `fixed`"
+                f"{where}: {value} is not the job's fixed value, {variable.shown(fixed)}; omit it"
+                " or change `fixed`"
             )
 
     def simulated(self, designs: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Designs as the simulator takes them, which knows every choice of its catalogue."""
+        """Translate designs to the simulator's catalogue, with its indices of choices."""
         translated = designs.copy()
-        for j, (own, known) in enumerate(zip(self.columns, self.catalogue, strict=True)):
-            if own.choices != known.choices:
-                index = np.array([known.number(choice) for choice in own.choices])
+        for j, (column, full) in enumerate(zip(self.columns, self.catalogue, strict=True)):
+            if column.choices != full.choices:
+                index = np.array([full.number(choice) for choice in column.choices])
                 translated[:, j] = index[designs[:, j].astype(np.intp)]
         return translated
 
     def shown(self, design: Iterable[float]) -> dict[str, float | str]:
-        """A design as people read it."""
+        """Return a design by name, for people."""
         return {
             variable.name: variable.shown(value)
             for variable, value in zip(self.columns, design, strict=True)
@@ -151,26 +153,27 @@ class DesignSpace:
 
     @property
     def shown_fixed(self) -> dict[str, float | str]:
-        """The fixed values as people read them, by name."""
+        """The fixed values by name, for people."""
         return {
-            v.name: v.shown(value) for v, (_, value) in zip(self._held, self.fixed, strict=True)
+            v.name: v.shown(value)
+            for v, (_, value) in zip(self._fixed_variables, self.fixed, strict=True)
         }
 
     def corners(self) -> Iterator[dict[str, float]]:
-        """What is simulated at the lower and at the upper ends of all bounds, by variable."""
+        """Yield the simulated values at all lower and at all upper bounds, by variable."""
         for corner in (self.low, self.high):
             (values,) = self.simulated(self.designs(corner.reshape(1, -1)))
             yield dict(zip(self.names, values.tolist(), strict=True))
 
     def refusal(self, error: SimulationInputError) -> InvalidRequest:
-        """An error in a design as one of the spec's field that the design has the value from."""
+        """Convert a simulator's error to one that names `fixed` or `variables`."""
         culprit = str(error).partition(":")[0]
         return InvalidRequest(
             str(error), field="fixed" if culprit in dict(self.fixed) else "variables"
         )
 
 
-def _held(
+def _fixed_values(
     fixed: Mapping[str, float | str], catalogue: Mapping[str, Variable]
 ) -> tuple[tuple[str, float], ...]:
     """Names and numbers of fixed values."""
@@ -186,17 +189,16 @@ def _held(
 
 
 def _searched(index: int, variable: Variable, design: Mapping[str, float | str]) -> float:
-    """The number of a searched variable in a design."""
     where = f"{index}.{variable.name}"
     if variable.name not in design:
-        raise ValueError(f"{where}: missing; a design gives every variable that is searched")
+        raise ValueError(f"{where}: missing; give every searched variable")
     number = _number(where, variable, design[variable.name])
     if variable.kind == "integer" and not number.is_integer():
-        raise ValueError(f"{where}: {number:g} is no whole number")
+        raise ValueError(f"{where}: {number:g} is not an integer")
     if not variable.low <= number <= variable.high:
         raise ValueError(
             f"{where}: {number:g} is outside the bounds {variable.low:g} to {variable.high:g};"
-            " widen them in `variables`, or leave the design out"
+            " widen them in `variables`, or omit the design"
         )
     return number
 
@@ -208,23 +210,25 @@ def _number(where: str, variable: Variable, value: float | str) -> float:
         raise ValueError(f"{where}: {str(error).removeprefix(f'{variable.name}: ')}") from error
 
 
-def _checked(entry: str | Variable, known: Variable) -> Variable:
-    """A user's own bounds or choices keep the catalogue's kind and unit."""
+def _checked(entry: str | Variable, catalogued: Variable) -> Variable:
+    """Return a variable with custom bounds or choices and the catalogue's unit."""
     if isinstance(entry, str):
-        return known
-    # A continuous variable may be searched in whole numbers.
-    if entry.kind != known.kind and (known.kind != "continuous" or entry.kind == "categorical"):
-        article = "an" if known.kind == "integer" else "a"
+        return catalogued
+    # A continuous variable may be restricted to integers.
+    if entry.kind != catalogued.kind and (
+        catalogued.kind != "continuous" or entry.kind == "categorical"
+    ):
+        article = "an" if catalogued.kind == "integer" else "a"
         raise ValueError(
-            f"variables: {entry.name} is {article} {known.kind} variable; set kind to"
-            f" {known.kind!r}"
+            f"variables: {entry.name} is {article} {catalogued.kind} variable; set kind to"
+            f" {catalogued.kind!r}"
         )
     for choice in entry.choices:
-        if choice not in known.choices:
+        if choice not in catalogued.choices:
             raise ValueError(
-                f"variables: {choice!r} is none of the choices of {entry.name}; they are"
-                f" {', '.join(known.choices)}"
+                f"variables: {choice!r} is not a choice of {entry.name}; choose from"
+                f" {', '.join(catalogued.choices)}"
             )
     return entry.model_copy(
-        update={"unit": known.unit, "description": entry.description or known.description}
+        update={"unit": catalogued.unit, "description": entry.description or catalogued.description}
     )

@@ -1,4 +1,4 @@
-"""Any job's spec: the union of all kinds, told apart by `kind`."""
+"""Union of the specs of all kinds of jobs, discriminated by `kind`"""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ _CERTIFICATE: Final = "<certificate>"
 
 
 def _kind(value: Any) -> str:
-    """Of a document or a spec; a job without one tunes a drive."""
-    named = value if isinstance(value, dict) else {"kind": getattr(value, "kind", "tuning")}
-    return f"<{named.get('kind', 'tuning')}>"
+    """Tag of a document or spec; the default kind is tuning."""
+    document = value if isinstance(value, dict) else {"kind": getattr(value, "kind", "tuning")}
+    return f"<{document.get('kind', 'tuning')}>"
 
 
 AnySpec = Annotated[
@@ -41,11 +41,11 @@ AnySpec = Annotated[
 SPECS: Final[TypeAdapter[JobSpec | IdentificationSpec | CalibrationSpec | CertificateSpec]] = (
     TypeAdapter(AnySpec)
 )
-"""Reads a document with a spec of any kind; raises ValidationError for what is none."""
+"""Validates a spec of any kind; raises ValidationError."""
 
 
 def checked_spec(spec: AnySpec, changes: Mapping[str, Any]) -> AnySpec:
-    """A spec with other values of some fields, so that what is stored of it can be read again."""
+    """Return a spec with changed fields, validated, so that it can be stored and read again."""
     try:
         return SPECS.validate_python({**spec.model_dump(), **changes})
     except ValidationError as error:
@@ -56,7 +56,7 @@ def checked_spec(spec: AnySpec, changes: Mapping[str, Any]) -> AnySpec:
 
 
 def check_budget(spec: AnySpec, iterations: int) -> None:
-    """Check that a job can have another budget, as if it had been submitted with it."""
+    """Check that a job may have another budget."""
     try:
         checked_spec(spec.with_budget(iterations), {})
     except InvalidRequest as error:

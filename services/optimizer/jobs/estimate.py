@@ -1,4 +1,4 @@
-"""What a job will cost before it is submitted: how many walks, and how long they take."""
+"""Estimates of jobs: total cost before submission, time left while running"""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
 from gaitswarm.services.optimizer.jobs.job import Job, JobState
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.spec import Spec, create_optimizer
+from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
 from gaitswarm.sim.case import Case, LongCase, Walk
 from gaitswarm.sim.outcome import Status
@@ -27,23 +27,23 @@ from gaitswarm.sim.simulate import prepare
 from gaitswarm.sim.worlds.walks import PerturbedWalk
 
 _WEIGHT: Final = 0.3
-"""Of the last iteration, against all before."""
+"""Weight of the last iteration in the moving average."""
 
 _LATE: Final = 2.0
-"""How many times as long as the last iterations one takes that is said to be late."""
+"""An iteration is reported as late beyond this multiple of the recent duration."""
 
 
 @dataclass(frozen=True, slots=True)
 class TimeLeft:
-    """Rates so far, and the rest of the budget at the pace of the last iterations.
+    """Rates so far, and the time to the end of the budget at the recent pace.
 
     Attributes:
-        eta_seconds: time to the end of the budget [s]; 0 for a job that succeeded, None unless it
-            runs, waits for nothing and has committed something.
-        evaluations_per_second: designs judged [1/s]; None before the first commit.
-        simulations_per_second: walks, one per case and design that was not known [1/s]; None before
-            the first commit, and where the spec cannot be read.
-        basis: what `eta_seconds` is derived from, or why it is not known, for people.
+        eta_seconds: [s]; 0 for a job that succeeded, None unless it is running, waits for nothing
+            and has committed an iteration.
+        evaluations_per_second: [1/s]; None before the first commit.
+        simulations_per_second: simulations that were not cached [1/s]; None before the first commit
+            or if the spec is unreadable.
+        basis: what `eta_seconds` is derived from, or why it is unknown, for people.
     """
 
     eta_seconds: float | None
@@ -53,19 +53,19 @@ class TimeLeft:
 
 
 def recent_pace(before: float | None, latest: float) -> float:
-    """The pace of a job when another iteration has ended."""
+    """Update the moving average of the time per design."""
     return latest if before is None else (1.0 - _WEIGHT) * before + _WEIGHT * latest
 
 
 def time_left(job: Job, now: datetime) -> TimeLeft:
-    """Estimate when a job ends, from its own committed iterations.
+    """Estimate a job's end from its committed iterations.
 
-    Rates are over the time spent evaluating, so pauses and the time in the queue do not count.
+    Rates refer to the time spent evaluating; pauses and time in the queue do not count.
     """
     progress = job.progress
-    nothing_known = job.own_evaluations == 0 or progress.compute_seconds <= 0.0
-    eta, basis = _without_pace(job, nothing_known=nothing_known)
-    if nothing_known:
+    no_rate = job.own_evaluations == 0 or progress.compute_seconds <= 0.0
+    eta, basis = _without_pace(job, no_rate=no_rate)
+    if no_rate:
         return TimeLeft(eta, None, None, basis)
     if not basis:
         eta, basis = _by_pace(job, now)
@@ -78,18 +78,18 @@ def time_left(job: Job, now: datetime) -> TimeLeft:
     )
 
 
-def _without_pace(job: Job, *, nothing_known: bool) -> tuple[float | None, str]:
-    """What is known without any pace, and why; no reason if a pace is all that it takes."""
+def _without_pace(job: Job, *, no_rate: bool) -> tuple[float | None, str]:
+    """Return what is known without a pace, and the basis; an empty basis if a pace suffices."""
     if job.state is JobState.SUCCEEDED:
-        return 0.0, "it has ended"
+        return 0.0, "the job has ended"
     if job.state is not JobState.RUNNING:
-        return None, f"not known of a job that is {job.state}"
+        return None, f"unknown: the job is {job.state}"
     if job.waiting is not None:
-        return None, "not known while it waits"
+        return None, "unknown while the job waits"
     if not job.readable:
-        return None, "not known, as its spec cannot be read"
-    if nothing_known:
-        return None, "not known before its first iteration is committed"
+        return None, "unknown: the job's spec cannot be read"
+    if no_rate:
+        return None, "unknown until the first iteration is committed"
     return None, ""
 
 
@@ -97,40 +97,39 @@ def _by_pace(job: Job, now: datetime) -> tuple[float, str]:
     progress = job.progress
     average = progress.compute_seconds / job.own_evaluations
     pace = average if progress.recent_seconds is None else progress.recent_seconds
-    own = progress.iterations - (job.lineage.own_from if job.lineage else 0)
-    one = pace * job.own_evaluations / own
+    iterations = progress.iterations - (job.lineage.own_from if job.lineage else 0)
+    one_iteration = pace * job.own_evaluations / iterations
     since = max(0.0, (now - job.updated_at).total_seconds())
     remaining = max(0, job.spec.budget - progress.evaluations) * pace
-    basis = f"at the pace of its last iterations, {one:.3g} s each"
-    if since > _LATE * one and remaining > 0.0:
-        basis += f"; the one under way has taken {since:.3g} s"
-    return max(0.0, remaining - min(one, since)), basis
+    basis = f"at the pace of the last iterations, {one_iteration:.3g} s each"
+    if since > _LATE * one_iteration and remaining > 0.0:
+        basis += f"; the current one has taken {since:.3g} s"
+    return max(0.0, remaining - min(one_iteration, since)), basis
 
 
 _MOST_JOBS: Final = 5
-"""Jobs whose rates are averaged, so that one on a busy machine does not count for all."""
+"""Jobs whose rates are averaged, so that no single job on a busy machine decides."""
 
 _MEASURED: Final = 8
-"""Designs that walk to measure a rate: a multiple of what any kernel takes at once."""
+"""Designs simulated to measure a rate: a multiple of every kernel's lanes."""
 
 _LONGEST_WALK: Final = 5.0
-"""Length of the walk that is measured [s]; a very short one would tell how long tables take."""
+"""Length of the measured simulation [s]; a very short one would measure table setup."""
 
 _REMEMBERED: Final = 64
 
 _MOST_WALKS: Final = 1_000_000
-"""Walks of an iteration: their objectives, 48 B each, are in memory together."""
+"""Limit on simulations per iteration: their objectives, 48 B each, are in memory together."""
 
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """What a job would cost.
+    """Predicted cost of a job.
 
     Attributes:
-        evaluations: designs that are judged.
-        walks: each design in each case.
-        simulated_seconds: simulated time of all walks together [s].
-        seconds: wall time [s], None where nothing is known.
+        walks: simulations: designs times cases.
+        simulated_seconds: of all simulations together [s].
+        seconds: wall time [s], None if unknown.
         basis: what the wall time is derived from, for people.
     """
 
@@ -144,16 +143,16 @@ class Estimate:
 def estimate(
     spec: Spec, cases: Sequence[Case], earlier: Sequence[Job], measured: MeasuredRates
 ) -> Estimate:
-    """Estimate a job by the rate of jobs like it, or else of a short walk in this thread."""
+    """Estimate a job from the rate of similar jobs, else from a short simulation in this thread."""
     evaluations = spec.budget
     one = duration(spec, cases)
-    positions = create_optimizer(spec).ask()
-    alike = [job for job in earlier if _alike(job, spec, len(positions))][:_MOST_JOBS]
-    if alike:
-        walked = sum(_simulated_seconds(job, one) for job in alike)
-        rate: float | None = walked / sum(job.progress.compute_seconds for job in alike)
-        jobs = "1 earlier job" if len(alike) == 1 else f"{len(alike)} earlier jobs"
-        basis = f"the rate of {jobs} with the same kind of walks: {rate:.3g} simulated s/s"
+    positions = spec.create_search().ask()
+    similar = [job for job in earlier if _is_similar(job, spec, len(positions))][:_MOST_JOBS]
+    if similar:
+        walked = sum(_simulated_seconds(job, one) for job in similar)
+        rate: float | None = walked / sum(job.progress.compute_seconds for job in similar)
+        jobs = "1 earlier job" if len(similar) == 1 else f"{len(similar)} earlier jobs"
+        basis = f"the rate of {jobs} with similar simulations: {rate:.3g} simulated s/s"
     else:
         rate, basis = measured.rate(spec, cases, positions)
     simulated = evaluations * one
@@ -167,7 +166,7 @@ def estimate(
 
 
 def duration(spec: Spec, cases: Sequence[Case]) -> float:
-    """Simulated time of one design in some of a spec's cases."""
+    """Return the simulated time of one design in some of a spec's cases [s]."""
     cycle_time = _typical(spec.design_space(), "cycle_time")
     return sum(
         case.scenario.cycles * cycle_time
@@ -178,28 +177,28 @@ def duration(spec: Spec, cases: Sequence[Case]) -> float:
 
 
 def checked_length(spec: Spec, cases: Sequence[Case], longest: float) -> float:
-    """Refuse a job whose walks are too many at once, or last too long."""
+    """Return a job's simulated time [s]. Raises InvalidRequest beyond the limits."""
     at_once = len(cases) * spec.optimizer.particles
     if at_once > _MOST_WALKS:
         raise InvalidRequest(
-            f"an iteration has {at_once} walks, more than the {_MOST_WALKS} that are kept at"
-            " once; give it fewer particles, scenarios or worlds",
+            f"an iteration has {at_once} simulations, more than the limit of {_MOST_WALKS};"
+            " use fewer particles, scenarios or worlds",
             field="optimizer",
         )
     seconds = spec.budget * duration(spec, cases)
     if seconds > longest:
         raise InvalidRequest(
-            f"all walks of the job last {seconds:.3g} s together, more than the {longest:.3g} s"
-            " that a job may have here; give it fewer iterations, or fewer or shorter scenarios",
+            f"the job's simulations last {seconds:.3g} s together, more than the limit of"
+            f" {longest:.3g} s; use fewer iterations, or fewer or shorter scenarios",
             field="iterations",
         )
     return seconds
 
 
 class MeasuredRates:
-    """Simulated over elapsed seconds, of this machine, by kind of walk. Thread-safe.
+    """Simulated seconds per second on this machine, by kind of simulation. Thread-safe.
 
-    A rate is measured once and kept: it is an estimate, and whoever fills a form asks often.
+    A rate is measured once and cached: forms ask for estimates often.
     """
 
     def __init__(self) -> None:
@@ -209,46 +208,43 @@ class MeasuredRates:
     def rate(
         self, spec: Spec, cases: Sequence[Case], positions: NDArray[np.float64]
     ) -> tuple[float | None, str]:
-        """Measure, unless it was measured before, how fast walks of a spec are simulated.
+        """Return the cached or measured rate, and its basis.
 
-        Compiles the robot's kernel if need be, as the job itself would.
+        Compiles the robot's kernel if needed, as the job itself would.
         """
         if any(isinstance(case, LongCase) for case in cases):
-            return None, "nothing: a run takes too long to be measured beforehand"
+            return None, "none: a simulation takes too long to be measured in advance"
         if prepare(spec.robot, precision=spec.precision) != "native":
-            return None, "nothing: without a C compiler walks take some hundred times as long"
-        # Only Linux says which processors a process may use.
+            return None, "none: without a C compiler simulations are some hundred times slower"
+        # Only Linux reports the processors that a process may use.
         affinity = getattr(os, "sched_getaffinity", None)
         cores = len(affinity(0)) if affinity else os.cpu_count() or 1
         with self._lock:
             key = f"{_kind_of_walk(spec)} {min(_MEASURED, len(positions))}"
             rate = self._rates.pop(key, None) or _measure(spec, cases, positions)
             if rate is None:
-                return None, "nothing: the designs that were tried are beyond the legs' reach"
+                return None, "none: the sampled designs are out of the legs' reach"
             self._rates[key] = rate
             if len(self._rates) > _REMEMBERED:
                 self._rates.popitem(last=False)
         return cores * rate, (
-            f"a walk measured on this machine, {rate:.3g} simulated s/s, on all of its"
+            f"a simulation measured on this machine, {rate:.3g} simulated s/s, on all of its"
             f" {cores} cores"
         )
 
 
 def _measure(spec: Spec, cases: Sequence[Case], positions: NDArray[np.float64]) -> float | None:
-    """Simulated seconds per second of one core: a search's first designs in the shortest case.
-
-    None if none of them can begin to walk.
-    """
+    """Measure one core on the search's first designs in the shortest case; None if all fail."""
     space = spec.design_space()
     at_once = min(_MEASURED, len(positions))
     if at_once < _MEASURED:
-        # A method that asks for few at a time would have nothing measured if those cannot walk.
+        # The few designs of a method that asks for few at a time may all be unable to walk.
         positions = space.box.evenly(
             RandomNumbers(spec.seed, 0).uniform(_MEASURED, space.box.dimension)
         )
     designs = space.simulated(space.designs(positions[:_MEASURED]))
     case = _shortened(min(cases, key=lambda case: case.duration))
-    # The first walk pays for what later ones find ready: tables, and memory that is mapped.
+    # Warm up tables and mapped memory.
     case.run(designs[:1])
     begun = time.perf_counter()
     outcomes = [case.run(designs[i : i + at_once]) for i in range(0, _MEASURED, at_once)]
@@ -258,7 +254,7 @@ def _measure(spec: Spec, cases: Sequence[Case], positions: NDArray[np.float64]) 
 
 
 def _shortened(case: Case) -> Case:
-    """A walk of some seconds; a fit needs all of its recording."""
+    """Limit a simulation to some seconds; a fit needs its whole recording."""
     if not isinstance(case, Walk | PerturbedWalk):
         return case
     scenario = case.scenario
@@ -266,10 +262,10 @@ def _shortened(case: Case) -> Case:
     return replace(case, scenario=scenario.model_copy(update={"cycles": cycles}))
 
 
-def _alike(job: Job, spec: Spec, asked: int) -> bool:
-    """Whether a job has run walks of the same kind; a fit, to the same recordings.
+def _is_similar(job: Job, spec: Spec, asked: int) -> bool:
+    """Whether a job has run similar simulations, in iterations of a similar size.
 
-    Few at once take longer each than many; asked: how many the spec's method asks for first.
+    asked: designs in the spec's first iteration; a few at once take longer each than many.
     """
     progress = job.progress
     return (
@@ -283,7 +279,7 @@ def _alike(job: Job, spec: Spec, asked: int) -> bool:
 
 
 def _kind_of_walk(spec: Spec) -> str:
-    """What a walk's speed depends on: robot, controller, precision, case; the method."""
+    """Determinants of a simulation's speed: robot, controller, precision, case."""
     if isinstance(spec, CertificateSpec):
         fields = {"controller", "robot", "precision", "engines"}
         return f"world {spec.model_dump_json(include=fields)}"
@@ -292,14 +288,14 @@ def _kind_of_walk(spec: Spec) -> str:
 
 
 def _fitted_walks(spec: Spec) -> str:
-    """Of a job that fits parameters: walks to recordings are logged, others are not."""
+    """Of a fit: simulations of recordings are logged, others are not."""
     return "recorded" if spec.recording_ids else "calibrated"
 
 
 def _simulated_seconds(job: Job, fitted: float) -> float:
-    """What the committed iterations of a job that is like another have walked [s], as planned.
+    """Return the simulated time of a similar job's committed iterations [s].
 
-    fitted: simulated time of one design of the other [s]; fits to the same recordings share it.
+    fitted: simulated time of one design of the new job [s]; fits to the same recordings share it.
     """
     recorded = bool(job.spec.recording_ids)
     one = fitted if recorded else duration(job.spec, job.spec.cases({}))
@@ -307,7 +303,7 @@ def _simulated_seconds(job: Job, fitted: float) -> float:
 
 
 def _typical(space: DesignSpace, name: str) -> float | None:
-    """Value of a variable that is fixed, or the middle of its bounds; None if it is neither."""
+    """Value of a fixed variable, or the middle of its bounds; None if it is neither."""
     fixed = dict(space.fixed)
     if name in fixed:
         return fixed[name]

@@ -1,4 +1,4 @@
-"""Iterations of a job: what is asked, and what its designs come to."""
+"""Iterations of a job: asks, evaluations and their results"""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from gaitswarm.sim.outcome import Outcome
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reevaluation:
-    """A design of a search in single precision, evaluated anew in double.
+    """A design of a single-precision search, reevaluated in double precision.
 
     Attributes:
-        particle: of the swarm of its iteration, from 0.
+        particle: index in the swarm, from 0.
         objectives: (K, m) raw objectives by case, as in `Evaluation`.
         statuses: (K,) values of `gaitswarm.sim.outcome.Status`.
-        fitness: as `Job.spec.judge` has it, minimized, +inf if any case failed.
+        fitness: minimized, +inf if any case failed.
     """
 
     particle: int
@@ -34,18 +34,17 @@ class Reevaluation:
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """One design, judged in every case of its job.
+    """A design's results in all cases of its job.
 
     Attributes:
-        iteration: index of the iteration, from 0.
-        particle: of the swarm, from 0.
-        design: (v,) values of `Job.spec.design_space().names`, in the variables' units.
-        objectives: (K, m) raw objectives by case, columns as in `Job.spec.objectives`, in their
-            units, NaN where there is none.
+        iteration: from 0.
+        particle: from 0.
+        design: (v,) values of `Job.spec.design_space().names`.
+        objectives: (K, m) raw objectives by case, columns as in `Job.spec.objectives`, NaN if
+            missing.
         statuses: (K,) values of `gaitswarm.sim.outcome.Status`.
-        fitness: as `Job.spec.judge` has it, minimized, +inf if any case failed.
-        reevaluation: of the same design, with a job's best where the search is in single
-            precision; None otherwise.
+        fitness: minimized, +inf if any case failed.
+        reevaluation: for a job's best design if the search uses single precision.
     """
 
     iteration: int
@@ -59,18 +58,16 @@ class Evaluation:
 
 @dataclass(frozen=True, slots=True)
 class Iteration:
-    """One committed iteration, as it is listed: no particles.
+    """A committed iteration as listed, without its designs.
 
     Attributes:
-        index: from 0.
-        designs: how many were judged in it.
-        best: least fitness of the swarm, None if every design failed; `mean`, `median` and `worst`
-            likewise, over the finite values.
+        best: least fitness, None if every design failed; `mean`, `median` and `worst` likewise,
+            over finite values.
         best_so_far: least fitness of this and all earlier iterations.
-        failed: designs that failed in at least one case.
-        evaluate_seconds: time that its evaluation took [s].
-        committed_at: when it was committed, UTC.
-        digest: of it and all before it, see `jobs.chain`.
+        failed: number of designs that failed in at least one case.
+        evaluate_seconds: duration of the evaluation [s].
+        committed_at: UTC.
+        digest: see `jobs.chain`.
     """
 
     index: int
@@ -88,13 +85,12 @@ class Iteration:
 
 @dataclass(frozen=True, slots=True)
 class Ask:
-    """An iteration that is to be evaluated: stored before it is sent out.
+    """An iteration to be evaluated, stored before evaluation.
 
     Positions and state are stored as standard JSON, so every number in them is finite.
 
     Attributes:
-        iteration: index of the iteration, from 0.
-        positions: (particles, d) as the optimizer gave them, in the variables' units.
+        positions: (particles, d) in the variables' units.
         state: the optimizer's dump after the ask.
     """
 
@@ -105,23 +101,18 @@ class Ask:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Answered:
-    """A committed ask, from which the next one follows.
-
-    Attributes:
-        ask: what was asked.
-        columns: what its designs came to.
-    """
+    """A committed ask, from which the next one follows."""
 
     ask: Ask
     columns: EvaluationColumns
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Known:
-    """What a design came to in all cases of some job.
+class CachedOutcome:
+    """A design's results in all cases of some job.
 
     Attributes:
-        objectives: (K, m) raw objectives by case, NaN where there is none.
+        objectives: (K, m) raw objectives by case, NaN if missing.
         statuses: (K,) values of `gaitswarm.sim.outcome.Status`.
     """
 
@@ -134,16 +125,15 @@ class CompletedIteration:
     """All that one transaction commits of an iteration.
 
     Attributes:
-        iteration: index of the iteration, from 0.
-        designs: (n, v) values of `Job.spec.design_space().names`, in the variables' units.
-        outcomes: K, one per case, of the n designs each.
-        fitness: (n,) of the designs, +inf for one that failed.
-        evaluate_seconds: time that the evaluation took [s].
-        precision: of the search.
-        reevaluation: of its best design, where the search is in single precision and no earlier
-            design is as good.
-        keys: n, as `walk_keys` has them, None for a design whose outcome was known without a walk;
-            or none at all, of an iteration that is not to be found again.
+        iteration: from 0.
+        designs: (n, v) values of `Job.spec.design_space().names`.
+        outcomes: K, one per case, of n designs each.
+        fitness: (n,), +inf for a failed design.
+        evaluate_seconds: duration of the evaluation [s].
+        reevaluation: of the best design, if the search uses single precision and no earlier design
+            is as good.
+        keys: n keys of `walk_keys`, None for a design whose outcome was cached; empty for an
+            iteration that is not cached.
     """
 
     iteration: int
@@ -157,20 +147,24 @@ class CompletedIteration:
 
     @property
     def saved(self) -> int:
-        """Designs whose outcome was known without a walk."""
+        """Number of designs whose outcome was cached."""
         return self.keys.count(None)
 
     @property
     def best(self) -> tuple[int, float] | None:
-        """Particle and fitness of its best design, in double precision; None if there is none."""
+        """Particle and fitness of the best design, in double precision; None if there is none."""
         if self.precision == "double":
             particle = best_particle(self.fitness)
             return None if particle is None else (particle, float(self.fitness[particle]))
-        anew = self.reevaluation
-        return (anew.particle, anew.fitness) if anew and math.isfinite(anew.fitness) else None
+        reevaluation = self.reevaluation
+        return (
+            (reevaluation.particle, reevaluation.fitness)
+            if reevaluation and math.isfinite(reevaluation.fitness)
+            else None
+        )
 
 
 def best_particle(fitness: NDArray[np.float64]) -> int | None:
-    """Find the best of a swarm."""
+    """Return the index of the least finite fitness."""
     finite = np.isfinite(fitness)
     return int(np.argmin(np.where(finite, fitness, np.inf))) if finite.any() else None

@@ -1,4 +1,4 @@
-"""Jobs and what is remembered of them: the domain objects of the service."""
+"""Jobs, claims and their states"""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from gaitswarm.sim.identification.recorded_walk import Recordings
 
 
 class JobState(StrEnum):
-    """Where a job is in its life."""
+    """State of a job."""
 
     QUEUED = "queued"
     RUNNING = "running"
@@ -35,20 +35,19 @@ class JobState(StrEnum):
 
     @property
     def terminal(self) -> bool:
-        """Nothing more happens to it by itself."""
         return self in (JobState.CANCELLED, JobState.FAILED, JobState.SUCCEEDED)
 
 
 ENDED: Final = frozenset(state for state in JobState if state.terminal)
-"""The states in which nothing more happens to a job by itself."""
+"""States in which a job has ended."""
 
 
 DELETABLE: Final = ENDED | {JobState.PAUSED}
-"""The states in which nobody works at a job."""
+"""States in which no runner holds the job."""
 
 
 class Command(StrEnum):
-    """What a user may ask of a job."""
+    """A user's command to a job."""
 
     PAUSE = "pause"
     RESUME = "resume"
@@ -56,16 +55,16 @@ class Command(StrEnum):
 
 
 class JobOrder(StrEnum):
-    """How a list of jobs is sorted."""
+    """Sort order of a list of jobs."""
 
     CREATED = "created"
     """Newest first."""
     FITNESS = "fitness"
     """Best fitness first, jobs without one last."""
     NAME = "name"
-    """By name whatever its case, jobs without one last."""
+    """Case-insensitive, unnamed jobs last."""
     STATE = "state"
-    """Those that wait or run first, then those that have ended."""
+    """Unfinished jobs first."""
     EVALUATIONS = "evaluations"
     """Most evaluations first."""
     GAIN = "gain"
@@ -75,9 +74,9 @@ class JobOrder(StrEnum):
     ITERATIONS = "iterations"
     """Most committed iterations first."""
     RATE = "rate"
-    """Most evaluations a second first, jobs without one last."""
+    """Most evaluations per second first, jobs without a rate last."""
     TIME_LEFT = "time_left"
-    """Those that end soonest first, jobs of which that is not known last."""
+    """Least time to the end first, jobs with unknown time last."""
 
 
 TRANSITIONS: Final[dict[tuple[JobState, Command], JobState]] = {
@@ -92,11 +91,11 @@ TRANSITIONS: Final[dict[tuple[JobState, Command], JobState]] = {
     (JobState.PAUSED, Command.CANCEL): JobState.CANCELLED,
     (JobState.FAILED, Command.CANCEL): JobState.CANCELLED,
 }
-"""Every transition that a user can ask for; the runner's own are claim, pause, end."""
+"""Transitions by users; the runner's are claim, pause and end."""
 
 
 def commanded(state: JobState, command: Command) -> JobState:
-    """The state after a command."""
+    """Return the state after a command. Raises Conflict."""
     try:
         return TRANSITIONS[state, command]
     except KeyError:
@@ -106,23 +105,23 @@ def commanded(state: JobState, command: Command) -> JobState:
 
 
 QUARANTINE_AFTER: Final = 5
-"""Runner processes in a row that go down with a job before it is quarantined."""
+"""Consecutive crashes of runner processes before a job is quarantined."""
 
 LONGEST_LEASE_SECONDS: Final = 3600.0
-"""No lease lasts longer; one that ends later was written by a clock that is wrong."""
+"""Upper bound on leases; a later end was written by a wrong clock."""
 
 LARGEST_BUDGET: Final = 1_000_000
-"""Iterations, as in a spec."""
+"""In iterations, as in a spec."""
 
 
 def extended(state: JobState, committed: int, iterations: int) -> JobState:
-    """The state of a job after it got another budget."""
+    """Return the state of a job after its budget was changed. Raises Conflict, InvalidRequest."""
     if state is JobState.CANCELLED:
-        raise Conflict("cannot extend a job that is cancelled; submit its spec as a new one")
+        raise Conflict("cannot extend a cancelled job; submit its spec as a new job")
     if not committed < iterations <= LARGEST_BUDGET:
         raise InvalidRequest(
-            f"must be more than the {committed} that the job has committed, and at most"
-            f" {LARGEST_BUDGET}; it is the number in all, not of further ones",
+            f"must exceed the {committed} committed iterations and be at most {LARGEST_BUDGET};"
+            " it is the total, not the number to add",
             field="iterations",
         )
     return JobState.QUEUED if state is JobState.SUCCEEDED else state
@@ -130,19 +129,15 @@ def extended(state: JobState, committed: int, iterations: int) -> JobState:
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a job is, by its committed iterations.
+    """Committed iterations of a job.
 
     Attributes:
-        iterations: how many there are.
-        evaluations: designs judged in them.
-        best_fitness: least fitness so far, in double precision; None while every design has failed.
-        best_iteration: iteration that found it.
-        best_particle: particle that found it.
-        compute_seconds: time that evaluating them took [s].
-        evaluations_saved: of the designs, those whose outcome was known without a walk.
-        recent_seconds: that a design took in the last iterations, as `recent_pace` weighs them [s];
-            None if that was not noted.
-        head: digest of the last iteration; None where there is none.
+        best_fitness: in double precision; None while every design has failed.
+        compute_seconds: time spent evaluating [s].
+        evaluations_saved: designs whose outcome was cached.
+        recent_seconds: moving average of the time per design [s], see `recent_pace`; None if
+            unknown.
+        head: digest of the last iteration; None if there is none.
     """
 
     iterations: int = 0
@@ -157,19 +152,19 @@ class Progress:
 
     @property
     def evaluations_walked(self) -> int:
-        """Designs that walked for this job."""
+        """Designs simulated for this job."""
         return self.evaluations - self.evaluations_saved
 
 
 @dataclass(frozen=True, slots=True)
 class UnreadableSpec:
-    """What can be said of a spec that this version cannot read; the stored one stays as it is.
+    """What is known of a stored spec that this version cannot read.
 
     Attributes:
-        reason: What cannot be read.
-        name: Of the job, "" if that is not known either.
-        iterations: The present budget, 0 if it is not known.
-        particles: Size of the swarm, 0 if it is not known.
+        reason: why it cannot be read.
+        name: "" if unknown.
+        iterations: the current budget, 0 if unknown.
+        particles: 0 if unknown.
     """
 
     reason: str
@@ -184,28 +179,20 @@ class Job:
 
     Attributes:
         id: twelve letters and digits.
-        stored_spec: resolved, as `Spec.resolved` has it; its `iterations` are the present budget.
-            An `UnreadableSpec` if this version cannot read it.
-        state: where it is in its life.
-        created_at: when it was submitted.
-        updated_at: when its state or progress last changed.
-        started_at: when it was first claimed.
-        finished_at: when it ended.
-        error: why it failed.
-        progress: how far it is.
-        provenance: what its numbers depend on, since which iteration.
-        accepts_changes: whether its user has said that it may go on although that has changed;
-            until it is claimed.
-        lineage: where it comes from, if it was forked from another job.
-        owner: name of the token that it was submitted with, if any.
+        stored_spec: resolved; its `iterations` are the current budget. An `UnreadableSpec` if this
+            version cannot read it.
+        updated_at: time of the last change of state or progress.
+        started_at: time of the first claim.
+        provenance: provenance of the results, by first iteration.
+        accepts_changes: whether the user has accepted a changed provenance; cleared by the claim.
+        lineage: origin of a fork.
+        owner: name of the token that submitted it.
         kept: whether it is protected from deletion.
-        submitted_iterations: budget that it was submitted with.
-        waiting: what it waits for while it runs, such as workers that are away; None if nothing.
-        priority: the higher, the sooner it is claimed and the more slots its walks get; see
-            `priority.py`.
-        labels: what people have written on it.
-        archived: whether it is out of the way in lists.
-        reference: what its best is measured against; None while nobody has found that out.
+        submitted_iterations: budget at submission.
+        waiting: reason for waiting while running, such as unreachable workers; None if it does not
+            wait.
+        priority: see `priority.py`.
+        reference: None until determined.
     """
 
     id: str
@@ -231,31 +218,31 @@ class Job:
 
     @property
     def gain(self) -> float | None:
-        """By which share its best is better than its reference [1]; None if not known."""
+        """Relative improvement of the best design over the reference [1]; None if unknown."""
         if self.reference is None:
             return None
         return self.reference.gain(self.progress.best_fitness)
 
     @property
     def name(self) -> str:
-        """What it is called: by its user since, or else by its spec; "" for neither."""
+        """Name set by a label, else the spec's; "" for neither."""
         return self.labels.name or self.stored_spec.name
 
     @property
     def spec(self) -> AnySpec:
-        """The spec of a job that can be read."""
+        """The spec. Raises Unreadable."""
         if isinstance(self.stored_spec, UnreadableSpec):
             raise Unreadable(f"job {self.id}: {self.stored_spec.reason}")
         return self.stored_spec
 
     @property
     def spent(self) -> int:
-        """Iterations of its budget that are spent: whole ones of `particles` designs each."""
+        """Iterations of the budget that are spent, of `particles` designs each."""
         return math.ceil(self.progress.evaluations / self.spec.optimizer.particles)
 
     @property
     def own_evaluations(self) -> int:
-        """Designs that were judged for it; a fork has taken over the others."""
+        """Evaluations without those that a fork has taken over."""
         return self.progress.evaluations - (self.lineage.evaluations if self.lineage else 0)
 
     @property
@@ -265,16 +252,16 @@ class Job:
 
 
 def refusal(job: Job, now: JobProvenance) -> str | None:
-    """Why a job must not go on without its user's consent, and how it does with it."""
+    """Return why a job requires consent to continue, and how to give it; None if it does not."""
     changes = changes_since(job.provenance, now)
     if not changes:
         return None
     return (
-        f"what its numbers depend on is not what it was: {'; '.join(changes)}. Resume it where that"
-        f" is as before, or accept the change: `gaitswarm optimize --resume {job.id}"
-        f" --accept-changes`, `gaitswarm resume {job.id} --accept-changes`, `accept_changes=True`"
-        ' in Python, or {"accept_changes": true} over HTTP'
-        f" goes on and records it from iteration {job.progress.iterations} on"
+        f"the provenance of its results has changed: {'; '.join(changes)}. Resume it in the"
+        " original environment, or accept the change, which is recorded from iteration"
+        f" {job.progress.iterations} on: `gaitswarm optimize --resume {job.id} --accept-changes`,"
+        f" `gaitswarm resume {job.id} --accept-changes`, `accept_changes=True` in Python, or"
+        ' {"accept_changes": true} over HTTP'
     )
 
 
@@ -283,14 +270,14 @@ class Claim:
     """A lease on a job.
 
     Attributes:
-        job: as it was when it was claimed.
-        runner: name of who holds it.
-        token: fences: a store refuses writes under an older one.
-        ask: the stored one to go on with; None for a job that has not begun, or was extended after
-            its budget was spent.
-        recordings: those that the job's spec names, by id.
-        answered: the last committed one, where there is no other to go on with.
-        taken_from: name of another runner whose lease had run out; None for a job that was queued.
+        job: as of the claim.
+        runner: the holder's name.
+        token: fencing token: the store rejects writes under an older one.
+        ask: the stored ask to continue with; None for a new job or one extended after its budget
+            was spent.
+        recordings: those named by the spec, by id.
+        answered: the last committed ask, if there is no open one.
+        taken_from: previous runner, whose lease had expired; None for a queued job.
     """
 
     job: Job
@@ -304,12 +291,7 @@ class Claim:
 
 @dataclass(frozen=True, slots=True)
 class Renewal:
-    """What a runner hears when it renews its claim on a job.
-
-    Attributes:
-        state: of the job, so that a pause is seen.
-        priority: of the job, which its user may have changed.
-    """
+    """Result of renewing a claim."""
 
     state: JobState
     priority: int = 0

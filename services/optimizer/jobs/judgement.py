@@ -1,4 +1,4 @@
-"""What designs are worth, from what the simulator says of them."""
+"""Fitness and utilities of designs"""
 
 from __future__ import annotations
 
@@ -14,17 +14,16 @@ from gaitswarm.sim.outcome import Outcome, Status
 Floats = NDArray[np.float64]
 
 _PIECE: Final = 4096
-"""Numbers that are converted at once: meanwhile no other thread of Python goes on."""
+"""Values converted at a time, so that other Python threads can run in between."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Judgement:
-    """What n designs are worth after K cases; all to be minimized.
+    """Fitness and utilities of n designs in K cases; all minimized.
 
     Attributes:
-        fitness: (n,), +inf where a case failed.
-        log_utilities: (n, K) logarithm of what a design is worth in each case, +inf where it
-            failed.
+        fitness: (n,), +inf if a case failed.
+        log_utilities: (n, K) logarithms of the utilities, +inf if the case failed.
     """
 
     fitness: Floats
@@ -32,7 +31,7 @@ class Judgement:
 
     @property
     def utilities(self) -> Floats:
-        """(n, K), +inf where the case failed or the number is too great."""
+        """(n, K), +inf if the case failed or on overflow."""
         flat = self.log_utilities.reshape(-1)
         utilities = np.empty(len(flat))
         for begin in range(0, len(flat), _PIECE):
@@ -42,7 +41,7 @@ class Judgement:
 
 
 def exponential(logarithm: float) -> float:
-    """The exponential function. Python's, as numpy's differs in the last bit between processors."""
+    """Python's exponential function: numpy's differs in the last bit between processors."""
     try:
         return math.exp(logarithm)
     except OverflowError:
@@ -50,7 +49,7 @@ def exponential(logarithm: float) -> float:
 
 
 def by_design(outcomes: tuple[Outcome, ...]) -> tuple[Floats, NDArray[np.bool_]]:
-    """Turn outcomes by case to numbers by design."""
+    """Convert outcomes by case to (n, K, m) objectives and (n, K) failures."""
     objectives = np.stack([outcome.objectives for outcome in outcomes], axis=1)
     failed = np.stack([outcome.statuses != Status.OK for outcome in outcomes], axis=1)
     return objectives, failed

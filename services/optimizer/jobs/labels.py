@@ -1,4 +1,4 @@
-"""What people write on a job, and by what they find it; none of it determines results."""
+"""Labels of jobs, and the facets by which jobs are values; results depend on neither"""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
 from gaitswarm.sim.robot.variant import SHIPPED
 
 OWN: Final = "own"
-"""What a preference is called that is none of those shipped, and a robot that says no name."""
+"""Facet value of custom preferences and unnamed robots."""
 
 Tag = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=40)]
 JobName = Annotated[str, StringConstraints(max_length=200)]
@@ -24,7 +24,7 @@ Note = Annotated[str, StringConstraints(max_length=10_000)]
 
 
 class Labels(BaseModel):
-    """Labels of a job as they are stored."""
+    """Labels of a job, as stored."""
 
     model_config = ConfigDict(frozen=True)
 
@@ -34,28 +34,27 @@ class Labels(BaseModel):
 
 
 class LabelsChange(BaseModel):
-    """Other labels for a job; what is left out, or null, stays as it is."""
+    """New labels for a job; omitted or null fields stay unchanged."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: JobName | None = Field(
         default=None,
-        description="Shown in place of the spec's name, which stays as it is; empty to show that"
-        " again.",
+        description="Shown instead of the spec's name; empty to show the spec's name again.",
         examples=["chapter 4, wider gains"],
     )
     note: Note | None = Field(
-        default=None, description="Text of any kind.", examples=["P lies at its bound"]
+        default=None, description="Free text.", examples=["P lies at its bound"]
     )
     tags: tuple[Tag, ...] | None = Field(
-        default=None, max_length=20, description="Words to find it by.", examples=[["thesis"]]
+        default=None, max_length=20, description="Words to find the job by.", examples=[["thesis"]]
     )
     archived: bool | None = Field(
-        default=None, description="Whether it is out of the way in lists; nothing is deleted."
+        default=None, description="Whether lists hide the job by default; nothing is deleted."
     )
 
     def applied(self, labels: Labels) -> Labels:
-        """Change labels."""
+        """Return the changed labels."""
         name = labels.name if self.name is None else self.name.strip() or None
         return Labels(
             name=name,
@@ -66,14 +65,11 @@ class LabelsChange(BaseModel):
 
 @dataclass(frozen=True, slots=True)
 class JobFilter:
-    """Which jobs are wanted; None for any.
+    """Criteria of a job list; None for any.
 
     Attributes:
-        archived: Whether they are archived.
-        robot: Name of their robot, `own` for any of their users'.
-        controller: Motor controller that they tune.
-        preference: Name of their preference, `own` for any other.
-        tag: One of their tags.
+        robot: name, or `own` for any custom robot.
+        preference: name, or `own` for any other.
     """
 
     archived: bool | None = None
@@ -84,22 +80,19 @@ class JobFilter:
 
     @property
     def needs_specs(self) -> bool:
-        """Whether it asks for more than whether jobs are archived."""
+        """Whether it filters by more than `archived`."""
         return any((self.robot, self.controller, self.preference, self.tag))
 
     def admits(self, facets: Facets) -> bool:
-        """Say whether a job is wanted, as far as its facets tell.
+        """Return whether a job with these facets passes.
 
         Args:
             facets: Of the job.
-
-        Returns:
-            Whether it is.
         """
-        wanted = (self.robot, self.controller, self.preference)
+        criteria = (self.robot, self.controller, self.preference)
         robot = OWN if self.robot == OWN and facets.own_robot else facets.robot
-        found = (robot, facets.controller, facets.preference)
-        return all(w is None or w == f for w, f in zip(wanted, found, strict=True)) and (
+        values = (robot, facets.controller, facets.preference)
+        return all(w is None or w == f for w, f in zip(criteria, values, strict=True)) and (
             self.tag is None or self.tag in facets.tags
         )
 
@@ -109,15 +102,13 @@ ANY_JOB: Final = JobFilter()
 
 @dataclass(frozen=True, slots=True)
 class Facets:
-    """What a job is found by.
+    """Properties by which a job is found.
 
     Attributes:
-        state: Of the job.
-        robot: Its name; None where it has none, or cannot be read.
-        controller: That it tunes; None for none.
-        preference: Its name, `own` for any other; None for none.
-        tags: Of the job.
-        own_robot: Whether the robot is a user's own.
+        robot: None if unnamed or unreadable.
+        controller: None for a job that tunes none.
+        preference: name, `own` for any other; None for none.
+        own_robot: whether the robot is custom.
     """
 
     state: str
@@ -130,16 +121,7 @@ class Facets:
 
 @dataclass(slots=True)
 class FacetCounts:
-    """How many jobs there are of each value of each facet.
-
-    Attributes:
-        total: Jobs in all.
-        states: By state.
-        robots: By robot.
-        controllers: By controller.
-        preferences: By preference.
-        tags: By tag.
-    """
+    """Number of jobs by value of each facet."""
 
     total: int = 0
     states: Counter[str] = field(default_factory=Counter)
@@ -149,7 +131,6 @@ class FacetCounts:
     tags: Counter[str] = field(default_factory=Counter)
 
     def add(self, facets: Facets) -> None:
-        """Count a job."""
         self.total += 1
         self.states[facets.state] += 1
         for counter, value in (
@@ -163,17 +144,17 @@ class FacetCounts:
 
 
 def robot_name(robot: Any) -> str | None:
-    """Name the robot of a spec."""
-    known = _parsed(robot)
-    if is_own_robot(known):
-        return _name_in(str(_part(known, "toml")))
-    if known is None or isinstance(known, str):
-        return known or None
-    return str(_part(known, "name") or OWN)
+    """Return the name of a spec's robot."""
+    document = _parsed(robot)
+    if is_own_robot(document):
+        return _name_in(str(_part(document, "toml")))
+    if document is None or isinstance(document, str):
+        return document or None
+    return str(_part(document, "name") or OWN)
 
 
 def is_own_robot(robot: Any) -> bool:
-    """Say whether the robot of a spec is a user's own."""
+    """Return whether a spec's robot is custom."""
     return _part(_parsed(robot), "toml") is not None
 
 
@@ -183,7 +164,7 @@ def _part(robot: Any, name: str) -> Any:
 
 @lru_cache(maxsize=256)
 def _name_in(toml: str) -> str:
-    """Of lists with many jobs of one robot it is read once."""
+    """Cached: lists may hold many jobs of one robot."""
     try:
         name = tomllib.loads(toml).get("name")
     except (tomllib.TOMLDecodeError, RecursionError):
@@ -192,19 +173,19 @@ def _name_in(toml: str) -> str:
 
 
 def preference_name(preference: Any) -> str | None:
-    """Name the preference of a spec."""
-    known = _parsed(preference)
-    if not known:
+    """Return the name of a spec's preference."""
+    document = _parsed(preference)
+    if not document:
         return None
-    if isinstance(known, str):
-        return known if known in PREFERENCES else OWN
-    document = known if isinstance(known, Mapping) else vars(known)
+    if isinstance(document, str):
+        return document if document in PREFERENCES else OWN
+    document = document if isinstance(document, Mapping) else vars(document)
     numbers = tuple(tuple(document.get(part) or ()) for part in ("bias", "exponent"))
     return next((n for n, p in PREFERENCES.items() if (p.bias, p.exponent) == numbers), OWN)
 
 
 def _parsed(value: Any) -> Any:
-    """A document of its text; any other value as it is."""
+    """Parse a JSON document; return any other value unchanged."""
     if isinstance(value, str) and value.startswith("{"):
         try:
             return json.loads(value)

@@ -1,4 +1,4 @@
-"""Notifications: who is told that a job has ended, and how often that is tried. Pure."""
+"""Notifications about jobs that have ended: recipients and retries. Pure functions"""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 from gaitswarm.services.optimizer.errors import InvalidRequest
 
 MOST_ATTEMPTS: Final = 16
-"""Some six hours, with the pauses below."""
+"""About six hours with the pauses below."""
 
 _FIRST_PAUSE: Final = 5.0
 _LONGEST_PAUSE: Final = 3600.0
@@ -21,18 +21,16 @@ _LONGEST_URL: Final = 2000
 
 @dataclass(frozen=True, slots=True)
 class Notification:
-    """What is sent to whom about a job that has ended.
+    """A message about a job that has ended.
 
     Attributes:
-        id: the same at every attempt, so that a receiver knows what it has had.
-        job_id: of the job.
-        url: where it is sent.
-        document: what is sent, as JSON.
-        created_at: when the job ended.
-        attempts: how often it was sent so far.
-        next_attempt_at: when it is sent next; None once it was delivered or given up.
-        delivered_at: when it was delivered; None if it was not.
-        error: why the last attempt failed, for people; None if it did not.
+        id: the same for every attempt, so that receivers can detect repetitions.
+        document: sent as JSON.
+        created_at: time of the job's end.
+        attempts: number so far.
+        next_attempt_at: None once delivered or given up.
+        delivered_at: None unless delivered.
+        error: cause of the last failed attempt; None after a success.
     """
 
     id: str
@@ -47,30 +45,30 @@ class Notification:
 
 
 class Outbox(Protocol):
-    """The port of the memory of notifications. Thread-safe; every method is one transaction.
+    """The notification store. Thread-safe; every method is one transaction.
 
-    A job that ends leaves one in the transaction that ends it, if it was submitted with a URL.
+    The transaction that ends a job with a URL adds its notification.
     """
 
     def take(self, *, lease_seconds: float) -> Notification | None:
-        """Take the notification that has been due for longest, for one attempt."""
+        """Lease the notification that has been due for longest, for one attempt."""
 
     def settle(self, taken: Notification, error: str | None, *, final: bool = False) -> None:
-        """Note what came of an attempt: it is delivered, due again later, or given up."""
+        """Record the result of an attempt: delivered, due again later, or given up."""
 
     def about(self, job_id: str) -> tuple[Notification, ...]:
-        """Read the notifications about a job."""
+        """Return the notifications about a job."""
 
 
 def pause_after(attempts: int) -> float | None:
-    """How long to wait after an attempt that failed."""
+    """Return the pause after a failed attempt [s]; None to give up."""
     if attempts >= MOST_ATTEMPTS:
         return None
     return float(min(_FIRST_PAUSE * 2.0 ** (attempts - 1), _LONGEST_PAUSE))
 
 
 def unusable_url(url: str) -> str | None:
-    """Why nothing can be sent to a URL, whoever sends."""
+    """Return why no sender can use a URL; None if it can be used."""
     try:
         parts = urlsplit(url)
         name, _ = parts.hostname, parts.port
@@ -88,26 +86,26 @@ def unusable_url(url: str) -> str | None:
 
 
 def refused_url(url: str, hosts: Collection[str]) -> str | None:
-    """Why nothing is sent to a URL.
+    """Return why this server does not send to a URL; None if it does.
 
-    A server must not be made to send requests where only it can: to itself, or into its network.
+    A server must not be made to send requests to itself or into its own network.
     """
     if not hosts:
-        return "notifications are off here; GAITSWARM_WEBHOOK_HOSTS of the server allows hosts"
+        return "notifications are disabled; set the server's GAITSWARM_WEBHOOK_HOSTS"
     reason = unusable_url(url)
     if reason is not None:
         return reason
     parts = urlsplit(url)
     name, port = (parts.hostname or "").lower(), parts.port
     named = f"[{name}]" if ":" in name else name
-    wanted = {named, f"{named}:{port or {'http': 80, 'https': 443}[parts.scheme]}"}
-    if not wanted & {host.lower() for host in hosts}:
-        return f"{name!r} is not among the hosts that GAITSWARM_WEBHOOK_HOSTS of the server allows"
+    candidates = {named, f"{named}:{port or {'http': 80, 'https': 443}[parts.scheme]}"}
+    if not candidates & {host.lower() for host in hosts}:
+        return f"{name!r} is not among the hosts in the server's GAITSWARM_WEBHOOK_HOSTS"
     return None
 
 
 def check_url(url: str, hosts: Collection[str], *, field: str) -> None:
-    """Refuse a URL to which nothing is sent."""
+    """Raise InvalidRequest for a URL to which nothing is sent."""
     reason = refused_url(url, hosts)
     if reason is not None:
         raise InvalidRequest(reason, field=field)

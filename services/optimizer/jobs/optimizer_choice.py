@@ -1,4 +1,4 @@
-"""How a job names its search: a method, a preset, or settings of one's own."""
+"""Choice of a search method: a name, a preset, or an object with settings"""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ _BUILT_IN: Final[dict[str, type[SearchSettings]]] = {
     "auto": AutoSettings,
     **{name: method.settings for name, method in METHODS.built_in.items()},
 }
-"""Models of the settings that gaitswarm brings, by their `name`."""
+"""Settings models of the built-in methods, by `name`."""
 
 
 def _model(name: str) -> type[SearchSettings]:
-    """The model of settings. Raises ValueError that names those that there are."""
+    """Return the settings model of a method. Raises ValueError that lists the methods."""
     if name in _BUILT_IN:
         return _BUILT_IN[name]
     if name in METHODS:
@@ -38,7 +38,7 @@ def _model(name: str) -> type[SearchSettings]:
 
 
 def optimizer_settings(choice: object) -> object:
-    """Look up settings that are named, and name the default method where none is."""
+    """Resolve a name to settings, and insert the default method if none is given."""
     if isinstance(choice, Mapping):
         name = choice.get("name", DEFAULT_METHOD)
         if isinstance(name, str):
@@ -49,12 +49,12 @@ def optimizer_settings(choice: object) -> object:
     if choice in CHOICES:
         return CHOICES[choice]
     reason = CHOICES.unknown(choice)
-    otherwise = "; or give an object: settings of your own" if "known are" in reason else ""
+    otherwise = "; or pass an object with settings" if "known are" in reason else ""
     raise ValueError(f"{reason}{otherwise}")
 
 
 def with_settings(choice: object, settings: Mapping[str, Any]) -> object:
-    """Lay settings over those of an optimizer."""
+    """Apply settings on top of those of an optimizer."""
     with suppress(ValueError):
         choice = optimizer_settings(choice)
     if isinstance(choice, SearchSettings):
@@ -66,8 +66,8 @@ def with_settings(choice: object, settings: Mapping[str, Any]) -> object:
 
 
 def _check_known(settings: Mapping[Any, Any], model: type[SearchSettings]) -> None:
-    """Raises ValidationError that names every unknown setting and those that there are."""
-    known = [name for name in model.model_fields if name != "name"]
+    """Raise ValidationError for unknown settings, with suggestions."""
+    setting_names = [name for name in model.model_fields if name != "name"]
     problems = [
         InitErrorDetails(
             type=PydanticCustomError(
@@ -75,7 +75,7 @@ def _check_known(settings: Mapping[Any, Any], model: type[SearchSettings]) -> No
                 "no setting of {method}; {known}",
                 {
                     "method": model.model_fields["name"].default,
-                    "known": instead_of(str(key), known),
+                    "known": instead_of(str(key), setting_names),
                 },
             ),
             loc=(str(key),),
@@ -89,7 +89,7 @@ def _check_known(settings: Mapping[Any, Any], model: type[SearchSettings]) -> No
 
 
 def _tag(settings: Any) -> str | None:
-    """The tag of the method that was meant."""
+    """Return the tag of the requested method."""
     if isinstance(settings, BaseModel):
         return f"<{getattr(settings, 'name', '')}>"
     return f"<{settings.get('name')}>" if isinstance(settings, Mapping) else None
@@ -98,13 +98,13 @@ def _tag(settings: Any) -> str | None:
 if TYPE_CHECKING:
     _Settings = ChosenSettings
 else:
-    # A tag in angle brackets is no part of the location that an error names.
+    # Tags in angle brackets are omitted from the locations that errors name.
     _Settings = Annotated[
         Union[tuple(Annotated[m, Tag(f"<{name}>")] for name, m in _BUILT_IN.items())],  # noqa: UP007 - of a tuple
         Discriminator(
             _tag,
             custom_error_type="no_choice",
-            custom_error_message="must be a name or an object: settings of your own",
+            custom_error_message="must be a name or an object with settings",
         ),
         PluginSettings(METHODS, settings_of, "/v1/optimizers"),
     ]
@@ -113,4 +113,4 @@ OptimizerChoice = Annotated[
     _Settings,
     BeforeValidator(optimizer_settings, json_schema_input_type=ChoiceName | _Settings),
 ]
-"""How jobs choose a search: once it is read, a name has become settings."""
+"""Choice of a search method; validation replaces a name by settings."""

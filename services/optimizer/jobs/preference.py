@@ -23,14 +23,15 @@ _FIELDS: Final = (
 )
 
 HEIGHT_LOSS: Final = _FIELDS.index("height_loss")
-"""Index of f6, which preferences weigh by its absolute value."""
+"""Index of f6; preferences use its absolute value."""
 
 _PIECE: Final = 4096
-"""Walks judged at a time: lists of a whole history would stop a server's other threads for as long
-as it takes to make them and to look for garbage among them."""
+"""Simulations judged at a time: lists of a whole history would block a server's other threads while
+they are built and garbage-collected.
+"""
 
-# At an exponent of ten, five factors of a million are still within a double; beyond, a utility is
-# infinite, as that of a failed walk.
+# At an exponent of ten, five factors of a million still fit a double; beyond, a utility is
+# infinite, as for a failed simulation.
 Bias = Annotated[float, Field(ge=0.0, le=1e6)]
 Exponent = Annotated[float, Field(ge=0.0, le=10.0)]
 
@@ -38,10 +39,9 @@ Exponent = Annotated[float, Field(ge=0.0, le=10.0)]
 class Preference(BaseModel):
     """Biases b and exponents e of the objectives, in the order f1..f6 of table 4.1.
 
-    A scenario's utility is prod_m (b_m + f_m) ** e_m, to be minimized: with five entries the
-    bias-weighted product of chapter 4 (eq. 4.1), with six that of chapter 3 (eq. 3.8). The loss of
-    height f6 has a sign, and enters by its absolute value, as in eq. 3.1: a body that rises is
-    worth no more than one that sinks.
+    A scenario's utility, minimized, is prod_m (b_m + f_m) ** e_m: with five entries the
+    bias-weighted product of chapter 4 (eq. 4.1), with six that of chapter 3 (eq. 3.8). The signed
+    height loss f6 enters by its absolute value, as in eq. 3.1: rising is no better than sinking.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -51,7 +51,7 @@ class Preference(BaseModel):
         max_length=6,
         description="b_m >= 0, in the unit of f_m: "
         + ", ".join(_FIELDS)
-        + "; five, or six to weigh the last as well.",
+        + "; five, or six to include the last.",
         examples=[(0.9, 0.8, 0.24, 0.5, 0.8)],
     )
     exponent: tuple[Exponent, ...] = Field(
@@ -64,11 +64,11 @@ class Preference(BaseModel):
     @model_validator(mode="after")
     def _ranks_designs(self) -> Preference:
         if not any(self.exponent):
-            raise ValueError("exponents are all zero, so every design would be worth the same")
+            raise ValueError("all exponents are zero, so every design would have the same fitness")
         if len(self.bias) != len(self.exponent):
             raise ValueError(
-                f"{len(self.bias)} biases and {len(self.exponent)} exponents; each objective has"
-                " one of both"
+                f"{len(self.bias)} biases and {len(self.exponent)} exponents; give one of each"
+                " per objective"
             )
         return self
 
@@ -77,9 +77,8 @@ PreferenceName = Literal["A", "B", "C", "chapter-3"]
 
 PreferenceChoice = Annotated[
     Annotated[PreferenceName, Tag(NAME)] | Annotated[Preference, Tag(OWN)],
-    alternatives("must be 'A', 'B', 'C' or 'chapter-3', or an object: a preference of your own"),
+    alternatives("must be 'A', 'B', 'C' or 'chapter-3', or an object with bias and exponent"),
 ]
-"""How jobs and requests choose a preference."""
 
 PREFERENCES: Final[dict[PreferenceName, Preference]] = {
     "A": Preference(bias=(0.9, 0.8, 0.24, 0.5, 0.8), exponent=(0.1, 0.7, 0.3, 0.3, 0.1)),
@@ -89,7 +88,7 @@ PREFERENCES: Final[dict[PreferenceName, Preference]] = {
         bias=(0.0, 0.0, 0.0, 0.0, 0.0, 0.03), exponent=(1.0, 1.0, 1.0, 1.0, 2.0, 1.0)
     ),
 }
-"""A, B, C of table 4.5; and chapter 3's, whose utility is 1e5 / F with F of eq. 3.1."""
+"""A, B, C of table 4.5, and chapter 3's, whose utility is 1e5 / F with F of eq. 3.1."""
 
 _NUMERATOR: Final = 1e5
 
@@ -97,7 +96,7 @@ _NUMERATOR: Final = 1e5
 def figure_of_merit(fitness: float, preference: Preference) -> float | None:
     """F of eq. 3.1, which chapter 3 maximizes: 1e5 V^2 / (E F_GEAR F_ACC F_ANGACC (|Z| + 0.03)).
 
-    Of several scenarios it is the geometric mean of theirs.
+    Over several scenarios it is the geometric mean. None for other preferences.
     """
     if preference != PREFERENCES["chapter-3"] or not 0.0 < fitness < math.inf:
         return None
@@ -145,11 +144,11 @@ def objective_vectors(
     failed: NDArray[np.bool_],
     bias: Sequence[float] = (0.0,) * 5,
 ) -> NDArray[np.float64]:
-    """What each design comes to in each objective, over all scenarios: what a Pareto front weighs.
+    """Return each design's objectives over all scenarios, (n, M), for Pareto fronts.
 
-    Objective m of a design is the geometric mean over scenarios of b_m + f_m. Under any preference
-    with these biases, fitness is the product of these numbers, each to the power of its exponent
-    (eq. 4.1, 4.2); so whatever the exponents, the best design is one that no other dominates.
+    Objective m is the geometric mean over scenarios of b_m + f_m. Under any preference with these
+    biases, fitness is the product of the objectives, each raised to its exponent (eq. 4.1, 4.2); so
+    for all exponents the best design is non-dominated.
     """
     count = len(bias)
     factors = objectives[:, :, :count].copy()
@@ -177,6 +176,6 @@ def _log_product(row: list[float], preference: Preference) -> float:
         factor = b + (abs(row[m]) if m == HEIGHT_LOSS else row[m])
         if not math.isfinite(factor):
             return math.inf
-        # A factor of zero or less cannot be improved upon.
+        # A factor of zero or less cannot be improved.
         terms.append(e * math.log(factor) if factor > 0.0 else -math.inf)
     return math.fsum(terms)

@@ -1,7 +1,7 @@
-"""How urgent a job is: which one waits for a runner the shortest, and whose walks get more slots.
+"""Priorities of jobs
 
-Priorities decide when walks run, never what comes of them. They are no part of specs, of provenance
-or of the chain, so that a job has the same bits under any.
+They decide the order in which jobs are claimed and the share of slots that their simulations get.
+Results do not depend on them, so they are not part of specs, provenance or the chain.
 """
 
 from __future__ import annotations
@@ -12,14 +12,13 @@ from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest
 from gaitswarm.services.optimizer.jobs.job import JobState
 
 DEFAULT: Final = 0
-"""Of a job for which nobody has said more."""
 
 LOWEST: Final = -10
 HIGHEST: Final = 10
 
 
 def check_priority(priority: int) -> None:
-    """Refuse what is no priority."""
+    """Check that a priority is within bounds."""
     if not LOWEST <= priority <= HIGHEST:
         raise InvalidRequest(
             f"must be from {LOWEST} (last) to {HIGHEST} (first), it is {priority}",
@@ -28,11 +27,11 @@ def check_priority(priority: int) -> None:
 
 
 def check_can_be_prioritized(state: JobState) -> None:
-    """Refuse another priority for a job that neither waits nor runs."""
+    """Check that a job has not ended."""
     if state.terminal:
         raise Conflict(f"cannot prioritize a job that is {state}; it has ended")
 
 
 def weight(priority: int) -> float:
-    """The weight with which running jobs share slots: each step up doubles it."""
+    """Return the weight by which running jobs share slots; it doubles with each step."""
     return 2.0**priority

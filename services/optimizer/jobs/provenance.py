@@ -1,4 +1,4 @@
-"""What a job's numbers depend on beside its spec, since which iteration, and when it may go on."""
+"""Provenance of a job's results besides its spec"""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ _JUDGING: Final = (
     "jobs/spec.py",
     "jobs/start.py",
 )
-"""Files that judge designs of all kinds of jobs."""
+"""Files that judge designs, for all kinds of jobs."""
 
-_ROOMS: Final = ("jobs/kinds", "search")
+_FOLDERS: Final = ("jobs/kinds", "search")
 """Folders in which every file judges designs or asks for them."""
 
 
 class JobProvenance(BaseModel):
-    """What a job's numbers depend on beside its spec."""
+    """Code and libraries that a job's results depend on."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     gaitswarm: str = Field(
-        description="Version of gaitswarm. For people: the digests tell whether code is the same.",
+        description="Version of gaitswarm, for information; the digests identify the code.",
         examples=["0.1.0"],
     )
     optimizer_digest: str = Field(
@@ -44,47 +44,47 @@ class JobProvenance(BaseModel):
     )
     search_libraries: dict[str, str] = Field(
         default_factory=dict,
-        description="Versions of the libraries that its search method computes with, if any.",
+        description="Versions of the libraries that the search method uses, if any.",
         examples=[{"cmaes": "0.13.1"}],
     )
-    simulation: Provenance = Field(description="What its walks depend on.")
+    simulation: Provenance = Field(description="Provenance of the simulations.")
 
     def changes(self, now: JobProvenance) -> tuple[str, ...]:
-        """What is different now, in words for people."""
-        found = list(self.simulation.changes(now.simulation))
+        """Describe the differences from the present provenance."""
+        changes = list(self.simulation.changes(now.simulation))
         if now.optimizer_digest != self.optimizer_digest:
-            found.append("other code of search and judgement")
-        found += version_changes(self.search_libraries, now.search_libraries)
-        if found and now.gaitswarm != self.gaitswarm:
-            found.append(f"gaitswarm {now.gaitswarm} instead of {self.gaitswarm}")
-        return tuple(found)
+            changes.append("other code of search and judgement")
+        changes += version_changes(self.search_libraries, now.search_libraries)
+        if changes and now.gaitswarm != self.gaitswarm:
+            changes.append(f"gaitswarm {now.gaitswarm} instead of {self.gaitswarm}")
+        return tuple(changes)
 
 
 class ProvenanceRecord(BaseModel):
-    """Since which iteration a job's numbers have had which provenance."""
+    """Provenance of a job's results from an iteration on."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     from_iteration: int = Field(
-        ge=0, description="First iteration that was computed so, from 0.", examples=[0]
+        ge=0, description="First iteration with this provenance, from 0.", examples=[0]
     )
-    provenance: JobProvenance = Field(description="What its numbers and those after it depend on.")
+    provenance: JobProvenance = Field(description="Provenance of this and later iterations.")
 
 
 ProvenanceRecords = tuple[ProvenanceRecord, ...]
-"""Of one job, only ever appended to."""
+"""Of one job; append-only."""
 
 RECORDS: Final = TypeAdapter(ProvenanceRecords)
 
 
 def job_provenance(spec: Spec) -> JobProvenance:
-    """The provenance of what this process computes for a job."""
+    """Return the provenance of what this process computes for a job."""
     return JobProvenance(
         gaitswarm=_version(),
         optimizer_digest=optimizer_digest(),
         search_libraries=spec.search_libraries,
         simulation=provenance_of(
-            *spec.described,
+            *spec.robot_sources,
             precision=spec.precision,
             libraries=(*LIBRARIES, *spec.further_libraries),
         ),
@@ -92,39 +92,38 @@ def job_provenance(spec: Spec) -> JobProvenance:
 
 
 def changes_since(records: Sequence[ProvenanceRecord], now: JobProvenance) -> tuple[str, ...]:
-    """What keeps a job from going on without its user's consent."""
+    """Return the changes that require the user's consent before a job continues."""
     return records[-1].provenance.changes(now) if records else ()
 
 
 def first_record(provenance: JobProvenance | None) -> ProvenanceRecords:
-    """Records of a job that is submitted."""
+    """Return the records of a new job."""
     return () if provenance is None else with_record((), 0, provenance)
 
 
 def with_record(
     records: ProvenanceRecords, iterations: int, now: JobProvenance
 ) -> ProvenanceRecords:
-    """Records of a job that goes on."""
+    """Return the records of a job that continues."""
     if records and not records[-1].provenance.changes(now):
         return records
     return (*records, ProvenanceRecord(from_iteration=iterations, provenance=now))
 
 
 def optimizer_files() -> tuple[Path, ...]:
-    """The source files that judge designs and ask for them, in order."""
-    rooms = (file for room in _ROOMS for file in sorted((_OPTIMIZER / room).rglob("*.py")))
-    return (*(_OPTIMIZER / name for name in _JUDGING), *rooms)
+    """Return the source files that ask for designs and judge them, in order."""
+    files = (file for folder in _FOLDERS for file in sorted((_OPTIMIZER / folder).rglob("*.py")))
+    return (*(_OPTIMIZER / name for name in _JUDGING), *files)
 
 
 @lru_cache(maxsize=1)
 def optimizer_digest() -> str:
-    """Digest of `optimizer_files`, as they are when it is called first; see `simulator_digest`."""
+    """Digest of `optimizer_files` at the first call; see `simulator_digest`."""
     return source_digest(_OPTIMIZER, optimizer_files())
 
 
 @lru_cache(maxsize=1)
 def _version() -> str:
-    """Of the installed package; a bare checkout has none."""
     try:
         return metadata.version("gaitswarm")
     except metadata.PackageNotFoundError:

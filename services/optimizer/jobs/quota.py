@@ -1,4 +1,4 @@
-"""How much of the service one owner may have waiting or running at a time."""
+"""Quota on one owner's unfinished jobs"""
 
 from __future__ import annotations
 
@@ -9,30 +9,29 @@ from gaitswarm.services.optimizer.errors import QuotaExceeded
 
 @dataclass(frozen=True, slots=True)
 class Quota:
-    """What the unfinished jobs of one owner may come to; those without an owner count together.
+    """Limits on the unfinished jobs of one owner; jobs without an owner count together.
 
-    A job is unfinished until it has succeeded, failed or been cancelled; it counts with the whole
-    of its budget, however much of that it has walked.
+    A job is unfinished until it has succeeded, failed or been cancelled; its whole budget counts,
+    whatever part of it has been spent.
 
     Attributes:
-        jobs: how many there may be.
-        seconds: simulated time of all their walks [s].
+        seconds: simulated time of all their simulations [s].
     """
 
     jobs: int
     seconds: float
 
     def check(self, jobs: int, seconds: float, *, new_jobs: int, new_seconds: float) -> None:
-        """Refuse what would be too much."""
+        """Raise QuotaExceeded if new jobs or simulated time exceed the limits."""
         if new_jobs and jobs + new_jobs > self.jobs:
             raise QuotaExceeded(
-                f"there are {jobs} unfinished jobs of this owner, and there may be {self.jobs};"
+                f"{jobs} unfinished jobs of this owner reach the limit of {self.jobs};"
                 " wait until one ends, cancel one, or ask an admin"
             )
         if new_seconds > 0.0 and seconds + new_seconds > self.seconds:
             raise QuotaExceeded(
-                f"the unfinished jobs of this owner walk {seconds:.3g} simulated s together, with"
-                f" this one {seconds + new_seconds:.3g} s, and may walk {self.seconds:.3g} s; give"
-                " it fewer iterations, wait until a job ends, cancel one, or ask an admin",
+                f"the unfinished jobs of this owner take {seconds:.3g} simulated s, with this one"
+                f" {seconds + new_seconds:.3g} s; the limit is {self.seconds:.3g} s. Use fewer"
+                " iterations, wait until a job ends, cancel one, or ask an admin",
                 field="iterations",
             )

@@ -1,4 +1,4 @@
-"""What a job's best is measured against: a published or a start design, judged as its own are."""
+"""Reference of a job's best design: a published design, or the start design"""
 
 from __future__ import annotations
 
@@ -18,19 +18,16 @@ from gaitswarm.sim.gait_variables import GAIT_CATALOGUE
 ReferenceKind = Literal["published", "start"]
 
 START: Final = "start design"
-"""What the middle of a job's bounds is called."""
+"""Name of the middle of a job's bounds."""
 
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """A published design, or the start design, in the cases of a job.
+    """The published or start design, evaluated in the cases of a job.
 
     Attributes:
-        name: Of the study or preference that it was published for, or `START`; None where there is
-            none for the job.
-        fitness: What it comes to, judged as the job judges, in double precision; None where it
-            does not walk in every case.
-        kind: Whether it was published or is the middle of the job's bounds.
+        name: study or preference for which it was published, or `START`; None if there is none.
+        fitness: by the job's measure, in double precision; None if it fails in a case.
     """
 
     name: str | None
@@ -38,30 +35,29 @@ class Reference:
     kind: ReferenceKind = "published"
 
     def gain(self, fitness: float | None) -> float | None:
-        """How much better a design is."""
+        """Return the relative improvement of a fitness over the reference."""
         if fitness is None or self.fitness is None or not self.fitness > 0.0:
             return None
         return 1.0 - fitness / self.fitness
 
 
 def published_for(spec: Spec) -> tuple[str, Mapping[str, float]] | None:
-    """The published design of a job's controller and preference.
+    """Return the published design for a job's controller and preference.
 
-    Published designs are of the robots that ship with gaitswarm. A plug-in's case judges by
-    another measure.
+    Published designs apply to the shipped robots. Plug-in cases have other measures.
     """
     if not isinstance(spec, JobSpec) or spec.case is not None:
         return None
     study = published_study(spec)
     if study is None or is_own_robot(spec.robot):
         return None
-    return study, on_the_jobs_terms(CONTROLLERS[spec.controller].published[study], spec)
+    return study, adapted_to_job(CONTROLLERS[spec.controller].published[study], spec)
 
 
 def start_of(spec: Spec) -> Mapping[str, float] | None:
-    """The start design of a job: the middle of the bounds within which it searches.
+    """Return the start design of a job, the middle of its bounds.
 
-    Nobody published a design of a user's own robot; this one shows what the search has gained.
+    Custom robots have no published design; this one shows the gain of the search.
     """
     if not isinstance(spec, JobSpec) or spec.case is not None or not is_own_robot(spec.robot):
         return None
@@ -72,7 +68,7 @@ def start_of(spec: Spec) -> Mapping[str, float] | None:
 
 
 def reference_design(spec: Spec) -> tuple[str, ReferenceKind, Mapping[str, float]] | None:
-    """The design that a job's best is measured against."""
+    """Return the design that a job's best is compared with."""
     published = published_for(spec)
     if published is not None:
         name, design = published
@@ -82,18 +78,20 @@ def reference_design(spec: Spec) -> tuple[str, ReferenceKind, Mapping[str, float
 
 
 def published_study(spec: JobSpec) -> str | None:
-    """Name the published design of a job's controller that was tuned as the job tunes."""
+    """Return the name of the published design that was tuned by the job's preference."""
     published = CONTROLLERS[spec.controller].published
-    wanted = spec.resolved_preference()
-    names = [name for name, known in PREFERENCES.items() if known == wanted and name in published]
+    preference = spec.resolved_preference()
+    names = [
+        name for name, other in PREFERENCES.items() if other == preference and name in published
+    ]
     return next(iter([*names, *published]), None)
 
 
-def on_the_jobs_terms(published: Mapping[str, float], spec: JobSpec) -> dict[str, float]:
-    """A published design for comparison with what a job finds.
+def adapted_to_job(published: Mapping[str, float], spec: JobSpec) -> dict[str, float]:
+    """Adapt a published design to a job.
 
-    It walks in its own gait only as far as the job searches the gait; else in the gait that all of
-    the job's designs have. So with conventions that the job holds fixed.
+    Gait variables that the job does not search, and conventions that it holds fixed, are those of
+    the job.
     """
     space = spec.design_space()
     searched = {variable.name for variable in space.variables}
@@ -101,9 +99,9 @@ def on_the_jobs_terms(published: Mapping[str, float], spec: JobSpec) -> dict[str
     held = {
         name: value for name, value in space.fixed if name in conventions or name in GAIT_CATALOGUE
     }
-    own = {
+    published_values = {
         name: value
         for name, value in published.items()
         if name not in GAIT_CATALOGUE or name in searched
     }
-    return own | held
+    return published_values | held

@@ -1,4 +1,4 @@
-"""Where a job's search begins: designs that are known to be good."""
+"""Start designs of a job's search"""
 
 from __future__ import annotations
 
@@ -17,27 +17,26 @@ StartDesign = Annotated[
     Field(
         min_length=1,
         max_length=128,
-        description="A value of every variable that is searched, by name; a categorical one at a"
-        " choice's name or index. A variable that is held fixed may be left out.",
+        description="Value of every searched variable, by name; a categorical one by a"
+        " choice's name or index. Fixed variables may be omitted.",
         examples=[{"FI1R": 4380.5, "FO2R": 231.0}],
     ),
 ]
-"""One design, as people give it."""
 
 
 class EarlierJobs(BaseModel):
-    """The best designs of earlier jobs; looked up once, when the job is submitted."""
+    """The best designs of earlier jobs, looked up once, at submission."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     jobs: tuple[Annotated[str, Field(min_length=1, max_length=64)], ...] = Field(
         min_length=1,
         max_length=100,
-        description="Identifiers of jobs: the best of each comes first, then the second of each.",
+        description="Job identifiers; the best design of each comes first, then the second ones.",
         examples=[["k2q7zr5dm9xw"]],
     )
     count: int = Field(
-        default=5, ge=1, le=10_000, description="Different designs in all, at most [1]."
+        default=5, ge=1, le=10_000, description="Maximum number of distinct designs in total [1]."
     )
 
 
@@ -56,4 +55,3 @@ StartChoice = Annotated[
         custom_error_message="must be a list of designs, or an object that names earlier jobs",
     ),
 ]
-"""How jobs name the designs that they start from."""

@@ -53,7 +53,7 @@ from gaitswarm.services.optimizer.jobs.iteration import (
 from gaitswarm.services.optimizer.jobs.job import Claim, Job, JobState, refusal
 from gaitswarm.services.optimizer.jobs.judgement import by_design
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
-from gaitswarm.services.optimizer.jobs.spec import Spec, create_optimizer, judge_outcomes
+from gaitswarm.services.optimizer.jobs.spec import Spec, judge_outcomes
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
 from gaitswarm.services.optimizer.run.outage import Backoff
 from gaitswarm.services.optimizer.search.optimizer import Optimizer
@@ -269,13 +269,13 @@ def walk_keys(
 ) -> tuple[bytes, ...]:
     """Name the outcomes of designs in all cases of a job.
 
-    A key is a digest of all that an outcome depends on: the design by name, as it is simulated; the
-    fields of the spec that are not in `Spec.unwalked`; and what is simulated. It does not depend on
-    whether a variable is searched or fixed, nor on the order of variables.
+    A key is a digest of all that an outcome depends on: the simulated design by name, the spec
+    without its `outcome_independent_fields`, and the provenance. It depends neither on the order of
+    variables nor on whether a variable is searched or fixed.
     """
     names = spec.design_space().names
     order = sorted(range(len(names)), key=names.__getitem__)
-    document = spec.model_dump_json(exclude=set(spec.unwalked))
+    document = spec.model_dump_json(exclude=set(spec.outcome_independent_fields))
     walked = [document, provenance.model_dump_json(), [names[j] for j in order]]
     common = blake2b(json.dumps(walked).encode(), digest_size=32).digest()
     rows = np.ascontiguousarray(simulated[:, order])
@@ -404,10 +404,10 @@ def _begin(state: Coordination, job: Job) -> tuple[Coordination, tuple[Action, .
     """From the last answered ask if there is one, under the job's present budget."""
     if state.answered is not None:
         came = state.answered.columns
-        told = job.spec.told(came.objectives, came.failed, came.fitness)
+        told = job.spec.search_feedback(came.objectives, came.failed, came.fitness)
         first = _following(job.spec, state.answered.ask, told)
     else:
-        first = _ask(job.spec, create_optimizer(job.spec))
+        first = _ask(job.spec, job.spec.create_search())
     if first is None:
         raise ValueError(f"job {job.id} has spent its budget")
     state = replace(state, job=job, ask=first)
@@ -451,7 +451,7 @@ def _commit(
     state: Coordination, done: CompletedIteration
 ) -> tuple[Coordination, tuple[Action, ...]]:
     job, ask = _current(state)
-    told = job.spec.told(*by_design(done.outcomes), done.fitness)
+    told = job.spec.search_feedback(*by_design(done.outcomes), done.fitness)
     following = _following(job.spec, ask, told)
     state = replace(state, phase=Phase.COMMITTING, done=done, following=following)
     return state, (Commit(done, following),)
@@ -526,7 +526,7 @@ def _walks_of(state: Coordination, spec: Spec, designs: NDArray[np.float64]) -> 
 
 def _following(spec: Spec, ask: Ask, told: NDArray[np.float64]) -> Ask | None:
     """The ask after one that was answered; None at the end of the budget."""
-    optimizer = create_optimizer(spec)
+    optimizer = spec.create_search()
     optimizer.load(ask.state)
     optimizer.tell(told)
     return _ask(spec, optimizer)

@@ -26,7 +26,7 @@ from gaitswarm.services.optimizer.errors import (
     StoreUnavailable,
     Unavailable,
 )
-from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration, Known
+from gaitswarm.services.optimizer.jobs.iteration import CachedOutcome, CompletedIteration
 from gaitswarm.services.optimizer.jobs.job import Claim, Job, JobState
 from gaitswarm.services.optimizer.jobs.priority import weight
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
@@ -114,7 +114,9 @@ def evaluate_unknown(
     return tuple(outcomes), tuple(key if i in new else None for i, key in enumerate(keys))
 
 
-def _known(store: Store, request: EvaluationRequest, keys: tuple[bytes, ...]) -> dict[bytes, Known]:
+def _known(
+    store: Store, request: EvaluationRequest, keys: tuple[bytes, ...]
+) -> dict[bytes, CachedOutcome]:
     """What the store has of these keys, as far as it is fit for use."""
     try:
         found = store.known(keys)
@@ -130,7 +132,7 @@ def _known(store: Store, request: EvaluationRequest, keys: tuple[bytes, ...]) ->
     }
 
 
-def _complete(known: Known) -> bool:
+def _complete(known: CachedOutcome) -> bool:
     """Not so where a number was stored as null, as infinities are."""
     ok = known.statuses == Status.OK
     return bool(np.isfinite(known.objectives[ok]).all())

@@ -1,1 +1,1 @@
-"""Kinds of jobs: what each varies, runs and minimizes."""
+"""Kinds of jobs, with their variables, cases and fitness"""

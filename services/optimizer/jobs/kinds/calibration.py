@@ -1,4 +1,4 @@
-"""Jobs that fit a robot and open conventions to a table of measured or published results."""
+"""Calibration jobs, which fit a robot and open conventions to a table of results"""
 
 from __future__ import annotations
 
@@ -48,13 +48,13 @@ Floats = NDArray[np.float64]
 _COLUMNS: Final = {result.name: column for column, result in enumerate(RESULTS)}
 
 
-def reached(
+def simulated_values(
     target: Target,
     objectives: Floats,
     failed: NDArray[np.bool_],
     of_walk: Mapping[str, Sequence[int]],
 ) -> Floats:
-    """What designs come to where a target is set."""
+    """Return the values that designs reach for a target."""
 
     def of(walk: str) -> Floats:
         cases = list(of_walk[walk])
@@ -70,12 +70,12 @@ def reached(
 
 
 def _of_all(quantity: str, rows: Floats, bad: NDArray[np.bool_]) -> Floats:
-    """(n, k, m) results in a walk's k scenarios -> (n,) values, any where it failed."""
+    """Reduce (n, k, m) results in a walk's k scenarios to (n,) values, any after a failure."""
     if quantity == "F":
         preference = PREFERENCES["chapter-3"]
         fitness = judge(rows, bad, preference).fitness.tolist()
-        found = [figure_of_merit(value, preference) for value in fitness]
-        return np.array([math.nan if value is None else value for value in found])
+        merits = [figure_of_merit(value, preference) for value in fitness]
+        return np.array([math.nan if value is None else value for value in merits])
     if quantity.startswith("fitness:"):
         name: PreferenceName = quantity.removeprefix("fitness:")  # type: ignore[assignment]
         return judge(rows, bad, PREFERENCES[name]).fitness
@@ -83,7 +83,7 @@ def _of_all(quantity: str, rows: Floats, bad: NDArray[np.bool_]) -> Floats:
 
 
 def difference(target: Target, value: float) -> float:
-    """How far off a value is, in tolerances."""
+    """Return the signed distance of a value from its target, in tolerances."""
     if not math.isfinite(value):
         return math.inf
     if not QUANTITIES[target.quantity].positive:
@@ -94,21 +94,20 @@ def difference(target: Target, value: float) -> float:
 
 
 def root_mean_square(differences: Floats) -> Floats:
-    """Root mean square of each row."""
     rows = [[difference * difference for difference in row] for row in differences.tolist()]
     return np.array([math.sqrt(math.fsum(row) / len(row)) if row else 0.0 for row in rows])
 
 
 _NO_EVIDENCE: Final = 4.0
-"""Growth of the sum of squares, in tolerances, that may be chance: two standard deviations."""
+"""Increase of the sum of squares, in tolerances, that may be chance: two standard deviations."""
 
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Which cases there are, and which of them every walk needs.
+    """Cases of a job, and the cases that each walk requires.
 
     Attributes:
-        cases: name, walk and scenario of each of the K cases; walks that are the same share one.
+        cases: name, walk and scenario of each of the K cases; identical walks share one.
         of_walk: indices of a walk's cases, in the order of its scenarios, by the walk's name.
     """
 
@@ -117,9 +116,9 @@ class Layout:
 
 
 class CalibrationSpec(Spec):
-    """Calibration: which parameters and conventions are fitted to which results of walks.
+    """Fit parameters and conventions to results of walks.
 
-    Fitness is the root mean square over fitted targets of how many tolerances each is off [1].
+    Fitness is the root mean square over fitted targets of their distances in tolerances [1].
     """
 
     model_config = ConfigDict(
@@ -150,7 +149,7 @@ class CalibrationSpec(Spec):
     robots: tuple[RobotName, ...] = Field(
         default=(),
         max_length=16,
-        description="Shipped robots that the variable `robot` chooses among, two at least. They"
+        description="At least two shipped robots among which the variable `robot` chooses. They"
         " replace `robot`.",
         examples=[[]],
     )
@@ -158,7 +157,7 @@ class CalibrationSpec(Spec):
         min_length=1, max_length=64, description="Walks that were measured or published."
     )
     targets: tuple[Target, ...] = Field(
-        min_length=1, max_length=512, description="What they came to; one at least is fitted."
+        min_length=1, max_length=512, description="Their results; at least one is fitted."
     )
 
     @model_validator(mode="before")
@@ -171,7 +170,7 @@ class CalibrationSpec(Spec):
     @model_validator(mode="after")
     def _can_be_run(self) -> CalibrationSpec:
         if len(self.robots) == 1 or len(set(self.robots)) < len(self.robots):
-            raise ValueError("robots: two different ones at least; one alone is given as `robot`")
+            raise ValueError("robots: give at least two different ones, or a single one as `robot`")
         if len({walk.name for walk in self.walks}) < len(self.walks):
             raise ValueError("walks: two of them have the same name")
         self._check_targets()
@@ -191,24 +190,23 @@ class CalibrationSpec(Spec):
                     continue
                 if name not in walks:
                     raise ValueError(
-                        f"targets.{index}.{field}: no walk {name!r}; there are {', '.join(walks)}"
+                        f"targets.{index}.{field}: no walk {name!r}; choose from {', '.join(walks)}"
                     )
                 of_all = QUANTITIES[target.quantity].scenarios
                 if not of_all and len(walks[name].scenarios) > 1:
                     raise ValueError(
-                        f"targets.{index}.quantity: {target.quantity} is of one scenario, and the"
+                        f"targets.{index}.quantity: {target.quantity} requires one scenario; the"
                         f" walk {name} has {len(walks[name].scenarios)}"
                     )
         if all(target.use != "fit" for target in self.targets):
-            raise ValueError("targets: one at least is to be fitted")
+            raise ValueError("targets: at least one must be fitted")
 
     @property
-    def described(self) -> tuple[RobotSource, ...]:
-        """The robots as described, one or those that `robot` chooses among."""
+    def robot_sources(self) -> tuple[RobotSource, ...]:
         return self.robots or (self.robot,)
 
     def layout(self) -> Layout:
-        """The cases and the walks that need them."""
+        """Return the cases and the walks that require them."""
         cases: list[tuple[str, TargetWalk, Scenario]] = []
         index: dict[tuple[object, ...], int] = {}
         of_walk = {}
@@ -226,58 +224,57 @@ class CalibrationSpec(Spec):
         return Layout(tuple(cases), of_walk)
 
     def catalogue(self) -> tuple[Variable, ...]:
-        """All that may be searched or fixed: of the robot, of controllers and of the gait.
+        """Return all variables of the robot, the controllers and the gait.
 
         Raises:
-            ValueError: two of them have one name.
+            ValueError: Two of them have the same name.
         """
         try:
-            of_robot = robot_variables(self.described)
+            of_robot = robot_variables(self.robot_sources)
             of_walks = walk_variables(walk.controller for walk in self.walks)
         except SimulationInputError as error:
             raise ValueError(str(error)) from error
         for variable in of_walks:
-            if any(variable.name == known.name for known in of_robot):
-                raise ValueError(f"{variable.name}: both the robot and a controller have it")
+            if any(variable.name == other.name for other in of_robot):
+                raise ValueError(
+                    f"{variable.name}: the robot and a controller both have this variable"
+                )
         return (*of_robot, *of_walks)
 
     def design_space(self) -> DesignSpace:
-        """Any of the catalogue."""
-        known, chosen = self.catalogue(), self.variables
+        """Return the chosen variables; by default those of the robot."""
+        catalogue, chosen = self.catalogue(), self.variables
         if chosen is None:
-            chosen = tuple(v for v in robot_variables(self.described) if v.name not in self.fixed)
-        return DesignSpace.build(required=(), optional=known, chosen=chosen, fixed=self.fixed)
+            chosen = tuple(
+                v for v in robot_variables(self.robot_sources) if v.name not in self.fixed
+            )
+        return DesignSpace.build(required=(), optional=catalogue, chosen=chosen, fixed=self.fixed)
 
     def _check_every_variable_matters(self) -> None:
-        of_robot = {variable.name for variable in robot_variables(self.described)}
+        of_robot = {variable.name for variable in robot_variables(self.robot_sources)}
         cases = self._cases()
         for variable in self.design_space().variables:
             drives = [case.drive({variable.name: math.nan}) for case in cases]
             unused = all(not _is_nan(drive.get(variable.name)) for drive in drives)
             if variable.name not in of_robot and unused:
                 raise ValueError(
-                    f"variables: {variable.name} changes nothing: the design of every walk that"
-                    " has it gives it; leave it out there, or here"
+                    f"variables: {variable.name} has no effect: the design of every walk that"
+                    " has it sets it; remove it there or here"
                 )
 
     def check_can_be_simulated(self) -> None:
-        """Check that robots, drives and gaits can be had at both ends of all bounds.
+        """Check robots, drives and gaits at both ends of all bounds.
 
-        A gait that is itself searched may leave the legs' reach at some points of the box: there a
-        status says so.
-
-        Raises:
-            InvalidRequest: bounds or values that nothing can run with, or a walk out of reach;
-                names the field.
+        Designs with a searched gait may be out of reach, which their status reports.
         """
         self.check_optimizer()
         self.check_precision()
         space, cases = self.design_space(), self._cases()
-        of_robot = {variable.name for variable in robot_variables(self.described)}
+        of_robot = {variable.name for variable in robot_variables(self.robot_sources)}
         for values in space.corners():
             try:
                 varied_robot(
-                    self.described, {name: v for name, v in values.items() if name in of_robot}
+                    self.robot_sources, {name: v for name, v in values.items() if name in of_robot}
                 )
             except SimulationInputError as error:
                 raise space.refusal(error) from error
@@ -285,7 +282,7 @@ class CalibrationSpec(Spec):
                 drive = case.drive(values)
                 try:
                     law = CONTROLLERS[case.controller].compile(drive)
-                    for robot in self.described:
+                    for robot in self.robot_sources:
                         check_drives(law, robot)
                 except SimulationInputError as error:
                     raise InvalidRequest(str(error), field=f"walks.{index}.design") from error
@@ -297,9 +294,9 @@ class CalibrationSpec(Spec):
                 self._check_reach(index, case, drive)
 
     def _check_gaits(self, space: DesignSpace, cases: tuple[CalibrationWalk, ...]) -> None:
-        """That the robots have the groups of legs that are named, and legs for every gait."""
+        """Check that the robots have the named groups of legs, and legs for every gait."""
         values, orders = next(space.corners()), orders_searched(space.variables)
-        for order, (_, case), robot in product(orders, self._walks(cases), self.described):
+        for order, (_, case), robot in product(orders, self._walks(cases), self.robot_sources):
             try:
                 check_gait(case.scenario, case.drive(values | order), robot=robot)
             except SimulationInputError as error:
@@ -307,7 +304,7 @@ class CalibrationSpec(Spec):
 
     def _check_reach(self, index: int, case: CalibrationWalk, drive: dict[str, float]) -> None:
         gait = {name: value for name, value in drive.items() if name in GAIT_CATALOGUE}
-        for robot in self.described:
+        for robot in self.robot_sources:
             try:
                 check_reach(case.scenario, tuple(gait), tuple(gait.values()), robot=robot)
             except SimulationInputError as error:
@@ -315,23 +312,16 @@ class CalibrationSpec(Spec):
 
     @property
     def objectives(self) -> tuple[Objective, ...]:
-        """Raw results of a walk: f1..f6 of table 4.1, and what else it tells."""
+        """Raw results of a simulation: f1..f6 of table 4.1, and further ones."""
         return RESULTS
 
     @property
     def case_names(self) -> tuple[str, ...]:
-        """Names of walks, with that of the scenario where a walk has several."""
+        """Names of walks, with the scenario's if a walk has several."""
         return tuple(name for name, _, _ in self.layout().cases)
 
     def cases(self, recordings: Recordings) -> tuple[Case, ...]:  # noqa: ARG002 - needs none
-        """One walk for each distinct drive and scenario.
-
-        Args:
-            recordings: none are needed.
-
-        Returns:
-            The walks, in the order of `case_names`.
-        """
+        """Return one simulation for each distinct drive and scenario."""
         return self._cases()
 
     def _cases(self) -> tuple[CalibrationWalk, ...]:
@@ -339,7 +329,7 @@ class CalibrationSpec(Spec):
         return tuple(
             CalibrationWalk(
                 name,
-                self.described,
+                self.robot_sources,
                 walk.controller,
                 walk.numbers,
                 scenario,
@@ -355,29 +345,27 @@ class CalibrationSpec(Spec):
         return [(i, cases[k]) for i, walk in enumerate(self.walks) for k in of_walk[walk.name]]
 
     def simulated(self, objectives: Floats, failed: NDArray[np.bool_]) -> Floats:
-        """What designs come to, target by target.
+        """Return (n, T) simulated values of `targets`, NaN after a failure.
 
         Args:
-            objectives: (n, K, m) raw results of walks, in their units.
-            failed: (n, K), true for a walk without a result.
-
-        Returns:
-            (n, T) values of `targets`, in their units, NaN where a walk failed.
+            objectives: (n, K, m) raw results of simulations.
+            failed: (n, K), true for a simulation without a result.
         """
         of_walk = self.layout().of_walk
-        columns = [reached(target, objectives, failed, of_walk) for target in self.targets]
+        columns = [simulated_values(target, objectives, failed, of_walk) for target in self.targets]
         return np.stack(columns, axis=1)
 
     def differences(self, simulated: Floats) -> Floats:
-        """How far off designs are, in tolerances.
+        """Return the distances from the targets, in tolerances.
 
         Args:
             simulated: (n, T) values of `targets`.
 
         Returns:
             (n, T): ln(simulated / value) / ln(1 + tolerance), so that a factor of 1 + tolerance
-            counts 1 and its inverse -1; for height_loss (simulated - value) / tolerance. +inf
-            where there is no value.
+            counts 1
+            and its inverse -1; for height_loss (simulated - value) / tolerance. +inf without a
+            value.
         """
         rows = [
             [difference(target, value) for target, value in zip(self.targets, row, strict=True)]
@@ -391,15 +379,10 @@ class CalibrationSpec(Spec):
         return np.array([target.use == "fit" for target in self.targets])
 
     def judge(self, objectives: Floats, failed: NDArray[np.bool_]) -> Judgement:
-        """Judge designs by how far fitted targets are off.
+        """Judge designs by their distances from fitted targets.
 
-        Args:
-            objectives: (n, K, m) raw results of walks, in their units.
-            failed: (n, K), true for a walk without a result.
-
-        Returns:
-            Fitness is the root mean square over fitted targets, in tolerances [1]; utilities are
-            the same over those that need a case, 0 where none does.
+        Fitness is the root mean square over fitted targets, in tolerances [1]; utilities are the
+        same over those that require a case, 0 if none does.
         """
         differences = self.differences(self.simulated(objectives, failed))
         fitted, of_walk = self.fitted, self.layout().of_walk
@@ -415,22 +398,17 @@ class CalibrationSpec(Spec):
             return Judgement(root_mean_square(differences[:, fitted]), np.log(utilities))
 
     def as_good_as(self, fitness: float) -> float:
-        """Read tolerances as standard deviations: two of them more in all is no evidence.
+        """Return the fitness at which the sum of squares over fitted targets is greater by 4.
 
-        Where even the best is off by more than tolerances, so are they taken to be too small.
-
-        Args:
-            fitness: the best one.
-
-        Returns:
-            The fitness at which the sum of squares over fitted targets is greater by 4, or by 4
-            times the best mean square where that is above 1.
+        Tolerances are read as standard deviations: two of them more in total is no evidence. If
+        even the best mean square exceeds 1, the tolerances are taken to be too small, and 4 is
+        multiplied by it.
         """
         square = fitness * fitness
         return math.sqrt(square + _NO_EVIDENCE * max(1.0, square) / int(self.fitted.sum()))
 
     def resolved(self) -> CalibrationSpec:
-        """The same job with scenarios, variables and optimizer written out."""
+        """Return the job with scenarios, variables and optimizer written out."""
         space = self.design_space()
         walks = tuple(
             walk.model_copy(

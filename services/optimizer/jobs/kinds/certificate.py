@@ -1,4 +1,4 @@
-"""Jobs that put one design to the test: in many worlds, and in scenarios that no job contained."""
+"""Certificates: one design in many perturbed models and in held-out scenarios"""
 
 from __future__ import annotations
 
@@ -48,14 +48,14 @@ Floats = NDArray[np.float64]
 def world_space(
     variables: Sequence[str | Variable] | None, fixed: Mapping[str, float | str]
 ) -> DesignSpace:
-    """The perturbations that are drawn or held."""
+    """Return the drawn and fixed perturbations."""
     if variables is None:
         variables = tuple(v for v in PERTURBATIONS if v.name not in fixed)
     return DesignSpace.build(required=(), optional=PERTURBATIONS, chosen=variables, fixed=fixed)
 
 
 def with_engine(space: DesignSpace, engines: Sequence[EngineName]) -> DesignSpace:
-    """The same worlds, each with the engine that computes its walks."""
+    """Add the engine that computes each world's simulations to a space."""
     if not engines:
         return space
     drawn = len(space.variables)
@@ -69,7 +69,7 @@ def with_engine(space: DesignSpace, engines: Sequence[EngineName]) -> DesignSpac
 def world_positions(
     space: DesignSpace, engines: Sequence[EngineName], seed: int
 ) -> Callable[[int, int], Floats]:
-    """The order of a certificate's walks."""
+    """Return a function of (start, stop) that yields the certificate's positions in order."""
     first = [[min(max(NOMINAL[v.name], v.low), v.high) for v in space.variables]]
     nominal = np.array(first * (1 + len(engines)))
     box = with_engine(space, engines).box
@@ -87,17 +87,17 @@ def world_positions(
 
 
 BATCH: Final = 50
-"""Worlds of an iteration: with eight scenarios 400 walks, half a second or so of two cores."""
+"""Worlds per iteration: with eight scenarios 400 simulations, about half a second on two cores."""
 
 _OPTIMIZER: Final[TypeAdapter[Any]] = TypeAdapter(OptimizerChoice)
 _COUNT: Final[TypeAdapter[int | None]] = TypeAdapter(int | None)
 
 
 class CertificateSpec(WalksSpec):
-    """A certificate: one design, in worlds that differ in all that a model may get wrong.
+    """A certificate: one design, in worlds that vary all that a model may get wrong.
 
-    A design of the job is a world: a value of every perturbation. The first is the nominal world;
-    it is walked again in each of the `engines`. The others are drawn, each by its number alone.
+    A design of the job is a world: a value of every perturbation. The first is the nominal world,
+    repeated in each of the `engines`. The others are drawn, each by its number alone.
     """
 
     model_config = ConfigDict(
@@ -115,58 +115,63 @@ class CertificateSpec(WalksSpec):
         },
     )
 
-    unwalked = WalksSpec.unwalked | {"preference", "worlds", "engines", "held_out"}
+    outcome_independent_fields = WalksSpec.outcome_independent_fields | {
+        "preference",
+        "worlds",
+        "engines",
+        "held_out",
+    }
 
     searches = False
 
-    kind: Literal["certificate"] = Field(description="Put one design to the test in many worlds.")
+    kind: Literal["certificate"] = Field(description="Test one design in many perturbed models.")
     controller: ControllerName = Field(
         default="fuzzy-pi", description="Motor controller of the design; see /v1/controllers."
     )
     design: dict[VariableName, VariableValue] = Field(
         description="The design: a value of each of the controller's variables, and of any gait"
-        " variable, which then replaces the scenarios' value.",
+        " variable, which overrides the scenarios' value.",
         examples=[dict(CONTROLLERS["fuzzy-pi"].published["A"])],
     )
     scenarios: tuple[ScenarioChoice, ...] = Field(
         default=tuple(scenario.name for scenario in certificate_scenarios()),
         min_length=1,
         max_length=32,
-        description="Walks that every world is put to: names or numbers of presets (see"
-        " /v1/scenarios), or your own. Default: the six of table 4.2, and its turn and"
-        " its slope the other way; name other walks for a robot that these do not suit.",
+        description="Scenarios simulated in every world: names or numbers of presets (see"
+        " /v1/scenarios), or custom ones. Default: the six of table 4.2, and its turn and"
+        " its slope in the other direction; choose others for a robot that these do not suit.",
     )
     held_out: tuple[ScenarioName, ...] | None = Field(
         default=None,
         max_length=32,
-        description="Names of those `scenarios` that the design was not tuned in, which are marked"
-        " so. Default: the presets beside those of table 4.2.",
+        description="Names of the `scenarios` that the design was not tuned in; they are marked."
+        " Default: the presets other than those of table 4.2.",
         examples=[["fast-turn-left", "fast-downhill"]],
     )
     preference: PreferenceChoice = Field(
         default="A",
-        description="How objectives are weighed: A, B, C of table 4.5, chapter-3 for eq. 3.1, or"
-        " your own.",
+        description="Weights of the objectives: A, B, C of table 4.5, chapter-3 for eq. 3.1, or"
+        " a custom preference.",
     )
     worlds: int = Field(
         default=1000,
         ge=1,
         le=100_000,
-        description="How many worlds are drawn; the nominal one, which differs in nothing, is"
-        " walked before them. `iterations` follow from it.",
+        description="Number of worlds to draw, besides the nominal one, which is simulated first."
+        " It determines `iterations`.",
     )
     engines: tuple[EngineName, ...] = Field(
         default=(),
         max_length=len(ENGINES),
-        description="Other engines that compute the design's walks in the nominal world, too, so"
-        " that the certificate shows what depends on ours: `mujoco` (its rigid bodies and"
-        " integrator, our laws of contact) and `mujoco-contacts` (its own contacts, too). A walk"
-        " takes some hundred times as long; they need the extra `mujoco`.",
+        description="Further engines that simulate the design in the nominal world, to show which"
+        " results depend on the engine: `mujoco` (its rigid bodies and integrator, gaitswarm's"
+        " contact laws) and `mujoco-contacts` (its contacts as well). Their simulations take some"
+        " hundred times as long and require the extra `mujoco`.",
         examples=[["mujoco"]],
     )
     optimizer: OptimizerChoice = Field(
         default=RandomSearchSettings(particles=BATCH),
-        description="What draws the worlds: `random`, whose `particles` are an iteration's.",
+        description="Sampler of the worlds: `random`, with `particles` worlds per iteration.",
     )
 
     @model_validator(mode="before")
@@ -175,11 +180,11 @@ class CertificateSpec(WalksSpec):
         if not isinstance(document, Mapping):
             return document
         if document.get("start"):
-            raise ValueError("start: worlds are drawn; leave it out")
+            raise ValueError("start: worlds are sampled; omit it")
         try:
             default = cls.model_fields["optimizer"].default
             batch = _OPTIMIZER.validate_python(document.get("optimizer", default)).particles
-            # Read as the fields read them: 1000.0 and "1000" are counts, too.
+            # As the fields parse them: 1000.0 and "1000" are valid counts.
             worlds = _COUNT.validate_python(document.get("worlds"))
             iterations = _COUNT.validate_python(document.get("iterations"))
         except ValidationError:
@@ -197,54 +202,46 @@ class CertificateSpec(WalksSpec):
         needed = math.ceil((worlds + nominal) / batch)
         if iterations not in (None, needed):
             raise ValueError(
-                f"iterations: follow from worlds; {worlds} in batches of {batch} are {needed}"
-                " with the nominal one; leave them out"
+                f"iterations: determined by worlds; {worlds} in batches of {batch} are {needed}"
+                " with the nominal one; omit it"
             )
         return {**document, "worlds": worlds, "iterations": needed}
 
     @model_validator(mode="after")
     def _can_be_run(self) -> Self:
         if self.optimizer.name != "random":
-            raise ValueError("optimizer: worlds are drawn by random")
+            raise ValueError("optimizer: must be random")
         for name in self.engines:
             if self.engines.count(name) > 1:
                 raise ValueError(f"engines: {name!r} is named twice")
         for held_out in self.held_out or ():
             if held_out not in self.case_names:
-                raise ValueError(f"held_out: {held_out!r} is none of the scenarios")
+                raise ValueError(f"held_out: {held_out!r} is not among the scenarios")
         check_design(self.controller, self.design)
         self.design_space()
         return self
 
     @property
     def numbers(self) -> dict[str, float]:
-        """The design as the simulator takes it."""
+        """The design in the simulator's numbers."""
         return design_numbers(self.controller, self.design)
 
     @property
     def budget(self) -> int:
-        """The nominal world, in every engine, and those that are drawn."""
+        """The nominal world in every engine, and the drawn worlds."""
         return self.nominal_rows + self.worlds
 
     @property
     def nominal_rows(self) -> int:
-        """How many evaluations are of the nominal world: by our engine first, then by `engines`."""
+        """Evaluations of the nominal world: our engine's first, then those of `engines`."""
         return 1 + len(self.engines)
 
     def with_budget(self, iterations: int) -> Self:
-        """The same job with as many worlds as so many iterations hold.
-
-        Args:
-            iterations: Of the budget.
-
-        Returns:
-            The spec of a job that was extended to it.
-        """
         worlds = iterations * self.optimizer.particles - self.nominal_rows
         return self.model_copy(update={"iterations": iterations, "worlds": worlds})
 
     def design_space(self) -> DesignSpace:
-        """The perturbations, and which of the `engines` computes the walk, if there are any."""
+        """Return the perturbations, and the engine if there are `engines`."""
         return with_engine(self.world_space(), self.engines)
 
     @classmethod
@@ -284,27 +281,23 @@ class CertificateSpec(WalksSpec):
         )
 
     def world_space(self) -> DesignSpace:
-        """The perturbations; what is neither drawn nor fixed is as the robot has it."""
+        """Return the perturbations; others are as the robot has them."""
         return world_space(self.variables, self.fixed)
 
     def create_search(self) -> Optimizer:
-        """What asks for the worlds: the nominal one, then those of `sample_worlds`."""
+        """Enumerate the nominal world, then those of `sample_worlds`."""
         positions = world_positions(self.world_space(), self.engines, self.seed)
         return Enumeration(self.optimizer.name, self.optimizer.particles, positions)
 
     @property
     def further_libraries(self) -> tuple[str, ...]:
-        """MuJoCo, if it is among the engines, and what brings a plug-in's controller."""
         return (*((LIBRARY,) if self.engines else ()), *CONTROLLERS.distribution(self.controller))
 
     def world(self, index: int) -> dict[str, float]:
-        """One of the worlds that are drawn.
+        """Return the perturbations of a drawn world, by name.
 
         Args:
             index: Its number, from 0.
-
-        Returns:
-            Value of every perturbation that is drawn or fixed, by name.
         """
         space = self.world_space()
         drawn = sample_worlds(index + 1, self.seed, space.variables)[index:]
@@ -312,11 +305,7 @@ class CertificateSpec(WalksSpec):
         return dict(zip(space.names, values, strict=True))
 
     def check_can_be_simulated(self) -> None:
-        """Check the design, the scenarios, and the worlds at both ends of all ranges.
-
-        Raises:
-            InvalidRequest: Something cannot be simulated; names the field.
-        """
+        """Check the design, the scenarios, and the worlds at both ends of all ranges."""
         self.check_optimizer()
         self.check_precision()
         self._check_engines()
@@ -354,14 +343,6 @@ class CertificateSpec(WalksSpec):
         return tuple(name for name in self.case_names if name in names)
 
     def cases(self, recordings: Recordings) -> tuple[Case, ...]:  # noqa: ARG002 - needs none
-        """The design's walk in each scenario, through worlds.
-
-        Args:
-            recordings: None are needed.
-
-        Returns:
-            The walks, in the order of `case_names`.
-        """
         space, design = self.world_space(), tuple(self.numbers.items())
         walks = tuple(
             WorldWalk(self.robot, self.controller, design, scenario, space.names, self.precision)
@@ -372,7 +353,7 @@ class CertificateSpec(WalksSpec):
         return tuple(EngineWalk(walk, len(space.variables)) for walk in walks)
 
     def resolved(self) -> Self:
-        """The same job with scenarios, preference, design and perturbations written out."""
+        """Return the job with scenarios, preference, design and perturbations written out."""
         space = self.world_space()
         return self.model_copy(
             update={

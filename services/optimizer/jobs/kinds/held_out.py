@@ -1,4 +1,4 @@
-"""Walks that a design was not tuned in: they show whether it was made for its scenarios alone."""
+"""Scenarios held out from tuning, for certificates"""
 
 from __future__ import annotations
 
@@ -12,26 +12,25 @@ from gaitswarm.sim.scenario import HELD_OUT, SCENARIOS, Scenario
 from gaitswarm.sim.simulate import check_reach
 
 CASES: Final = 8
-"""Scenarios of a certificate that names none."""
+"""Default number of scenarios of a certificate."""
 
 LEAST: Final = 2
-"""Held-out ones among them, however many there are."""
+"""Minimum number of held-out ones among them."""
 
 TURN: Final = 0.5
-"""Of walks that turn, as in table 4.2 [1]."""
+"""Of turning scenarios, as in table 4.2 [1]."""
 
 SLOPE: Final = 5.0
-"""Of walks up and down [deg]: half of table 4.2's, as other robots' walks are not made for one."""
+"""Of slopes up and down [deg]: half of table 4.2's, as other robots are not built for one."""
 
 LOAD_SHARE: Final = 0.25
-"""Of walks with a load, of the robot's mass, as in table 4.2 [1]."""
+"""Load as a share of the robot's mass, as in table 4.2 [1]."""
 
 PACE: Final = 0.8
-"""Cycle time of a faster walk, as a share of the tuned one; that of a slower one is divided by
-it."""
+"""Cycle time of a faster scenario as a share of the tuned one; a slower one is divided by it."""
 
 _MIRRORED: Final = ("turn-left-fast", "downhill-fast")
-"""The presets that come first: the turn and the slope of table 4.2, the other way."""
+"""Presets that come first: the turn and the slope of table 4.2, in the other direction."""
 
 _LONGEST_NAME: Final = 60
 
@@ -41,7 +40,7 @@ def certificate_scenarios(
     robot: RobotChoice = DEFAULT_ROBOT,
     design: Mapping[str, float] | None = None,
 ) -> tuple[Scenario, ...]:
-    """The scenarios of a certificate: those that a design was tuned in, and held-out ones."""
+    """Return the scenarios a design was tuned in, then held-out ones."""
     count = max(LEAST, CASES - len(tuned))
     if load_robot(robot).ships:
         names = {scenario.name for scenario in tuned}
@@ -55,7 +54,7 @@ def certificate_scenarios(
 def certificate_walks(
     tuned: Sequence[Scenario], robot: RobotChoice, design: Mapping[str, float]
 ) -> dict[str, Any]:
-    """Fields of a certificate's spec that say where a design walks."""
+    """Return the fields of a certificate's spec that determine the scenarios."""
     scenarios = certificate_scenarios(tuned, robot, design)
     if load_robot(robot).ships:
         return {"scenarios": scenarios}
@@ -66,29 +65,29 @@ def certificate_walks(
 def _derived(
     tuned: Sequence[Scenario], robot: RobotChoice, design: Mapping[str, float]
 ) -> list[Scenario]:
-    """Walks like the fastest of the tuned ones, as far as the legs reach, each another one."""
+    """Return reachable, distinct variations of the fastest tuned scenario."""
     fastest = max(tuned, key=lambda scenario: scenario.stride / scenario.cycle_time)
     gait = {name: value for name, value in design.items() if name in GAIT_CATALOGUE}
     names = {scenario.name for scenario in tuned}
     walked = [_unnamed(with_gait(scenario, gait)) for scenario in tuned]
-    found = []
+    derived = []
     for suffix, changes in _changes(fastest, load_robot(robot).mass):
         name = f"{fastest.name[: _LONGEST_NAME - len(suffix) - 1]}-{suffix}"
         try:
             scenario = Scenario.model_validate(fastest.model_dump() | changes | {"name": name})
             check_reach(scenario, tuple(design), tuple(design.values()), robot=robot)
         except (ValueError, SimulationInputError):
-            # Beyond the bounds of a scenario, or out of the legs' reach.
+            # Out of a scenario's bounds, or of the legs' reach.
             continue
         other = _unnamed(with_gait(scenario, gait))
         if name not in names and other not in walked:
             walked.append(other)
-            found.append(scenario)
-    return found
+            derived.append(scenario)
+    return derived
 
 
 def _changes(base: Scenario, mass: float) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Name's end and changed fields, those first that differ most from each other."""
+    """Yield name suffixes and changed fields, the most different ones first."""
     yield "turn-left", {"turn": -TURN}
     yield "downhill", {"slope": -SLOPE, "slope_direction": 0.0}
     yield "loaded", {"load": round(base.load + LOAD_SHARE * mass, 3)}

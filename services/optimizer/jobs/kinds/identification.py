@@ -1,4 +1,4 @@
-"""Jobs that fit a robot's parameters to measured walks (thesis 2.4)."""
+"""Identification jobs, which fit a robot's parameters to measured walks (thesis 2.4)"""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ RecordingId = Annotated[
     str,
     Field(
         pattern=r"^[0-9a-f]{32}$",
-        description="Id of a recorded walk, as POST /v1/recordings answers it.",
+        description="Id of a recorded walk, as returned by POST /v1/recordings.",
         examples=["0f343b0931126a20f133d67c2b018a3b"],
     ),
 ]
@@ -35,7 +35,7 @@ Link = Literal[1, 2, 3]
 
 
 class IdentificationSpec(Spec):
-    """Identification: which of a robot's parameters are fitted to which recorded walks.
+    """Fit a robot's parameters to recorded walks.
 
     Fitness is the mean absolute error of motor currents (eq. 2.21), over links and walks [A].
     """
@@ -57,7 +57,7 @@ class IdentificationSpec(Spec):
     recordings: tuple[RecordingId, ...] = Field(
         min_length=1,
         max_length=32,
-        description="Walks to fit, several at once; see /v1/recordings.",
+        description="Recorded walks to fit simultaneously; see /v1/recordings.",
     )
     links: tuple[Link, ...] = Field(
         default=(1, 2, 3),
@@ -76,19 +76,17 @@ class IdentificationSpec(Spec):
         return self
 
     def design_space(self) -> DesignSpace:
-        """Any of the robot's parameters; the others stay as described."""
-        known = identifiable_variables(load_robot(self.robot))
+        """Return the chosen robot parameters; the others stay as described."""
+        identifiable = identifiable_variables(load_robot(self.robot))
         chosen = self.variables
         if chosen is None:
-            chosen = tuple(v for v in known if v.name not in self.fixed)
-        return DesignSpace.build(required=(), optional=known, chosen=chosen, fixed=self.fixed)
+            chosen = tuple(v for v in identifiable if v.name not in self.fixed)
+        return DesignSpace.build(
+            required=(), optional=identifiable, chosen=chosen, fixed=self.fixed
+        )
 
     def check_can_be_simulated(self) -> None:
-        """Check that there is a robot at both ends of all bounds.
-
-        Raises:
-            InvalidRequest: bounds or values that no robot can have; names the field.
-        """
+        """Check that the robot is valid at both ends of all bounds."""
         self.check_optimizer()
         self.check_precision()
         robot, space = load_robot(self.robot), self.design_space()
@@ -100,7 +98,7 @@ class IdentificationSpec(Spec):
 
     @property
     def objectives(self) -> tuple[Objective, ...]:
-        """Raw objectives of a fit: mean absolute error of the currents of each link [A]."""
+        """Mean absolute error of the currents of each link [A]."""
         return LINK_CURRENTS
 
     @property
@@ -110,17 +108,13 @@ class IdentificationSpec(Spec):
 
     @property
     def recording_ids(self) -> tuple[str, ...]:
-        """Ids of the recorded walks, in order."""
         return self.recordings
 
     def cases(self, recordings: Recordings) -> tuple[Case, ...]:
-        """One fit to each recorded walk.
+        """Return one fit for each recorded walk.
 
         Args:
-            recordings: those that `recording_ids` names, by id.
-
-        Returns:
-            The fits, in the order of `case_names`.
+            recordings: Those named by `recording_ids`, by id.
         """
         names = self.design_space().names
         return tuple(
@@ -129,14 +123,9 @@ class IdentificationSpec(Spec):
         )
 
     def judge(self, objectives: Floats, failed: NDArray[np.bool_]) -> Judgement:
-        """Judge designs by the mean absolute error of currents (eq. 2.21).
+        """Judge designs by the mean absolute error of currents (eq. 2.21) [A].
 
-        Args:
-            objectives: (n, K, 3) errors of coxa, femur and tibia in each walk [A].
-            failed: (n, K), true for a fit without a result.
-
-        Returns:
-            Utilities are the mean over `links`, fitness that over walks [A].
+        Utilities are means over `links`, fitness is the mean over walks.
         """
         columns = [link - 1 for link in self.links]
         means = [
@@ -149,7 +138,7 @@ class IdentificationSpec(Spec):
             return Judgement(np.array(fitness), np.log(errors))
 
     def resolved(self) -> IdentificationSpec:
-        """The same job with its variables and optimizer written out."""
+        """Return the job with its variables and optimizer written out."""
         space = self.design_space()
         return self.model_copy(
             update={

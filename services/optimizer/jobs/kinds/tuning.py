@@ -1,4 +1,4 @@
-"""Jobs that tune a drive. The same object is request body, stored JSON and argument."""
+"""Tuning jobs. One model serves as request body, stored JSON and argument"""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from gaitswarm.sim.worlds.walks import PerturbedWalk
 
 
 def _case_settings(choice: object) -> object:
-    """Settings of a name, and a refusal of one that is none."""
+    """Convert a name to settings. Raises ValueError for an unknown one."""
     if isinstance(choice, str):
         choice = {"name": choice}
     if isinstance(choice, Mapping):
@@ -42,7 +42,7 @@ def _case_settings(choice: object) -> object:
         if isinstance(name, str) and name not in CASES:
             raise ValueError(CASES.unknown(name))
     elif choice is not None and not isinstance(choice, CaseSettings):
-        raise ValueError("must be a name or an object: settings of a plug-in's case")
+        raise ValueError("must be a name or an object with settings of a plug-in's case")
     return choice
 
 
@@ -51,16 +51,16 @@ def _model(family: CaseFamily) -> type[CaseSettings]:
 
 
 class _OrName:
-    """A case's name in place of its settings, in schemas."""
+    """Allows a case's name in place of its settings, in schemas."""
 
     @staticmethod
     def __get_pydantic_json_schema__(
         schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
-        found, names = handler(schema), list(CASES)
+        settings, names = handler(schema), list(CASES)
         if not names:
-            return found
-        return {"anyOf": [{"type": "string", "enum": names}, *found["anyOf"]]}
+            return settings
+        return {"anyOf": [{"type": "string", "enum": names}, *settings["anyOf"]]}
 
 
 if TYPE_CHECKING:
@@ -69,20 +69,20 @@ else:
     CaseChoice = Annotated[
         None, PluginSettings(CASES, _model, "/v1/cases"), BeforeValidator(_case_settings), _OrName()
     ]
-"""What a job may say; once it is read, a name has become settings."""
+"""Choice of a case; validation replaces a name by settings."""
 
 Floats = NDArray[np.float64]
 
 GAIT_OF_CHAPTER_3: Final = ("cycle_time", "stride", "height", "duty_factor", "fir_ms")
-"""The gait variables that chapter 3 optimizes together with a controller's (table 3.2)."""
+"""Gait variables that chapter 3 optimizes together with a controller's (table 3.2)."""
 
 
 _POSTURE: Final = ("hip_height", "radius")
-"""Gait variables of which no end of the bounds is easier to reach than the other."""
+"""Gait variables for which neither end of the bounds is easier to reach."""
 
 
 class JobSpec(WalksSpec):
-    """Tuning of a drive: which variables, in which scenarios, by which measure, how long."""
+    """A tuning job: controller, scenarios, preference and the search."""
 
     model_config = ConfigDict(
         json_schema_extra={
@@ -102,9 +102,9 @@ class JobSpec(WalksSpec):
 
     has_objective_vectors = True
 
-    unwalked = WalksSpec.unwalked | {"preference"}
+    outcome_independent_fields = WalksSpec.outcome_independent_fields | {"preference"}
 
-    kind: Literal["tuning"] = Field(default="tuning", description="Tune a drive to walk well.")
+    kind: Literal["tuning"] = Field(default="tuning", description="Tune a motor controller.")
     controller: ControllerName = Field(
         default="fuzzy-pi", description="Motor controller to be tuned; see /v1/controllers."
     )
@@ -112,37 +112,37 @@ class JobSpec(WalksSpec):
         default=tuple(scenario.name for scenario in SCENARIOS),
         min_length=1,
         max_length=32,
-        description="Walks in which every design is judged: names or numbers of presets (see"
-        " /v1/scenarios), or scenarios of your own.",
+        description="Scenarios in which every design is simulated: names or numbers of presets"
+        " (see /v1/scenarios), or custom scenarios.",
     )
     preference: PreferenceChoice = Field(
         default="A",
-        description="How objectives are weighed: A, B, C of table 4.5, chapter-3 for eq. 3.1, or"
-        " your own.",
+        description="Weights of the objectives: A, B, C of table 4.5, chapter-3 for eq. 3.1, or"
+        " a custom preference.",
     )
     case: CaseChoice = Field(
         default=None,
-        description="What evaluates designs in each scenario: a plug-in's case by name, or its"
-        " settings (see /v1/cases); null walks in gaitswarm's simulator.",
+        description="Evaluator of designs in each scenario: a plug-in's case, by name or with"
+        " settings (see /v1/cases); null: gaitswarm's simulator.",
     )
     worlds: TuningWorlds | None = Field(
         default=None,
-        description="Worlds that differ from the model, in each of which every design walks through"
-        " every scenario, so that the search pays for robustness; null judges by the model alone.",
+        description="Perturbed models in which every design is simulated in every scenario, so"
+        " that the search favors robust designs; null: the nominal model alone.",
         examples=[None, {"count": 8, "aggregate": "cvar"}],
     )
 
     @model_validator(mode="after")
     def _can_be_run(self) -> JobSpec:
         if self.case is not None and self.worlds is not None:
-            raise ValueError(f"worlds: {self.case.name} evaluates designs in the model alone")
+            raise ValueError(f"worlds: {self.case.name} supports the nominal model alone; omit it")
         if self.case is not None and self.precision != "double":
-            raise ValueError(f"precision: {self.case.name} has one of its own; leave it out")
+            raise ValueError(f"precision: {self.case.name} has its own precision; omit it")
         self.design_space()
         return self
 
     def design_space(self) -> DesignSpace:
-        """The controller's variables, and any of its conventions and of the gait's."""
+        """Return the controller's variables, and chosen ones of its conventions and of the gait."""
         controller = CONTROLLERS[self.controller]
         return DesignSpace.build(
             required=controller.variables,
@@ -152,21 +152,17 @@ class JobSpec(WalksSpec):
         )
 
     def with_gait_searched(self) -> JobSpec:
-        """The same job that searches the gait of chapter 3, too, but what it holds fixed of it."""
+        """Return the job with chapter 3's gait variables searched as well, unless fixed."""
         space = self.design_space()
         added = tuple(name for name in GAIT_OF_CHAPTER_3 if name not in space.names)
         document = self.model_dump() | {"variables": (*space.variables, *added)}
         return JobSpec.model_validate(document)
 
     def check_can_be_simulated(self) -> None:
-        """Check that the controller can be compiled and that the legs reach their feet's paths.
+        """Check that the controller compiles and that the legs reach their feet's paths.
 
-        A gait that is itself searched may leave the legs' reach at some points of the box: there a
-        status says so. Only a scenario whose gentlest gait is beyond reach is refused.
-
-        Raises:
-            InvalidRequest: bounds or values that nothing can run with, or a scenario out of reach;
-                names the field.
+        Designs with a searched gait may be out of reach, which their status reports. Only a
+        scenario whose gentlest gait is out of reach is rejected.
         """
         self.check_optimizer()
         self.check_precision()
@@ -198,7 +194,6 @@ class JobSpec(WalksSpec):
             raise InvalidRequest(str(error), field="case") from error
 
     def _check_worlds(self) -> None:
-        """Raises InvalidRequest for a range that cannot be simulated."""
         variables = () if self.worlds is None else self.worlds.variables()
         ends = np.array([[v.low for v in variables], [v.high for v in variables]])
         try:
@@ -208,24 +203,14 @@ class JobSpec(WalksSpec):
 
     @property
     def case_names(self) -> tuple[str, ...]:
-        """Names of the scenarios, in order; with that of the world where there are worlds."""
+        """Names of the scenarios, in order; with worlds, of each world in each scenario."""
         names = super().case_names
         if self.worlds is None:
             return names
         return tuple(f"{name}.world-{k}" for name in names for k in range(self.worlds.count))
 
     def cases(self, recordings: Recordings) -> tuple[Case, ...]:  # noqa: ARG002 - needs none
-        """One walk in each scenario, or in each world of it; or what the job has in its place.
-
-        Args:
-            recordings: none are needed.
-
-        Returns:
-            The walks, in the order of `case_names`.
-
-        Raises:
-            SimulationInputError: A plug-in's case cannot be made here.
-        """
+        """Return one case for each scenario, or for each world in each scenario."""
         names = self.design_space().names
         if self.worlds is not None:
             pairs = product(self.resolved_scenarios(), self.worlds.drawn())
@@ -245,58 +230,47 @@ class JobSpec(WalksSpec):
 
     @property
     def further_libraries(self) -> tuple[str, ...]:
-        """Of plug-ins: what brings its controller, and what its case computes with."""
+        """Distributions of a plug-in's controller and libraries of its case."""
         case = () if self.case is None else CASES[self.case.name].libraries
         return (*CONTROLLERS.distribution(self.controller), *case)
 
     def judge(self, objectives: Floats, failed: NDArray[np.bool_]) -> Judgement:
-        """Judge designs by the preference (eq. 3.8, 4.1, 4.2).
+        """Judge designs by the preference and the aggregate over worlds.
 
         Args:
-            objectives: (n, K, 6) raw objectives, in their units.
-            failed: (n, K), true for a walk without a result.
-
-        Returns:
-            Fitness and utilities of the n designs.
+            objectives: (n, K, 6) raw objectives.
+            failed: (n, K), true for a simulation without a result.
         """
         judged = super().judge(objectives, failed)
         return judged if self.worlds is None else self.worlds.judged(judged.log_utilities)
 
-    def told(self, objectives: Floats, failed: NDArray[np.bool_], fitness: Floats) -> Floats:
-        """What the search is told: fitness, or to a multi-objective method what it trades.
-
-        Args:
-            objectives: As for `Spec.told`.
-            failed: As for `Spec.told`.
-            fitness: As for `Spec.told`.
-
-        Returns:
-            As of `Spec.told`.
-        """
+    def search_feedback(
+        self, objectives: Floats, failed: NDArray[np.bool_], fitness: Floats
+    ) -> Floats:
         if METHODS[self.search.name].multi_objective:
             return self.objective_vectors(objectives, failed)
         return fitness
 
     def objective_vectors(self, objectives: Floats, failed: NDArray[np.bool_]) -> Floats:
-        """What designs come to in f1 to f5, over all scenarios, without any bias.
+        """Return (n, 5) objectives f1 to f5 over all scenarios, without biases.
 
-        They depend on no preference: a multi-objective search goes the same way whatever preference
-        its designs are judged by.
+        They depend on no preference, so neither does the path of a multi-objective search.
 
         Args:
-            objectives: (n, K, 6) raw objectives, in their units.
-            failed: (n, K), true for a walk without a result.
+            objectives: (n, K, 6) raw objectives.
+            failed: (n, K), true for a simulation without a result.
 
         Returns:
-            (n, 5) geometric means over the scenarios, of the aggregates where there are worlds; a
-            row is +inf throughout where they cannot be given.
+            Geometric means over the scenarios, of the aggregates if there are worlds; a row is +inf
+            if
+            one is missing.
         """
         if self.worlds is None:
             return objective_vectors(objectives, failed)
         return self.worlds.objective_vectors(objectives, failed)
 
     def resolved(self) -> JobSpec:
-        """The same job with scenarios, preference, variables and optimizer written out."""
+        """Return the job with scenarios, preference, variables and optimizer written out."""
         space = self.design_space()
         return self.model_copy(
             update={
@@ -316,9 +290,9 @@ def _gait_of(design: Mapping[str, float]) -> dict[str, float]:
 
 
 def _gentlest_gait(searched: Sequence[Variable]) -> dict[str, float]:
-    """Of the gaits that may be searched, the one whose feet stray least: short, flat, smooth."""
+    """Return the searched gait whose feet move least: short, flat, smooth."""
     least = {v.name: v.low for v in searched if split_name(v.name)[0] in ("stride", "height")}
-    # Any value tells whether the robot has such a group of legs.
+    # Any value shows whether the robot has such a group of legs.
     least |= {
         v.name: 0.5 * (v.low + v.high)
         for v in searched

@@ -1,4 +1,4 @@
-"""What is common to jobs whose designs walk through scenarios and are judged by a preference."""
+"""Common part of jobs whose designs are simulated in scenarios and judged by a preference"""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 
 
 class WalksSpec(Spec):
-    """A job of one kind of walks; the fields are declared by the kinds, each with its defaults."""
+    """A job with scenarios and a preference; each kind declares these fields with its defaults."""
 
     if TYPE_CHECKING:
         scenarios: tuple[ScenarioChoice, ...]
@@ -43,13 +43,13 @@ class WalksSpec(Spec):
         return self
 
     def resolved_scenarios(self) -> tuple[Scenario, ...]:
-        """The scenarios in full, presets looked up."""
+        """Return the scenarios with presets resolved."""
         return tuple(
             find_scenario(entry) if isinstance(entry, str) else entry for entry in self.scenarios
         )
 
     def resolved_preference(self) -> Preference:
-        """The preference in full."""
+        """Return the preference with a preset resolved."""
         return PREFERENCES[self.preference] if isinstance(self.preference, str) else self.preference
 
     def check_drives(self, law: ControlLaw) -> None:
@@ -59,7 +59,7 @@ class WalksSpec(Spec):
             law: Of any design of the controller.
 
         Raises:
-            InvalidRequest: It cannot; its field is `controller`.
+            InvalidRequest: It cannot; the field is `controller`.
         """
         try:
             check_drives(law, self.robot)
@@ -77,24 +77,9 @@ class WalksSpec(Spec):
         return tuple(scenario.name for scenario in self.resolved_scenarios())
 
     def judge(self, objectives: Floats, failed: NDArray[np.bool_]) -> Judgement:
-        """Judge designs by the preference (eq. 3.8, 4.1, 4.2).
-
-        Args:
-            objectives: (n, K, 6) raw objectives, in their units.
-            failed: (n, K), true for a walk without a result.
-
-        Returns:
-            Fitness and utilities of the n designs.
-        """
+        """Judge designs by the preference (eq. 3.8, 4.1, 4.2)."""
         return judge(objectives, failed, self.resolved_preference())
 
     def figure_of_merit(self, fitness: float) -> float | None:
-        """F of eq. 3.1, to be maximized.
-
-        Args:
-            fitness: Of a design, by the job's preference.
-
-        Returns:
-            F if the preference is that of chapter 3, else None.
-        """
+        """Return F of eq. 3.1, maximized; None unless the preference is that of chapter 3."""
         return figure_of_merit(fitness, self.resolved_preference())

@@ -12,7 +12,12 @@ from numpy.typing import NDArray
 
 from gaitswarm.services.optimizer.jobs.chain import ChainDocuments, Link
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
-from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Iteration, Known, Reevaluation
+from gaitswarm.services.optimizer.jobs.iteration import (
+    CachedOutcome,
+    Evaluation,
+    Iteration,
+    Reevaluation,
+)
 from gaitswarm.services.optimizer.jobs.job import JobState
 
 T = TypeVar("T")
@@ -142,7 +147,7 @@ class CommittedHistory(Protocol):
             The particles, in order of iteration and particle.
         """
 
-    def known(self, keys: Sequence[bytes]) -> dict[bytes, Known]:
+    def known(self, keys: Sequence[bytes]) -> dict[bytes, CachedOutcome]:
         """Find what designs came to in any job.
 
         Args:

@@ -18,7 +18,7 @@ from pydantic import TypeAdapter
 from sqlalchemy import Connection, Text, cast, select
 
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
-from gaitswarm.services.optimizer.jobs.iteration import Known
+from gaitswarm.services.optimizer.jobs.iteration import CachedOutcome
 from gaitswarm.services.optimizer.store.rows.tables import evaluations
 from gaitswarm.sim.outcome import Status
 
@@ -74,7 +74,7 @@ def select_columns(
     )
 
 
-def select_known(connection: Connection, keys: Sequence[bytes]) -> dict[bytes, Known]:
+def select_known(connection: Connection, keys: Sequence[bytes]) -> dict[bytes, CachedOutcome]:
     """Find what designs came to in any job.
 
     Args:
@@ -84,7 +84,7 @@ def select_known(connection: Connection, keys: Sequence[bytes]) -> dict[bytes, K
     Returns:
         Outcomes of those that are known, by key; damaged ones are left out.
     """
-    table, found = evaluations.c, dict[bytes, Known]()
+    table, found = evaluations.c, dict[bytes, CachedOutcome]()
     for first in range(0, len(keys), _KEYS):
         query = select(
             table.walk_key, cast(table.objectives, Text), cast(table.statuses, Text)
@@ -92,7 +92,9 @@ def select_known(connection: Connection, keys: Sequence[bytes]) -> dict[bytes, K
         for key, objectives, statuses in connection.execute(query):
             with suppress(ValueError, TypeError, KeyError):
                 numbers = np.array(_JSON.validate_json(objectives), dtype=np.float64)
-                found[key] = Known(numbers, np.array(_status_values(statuses), dtype=np.uint8))
+                found[key] = CachedOutcome(
+                    numbers, np.array(_status_values(statuses), dtype=np.uint8)
+                )
     return found
 
 

@@ -12,7 +12,12 @@ from sqlalchemy import Integer, Select, Table, bindparam, select
 from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
 from gaitswarm.services.optimizer.jobs.chain import ChainDocuments
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
-from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Iteration, Known, Reevaluation
+from gaitswarm.services.optimizer.jobs.iteration import (
+    CachedOutcome,
+    Evaluation,
+    Iteration,
+    Reevaluation,
+)
 from gaitswarm.services.optimizer.store.connections.engine import Database
 from gaitswarm.services.optimizer.store.port.reading import Page, StoredLink
 from gaitswarm.services.optimizer.store.rows.columns import select_columns, select_known
@@ -146,7 +151,7 @@ class SqlHistory:
             require_job(connection, job_id)
             return select_reevaluations(connection, job_id, _bounded(first), _bounded(last))
 
-    def known(self, keys: Sequence[bytes]) -> dict[bytes, Known]:
+    def known(self, keys: Sequence[bytes]) -> dict[bytes, CachedOutcome]:
         """Find what designs came to in any job."""
         with self._database.transaction(write=False) as connection:
             return select_known(connection, keys)

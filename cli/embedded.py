@@ -110,7 +110,7 @@ class Embedded:
                     stop=stop,
                     accepts_changes=self._accepts_changes,
                     cache=self._settings.cache,
-                    known=job.progress.iterations,
+                    followed_iterations=job.progress.iterations,
                 )
             except Exception as error:
                 error.add_note(_how_to_go_on(job.id, jobs.place))

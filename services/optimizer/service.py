@@ -15,7 +15,12 @@ from gaitswarm.services.optimizer.analysis.distribution import (
     distribution,
     iteration_starts,
 )
-from gaitswarm.services.optimizer.analysis.fork import Parent, check_begun, forked, started
+from gaitswarm.services.optimizer.analysis.fork import (
+    Parent,
+    check_begun,
+    forked,
+    with_start_designs,
+)
 from gaitswarm.services.optimizer.analysis.history import (
     PIECE,
     HistoryCache,
@@ -98,7 +103,7 @@ class JobService:
         if request is None:
             request = spec.model_dump(mode="json", exclude_unset=True)
         return self.store.create_job(
-            started(spec, self.job, self.columns),
+            with_start_designs(spec, self.job, self.columns),
             provenance=self.provenance(spec),
             idempotency_key=idempotency_key,
             request=request,
@@ -155,7 +160,7 @@ class JobService:
         """Validate a job and store it claimed by this process."""
         self._check(spec)
         return self.store.create_claimed_job(
-            started(spec, self.job, self.columns),
+            with_start_designs(spec, self.job, self.columns),
             runner_name(),
             lease_seconds=EMBEDDED_LEASE_SECONDS,
             provenance=self.provenance(spec),
@@ -179,7 +184,9 @@ class JobService:
         self._check(spec)
         cases = spec.cases(self.store.recordings(spec.recording_ids))
         others = [job for job in self.store.jobs(limit=_RECENT_JOBS).items if job.readable]
-        return estimate(started(spec, self.job, self.columns), cases, others, self._rates)
+        return estimate(
+            with_start_designs(spec, self.job, self.columns), cases, others, self._rates
+        )
 
     def job(self, job_id: str) -> Job:
         return self.store.job(job_id)

@@ -105,4 +105,4 @@ def test_only_a_certificate_has_worlds_and_only_after_the_first(client: httpx2.C
     queued = client.post("/v1/jobs", json=DOCUMENT).json()
     early = client.get(f"/v1/jobs/{queued['id']}/certificate")
     assert early.status_code == 409
-    assert "no drawn world has walked yet" in early.json()["detail"]
+    assert "no drawn world has been simulated yet" in early.json()["detail"]

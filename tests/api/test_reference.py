@@ -111,7 +111,7 @@ def test_a_reference_that_an_outage_hinders_is_a_line_of_the_log_and_found_later
         assert note_reference(store, ended) == ended
     (record,) = caplog.records
     assert (record.levelname, record.exc_info) == ("WARNING", None)
-    assert record.getMessage() == f"job {job.id}: its best is compared with nothing yet: it is away"
+    assert record.getMessage() == f"job {job.id}: its reference was not determined: it is away"
     assert note_reference(store, ended).reference is not None
 
 
@@ -122,7 +122,7 @@ def test_a_start_that_does_not_walk_says_so(store: SqlStore, commit: Commit) -> 
     commit(job, 1)
     found, reason = with_reference(store, store.job(job.id))
     assert found.reference == Reference("start design", None, "start")
-    assert reason == "the start design does not walk in all of its scenarios"
+    assert reason == "the start design fails in one of the scenarios"
 
 
 @pytest.mark.parametrize(

@@ -139,5 +139,5 @@ def test_fewer_worlds_are_the_first_ones() -> None:
 
 def test_without_a_drawn_world_there_is_nothing_to_say() -> None:
     spec = plain(5)
-    with pytest.raises(Conflict, match="no drawn world has walked yet"):
+    with pytest.raises(Conflict, match="no drawn world has been simulated yet"):
         certificate(spec, columns(spec, np.ones((1, 2))))

@@ -95,7 +95,7 @@ def test_an_optimization_that_was_away_too_long_says_so_and_follows_its_job(
     out, err = process.communicate(timeout=120)
     assert process.returncode == 0, err
     assert json.loads(out)["state"] == "succeeded"
-    assert "this process was not heard of" in err and "another one has taken the job over" in err
+    assert "this process lost its lease" in err and "another process has taken the job over" in err
 
 
 def test_an_optimization_that_is_cancelled_elsewhere_says_so(

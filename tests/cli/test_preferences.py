@@ -46,7 +46,7 @@ def test_winners_are_listed_by_how_robust_they_are(
     ("options", "said"),
     [
         (("--drawn", "0"), "drawn: must be at least 1"),
-        (("--samples", "9"), "samples: 8 variables need at least 36"),
+        (("--samples", "9"), "samples: 8 variables require at least 36"),
         (("--precision", "half"), "precision"),
     ],
 )

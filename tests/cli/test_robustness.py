@@ -60,7 +60,7 @@ def test_a_jobs_best_is_walked_as_its_job_walked_it(
     ("options", "said"),
     [
         (("--radius", "0"), "radius: must be greater than 0"),
-        (("--samples", "20"), "samples: 8 variables need at least 36"),
+        (("--samples", "20"), "samples: 8 variables require at least 36"),
         (("--scenarios", "moon"), "unknown scenario 'moon'"),
         (("--robot", "spot"), "unknown robot 'spot'"),
     ],

@@ -73,7 +73,7 @@ def test_a_single_job_run_twice_has_the_same_head(proved: Proved, tmp_path: Path
     [
         (
             "UPDATE evaluations SET design = '[0.5, 0.25]' WHERE iteration = 1 AND particle = 2",
-            "design 2 is not what was asked for",
+            "design 2 differs from the ask",
         ),
         (
             "UPDATE evaluations SET fitness = fitness * 1.001 WHERE iteration = 1 AND particle = 0",
@@ -102,7 +102,9 @@ def test_a_check_of_the_database_names_job_and_iteration_unless_histories_are_sk
     broken = run_command("db", "check", "--db", copy, "--json")
     assert broken.code == ExitCode.JOB_FAILED
     (finding,) = broken.json
-    assert finding.startswith(f"job {proved.id} is not what was committed: iteration 1: the fit")
+    assert finding.startswith(
+        f"job {proved.id} differs from what was committed: iteration 1: the fit"
+    )
     skipped = run_command("db", "check", "--db", copy, "--skip-histories", "--json")
     assert (skipped.code, skipped.json) == (ExitCode.OK, [])
 

@@ -67,5 +67,5 @@ def test_a_single_run_is_inconclusive() -> None:
 def test_a_run_without_a_good_design_is_refused() -> None:
     bad = run(7.0, seed=1)
     failed = replace(bad, fitness=np.full(400, np.inf))
-    with pytest.raises(ValueError, match="every run needs a design"):
+    with pytest.raises(ValueError, match="every run must have a design"):
         identifiability(VARIABLES, [bad, failed])

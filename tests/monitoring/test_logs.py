@@ -21,7 +21,7 @@ from starlette.responses import StreamingResponse
 from gaitswarm.cli.logs import JsonFormatter
 from gaitswarm.services.optimizer.errors import StoreUnavailable
 from gaitswarm.services.optimizer.log_context import log_context, log_fields
-from gaitswarm.services.optimizer.run.execution import Surroundings, run_claim
+from gaitswarm.services.optimizer.run.execution import RunContext, run_claim
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from tests.examples.forked import ForkedCommand
@@ -125,7 +125,7 @@ def test_a_bug_in_an_evaluation_is_one_line_with_job_iteration_and_traceback(
     claim = store.claim("runner", lease_seconds=30.0)
     assert claim is not None
     evaluator = FormulaEvaluator([None, ZeroDivisionError("of the test")])
-    run_claim(claim, Surroundings(store, evaluator, provenance=lambda _: HERE))
+    run_claim(claim, RunContext(store, evaluator, provenance=lambda _: HERE))
     (bug,) = [entry for entry in written() if "traceback" in entry]
     assert (bug["job"], bug["iteration"], bug["level"]) == (job.id, 1, "error")
     assert bug["traceback"].endswith("ZeroDivisionError: of the test")

@@ -13,7 +13,7 @@ from gaitswarm.services.monitoring.metrics import Metrics
 from gaitswarm.services.optimizer.errors import LeaseLost, StoreUnavailable
 from gaitswarm.services.optimizer.jobs.job import Command, JobState
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
-from gaitswarm.services.optimizer.run.execution import Surroundings, run_claim
+from gaitswarm.services.optimizer.run.execution import RunContext, run_claim
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
 from gaitswarm.services.worker.cutting import Chunk, Part
@@ -201,7 +201,7 @@ def test_failed_jobs_are_counted_by_cause(
     claim = counted.claim("runner", lease_seconds=30.0)
     assert claim is not None
     evaluator = FormulaEvaluator([error])
-    failed = run_claim(claim, Surroundings(counted, evaluator, provenance=computed))
+    failed = run_claim(claim, RunContext(counted, evaluator, provenance=computed))
     assert failed.state is JobState.FAILED
     assert of(metrics).value("gaitswarm_job_failures_total", cause=cause) == 1
     assert of(metrics).value("gaitswarm_jobs_ended_total", state="failed", kind="tuning") == 1

@@ -17,7 +17,7 @@ from gaitswarm.services.optimizer.errors import LeaseLost
 from gaitswarm.services.optimizer.jobs.documents import SPECS
 from gaitswarm.services.optimizer.jobs.job import Command, JobState
 from gaitswarm.services.optimizer.run.evaluator import TaskReport
-from gaitswarm.services.optimizer.run.execution import Surroundings, run_claim
+from gaitswarm.services.optimizer.run.execution import RunContext, run_claim
 from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from gaitswarm.services.runtime import open_runtime
 from gaitswarm.services.worker.dispatch import Dispatcher
@@ -87,7 +87,7 @@ def test_a_job_that_fails_and_its_iteration_say_why(
     claim = traced.claim("runner", lease_seconds=30.0)
     assert claim is not None
     evaluator = tracing.traced_evaluator(FormulaEvaluator([None, ZeroDivisionError("of the test")]))
-    run_claim(claim, Surroundings(traced, evaluator, provenance=lambda _: HERE))
+    run_claim(claim, RunContext(traced, evaluator, provenance=lambda _: HERE))
     (job,) = named(exporter, "job")
     first, second = named(exporter, "iteration")
     assert first.status.status_code is StatusCode.UNSET

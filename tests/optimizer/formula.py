@@ -14,7 +14,7 @@ from gaitswarm.services.optimizer.jobs.job import Job, JobState
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, with_record
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped
-from gaitswarm.services.optimizer.run.execution import Surroundings, run_claim
+from gaitswarm.services.optimizer.run.execution import RunContext, run_claim
 from gaitswarm.services.optimizer.store.port.base import Store
 from gaitswarm.sim.case import Walk
 from gaitswarm.sim.outcome import Outcome, Status
@@ -138,5 +138,5 @@ def run(
 ) -> Job:
     claim = store.claim("runner", lease_seconds=lease_seconds)
     assert claim is not None
-    around = replace(Surroundings(store, evaluator, lease_seconds=lease_seconds), **given)  # type: ignore[arg-type]
+    around = replace(RunContext(store, evaluator, lease_seconds=lease_seconds), **given)  # type: ignore[arg-type]
     return run_claim(claim, around, stop)

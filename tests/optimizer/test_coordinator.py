@@ -218,5 +218,5 @@ def test_after_the_lease_is_lost_nothing_is_written() -> None:
 
 def test_an_event_that_makes_no_sense_is_refused() -> None:
     state, _ = begin()
-    with pytest.raises(ValueError, match="Committed makes no sense while evaluating"):
+    with pytest.raises(ValueError, match="unexpected Committed while evaluating"):
         handle(state, Committed(JobState.RUNNING))

@@ -15,7 +15,7 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
 from gaitswarm.services.optimizer.run.coordinator import walk_keys
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
-from gaitswarm.services.optimizer.run.execution import Surroundings, evaluate_unknown, run_claim
+from gaitswarm.services.optimizer.run.execution import RunContext, evaluate_uncached, run_claim
 from gaitswarm.services.optimizer.store.port.base import Store
 from gaitswarm.services.optimizer.store.sql_store import SqlStore
 from gaitswarm.sim.outcome import Outcome
@@ -49,7 +49,7 @@ def run(
     claim = store.claim("runner", lease_seconds=30.0, job_id=job.id)
     assert claim is not None
     evaluator = CountingEvaluator()
-    around = Surroundings(store, evaluator, cache=cache, provenance=lambda _: provenance)
+    around = RunContext(store, evaluator, cache=cache, provenance=lambda _: provenance)
     ended = run_claim(claim, around)
     assert ended.state is JobState.SUCCEEDED
     return ended, evaluator.walked
@@ -162,7 +162,7 @@ def test_a_design_that_is_asked_for_twice_walks_once() -> None:
     asked = request([[0.5, 0.1], [0.2, 0.3], [0.5, 0.1], [0.5, 0.1]])
     evaluator = CountingEvaluator()
     keys = keys_of(asked)
-    outcomes, walked = evaluate_unknown(evaluator, Knows({}), asked, keys, lambda: False)
+    outcomes, walked = evaluate_uncached(evaluator, Knows({}), asked, keys, lambda: False)
     assert evaluator.walked == 2
     assert walked == (keys[0], keys[1], None, None)
     assert bits(outcomes) == bits(walk(asked))
@@ -176,7 +176,9 @@ def test_known_and_unknown_designs_come_in_the_order_of_the_request() -> None:
         np.array([outcome.statuses[1] for outcome in outcomes], dtype=np.uint8),
     )
     evaluator = CountingEvaluator()
-    found, walked = evaluate_unknown(evaluator, Knows({keys[1]: known}), asked, keys, lambda: False)
+    found, walked = evaluate_uncached(
+        evaluator, Knows({keys[1]: known}), asked, keys, lambda: False
+    )
     assert (evaluator.walked, walked) == (2, (keys[0], None, keys[2]))
     assert bits(found) == bits(outcomes)
 
@@ -188,7 +190,9 @@ def test_an_outcome_that_lost_a_number_when_it_was_stored_is_walked_again() -> N
     for damaged in (np.where(objectives == objectives[0, 0], np.nan, objectives), objectives[:1]):
         known = CachedOutcome(damaged, np.zeros(2, dtype=np.uint8))
         evaluator = CountingEvaluator()
-        outcomes, _ = evaluate_unknown(evaluator, Knows({key: known}), asked, (key,), lambda: False)
+        outcomes, _ = evaluate_uncached(
+            evaluator, Knows({key: known}), asked, (key,), lambda: False
+        )
         assert evaluator.walked == 1
         assert bits(outcomes) == bits(walk(asked))
 
@@ -199,7 +203,7 @@ def test_a_store_that_does_not_answer_knows_nothing() -> None:
             raise StoreUnavailable("gone")
 
     asked = request([[0.5, 0.1], [0.2, 0.3]])
-    outcomes, walked = evaluate_unknown(
+    outcomes, walked = evaluate_uncached(
         CountingEvaluator(), Gone({}), asked, keys_of(asked), lambda: False
     )
     assert (bits(outcomes), walked) == (bits(walk(asked)), keys_of(asked))
@@ -207,7 +211,7 @@ def test_a_store_that_does_not_answer_knows_nothing() -> None:
 
 def test_walks_without_keys_are_all_walked() -> None:
     asked, evaluator = request([[0.5, 0.1], [0.5, 0.1]]), CountingEvaluator()
-    assert evaluate_unknown(evaluator, Knows({}), asked, (), lambda: False)[1] == ()
+    assert evaluate_uncached(evaluator, Knows({}), asked, (), lambda: False)[1] == ()
     assert evaluator.walked == 2
 
 

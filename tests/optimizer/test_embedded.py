@@ -20,7 +20,7 @@ from gaitswarm.services.optimizer.run.evaluator import (
     EvaluationStopped,
     Evaluator,
 )
-from gaitswarm.services.optimizer.run.execution import Surroundings, run_claim
+from gaitswarm.services.optimizer.run.execution import RunContext, run_claim
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store.port.base import Store
 from gaitswarm.services.optimizer.store.sql_store import open_store
@@ -80,7 +80,7 @@ def running(store: Store, claim: Claim, *, after: threading.Event) -> Iterator[N
 
     def run() -> None:
         after.wait()
-        run_claim(claim, Surroundings(store, FormulaEvaluator()))
+        run_claim(claim, RunContext(store, FormulaEvaluator()))
 
     thread = threading.Thread(target=run)
     thread.start()
@@ -187,11 +187,11 @@ def test_following_begins_after_the_iterations_that_the_caller_knows_of(
     store: Store, told: Told
 ) -> None:
     first, stop = held_by_another(store), threading.Event()
-    run_claim(first, Surroundings(store, FormulaEvaluator(), on_commit=lambda *_: stop.set()), stop)
+    run_claim(first, RunContext(store, FormulaEvaluator(), on_commit=lambda *_: stop.set()), stop)
     claim = store.claim("another", lease_seconds=60.0)
     assert claim is not None and claim.job.progress.iterations == 1
     with running(store, claim, after=told.any_news):
-        run_embedded(store, no_workers, claim.job.id, known=0, **told.callbacks())
+        run_embedded(store, no_workers, claim.job.id, followed_iterations=0, **told.callbacks())
     assert told.followed == ALL
 
 
@@ -205,7 +205,7 @@ def test_a_job_that_another_process_gives_back_goes_on_here(store: Store, told: 
 
     def run() -> None:
         told.any_news.wait()
-        run_claim(claim, Surroundings(store, FormulaEvaluator(), on_commit=give_back), stop)
+        run_claim(claim, RunContext(store, FormulaEvaluator(), on_commit=give_back), stop)
 
     another = threading.Thread(target=run)
     another.start()
@@ -213,7 +213,7 @@ def test_a_job_that_another_process_gives_back_goes_on_here(store: Store, told: 
     another.join()
     assert job.state is JobState.SUCCEEDED
     assert (told.followed, told.committed) == (ALL[:2], ALL[2:])
-    assert "goes on here" in told.news[-1]
+    assert "continuing it here" in told.news[-1]
 
 
 def test_a_job_whose_process_was_killed_goes_on_here_when_its_lease_has_run_out(
@@ -222,7 +222,7 @@ def test_a_job_whose_process_was_killed_goes_on_here_when_its_lease_has_run_out(
     claim = held_by_another(store, lease_seconds=0.4)
     job = run_embedded(store, FormulaEvaluator(), claim.job.id, **told.callbacks())
     assert job.state is JobState.SUCCEEDED
-    assert "killed" in told.news[0] and "goes on here" in told.news[1]
+    assert "killed" in told.news[0] and "continuing it here" in told.news[1]
 
 
 def test_a_job_that_is_lost_to_another_process_is_followed_there_and_nothing_is_told_twice(
@@ -245,7 +245,7 @@ def test_a_job_that_is_lost_to_another_process_is_followed_there_and_nothing_is_
     with running(store, theirs, after=told.any_news):
         here.join()
     assert [job.state for job in ended] == [JobState.SUCCEEDED]
-    assert "not heard of" in told.news[0]
+    assert "lost its lease" in told.news[0]
     assert (told.committed, told.followed) == ([], ALL)
 
 
@@ -265,7 +265,7 @@ class Asleep(FormulaEvaluator):
             # A heartbeat may just have come in between.
             self.clock.advance(EMBEDDED_LEASE_SECONDS + 1.0)
             theirs = self.store.claim("another", lease_seconds=60.0)
-        run_claim(theirs, Surroundings(self.store, FormulaEvaluator()))
+        run_claim(theirs, RunContext(self.store, FormulaEvaluator()))
         return super().evaluate(request, should_stop)
 
 
@@ -275,7 +275,7 @@ def test_a_job_that_another_process_took_and_ended_unnoticed_is_told_to_its_end(
     job = run_embedded(store, Asleep(store, clock), submitted(store), **told.callbacks())
     assert job.state is JobState.SUCCEEDED
     assert (told.committed, told.followed) == ([], ALL)
-    assert len(told.news) == 1 and "not heard of" in told.news[0]
+    assert len(told.news) == 1 and "lost its lease" in told.news[0]
 
 
 def test_a_job_that_is_cancelled_while_it_is_followed_is_returned_cancelled(

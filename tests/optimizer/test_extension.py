@@ -25,7 +25,7 @@ from gaitswarm.services.optimizer.run.coordinator import (
     Extended,
     handle,
 )
-from gaitswarm.services.optimizer.run.execution import OnCommit, Surroundings, run_claim
+from gaitswarm.services.optimizer.run.execution import OnCommit, RunContext, run_claim
 from gaitswarm.services.optimizer.store.port.base import Store
 from tests.examples.jobs import Bits, history
 from tests.optimizer.formula import HERE, SPEC, FormulaEvaluator, job, walk
@@ -40,7 +40,7 @@ class CrashError(Exception):
 def run(store: Store, job_id: str, on_commit: OnCommit | None = None) -> Job:
     claim = store.claim("runner", lease_seconds=30.0, job_id=job_id)
     assert claim is not None
-    return run_claim(claim, Surroundings(store, FormulaEvaluator(), on_commit=on_commit))
+    return run_claim(claim, RunContext(store, FormulaEvaluator(), on_commit=on_commit))
 
 
 def run_through_crashes(store: Store, job_id: str) -> Job:
@@ -105,7 +105,7 @@ def test_a_job_that_is_killed_before_its_first_walk_after_an_extension_has_the_s
     assert claim is not None and claim.ask is None
     stop = threading.Event()
     stop.set()
-    stopped = run_claim(claim, Surroundings(store, FormulaEvaluator()), stop)
+    stopped = run_claim(claim, RunContext(store, FormulaEvaluator()), stop)
     assert (stopped.state, stopped.progress.iterations) == (JobState.QUEUED, BUDGET)
     run(store, whole)
     run(store, killed)
@@ -147,7 +147,7 @@ def test_a_job_that_is_extended_between_claim_and_first_ask_is_asked_under_the_l
     claim = store.claim("runner", lease_seconds=30.0, job_id=between)
     assert claim is not None and claim.ask is None
     store.extend(between, BUDGET + 5)
-    done = run_claim(claim, Surroundings(store, FormulaEvaluator()))
+    done = run_claim(claim, RunContext(store, FormulaEvaluator()))
     assert (done.state, done.progress.iterations) == (JobState.SUCCEEDED, BUDGET + 5)
     assert history(store, between) == history(store, before)
 

@@ -20,7 +20,7 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import Aggregate
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, judge
 from gaitswarm.services.optimizer.run.embedded import run_embedded
-from gaitswarm.services.optimizer.run.execution import Surroundings, run_claim
+from gaitswarm.services.optimizer.run.execution import RunContext, run_claim
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store.port.base import Store
 from tests.calibration.conftest import spec as calibration
@@ -58,7 +58,7 @@ def run_through_kills(store: Store, job_id: str) -> Job:
         claim = store.claim("runner", lease_seconds=30.0, job_id=job_id)
         assert claim is not None
         with pytest.raises(KilledError):
-            run_claim(claim, Surroundings(store, TradeOff(), on_commit=kill))
+            run_claim(claim, RunContext(store, TradeOff(), on_commit=kill))
     return store.job(job_id)
 
 
@@ -79,7 +79,7 @@ def test_the_search_is_told_geometric_means_of_each_objective_without_biases(sto
     asked = store.asked(job.id, 0, job.progress.iterations)
     retraced(job.spec, [job.spec.iterations], asked, by_iteration(store, job, told))
     worse = by_iteration(store, job, told[:, ::-1] * np.arange(1.0, len(told) + 1.0)[:, None])
-    with pytest.raises(ValueError, match="would ask for other designs"):
+    with pytest.raises(ValueError, match="asks for other designs"):
         retraced(job.spec, [job.spec.iterations], asked, worse)
 
 

@@ -36,7 +36,7 @@ from gaitswarm.services.optimizer.run.coordinator import (
     Release,
     handle,
 )
-from gaitswarm.services.optimizer.run.execution import OnCommit, Surroundings, run_claim
+from gaitswarm.services.optimizer.run.execution import OnCommit, RunContext, run_claim
 from gaitswarm.services.optimizer.search.registry import create_search
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store.port.base import Store
@@ -71,7 +71,7 @@ def run(
 ) -> Job:
     claim = store.claim("runner", lease_seconds=30.0)
     assert claim is not None
-    around = Surroundings(
+    around = RunContext(
         store, FormulaEvaluator(), on_commit=on_commit, provenance=lambda _: provenance, **given
     )
     return run_claim(claim, around)
@@ -209,7 +209,7 @@ def test_a_job_whose_robot_cannot_be_read_fails_with_the_reason(store: Store) ->
 
     claim = store.claim("runner", lease_seconds=30.0)
     assert claim is not None
-    failed = run_claim(claim, Surroundings(store, FormulaEvaluator(), provenance=unreadable))
+    failed = run_claim(claim, RunContext(store, FormulaEvaluator(), provenance=unreadable))
     assert failed.state is JobState.FAILED
     assert failed.error is not None and "robot.toml: motors: Field required" in failed.error
 
@@ -219,7 +219,7 @@ def test_a_worker_that_computes_something_else_fails_the_job_with_its_reason(sto
     claim = store.claim("runner", lease_seconds=30.0)
     assert claim is not None
     unlike = ProvenanceChanged("a worker on node-7: no C compiler")
-    around = Surroundings(store, FormulaEvaluator([None, unlike]), provenance=lambda _: HERE)
+    around = RunContext(store, FormulaEvaluator([None, unlike]), provenance=lambda _: HERE)
     failed = run_claim(claim, around)
     assert (failed.state, failed.error) == (JobState.FAILED, str(unlike))
     assert failed.progress.iterations == 1

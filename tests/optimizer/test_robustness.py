@@ -172,5 +172,5 @@ def test_integers_vary_in_whole_steps_if_the_radius_reaches_them_and_choices_nev
 def test_a_sample_without_variables_or_with_too_few_designs_is_refused() -> None:
     with pytest.raises(ValueError, match="variables: none"):
         local_sample({"kind": 1.0}, (KIND,), radius=0.05, samples=64, seed=1)
-    with pytest.raises(ValueError, match="samples: 2 variables need at least 12"):
+    with pytest.raises(ValueError, match="samples: 2 variables require at least 12"):
         local_sample({"x": 5.0, "y": 0.0}, (X, Y), radius=0.05, samples=11, seed=1)

@@ -22,7 +22,7 @@ from gaitswarm.services.optimizer.jobs.job import Claim, Command, Job, JobState
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
-from gaitswarm.services.optimizer.run.execution import Surroundings, run_claim
+from gaitswarm.services.optimizer.run.execution import RunContext, run_claim
 from gaitswarm.services.optimizer.run.outage import Backoff
 from gaitswarm.services.optimizer.run.runner import Runner
 from gaitswarm.services.optimizer.store.port.base import Store
@@ -432,9 +432,9 @@ def test_a_run_that_lost_its_lease_writes_nothing(store: Store) -> None:
     assert claim is not None
     taken = store.claim("quick", lease_seconds=60.0)
     assert taken is not None
-    job = run_claim(claim, Surroundings(store, FormulaEvaluator(), lease_seconds=60.0))
+    job = run_claim(claim, RunContext(store, FormulaEvaluator(), lease_seconds=60.0))
     assert job.progress.iterations == 0
-    finished = run_claim(taken, Surroundings(store, FormulaEvaluator(), lease_seconds=60.0))
+    finished = run_claim(taken, RunContext(store, FormulaEvaluator(), lease_seconds=60.0))
     assert (finished.id, finished.state) == (job_id, JobState.SUCCEEDED)
 
 
@@ -514,7 +514,7 @@ def test_a_drained_job_does_not_wait_for_workers_out_of_reach(store: Store) -> N
     claim = store.claim("runner", lease_seconds=60.0, job_id=job_id)
     assert claim is not None
     gone = EvaluatorUnavailable("no route to host")
-    around = Surroundings(
+    around = RunContext(
         store,
         FormulaEvaluator([None, gone]),
         backoff=Backoff(first=600.0),
@@ -531,6 +531,6 @@ def test_a_drain_in_single_precision_commits_the_best_as_judged_in_double(store:
     drain.set()
     claim = store.claim("runner", lease_seconds=60.0, job_id=job_id)
     assert claim is not None
-    job = run_claim(claim, Surroundings(store, evaluator), drain=drain)
+    job = run_claim(claim, RunContext(store, evaluator), drain=drain)
     assert (job.state, job.progress.iterations) == (JobState.QUEUED, 1)
     assert len(store.reevaluations(job_id)) == 1

@@ -203,8 +203,8 @@ def test_an_end_that_was_cut_off_is_found_by_the_digest_that_was_noted_down(
     [
         ("UPDATE jobs SET head = 'aa'", "the digest of the job"),
         ("UPDATE jobs SET evaluations = 5", "it has 6 evaluations"),
-        ("UPDATE jobs SET best_fitness = 0.5", "the best design"),
-        ("UPDATE jobs SET best_particle = 1", "the best design"),
+        ("UPDATE jobs SET best_fitness = 0.5", "best design"),
+        ("UPDATE jobs SET best_particle = 1", "best design"),
     ],
 )
 def test_what_a_job_says_of_its_history_is_checked_too(
@@ -225,7 +225,7 @@ def test_what_is_asked_but_not_yet_evaluated_is_checked_too(
         database_url, "UPDATE iterations SET positions = '[[0, 0], [0, 0]]' WHERE iteration = 1"
     )
     found = checked(store, claim.job.id)
-    assert found.broken_at == 1 and found.problem.startswith("what is asked")
+    assert found.broken_at == 1 and found.problem.startswith("the ask")
 
 
 def test_a_design_that_was_evaluated_anew_is_chained_too(

@@ -66,7 +66,7 @@ def test_histories_are_compared_with_their_digests_and_a_deleted_one_is_left_out
     assert check_histories(store) == [], "how long it took is no part of a history"
     edit(database_url, "UPDATE evaluations SET fitness = 0.5 WHERE iteration = 1")
     (finding,) = check_histories(store)
-    assert finding.startswith(f"job {job_id} is not what was committed: iteration 1: ")
+    assert finding.startswith(f"job {job_id} differs from what was committed: iteration 1: ")
     edit(database_url, "UPDATE jobs SET deleted_at = '2026-01-01 00:00:00'")
     assert check_histories(store) == []
 

@@ -173,7 +173,7 @@ def test_an_iteration_of_more_walks_than_are_kept_at_once_is_refused(store: SqlS
     asked = JobSpec.model_validate(
         {"worlds": {"count": 100}, "optimizer": {"name": "pso", "particles": 2000}, "iterations": 1}
     )
-    with pytest.raises(InvalidRequest, match="optimizer: an iteration has 1200000 walks"):
+    with pytest.raises(InvalidRequest, match="optimizer: an iteration has 1200000 simulations"):
         JobService(store, longest_job=1e10).submit(asked)
 
 

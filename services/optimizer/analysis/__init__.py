@@ -1,1 +1,1 @@
-"""Questions about whole histories of jobs."""
+"""Analyses of whole job histories"""

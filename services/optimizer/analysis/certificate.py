@@ -1,4 +1,4 @@
-"""What other engines make of a certificate's nominal world."""
+"""Evaluation of certificates: statistics over worlds, and comparison of engines"""
 
 from __future__ import annotations
 
@@ -23,19 +23,14 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Compared:
-    """One quantity by two engines; NaN where a walk failed.
-
-    Attributes:
-        ours: By our engine.
-        theirs: By the other one.
-    """
+    """One quantity by two engines; NaN after a failed simulation."""
 
     ours: float
     theirs: float
 
     @property
     def difference(self) -> float:
-        """By which the other engine's is greater, as a share of ours [1]; NaN if that is 0."""
+        """Relative difference of the other engine [1]; NaN if ours is 0."""
         return (self.theirs - self.ours) / self.ours if self.ours else float("nan")
 
 
@@ -44,11 +39,8 @@ class ComparedCase:
     """One scenario by two engines.
 
     Attributes:
-        name: Of the scenario.
-        ours: How the walk ended by our engine.
-        theirs: How it ended by the other one.
-        utility: By the preference.
-        objectives: f1 to f6 of table 4.1; f6 by its size.
+        utility: by the preference.
+        objectives: f1 to f6 of table 4.1; f6 by its absolute value.
     """
 
     name: str
@@ -60,13 +52,7 @@ class ComparedCase:
 
 @dataclass(frozen=True, slots=True)
 class ComparedEngine:
-    """Another engine, in the nominal world of all scenarios.
-
-    Attributes:
-        name: Of the engine.
-        fitness: Over all scenarios.
-        cases: By scenario, in the job's order.
-    """
+    """Another engine, in the nominal world of all scenarios."""
 
     name: EngineName
     fitness: Compared
@@ -76,7 +62,6 @@ class ComparedEngine:
 def compared_engines(
     spec: CertificateSpec, nominal: EvaluationColumns
 ) -> tuple[ComparedEngine, ...]:
-    """Compare engines."""
     judged = spec.judge(nominal.objectives, nominal.failed)
     utilities = judged.utilities
     values = nominal.objectives.copy()
@@ -101,7 +86,7 @@ def compared_engines(
 
 
 def _compared(pair: Floats) -> Compared:
-    """pair (2,): NaN or +inf for a failed walk."""
+    """pair (2,): NaN or +inf for a failed simulation."""
     ours, theirs = np.where(np.isfinite(pair), pair, np.nan).tolist()
     return Compared(ours, theirs)
 
@@ -109,27 +94,26 @@ def _compared(pair: Floats) -> Compared:
 QUANTILES: Final = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 LEVEL: Final = 0.95
-"""Of the conditional value at risk, and of all intervals."""
+"""Level of the conditional value at risk and of all intervals."""
 
 MOST_WORST: Final = 1000
-"""Worst worlds that can be named."""
+"""Limit on the number of worst worlds listed."""
 
 _SEED: Final = "world_seed"
-"""A perturbation whose order means nothing."""
+"""A perturbation without order."""
 
 _NORMAL: Final = 1.959963984540054
-"""The standard normal distribution's quantile at 0.975."""
+"""0.975 quantile of the standard normal distribution."""
 
 
 @dataclass(frozen=True, slots=True)
 class Proportion:
-    """How often something happened, and how often it would in all worlds.
+    """A binomial proportion over worlds.
 
     Attributes:
-        count: Worlds in which it happened.
-        worlds: Worlds in all.
-        low: Lower end of the exact interval of 95 % (Clopper and Pearson 1934).
-        high: Upper end.
+        count: worlds in which the event occurred.
+        low: lower end of the exact 95 % interval (Clopper and Pearson 1934).
+        high: upper end.
     """
 
     count: int
@@ -139,21 +123,20 @@ class Proportion:
 
     @property
     def share(self) -> float:
-        """Of the worlds."""
         return self.count / self.worlds
 
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """How a quantity spreads over worlds; less is better, and a failed walk is worse than any.
+    """Distribution of a minimized quantity over worlds; failures are worse than any value.
 
     Attributes:
-        quantiles: At `QUANTILES`, of all worlds: +inf where a quantile is a failed walk.
-        worst: The greatest of walks that did not fail, NaN if all did.
-        cvar: Mean of the worst 5 % of worlds, the conditional value at risk at 0.95. A failed walk,
-            which has no value, counts as `worst`: with failures in the tail this is a lower bound.
-        tail_failed: Share of that tail that failed.
-        nominal: In the nominal world, NaN if the walk failed there.
+        quantiles: at `QUANTILES`, over all worlds; +inf where a quantile is a failure.
+        worst: greatest value of successful simulations, NaN if all failed.
+        cvar: mean of the worst 5 % of worlds, the conditional value at risk at 0.95. A failure
+            counts as `worst`: with failures in the tail this is a lower bound.
+        tail_failed: failed share of that tail.
+        nominal: in the nominal world, NaN after a failure.
     """
 
     quantiles: tuple[float, ...]
@@ -168,12 +151,8 @@ class CaseResult:
     """One scenario over all worlds.
 
     Attributes:
-        name: Of the scenario.
-        statuses: How many walks ended so.
-        fell: How often the robot fell.
-        failed: How often the walk failed in any way.
-        utility: By the preference.
-        objectives: f1 to f6 of table 4.1; f6 by its size.
+        utility: by the preference.
+        objectives: f1 to f6 of table 4.1; f6 by its absolute value.
     """
 
     name: str
@@ -186,17 +165,17 @@ class CaseResult:
 
 @dataclass(frozen=True, slots=True)
 class WorldOutcome:
-    """What a design came to in one world.
+    """A design's results in one world.
 
     Attributes:
-        index: Of the world, from 0.
-        iteration: Of the job, in which it was walked.
-        particle: Its place there.
-        fitness: Geometric mean over the scenarios, +inf if one of them failed.
-        failures: Scenarios that failed, and how.
-        scenario: In which the world is worst: one that failed, or else the one whose utility is the
-            greatest multiple of that in the nominal world.
-        values: Of all perturbations that are drawn or fixed, by name.
+        index: of the world, from 0.
+        iteration: of the job.
+        particle: index in the iteration.
+        fitness: geometric mean over the scenarios, +inf if one failed.
+        failures: failed scenarios with their statuses.
+        scenario: worst scenario: a failed one, else the one whose utility is the greatest multiple
+            of that in the nominal world.
+        values: drawn and fixed perturbations, by name.
     """
 
     index: int
@@ -210,14 +189,13 @@ class WorldOutcome:
 
 @dataclass(frozen=True, slots=True)
 class Influence:
-    """How a perturbation goes with the outcome.
+    """Rank correlation of a perturbation with the fitness.
 
     Attributes:
-        name: Of the perturbation.
-        correlation: Spearman's, of its value with the fitness: worlds in which a scenario failed
-            share the last rank. Positive: greater values go with worse outcomes.
-        low: Lower end of the interval of 95 % (Bonett and Wright 2000).
-        high: Upper end.
+        correlation: Spearman's; worlds with a failed scenario share the last rank. Positive:
+            greater values go with worse results.
+        low: lower end of the 95 % interval (Bonett and Wright 2000).
+        high: upper end.
     """
 
     name: str
@@ -228,17 +206,17 @@ class Influence:
 
 @dataclass(frozen=True, slots=True)
 class Certificate:
-    """A design in many worlds.
+    """Results of a design in many worlds.
 
     Attributes:
-        worlds: How many were drawn and walked.
-        cases: By scenario, in the job's order.
-        fitness: Over all scenarios, by the preference.
-        fell: How often the robot fell in one scenario at least.
-        failed: How often a walk failed in one scenario at least.
-        worst: The worst worlds, first those in which most scenarios failed.
-        influences: Of the perturbations that are drawn, the strongest first.
-        engines: What other engines make of the nominal world.
+        worlds: number of drawn worlds.
+        cases: in the job's order.
+        fitness: over all scenarios.
+        fell: worlds in which the robot fell in at least one scenario.
+        failed: worlds in which at least one scenario failed.
+        worst: those with the most failed scenarios first.
+        influences: strongest first.
+        engines: other engines in the nominal world.
     """
 
     worlds: int
@@ -254,13 +232,13 @@ class Certificate:
 def certificate(
     spec: CertificateSpec, columns: EvaluationColumns, *, worlds: int | None = None, most: int = 5
 ) -> Certificate:
-    """Say what a certificate's walks come to."""
+    """Evaluate a certificate's simulations."""
     first = spec.nominal_rows
     nominal = columns.rows(slice(first))
     walked = columns.rows(slice(None if worlds is None else first + worlds))
     taken = walked.rows(np.delete(np.arange(len(walked)), slice(1, first)))
     if len(taken) < 2:
-        raise Conflict("no drawn world has walked yet; ask again after the first iteration")
+        raise Conflict("no drawn world has been simulated yet; try again after the first iteration")
     values = taken.objectives.copy()
     values[:, :, HEIGHT_LOSS] = np.abs(values[:, :, HEIGHT_LOSS])
     judged = spec.judge(taken.objectives, taken.failed)
@@ -283,12 +261,8 @@ def certificate(
 
 
 def proportion(happened: NDArray[np.bool_]) -> Proportion:
-    """Count worlds, with the exact interval of a binomial proportion (Clopper and Pearson 1934).
-
-    Args:
-        happened: (n,), by world; n >= 1.
-    """
-    # It takes a quarter of a second to import, and few questions need it.
+    """Return the proportion of worlds in which an event (n,) occurred, n >= 1."""
+    # Its import takes a quarter of a second.
     require_room_for_scipy()
     from scipy.special import betaincinv  # noqa: PLC0415
 
@@ -300,11 +274,7 @@ def proportion(happened: NDArray[np.bool_]) -> Proportion:
 
 
 def conditional_value_at_risk(values: Floats, level: float = LEVEL) -> float:
-    """Mean of the worst values (Rockafellar and Uryasev 2002), the greatest being the worst.
-
-    Args:
-        values: (n,) finite numbers, n >= 1.
-    """
+    """Mean of the worst of (n,) values (Rockafellar and Uryasev 2002), the greatest being worst."""
     ordered = np.sort(values)[::-1].tolist()
     size = max((1.0 - level) * len(ordered), 1.0)
     whole = math.floor(size + 1e-9)
@@ -316,11 +286,13 @@ def conditional_value_at_risk(values: Floats, level: float = LEVEL) -> float:
 
 
 def _case(name: str, statuses: NDArray[np.uint8], utility: Floats, values: Floats) -> CaseResult:
-    """utility (1 + n,) and values (1 + n, 6) with the nominal world; statuses (n,) without."""
-    found, counts = np.unique(statuses, return_counts=True)
+    """utility (1 + n,) and values (1 + n, 6) start with the nominal world; statuses (n,) do not."""
+    occurring, counts = np.unique(statuses, return_counts=True)
     return CaseResult(
         name=name,
-        statuses={Status(s): int(c) for s, c in zip(found.tolist(), counts.tolist(), strict=True)},
+        statuses={
+            Status(s): int(c) for s, c in zip(occurring.tolist(), counts.tolist(), strict=True)
+        },
         fell=proportion(statuses == Status.FELL),
         failed=proportion(statuses != Status.OK),
         utility=_spread(utility),
@@ -329,7 +301,7 @@ def _case(name: str, statuses: NDArray[np.uint8], utility: Floats, values: Float
 
 
 def _spread(values: Floats) -> Spread:
-    """values (1 + n,), the nominal world's first; NaN or +inf for a failed walk."""
+    """values (1 + n,), the nominal world first; NaN or +inf for a failed simulation."""
     nominal, drawn = float(values[0]), values[1:]
     failed = ~np.isfinite(drawn)
     filled = np.where(failed, np.inf, drawn)
@@ -355,18 +327,18 @@ def _worst(
     most: int,
 ) -> tuple[WorldOutcome, ...]:
     failed = taken.failed[1:]
-    # The last key sorts first; the earlier of equals is first.
+    # The last key sorts first; ties keep their order.
     order = np.lexsort((-fitness[1:], -failed.sum(axis=1)))[:most]
     space, names = spec.design_space(), spec.case_names
     drawn = set(spec.world_space().names)
     nominal = np.where(np.isfinite(log_utilities[0]), log_utilities[0], 0.0)
-    found = []
+    results = []
     for index in order.tolist():
         row = index + 1
         failures = tuple(
             (names[k], Status(int(taken.statuses[row, k]))) for k in np.flatnonzero(failed[index])
         )
-        found.append(
+        results.append(
             WorldOutcome(
                 index=index,
                 iteration=int(taken.iteration[row]),
@@ -383,25 +355,27 @@ def _worst(
                 },
             )
         )
-    return tuple(found)
+    return tuple(results)
 
 
 def _influences(spec: CertificateSpec, worlds: Floats, fitness: Floats) -> tuple[Influence, ...]:
-    """worlds: (n, v) as they were drawn."""
-    found = []
+    """worlds: (n, v) drawn values."""
+    results = []
     for j, variable in enumerate(spec.world_space().variables):
         if variable.name == _SEED:
             continue
         correlation = spearman(worlds[:, j], fitness)
         if not math.isnan(correlation):
-            found.append(
+            results.append(
                 Influence(variable.name, correlation, *_interval(correlation, len(worlds)))
             )
-    return tuple(sorted(found, key=lambda influence: -abs(influence.correlation)))
+    return tuple(sorted(results, key=lambda influence: -abs(influence.correlation)))
 
 
 def _interval(correlation: float, n: int) -> tuple[float, float]:
-    """Of Spearman's correlation, by Fisher's z with the variance of Bonett and Wright (2000)."""
+    """Interval of Spearman's correlation by Fisher's z, with the variance of Bonett and Wright
+    (2000).
+    """
     if n <= 3 or abs(correlation) >= 1.0:
         return (-1.0, 1.0) if n <= 3 else (correlation, correlation)
     z = math.atanh(correlation)

@@ -1,4 +1,4 @@
-"""How designs are spread, iteration by iteration, and which of its designs a picture shows."""
+"""Spread of designs by iteration, and thinning for plots"""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ class Distribution:
     """The designs of each of I iterations.
 
     Attributes:
-        index: (I,) of the iteration, from 0.
-        fitness: (I, 7) `QUANTILES` of their finite fitness, NaN if there is none.
-        mean: (I,) of the same values.
-        failed: (I,) number of the other designs.
-        diversity: (I,) standard deviation of the designs as a share of each searched
-            variable's range, mean over these variables [1]; 0 for a search that has come together,
-            NaN for a single design.
+        index: (I,) from 0.
+        fitness: (I, 7) `QUANTILES` of finite fitness, NaN if there is none.
+        mean: (I,) of finite fitness.
+        failed: (I,) number of designs without finite fitness.
+        diversity: (I,) standard deviation of the designs as a share of each searched variable's
+            range, averaged over these variables [1]; 0 for a converged search, NaN for a single
+            design.
     """
 
     index: NDArray[np.int64]
@@ -38,10 +38,9 @@ class Distribution:
 
 
 def distribution(columns: EvaluationColumns, space: DesignSpace) -> Distribution:
-    """Say how designs are spread, iteration by iteration."""
     starts = iteration_starts(columns)
     sizes = np.diff(starts, append=len(columns))
-    found = Distribution(
+    result = Distribution(
         index=columns.iteration[starts],
         fitness=np.empty((len(starts), len(QUANTILES))),
         mean=np.empty(len(starts)),
@@ -50,46 +49,38 @@ def distribution(columns: EvaluationColumns, space: DesignSpace) -> Distribution
     )
     searched = len(space.variables)
     share = space.box.to_unit(columns.designs[:, :searched])
-    # Iterations of one size at once, as most methods' are all of one or two sizes.
+    # By size: most methods have iterations of one or two sizes.
     for size in np.unique(sizes):
         chosen = sizes == size
         rows = starts[chosen][:, np.newaxis] + np.arange(size)
-        _describe(found, chosen, columns.fitness[rows], share[rows])
-    return found
+        _describe(result, chosen, columns.fitness[rows], share[rows])
+    return result
 
 
 def _describe(
-    found: Distribution, chosen: NDArray[np.bool_], fitness: Floats, share: Floats
+    result: Distribution, chosen: NDArray[np.bool_], fitness: Floats, share: Floats
 ) -> None:
     """Fill in iterations of n designs: fitness (i, n), share of the variables' ranges (i, n, d)."""
     size = fitness.shape[1]
     finite = np.isfinite(fitness)
     count = finite.sum(axis=1)
-    # A mean of huge values may overflow; such a mean is as good as none.
+    # A mean of huge values may overflow.
     with np.errstate(over="ignore", invalid="ignore"):
-        found.mean[chosen] = np.where(finite, fitness, 0.0).sum(axis=1) / count
-    found.fitness[chosen] = finite_quantiles(fitness, QUANTILES)
-    found.failed[chosen] = size - count
-    found.diversity[chosen] = share.std(axis=1).mean(axis=1) if size > 1 else np.nan
+        result.mean[chosen] = np.where(finite, fitness, 0.0).sum(axis=1) / count
+    result.fitness[chosen] = finite_quantiles(fitness, QUANTILES)
+    result.failed[chosen] = size - count
+    result.diversity[chosen] = share.std(axis=1).mean(axis=1) if size > 1 else np.nan
 
 
 def iteration_starts(columns: EvaluationColumns) -> NDArray[np.intp]:
-    """Where each iteration begins.
-
-    Returns:
-        (I,) row of the first design of each.
-    """
+    """Return the (I,) row of the first design of each iteration."""
     return np.flatnonzero(np.diff(columns.iteration, prepend=-1))
 
 
 def finite_quantiles(values: Floats, quantiles: tuple[float, ...]) -> Floats:
-    """Quantiles of each row's finite values, linear between neighbours.
+    """Return (I, q) quantiles of each row's finite values (I, n), linearly interpolated.
 
-    Args:
-        values: (I, n), +inf for a value that is none.
-
-    Returns:
-        (I, q), NaN for a row without a finite value.
+    NaN for a row without a finite value.
     """
     ordered = np.sort(values, axis=1)
     last = np.isfinite(ordered).sum(axis=1) - 1
@@ -105,13 +96,10 @@ def finite_quantiles(values: Floats, quantiles: tuple[float, ...]) -> Floats:
 
 
 def thinned(columns: EvaluationColumns, most: int) -> NDArray[np.intp]:
-    """Choose whole iterations evenly, from the first to the last, for a picture of all.
+    """Return at most `most` rows for a plot: whole iterations, evenly chosen, ascending.
 
-    The row of least fitness is always among them. Where one iteration is too much, its rows are
+    The row of least fitness is always included. If one iteration exceeds the limit, its rows are
     thinned as well.
-
-    Returns:
-        (n,) indices of rows, ascending, n <= `most`.
     """
     rows = len(columns)
     if rows <= most:
@@ -120,13 +108,13 @@ def thinned(columns: EvaluationColumns, most: int) -> NDArray[np.intp]:
     starts = iteration_starts(columns)
     sizes = np.diff(starts, append=rows)
     chosen = np.linspace(0, rows - 1, most - 1).round().astype(np.intp)
-    # As many as fit if all were of the mean size; fewer if larger ones are among them.
+    # As many as fit at the mean size; fewer if larger ones are among them.
     iterations = (most - 1) * len(starts) // rows
     while iterations >= 1:
-        kept = np.linspace(0, len(starts) - 1, iterations).round().astype(np.intp)
-        taken = int(sizes[kept].sum())
+        selected = np.linspace(0, len(starts) - 1, iterations).round().astype(np.intp)
+        taken = int(sizes[selected].sum())
         if taken < most:
-            chosen = np.concatenate([np.arange(starts[k], starts[k] + sizes[k]) for k in kept])
+            chosen = np.concatenate([np.arange(starts[k], starts[k] + sizes[k]) for k in selected])
             break
         iterations = min(iterations - 1, iterations * (most - 1) // taken)
     return np.unique(np.append(chosen, best))

@@ -1,14 +1,14 @@
-"""How a job is forked: what of its parent's history and search the fork takes over.
+"""Forks: the part of the parent's history and search that is taken over
 
-what is different        outcomes hold   search                        the fork begins with
-nothing but the budget   yes             goes on where it was          the parent's iterations
-the preference           yes             the same, its memory judged   the parent's iterations,
-                                         anew, if its method can       judged anew
-anything else            no, but for     a new one                     the best designs, if
-                         the optimizer                                 it searches for any
+change                   outcomes valid    search                       start of the fork
+only the budget          yes               continues                    the parent's iterations
+the preference           yes               continues, its memory        the parent's iterations,
+                                           rejudged if supported        rejudged
+any other                no, except for    new                          the best designs, if
+                         the optimizer                                  designs are searched for
 
-Where the search cannot be taken over under another preference, the fork begins with the best
-designs, too, as judged by that preference.
+If the search cannot be taken over under another preference, the fork starts from the best designs
+by that preference.
 """
 
 from __future__ import annotations
@@ -53,48 +53,48 @@ Floats = NDArray[np.float64]
 def retraced(
     spec: Spec,
     budgets: Sequence[int],
-    asked: Sequence[Floats],
-    told: Sequence[Floats],
+    positions: Sequence[Floats],
+    feedback: Sequence[Floats],
     *,
     until: float = math.inf,
 ) -> Optimizer:
-    """Take a search along a path, up to its last ask, which is not answered.
+    """Replay a search up to its last ask, which is not answered.
 
-    Args:
-        asked: (n, d) positions of every iteration, at least one.
-        until: When `time.monotonic` is past this, it is given up [s].
+    budgets: in iterations, in order. positions: (n, d) of every iteration, at least one. feedback:
+    of every iteration. Raises ValueError if the search asks for other positions, and TimeoutError
+    when `time.monotonic` exceeds `until`.
     """
     searches = [spec.model_copy(update={"iterations": n}).create_search() for n in budgets]
     search = searches.pop(0)
-    for index, positions in enumerate(asked):
+    for index, expected in enumerate(positions):
         if index:
-            search.tell(told[index - 1])
+            search.tell(feedback[index - 1])
         if time.monotonic() > until:
-            raise TimeoutError(f"it came to iteration {index} of {len(asked)}")
-        # Of some methods as long as all that they were told.
+            raise TimeoutError(f"at iteration {index} of {len(positions)}")
+        # Some methods' dumps grow with all their feedback.
         state = search.dump() if searches else {}
-        while not _asks_for(search, positions):
+        while not _asks_for(search, expected):
             if not searches:
-                raise ValueError(f"its search would ask for other designs in iteration {index}")
+                raise ValueError(f"its search asks for other designs in iteration {index}")
             search = searches.pop(0)
             search.load(state)
     return search
 
 
 def _asks_for(search: Optimizer, positions: Floats) -> bool:
-    found = search.ask(len(positions))
-    return found.shape == positions.shape and found.tobytes() == positions.tobytes()
+    actual = search.ask(len(positions))
+    return actual.shape == positions.shape and actual.tobytes() == positions.tobytes()
 
 
 Design = dict[str, float | str]
 
 
-def started(
+def with_start_designs(
     spec: Spec,
     job_of: Callable[[str], Job],
     columns_of: Callable[[Job], EvaluationColumns],
 ) -> Spec:
-    """Look up the designs that a job starts from, if it names earlier jobs."""
+    """Look up the designs of the earlier jobs that a spec names as its start."""
     if not isinstance(spec.start, EarlierJobs):
         return spec
     searched = tuple(variable.name for variable in spec.design_space().variables)
@@ -103,19 +103,19 @@ def started(
         try:
             job = job_of(job_id)
             space, count = job.spec.design_space(), spec.start.count
-            found = list(best_designs(space, columns_of(job), searched, count))
-            if not found:
-                raise InvalidRequest(f"job {job_id} has no design that has not failed")
-            _check(spec, found)
+            best = list(best_designs(space, columns_of(job), searched, count))
+            if not best:
+                raise InvalidRequest(f"every design of job {job_id} has failed")
+            _check(spec, best)
         except (GaitswarmError, ValueError) as error:
             raise InvalidRequest(str(error), field=f"start.jobs.{index}") from error
-        ranked.append(found)
+        ranked.append(best)
     designs = [design for design in chain(*zip_longest(*ranked)) if design is not None]
     different = list({tuple(design.items()): design for design in designs}.values())
     start = tuple(different[: spec.start.count])
     if len(start) > spec.budget:
         raise InvalidRequest(
-            f"{len(start)} designs are more than the budget of {spec.budget}; lower it, or give"
+            f"{len(start)} designs are more than the budget of {spec.budget}; lower it, or use"
             " more iterations",
             field="start.count",
         )
@@ -125,7 +125,7 @@ def started(
 def best_designs(
     space: DesignSpace, columns: EvaluationColumns, searched: tuple[str, ...], count: int
 ) -> Iterator[Design]:
-    """Choose the best different designs of a job."""
+    """Yield the best distinct designs of a job."""
     seen = set[tuple[float | str, ...]]()
     for row in np.argsort(columns.fitness, kind="stable").tolist():
         if len(seen) == count or not np.isfinite(columns.fitness[row]):
@@ -146,57 +146,45 @@ def _check(spec: Spec, designs: list[Design]) -> None:
         raise ValueError(f"{name} of its best design no. {int(number) + 1}: {problem}") from error
 
 
-_HOLD: Final = frozenset({"preference", "optimizer"})
-"""Fields of a spec without which outcomes stay what they are."""
+_OUTCOMES_HOLD: Final = frozenset({"preference", "optimizer"})
+"""Fields of a spec that do not affect outcomes."""
 
 
 @dataclass(frozen=True, slots=True)
 class Parent:
-    """A job that is forked, with those of its iterations that the fork begins with.
+    """The parent of a fork, and its iterations before the fork.
 
     Attributes:
-        job: As it was read.
-        columns: Evaluations of these iterations.
-        asked: Reads the (n, d) positions of each of them.
-        digest: Of the last of them; None if it is not chained.
+        columns: evaluations of these iterations.
+        positions: reads the (n, d) positions of each of them.
+        digest: of the last of them; None if it is not chained.
     """
 
     job: Job
     columns: EvaluationColumns
-    asked: Callable[[], tuple[Floats, ...]]
+    positions: Callable[[], tuple[Floats, ...]]
     digest: str | None = None
 
     def by_iteration(self, column: Floats) -> tuple[Floats, ...]:
-        """Cut a column.
-
-        Args:
-            column: (r, ...) of every evaluation.
-
-        Returns:
-            (n, ...) of each iteration.
-        """
+        """Split a column by iteration."""
         ends = np.flatnonzero(np.diff(self.columns.iteration)) + 1
         return tuple(np.split(column, ends))
 
-    def told(self, spec: AnySpec, fitness: Floats) -> tuple[Floats, ...]:
-        """What the search of a job with this history is told.
-
-        Args:
-            fitness: (r,) of every evaluation, by its measure.
-        """
-        told = spec.search_feedback(self.columns.objectives, self.columns.failed, fitness)
-        return self.by_iteration(told)
+    def feedback(self, spec: AnySpec, fitness: Floats) -> tuple[Floats, ...]:
+        """Return the search feedback of each iteration, for a fitness (r,)."""
+        feedback = spec.search_feedback(self.columns.objectives, self.columns.failed, fitness)
+        return self.by_iteration(feedback)
 
 
 def budgets_of(job: Job) -> tuple[int, ...]:
-    """Budgets under which the iterations of a job may have been asked for."""
+    """Return the budgets under which a job's iterations may have been asked for."""
     earlier = () if job.lineage is None else job.lineage.budgets
     present = job.spec.iterations
     return tuple(dict.fromkeys((*earlier, job.submitted_iterations or present, present)))
 
 
 def check_begun(job: Job, iterations: int) -> None:
-    """Check that a job has committed so many iterations."""
+    """Check that a job has committed a number of iterations."""
     committed = job.progress.iterations
     if iterations > committed:
         raise InvalidRequest(
@@ -214,10 +202,9 @@ def forked(
     *,
     longest: float = math.inf,
 ) -> tuple[AnySpec, Fork]:
-    """Decide how a job is forked.
+    """Return the spec and origin of a fork.
 
-    Args:
-        longest: Time that bringing its search to where it was may take [s].
+    longest: limit on the time to restore the search [s].
     """
     before = parent.job.spec
     spec = forked_spec(before, request)
@@ -230,26 +217,25 @@ def forked(
         digest=parent.digest,
     )
     fitness = parent.columns.fitness
-    if "preference" in changed and _HOLD.issuperset(changed):
+    if "preference" in changed and _OUTCOMES_HOLD.issuperset(changed):
         fitness = spec.judge(parent.columns.objectives, parent.columns.failed).fitness
-    reason = _why_not(before, changed)
+    reason = _reason_for_new_search(before, changed)
     if not reason:
         try:
             until = time.monotonic() + longest
             state = _search_state(parent, spec, fitness if changed else None, until)
         except TimeoutError as error:
             raise Conflict(
-                f"to bring the search of job {parent.job.id} to where it was takes longer than the"
-                f" {longest:g} s that it may take here ({error}); fork it earlier, or where its"
-                " database is, with `gaitswarm fork`. With another optimizer the fork starts from"
-                " the best designs"
+                f"restoring the search of job {parent.job.id} exceeds the limit of {longest:g} s"
+                f" ({error}); fork at an earlier iteration, or directly on the database with"
+                " `gaitswarm fork`. With another optimizer the fork starts from the best designs"
             ) from error
         except ValueError as error:
             if not changed:
                 raise Conflict(
-                    f"job {parent.job.id} cannot be forked so: {error}; code or libraries of the"
-                    " search have changed, or its budget was changed more than once. With another"
-                    " optimizer the fork starts from the best designs"
+                    f"job {parent.job.id} cannot be forked with its search: {error}; code or"
+                    " libraries of the search have changed, or its budget was changed more than"
+                    " once. With another optimizer the fork starts from the best designs"
                 ) from error
             reason = str(error)
         else:
@@ -267,53 +253,56 @@ def forked(
             _check_unchanged(parent, taken, provenance(spec))
             update = {"evaluations": len(fitness), "budgets": budgets_of(parent.job)}
             return spec, Fork(lineage.model_copy(update=update), taken)
-    return _started(parent, spec, fitness, request, reason), Fork(
+    return _from_best_designs(parent, spec, fitness, request, reason), Fork(
         lineage.model_copy(update={"carried": "designs", "reason": reason})
     )
 
 
-def _why_not(parent: AnySpec, changed: Sequence[str]) -> str:
-    """Why the search cannot be taken over, whatever its method; "" if it may be."""
-    others = [name for name in changed if name not in _HOLD]
+def _reason_for_new_search(parent: AnySpec, changed: Sequence[str]) -> str:
+    """Return why no method's search can be taken over; "" if it may be."""
+    others = [name for name in changed if name not in _OUTCOMES_HOLD]
     if others:
-        return f"what designs came to does not hold for another {' and '.join(others)}"
+        return f"results of the parent's designs do not hold for another {' and '.join(others)}"
     if "optimizer" in changed:
-        return "another search method, or other settings of it, knows nothing of the parent's"
+        return "another search method or other settings cannot continue the parent's search"
     if "preference" in changed and parent.precision == "single":
-        return "which of the designs is the best by another preference is not known in double"
+        return "the best design by another preference was not reevaluated in double precision"
     return ""
 
 
 def _search_state(
-    parent: Parent, spec: AnySpec, anew: Floats | None, until: float
+    parent: Parent, spec: AnySpec, rejudged: Floats | None, until: float
 ) -> dict[str, Any]:
-    """The optimizer's dump after the last ask that is taken over.
+    """Return the optimizer's dump after the last ask taken over.
 
-    anew: (r,) fitness by another preference; None: by the parent's. until: as of `retraced`. Raises
-    ValueError, TimeoutError.
+    rejudged: (r,) fitness by another preference; None: by the parent's. until: see `retraced`.
+    Raises ValueError, TimeoutError.
     """
-    asked, told = parent.asked(), parent.told(parent.job.spec, parent.columns.fitness)
+    positions, feedback = (
+        parent.positions(),
+        parent.feedback(parent.job.spec, parent.columns.fitness),
+    )
     budgets = budgets_of(parent.job)
-    if anew is None:
-        return _dumped(retraced(spec, budgets, asked, told, until=until))
-    told_anew = parent.told(spec, anew)
+    if rejudged is None:
+        return _dumped(retraced(spec, budgets, positions, feedback, until=until))
+    rejudged_feedback = parent.feedback(spec, rejudged)
     try:
-        # Whatever the method is, if it would have asked for the same, it is where it would be.
-        return _dumped(retraced(spec, budgets, asked, told_anew, until=until))
+        # Any method that would have asked for the same positions can continue.
+        return _dumped(retraced(spec, budgets, positions, rejudged_feedback, until=until))
     except ValueError:
-        search = retraced(spec, budgets, asked, told, until=until)
+        search = retraced(spec, budgets, positions, feedback, until=until)
     name = spec.optimizer.name
     if isinstance(search, Rejudging):
-        search.rejudge(list(zip(asked[:-1], told_anew[:-1], strict=True)))
+        search.rejudge(list(zip(positions[:-1], rejudged_feedback[:-1], strict=True)))
         return _dumped(search)
     raise ValueError(
-        f"{name} would have asked for other designs by this preference, and cannot take in those"
-        " that were asked for"
+        f"{name} would have asked for other designs by this preference, and cannot learn from"
+        " the parent's"
     )
 
 
 def _dumped(search: Optimizer) -> dict[str, Any]:
-    """What the store will give back."""
+    """The dump as the store will return it."""
     stored: dict[str, Any] = json.loads(json.dumps(search.dump(), allow_nan=False))
     return stored
 
@@ -321,8 +310,8 @@ def _dumped(search: Optimizer) -> dict[str, Any]:
 def _check_budget(spec: AnySpec, evaluations: int) -> None:
     if spec.budget <= evaluations:
         raise InvalidRequest(
-            f"the fork begins with {evaluations} evaluations, all of its budget of {spec.budget};"
-            " give more iterations, counted from the parent's first",
+            f"the {evaluations} evaluations taken over exhaust the budget of {spec.budget};"
+            " use more iterations, counted from the parent's first",
             field="iterations",
         )
 
@@ -331,21 +320,21 @@ def _check_unchanged(parent: Parent, taken: TakenHistory, now: JobProvenance) ->
     changes = changes_since(taken.provenance, now)
     if changes and not taken.accepts_changes:
         raise ProvenanceChanged(
-            f"job {parent.job.id} cannot be forked here: what its numbers depend on is not what it"
-            f" was: {'; '.join(changes)}. Fork it where that is as before, or accept the change:"
+            f"job {parent.job.id} cannot be forked here: the provenance of its results has changed:"
+            f" {'; '.join(changes)}. Fork it in the original environment, or accept the change:"
             " --accept-changes, accept_changes=True in Python, or"
             ' {"accept_changes": true} over HTTP'
         )
 
 
-def _started(
+def _from_best_designs(
     parent: Parent, spec: AnySpec, fitness: Floats, request: ForkRequest, reason: str
 ) -> AnySpec:
-    """The spec that starts from the parent's best designs. Raises InvalidRequest, Conflict."""
+    """Return the spec that starts from the parent's best designs."""
     if not spec.searches:
         raise InvalidRequest(
-            f"{reason}, and a job of the kind {spec.kind} draws its designs, so that the best of"
-            " another one are no start; submit a new job in place of a fork"
+            f"{reason}, and a job of kind {spec.kind} samples its designs, so it cannot start from"
+            " the best of another job; submit a new job instead"
         )
     columns = replace(parent.columns, fitness=fitness)
     searched = tuple(variable.name for variable in spec.design_space().variables)
@@ -353,10 +342,10 @@ def _started(
     designs = tuple(best_designs(parent.job.spec.design_space(), columns, searched, count))
     if not designs:
         raise Conflict(
-            f"job {parent.job.id} has no design in these iterations that has not failed, so there"
-            " is nothing that a fork could start from"
+            f"every design of job {parent.job.id} in these iterations has failed;"
+            " there is none to start from"
         )
     try:
         return checked_spec(spec, {"start": designs})
     except InvalidRequest as error:
-        raise InvalidRequest(f"of the parent's best designs: {error}") from error
+        raise InvalidRequest(f"the parent's best designs: {error}") from error

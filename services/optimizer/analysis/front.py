@@ -20,47 +20,41 @@ Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
 _LEAF: Final = 1 << 15
-"""Pairs of points that are compared with each other without further division."""
+"""Pairs of points compared without further division."""
 
 
 def non_dominated(points: Floats) -> NDArray[np.bool_]:
-    """Find the points that no other dominates; all objectives are minimized.
+    """Return the (r,) mask of the points (r, M) that no other dominates; minimized.
 
-    A point dominates another if it is no worse in any objective and better in one; of equal points
-    none dominates the other.
-
-    Args:
-        points: (r, M) objectives; a row that is not finite is not on the front.
-
-    Returns:
-        (r,), true for the points of the front.
+    A point dominates another if it is no worse in any objective and better in one; equal points do
+    not dominate each other. Points that are not finite are never on the front.
     """
     finite = np.isfinite(points).all(axis=1)
     front = np.zeros(len(points), dtype=np.bool_)
     if not finite.any():
         return front
-    # Sorted by the first objective, then the second and so on: none is dominated by a later one.
+    # Sorted lexicographically: no point is dominated by a later one.
     distinct, inverse = np.unique(points[finite], axis=0, return_inverse=True)
-    kept = np.zeros(len(distinct), dtype=np.bool_)
-    kept[_front(distinct, np.arange(len(distinct)))] = True
-    front[finite] = kept[inverse.reshape(-1)]
+    selected = np.zeros(len(distinct), dtype=np.bool_)
+    selected[_front(distinct, np.arange(len(distinct)))] = True
+    front[finite] = selected[inverse.reshape(-1)]
     return front
 
 
 def _front(points: Floats, rows: Rows) -> Rows:
-    """Those of the rows, ascending, that no other of them dominates."""
+    """Return the non-dominated rows, ascending."""
     if len(rows) ** 2 <= _LEAF:
         return rows[~_any_below(points[rows], points[rows], itself=True)]
     half = len(rows) // 2
     better, worse = _front(points, rows[:half]), _front(points, rows[half:])
-    # The first objective is in order already.
+    # The first objective is already sorted.
     return np.concatenate([better, _left(points, better, worse, 1)])
 
 
 def _left(points: Floats, judges: Rows, rows: Rows, first: int) -> Rows:
-    """Those of the rows, in order, that no judge is as good as in all objectives from `first` on.
+    """Return the rows, in order, that no judge is as good as in all objectives from `first` on.
 
-    Judges are as good as all rows in the objectives before, and none is equal to a row throughout.
+    Judges are as good as all rows in the objectives before, and none equals a row in all.
     """
     if not len(judges) or not len(rows):
         return rows
@@ -74,12 +68,12 @@ def _left(points: Floats, judges: Rows, rows: Rows, first: int) -> Rows:
         return rows[~_any_below(points[judges, first:], points[rows, first:])]
     if first == objectives - 2:
         return rows[~_swept(points[judges, first:], points[rows, first:])]
-    own, others = points[rows, first], points[judges, first]
-    pivot = np.median(np.concatenate([own, others]))
-    low, judge_low = own < pivot, others < pivot
+    values, others = points[rows, first], points[judges, first]
+    pivot = np.median(np.concatenate([values, others]))
+    low, judge_low = values < pivot, others < pivot
     if not (low.any() or judge_low.any()):
-        # Nothing is below the pivot: most are equal to it, and they divide the rest.
-        low, judge_low = own <= pivot, others <= pivot
+        # Nothing is below the pivot: most equal it.
+        low, judge_low = values <= pivot, others <= pivot
         if low.all() and judge_low.all():
             return _left(points, judges, rows, first + 1)
     good = _left(points, judges[judge_low], rows[low], first)
@@ -88,7 +82,7 @@ def _left(points: Floats, judges: Rows, rows: Rows, first: int) -> Rows:
 
 
 def _any_below(judges: Floats, points: Floats, *, itself: bool = False) -> NDArray[np.bool_]:
-    """(n,): whether any judge is as good as each point in every objective; itself: but itself."""
+    """(n,): whether any judge, except itself with `itself`, is as good in every objective."""
     below = np.ones((len(judges), len(points)), dtype=np.bool_)
     for m in range(points.shape[1]):
         below &= judges[:, m, None] <= points[None, :, m]
@@ -98,7 +92,7 @@ def _any_below(judges: Floats, points: Floats, *, itself: bool = False) -> NDArr
 
 
 def _swept(judges: Floats, points: Floats) -> NDArray[np.bool_]:
-    """As `_any_below` for two objectives, in order of the first."""
+    """As `_any_below`, for two objectives, by sweeping along the first."""
     order = np.argsort(judges[:, 0], kind="stable")
     least = np.minimum.accumulate(judges[order, 1])
     before = np.searchsorted(judges[order, 0], points[:, 0], side="right")
@@ -106,19 +100,18 @@ def _swept(judges: Floats, points: Floats) -> NDArray[np.bool_]:
 
 
 MOST_BOUNDS: Final = 250_000
-"""Local upper bounds up to which a hypervolume is exact."""
+"""Number of local upper bounds up to which a hypervolume is computed exactly."""
 
 _MOST_SAMPLES: Final = 100_000
-"""Points that are drawn for an estimate, at most."""
+"""Limit on the sample size of an estimate."""
 
 _COMPARISONS: Final = 1_000_000_000
-"""Pairs of points that an estimate compares; the more points there are, the fewer are drawn."""
+"""Limit on compared pairs of an estimate: more points reduce the sample."""
 
 _DRAW: Final = 0xA7EA
-"""Purpose of the random numbers."""
 
 _AT_ONCE: Final = 4_000_000
-"""Comparisons of an estimate that are held in memory at a time."""
+"""Comparisons held in memory at a time."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,8 +119,8 @@ class HypervolumeCurve:
     """Hypervolume after each point of a sequence.
 
     Attributes:
-        values: (n,) share of the unit box that the first 1, 2, ... points dominate; never falls.
-        standard_error: of the last value, if they are estimates; 0 if they are exact.
+        values: (n,) share of the unit box dominated by the first 1, 2, ... points.
+        standard_error: of the last value for estimates; 0 for exact values.
     """
 
     values: Floats
@@ -135,12 +128,9 @@ class HypervolumeCurve:
 
 
 def hypervolume_curve(points: Floats, *, most_bounds: int = MOST_BOUNDS) -> HypervolumeCurve:
-    """Measure what points dominate, one after the other.
+    """Return the hypervolume after each of (n, M) points, minimized, in their order.
 
-    Args:
-        points: (n, M) objectives, minimized, in the order in which they came; each is counted in
-            the box from 0 to 1, at whose corner 1 is the reference point. What lies below 0 is
-            taken for 0.
+    The box is the unit box with the reference point at 1; values below 0 count as 0.
     """
     clipped = np.maximum(points, 0.0)
     exact = _exact(clipped, most_bounds)
@@ -148,7 +138,7 @@ def hypervolume_curve(points: Floats, *, most_bounds: int = MOST_BOUNDS) -> Hype
 
 
 def _exact(points: Floats, most_bounds: int) -> Floats | None:
-    """(n,) values; None if it takes more bounds than allowed."""
+    """(n,) values; None beyond the limit on bounds."""
     undominated = _Undominated.of(points)
     values = np.empty(len(points))
     for row in range(len(points)):
@@ -164,8 +154,8 @@ class _Undominated:
     """The part of the unit box that no point dominates, as a union of [0, bound).
 
     A bound's coordinate j is that of the point defining[j], or 1 where that is -1; the point is
-    below the bound in all other coordinates. Of equal coordinates that of the later point counts
-    as the greater, so that no two are equal.
+    below the bound in all other coordinates. Of equal coordinates the later point's counts as
+    greater, so that no two are equal.
 
     points: (n, M); bounds: (M, room), used up to `count`; defining: (M, room) rows of points;
     volumes: (room,) of the disjoint boxes; volume: their sum.
@@ -182,7 +172,7 @@ class _Undominated:
     def of(cls, points: Floats) -> _Undominated:
         size = points.shape[1]
         return cls(
-            # The last row belongs to -1: the sides of the box, 0 in all coordinates but one.
+            # The last row belongs to -1: the sides of the box.
             np.vstack([points, np.zeros(size)]),
             np.ones((size, 1024)),
             np.full((size, 1024), -1, dtype=np.intp),
@@ -192,7 +182,7 @@ class _Undominated:
         )
 
     def insert(self, row: int) -> None:
-        """Take away what a point dominates."""
+        """Remove what a point dominates."""
         point, size = self.points[row], self.points.shape[1]
         above = self.bounds[0, : self.count] > point[0]
         for j in range(1, size):
@@ -204,10 +194,10 @@ class _Undominated:
         new_bounds, new_defining = [], []
         for j in range(size):
             others = self.points[np.delete(defining, j, axis=0), j]
-            kept = point[j] >= others.max(axis=0, initial=0.0)
-            new = bounds[:, kept]
+            selected = point[j] >= others.max(axis=0, initial=0.0)
+            new = bounds[:, selected]
             new[j] = point[j]
-            by = defining[:, kept]
+            by = defining[:, selected]
             by[j] = row
             new_bounds.append(new)
             new_defining.append(by)
@@ -222,12 +212,12 @@ class _Undominated:
         places, empty = places[: len(volumes)], places[len(volumes) :]
         self.bounds[:, places], self.defining[:, places] = bounds, defining
         self.volumes[places] = volumes
-        # No point is below these any more.
+        # No point is below these.
         self.bounds[:, empty], self.volumes[empty] = 0.0, 0.0
         self.count += added
 
     def _volumes(self, bounds: Floats, defining: Rows) -> Floats:
-        """Of the boxes: in coordinate j, from the points that define the coordinates before."""
+        """Volumes of the boxes: in coordinate j, above the points that define earlier ones."""
         volumes: Floats = bounds[0].copy()
         for j in range(1, len(bounds)):
             volumes *= np.maximum(bounds[j] - self.points[defining[:j], j].max(axis=0), 0.0)
@@ -243,7 +233,7 @@ class _Undominated:
 
 
 def _estimated(points: Floats) -> HypervolumeCurve:
-    """The share of points drawn in the box that are dominated, after each point."""
+    """Share of sampled points that are dominated, after each point."""
     size = points.shape[1]
     samples = min(_MOST_SAMPLES, _COMPARISONS // len(points))
     drawn = uniform(0, _DRAW, iteration=0, particle=0, count=samples * size)
@@ -275,15 +265,15 @@ BEYOND_NADIR: Final = 0.1
 """Distance of the reference point from the nadir, as a share of the front's range."""
 
 MOST_KNEES: Final = 5
-"""Knees that are named, at most."""
+"""Limit on the number of knees."""
 
 KNEE_DISTANCE: Final = 0.25
-"""Share of the front's range by which two knees differ in one objective at least."""
+"""Share of the front's range by which two knees differ in at least one objective."""
 
 
 @dataclass(frozen=True, slots=True)
 class Knee:
-    """A design of the front that is nearer to the ideal than its surroundings.
+    """A design of the front that is closer to the ideal than its neighborhood.
 
     Attributes:
         row: of the job's evaluations.
@@ -296,12 +286,12 @@ class Knee:
 
 @dataclass(frozen=True, slots=True)
 class FrontWinner:
-    """The job's best design by some preference, and where it is with respect to the front.
+    """The job's best design by a preference, relative to the front.
 
     Attributes:
         row: of the job's evaluations.
-        on_front: whether it is of the front, or equal to a design of it.
-        dominated_by: designs of the front that dominate it.
+        on_front: whether it belongs to the front, or equals a design of it.
+        dominated_by: number of designs of the front that dominate it.
         behind: share by which one of them is better in every objective; 0 on the front.
     """
 
@@ -313,24 +303,24 @@ class FrontWinner:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Front:
-    """What a job's designs trade against each other: five objectives over all scenarios.
+    """Trade-off between a job's designs: five objectives over all scenarios.
 
     Normalised objectives are logarithms, 0 at the ideal and 1 at the nadir.
 
     Attributes:
         vectors: (r, M) objectives of all designs, see `objective_vectors`.
-        rows: (f,) those of the front, ascending; of equal designs the earliest.
-        ideal: (M,) least of the front in each objective.
-        nadir: (M,) greatest of the front.
+        rows: (f,) rows of the front, ascending; of equal designs the earliest.
+        ideal: (M,) minimum of the front.
+        nadir: (M,) maximum of the front.
         normalised: (r, M) objectives of all designs.
-        reference: (M,) reference point of the hypervolume, in the objectives' units.
-        extremes: (M,) row of the best in each objective, of equal ones the nearest to the ideal.
-        knees: the most pronounced first.
+        reference: (M,) reference point of the hypervolume.
+        extremes: (M,) row of the best in each objective; of equal ones the nearest to the ideal.
+        knees: most pronounced first.
         winners: best designs by A, B and C, and by the job's own preference as `job`.
         iterations: (k,) iterations with evaluations.
-        hypervolume: (k,) share of the box between ideal and reference that is dominated by the
-            designs of this and all earlier iterations.
-        standard_error: of the last hypervolume if it is an estimate, else 0.
+        hypervolume: (k,) share of the box between ideal and reference dominated up to each
+            iteration.
+        standard_error: of the last hypervolume if estimated, else 0.
     """
 
     vectors: Floats
@@ -347,7 +337,7 @@ class Front:
     standard_error: float
 
     def spread(self, most: int) -> Rows:
-        """Choose designs that cover the front: named ones, then always the one farthest from all"""
+        """Return rows that cover the front: named designs, then repeatedly the farthest one."""
         if most >= len(self.rows):
             return self.rows
         winners = [winner.row for winner in self.winners.values() if winner.on_front]
@@ -371,17 +361,13 @@ def pareto_front(
     *,
     worlds: TuningWorlds | None = None,
 ) -> Front:
-    """Find the front of a job's designs.
-
-    Args:
-        vectors: (r, M) their objectives over all scenarios, at least one row finite.
-    """
-    came = _best_at_their_time(vectors)
-    rows = came[non_dominated(vectors[came])]
+    """Find the front of (r, M) objective vectors, at least one row finite."""
+    record_rows = _best_at_their_time(vectors)
+    rows = record_rows[non_dominated(vectors[record_rows])]
     ideal, nadir = vectors[rows].min(axis=0), vectors[rows].max(axis=0)
     logarithms, low, span = _logarithms(vectors, rows)
     normalised = (logarithms - low) / span
-    iterations, hypervolume, error = _over_iterations(columns.iteration, normalised, came)
+    iterations, hypervolume, error = _over_iterations(columns.iteration, normalised, record_rows)
     with np.errstate(over="ignore"):
         reference = np.exp(low + (1.0 + BEYOND_NADIR) * span)
     extremes = _extremes(vectors, normalised, rows)
@@ -408,40 +394,35 @@ def pareto_front(
 def knees(normalised: Floats, rows: Rows, extremes: Rows) -> tuple[Knee, ...]:
     """Find the knees of a front.
 
-    The distance of a design is that from the plane of equal intercepts through the mean of the
-    extremes, towards the ideal (Das 1999). A knee has the greatest distance among all designs that
-    differ from it by less than `KNEE_DISTANCE` in each objective (Zhang, Tian and Jin 2015).
-
-    Args:
-        normalised: (r, M) objectives of all designs, 0 at the ideal and 1 at the nadir.
-        rows: (f,) those of the front.
-        extremes: (M,) rows of the best in each objective.
+    A design's distance is that from the plane of equal intercepts through the mean of the extremes,
+    towards the ideal (Das 1999). A knee has the greatest distance among all designs that differ
+    from it by less than `KNEE_DISTANCE` in each objective (Zhang, Tian and Jin 2015).
     """
     plane = normalised[extremes].sum(axis=1).mean()
     distances = (plane - normalised[rows].sum(axis=1)) / math.sqrt(normalised.shape[1])
     order = np.argsort(-distances, kind="stable")
     points, free = normalised[rows[order]], distances[order] > 0.0
-    found: list[Knee] = []
-    while len(found) < MOST_KNEES and free.any():
+    result: list[Knee] = []
+    while len(result) < MOST_KNEES and free.any():
         place = int(free.argmax())
         near = (np.abs(points - points[place]) < KNEE_DISTANCE).all(axis=1)
         if not near[:place].any():
-            found.append(Knee(int(rows[order[place]]), float(distances[order[place]])))
-        # It is farther from the plane than all that are still free, so those beside it are none.
+            result.append(Knee(int(rows[order[place]]), float(distances[order[place]])))
+        # It is the farthest of the remaining designs, so its neighbors are no knees.
         free &= ~near
-    return tuple(found)
+    return tuple(result)
 
 
 def _best_at_their_time(vectors: Floats) -> Rows:
-    """Rows (of r) without any earlier one that is as good in all objectives."""
+    """Rows without any earlier one that is as good in all objectives."""
     time = np.arange(len(vectors), dtype=np.float64)
     return np.flatnonzero(non_dominated(np.column_stack([time, vectors])))
 
 
 def _logarithms(vectors: Floats, rows: Rows) -> tuple[Floats, Floats, Floats]:
-    """(r, M) logarithms; (M,) the front's least; (M,) its range, 1 where it has none.
+    """(r, M) logarithms; (M,) the front's minimum; (M,) its range, 1 if there is none.
 
-    An objective of 0, which has no logarithm, counts as the least that is more.
+    An objective of 0, which has no logarithm, counts as the least positive one.
     """
     positive = np.where(vectors > 0.0, vectors, np.inf)
     least = np.where(np.isfinite(positive.min(axis=0)), positive.min(axis=0), 1.0)
@@ -459,26 +440,26 @@ def _extremes(vectors: Floats, normalised: Floats, rows: Rows) -> Rows:
 
 
 def _winner(vectors: Floats, rows: Rows, row: int) -> FrontWinner:
-    own, front = vectors[row], vectors[rows]
-    no_worse = (front <= own).all(axis=1)
-    equal = (front == own).all(axis=1)
+    vector, front = vectors[row], vectors[rows]
+    no_worse = (front <= vector).all(axis=1)
+    equal = (front == vector).all(axis=1)
     dominating = front[no_worse & ~equal]
     if not len(dominating):
         return FrontWinner(row, on_front=True, dominated_by=0, behind=0.0)
     # 0 where both are 0.
-    ratios = np.divide(dominating, own, out=np.ones_like(dominating), where=own > 0.0)
+    ratios = np.divide(dominating, vector, out=np.ones_like(dominating), where=vector > 0.0)
     behind = 1.0 - float(ratios.max(axis=1).min())
     return FrontWinner(row, on_front=False, dominated_by=len(dominating), behind=behind)
 
 
 def _over_iterations(
-    iteration: NDArray[np.int64], normalised: Floats, came: Rows
+    iteration: NDArray[np.int64], normalised: Floats, record_rows: Rows
 ) -> tuple[NDArray[np.int64], Floats, float]:
     """(k,) iterations; (k,) hypervolume after each; standard error of the last.
 
-    iteration: (r,); normalised: (r, M); came: rows that no earlier one dominates.
+    iteration: (r,); normalised: (r, M); record_rows: rows that no earlier one dominates.
     """
-    curve: HypervolumeCurve = hypervolume_curve(normalised[came] / (1.0 + BEYOND_NADIR))
+    curve: HypervolumeCurve = hypervolume_curve(normalised[record_rows] / (1.0 + BEYOND_NADIR))
     iterations = np.unique(iteration)
-    counts = np.searchsorted(iteration[came], iterations, side="right")
+    counts = np.searchsorted(iteration[record_rows], iterations, side="right")
     return iterations, np.concatenate([[0.0], curve.values])[counts], curve.standard_error

@@ -1,4 +1,4 @@
-"""Committed history as columns in memory, and the questions that read it"""
+"""Memory for the columns of committed histories"""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.store.port.base import Store
 
 PIECE: Final = 2000
-"""Evaluations read in one transaction."""
+"""Evaluations per transaction."""
 
 _PIECE_ITERATIONS: Final = 16
 
@@ -29,13 +29,15 @@ _PIECE_ITERATIONS: Final = 16
 def read_history(
     store: Store, job_id: str, *, after: int | None
 ) -> Iterator[tuple[Iteration, tuple[Evaluation, ...]]]:
-    """Read committed iterations with their particles, piece by piece as they are consumed."""
+    """Yield committed iterations with their evaluations, read piece by piece."""
     while True:
         page = store.iterations(job_id, after=after, limit=_PIECE_ITERATIONS)
         if page.items:
             first, last = page.items[0].index, page.items[-1].index
-            found = store.evaluations_between(job_id, first, last + 1)
-            by_iteration = {k: tuple(g) for k, g in groupby(found, key=attrgetter("iteration"))}
+            evaluations = store.evaluations_between(job_id, first, last + 1)
+            by_iteration = {
+                k: tuple(g) for k, g in groupby(evaluations, key=attrgetter("iteration"))
+            }
             for iteration in page.items:
                 yield iteration, by_iteration.get(iteration.index, ())
             after = last
@@ -44,7 +46,7 @@ def read_history(
 
 
 def read_columns(store: Store, job: Job, *, rows: int) -> Iterator[EvaluationColumns]:
-    """Read a job's evaluations as columns, piece by piece as they are consumed."""
+    """Yield a job's evaluations as columns, read piece by piece."""
     step = iterations_of(rows, job)
     for first in range(0, job.progress.iterations, step):
         piece = store.evaluation_columns(job.id, first, min(first + step, job.progress.iterations))
@@ -53,7 +55,7 @@ def read_columns(store: Store, job: Job, *, rows: int) -> Iterator[EvaluationCol
 
 
 def iterations_of(rows: int, job: Job) -> int:
-    """Say how many iterations of a job have so many evaluations on average."""
+    """Return how many iterations of a job have `rows` evaluations on average."""
     progress = job.progress
     return max(1, rows * progress.iterations // max(1, progress.evaluations))
 
@@ -62,18 +64,12 @@ DEFAULT_BYTES: Final = 512 << 20
 """Ten jobs of 100 000 evaluations in six scenarios."""
 
 _LONGEST_WAIT: Final = 10.0
-"""Seconds that a history waits for memory that other questions use."""
+"""Time to wait for memory that other analyses use [s]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """Of a row of columns.
-
-    Attributes:
-        variables: Of a design.
-        cases: That it is put to.
-        objectives: Of each case.
-    """
+    """Dimensions of a row of columns."""
 
     variables: int
     cases: int
@@ -85,7 +81,6 @@ class Shape:
         return sum(array.nbytes for array in self.empty(1).arrays)
 
     def empty(self, rows: int) -> EvaluationColumns:
-        """Make columns."""
         return EvaluationColumns(
             iteration=np.empty(rows, dtype=np.int64),
             particle=np.empty(rows, dtype=np.int64),
@@ -97,13 +92,12 @@ class Shape:
 
 
 class HistoryMemory:
-    """Memory that histories take, in all threads and for all databases together. Thread-safe.
+    """Memory budget of histories, shared by all threads and databases. Thread-safe.
 
-    Every array counts until nobody refers to it: one that was dropped here, but is still computed
-    with, as well. The history asked about longest ago is dropped first.
+    An array counts until it is garbage-collected, even after its history was dropped. The least
+    recently used history is dropped first.
 
-    Args:
-        longest_wait: How long a history waits for memory that others use [s].
+    longest_wait: time to wait for memory [s].
     """
 
     def __init__(
@@ -111,20 +105,20 @@ class HistoryMemory:
     ) -> None:
         self.max_bytes = max_bytes
         self._longest_wait = longest_wait
-        # Arrays may die in any thread, also in one that has the lock: it is reentrant.
+        # Reentrant, as arrays may be finalized in a thread that holds the lock.
         self._changed = threading.Condition(threading.RLock())
         self._used = 0
         self._histories: OrderedDict[tuple[int, str], _History] = OrderedDict()
 
     @property
     def nbytes(self) -> int:
-        """Memory that is used now."""
+        """Memory in use."""
         with self._changed:
             return self._used
 
     @contextmanager
     def history(self, cache: HistoryCache, job: Job) -> Iterator[_History]:
-        """Have the history of a job alone; it is the one that was asked about last."""
+        """Lock the history of a job; it becomes the most recently used."""
         key = (id(cache), job.id)
         while True:
             with self._changed:
@@ -133,7 +127,7 @@ class HistoryMemory:
                 self._histories.move_to_end(key)
                 history = self._histories[key]
             with history.lock:
-                # It may have been dropped while it was waited for.
+                # It may have been dropped during the wait.
                 if self._histories.get(key) is history:
                     yield history
                     return
@@ -145,19 +139,16 @@ class HistoryMemory:
                 del self._histories[key]
 
     def columns(self, rows: int, shape: Shape, *, job_id: str) -> EvaluationColumns:
-        """Make columns, as soon as there is room for them.
-
-        Histories that nobody is reading are dropped for them, and others are waited for.
-        """
+        """Allocate columns, dropping histories that are not being read, and waiting for others."""
         nbytes = rows * shape.nbytes
         with self._changed:
             fits = self._changed.wait_for(
-                lambda: self._used + nbytes <= self.max_bytes or self._dropped(nbytes),
+                lambda: self._used + nbytes <= self.max_bytes or self._make_room(nbytes),
                 timeout=self._longest_wait,
             )
             if not fits:
                 raise EvaluatorUnavailable(
-                    f"the history of job {job_id} needs {nbytes >> 20} MiB, but others are using"
+                    f"the history of job {job_id} needs {nbytes >> 20} MiB, but others use"
                     f" the {self.max_bytes >> 20} MiB for histories; try again in a few seconds"
                 )
             made = shape.empty(rows)
@@ -166,8 +157,8 @@ class HistoryMemory:
                 weakref.finalize(array, self._free, array.nbytes).atexit = False
         return made
 
-    def _dropped(self, nbytes: int) -> bool:
-        """Drop one history after the other; whether there is room then."""
+    def _make_room(self, nbytes: int) -> bool:
+        """Drop histories one by one; return whether there is room."""
         for key, history in tuple(self._histories.items()):
             if history.lock.acquire(blocking=False):
                 try:
@@ -186,20 +177,19 @@ class HistoryMemory:
 
 
 MEMORY: Final = HistoryMemory()
-"""Of this process."""
+"""Shared by the process."""
 
 
 class HistoryCache:
-    """Columns of a store's jobs that were asked about last. Thread-safe."""
+    """Columns of a store's recently used jobs. Thread-safe."""
 
     def __init__(self, store: Store, *, memory: HistoryMemory = MEMORY) -> None:
-        """Create an empty cache."""
         self._store = store
         self._memory = memory
         weakref.finalize(self, memory.forget, id(self)).atexit = False
 
     def columns(self, job: Job) -> EvaluationColumns:
-        """Every evaluation of a job's committed iterations."""
+        """Return the evaluations of a job's committed iterations."""
         with self._memory.history(self, job) as history:
             history.reserve(job.progress.evaluations)
             while history.iterations < job.progress.iterations:
@@ -209,17 +199,16 @@ class HistoryCache:
     def _read_on(self, history: _History, job: Job) -> None:
         first = history.iterations
         last = min(first + iterations_of(PIECE, job), job.progress.iterations)
-        found = self._store.evaluation_columns(job.id, first, last)
-        if found is not None:
-            history.append(found)
+        piece = self._store.evaluation_columns(job.id, first, last)
+        if piece is not None:
+            history.append(piece)
         history.iterations = last
 
 
 class _History:
-    """Columns with room to grow: rows are appended in place, and never written again."""
+    """Columns with room to grow: rows are appended in place and never rewritten."""
 
     def __init__(self, job: Job, memory: HistoryMemory) -> None:
-        """Without any row yet."""
         spec = job.spec
         cases, objectives = len(spec.case_names), len(spec.objectives)
         self.lock = threading.Lock()
@@ -231,15 +220,15 @@ class _History:
         self._room = self._empty(0)
 
     def clear(self) -> None:
-        """Forget all rows. Columns that were handed out stay as they are."""
+        """Drop all rows. Columns that were returned remain valid."""
         self.iterations = self._length = 0
         self._room = self._empty(0)
 
     def reserve(self, rows: int) -> None:
-        """Make room for so many rows in all. Columns that were handed out stay as they are.
+        """Make room for `rows` rows in total. Columns that were returned remain valid.
 
-        Where there is no room for a larger copy beside the present one, all is read anew. Raises
-        Conflict if it would never fit, and EvaluatorUnavailable if others use the memory.
+        Without room for a larger copy, all rows are dropped and read again. Raises Conflict if they
+        can never fit, and EvaluatorUnavailable if others use the memory.
         """
         if rows <= len(self._room):
             return
@@ -247,21 +236,20 @@ class _History:
         if rows > most:
             raise Conflict(
                 f"job {self._job_id} has {rows} evaluations, more than fit into the"
-                f" {self._memory.max_bytes >> 20} MiB for this; export it and evaluate the file"
+                f" {self._memory.max_bytes >> 20} MiB for histories; export it and analyze the file"
                 " instead"
             )
-        wanted = max(rows, len(self._room) + len(self._room) // 2)
-        if len(self._room) + wanted > most:
-            wanted = rows
-        if len(self._room) + wanted > most:
+        room = max(rows, len(self._room) + len(self._room) // 2)
+        if len(self._room) + room > most:
+            room = rows
+        if len(self._room) + room > most:
             self.clear()
-        larger = self._empty(wanted)
+        larger = self._empty(room)
         for new, old in zip(larger.arrays, self._room.arrays, strict=True):
             new[: self._length] = old[: self._length]
         self._room = larger
 
     def append(self, rows: EvaluationColumns) -> None:
-        """Take over rows, for which there may be room already."""
         needed = self._length + len(rows)
         self.reserve(needed)
         for room, new in zip(self._room.arrays, rows.arrays, strict=True):
@@ -269,7 +257,7 @@ class _History:
         self._length = needed
 
     def columns(self) -> EvaluationColumns:
-        """What has been read so far, as views that cannot be written to."""
+        """Return the rows read so far, as read-only views."""
         views = self._room.rows(slice(self._length))
         for array in views.arrays:
             array.flags.writeable = False

@@ -1,8 +1,8 @@
-"""Which fitted parameters can be trusted: their intervals among good designs (thesis fig. 2.14).
+"""Identifiability of fitted parameters: their intervals among good designs (thesis fig. 2.14)
 
 A search contracts whether or not a parameter matters, so the interval of one run says little. Runs
-that differ in their seed alone contract to the same value only where the measured walks ask for it:
-the intervals here are over all runs together, each run's good designs by its own best.
+with different seeds contract to the same value only where the measured walks determine it: the
+intervals here are over all runs, with each run's good designs relative to its own best.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from gaitswarm.sim.variables import Variable
 Floats = NDArray[np.float64]
 
 THRESHOLDS: Final = (1.0, 0.7, 0.5, 0.35, 0.25, 0.2, 0.15, 0.1, 0.07, 0.05, 0.03, 0.02)
-"""Twelve distances from a run's best fitness, as shares of it."""
+"""Relative distances from a run's best fitness."""
 
 _TRUSTED: Final = 0.15
 _ROUGH: Final = 0.35
-"""Widths at the decisive threshold, as shares of the range that was searched."""
+"""Limits on the width at the decisive threshold, as shares of the searched range."""
 
 
 class Trust(StrEnum):
-    """What several runs say of a parameter."""
+    """Agreement of several runs on a parameter."""
 
     TRUSTED = "trusted"
     ROUGH = "rough"
@@ -41,25 +41,24 @@ class Trust(StrEnum):
 
     @property
     def phrase(self) -> str:
-        """One sentence that a user can act on."""
+        """Explanation in one sentence."""
         return _PHRASES[self]
 
 
 _PHRASES: Final = {
     Trust.TRUSTED: "all runs agree on a small part of the range",
     Trust.ROUGH: "all runs agree on a part of the range; more or longer walks may narrow it",
-    Trust.UNKNOWN: "runs as good as each other disagree: these walks cannot tell it",
+    Trust.UNKNOWN: "equally good runs disagree: these walks do not determine it",
 }
 
 
 @dataclass(frozen=True, slots=True)
 class ChoiceEvidence:
-    """What runs say of one choice of a categorical variable.
+    """Evidence for one choice of a categorical variable.
 
     Attributes:
-        name: of the choice.
-        fitness: each run's least among designs with this choice, +inf where there is none.
-        remains: whether it is among the designs of any run that are as good as that run's best.
+        fitness: each run's least fitness with this choice, +inf if there is none.
+        remains: whether any run's equally good designs include it.
     """
 
     name: str
@@ -73,11 +72,11 @@ class ParameterIdentifiability:
 
     Attributes:
         variable: with the bounds of the search.
-        best: value in the best design of all runs, in its unit; of a categorical variable the
-            index of a choice.
+        best: value in the best design of all runs; for a categorical variable the index of a
+            choice.
         bests: value in each run's best design.
         intervals: least and greatest value at each of `THRESHOLDS`.
-        trust: None for a single run, which cannot tell.
+        trust: None for a single run.
         choices: of a categorical variable.
     """
 
@@ -90,34 +89,29 @@ class ParameterIdentifiability:
 
     @property
     def explanation(self) -> str | None:
-        """What the trust means, in a sentence; None without any."""
+        """Explanation of the trust in one sentence; None without any."""
         if self.trust is None or not self.choices:
             return None if self.trust is None else self.trust.phrase
         remaining = [choice.name for choice in self.choices if choice.remains]
         if self.trust is Trust.TRUSTED:
-            return f"no other choice than {remaining[0]} comes near the best"
+            return f"only the choice {remaining[0]} comes close to the best"
         if self.trust is Trust.ROUGH:
             return f"undecided between {', '.join(remaining)}; the others are worse"
-        return "every choice comes near the best: these walks cannot tell it"
+        return "every choice comes close to the best: these walks do not determine it"
 
     def width(self, threshold: float = DECISIVE) -> float:
-        """Width of an interval.
-
-        Returns:
-            Share of the range that was searched [1].
-        """
+        """Return the width of an interval as a share of the searched range [1]."""
         low, high = self.intervals[THRESHOLDS.index(threshold)]
         return (high - low) / (self.variable.high - self.variable.low)
 
 
 @dataclass(frozen=True, slots=True)
 class Identifiability:
-    """All searched parameters.
+    """Identifiability of all searched parameters.
 
     Attributes:
-        fitness: each run's least.
-        designs: how many designs of all runs lie within each of `THRESHOLDS`.
-        parameters: in the order of the variables.
+        fitness: each run's least fitness.
+        designs: number of designs of all runs within each of `THRESHOLDS`.
     """
 
     fitness: tuple[float, ...]
@@ -130,9 +124,8 @@ def identifiability(
     runs: Sequence[EvaluationColumns],
     as_good_as: Callable[[float], float] = lambda fitness: fitness * (1.0 + DECISIVE),
 ) -> Identifiability:
-    """Find the intervals of parameters over runs of one problem."""
     if not runs or not all(np.isfinite(run.fitness).any() for run in runs):
-        raise ValueError("every run needs a design that did not fail")
+        raise ValueError("every run must have a design that did not fail")
     best = [int(np.argmin(run.fitness)) for run in runs]
     fitness = tuple(float(run.fitness[row]) for run, row in zip(runs, best, strict=True))
     overall = int(np.argmin(fitness))
@@ -163,33 +156,33 @@ def identifiability(
 
 
 def check_comparable(jobs: Sequence[Job]) -> None:
-    """Check that jobs are runs of one problem that tell something about each other."""
+    """Check that jobs are runs of one problem with different seeds."""
     first, *others = jobs
     seeds = {first.spec.seed: first.id}
     for other in others:
         if other.spec.seed in seeds:
             raise InvalidRequest(
-                f"job {other.id} has the seed of job {seeds[other.spec.seed]}, so that they"
-                " agree whatever the walks say; compare runs of different seeds",
+                f"job {other.id} has the seed of job {seeds[other.spec.seed]}, so they agree"
+                " in any case; compare runs with different seeds",
                 field="also",
             )
         seeds[other.spec.seed] = other.id
         if _problem(other.spec) != _problem(first.spec):
             raise InvalidRequest(
-                f"job {other.id} is of another problem than job {first.id}; runs that are"
-                " compared differ in name, seed, optimizer and iterations alone",
+                f"job {other.id} solves another problem than job {first.id}; comparable runs"
+                " differ only in name, seed, optimizer and iterations",
                 field="also",
             )
     for job in jobs:
         if job.progress.best_fitness is None:
             raise Conflict(
-                f"job {job.id} has no design yet that did not fail; ask again after its next"
-                " iteration, or leave it out"
+                f"every design of job {job.id} has failed so far; try again after its next"
+                " iteration, or omit it"
             )
 
 
 def _problem(spec: Spec) -> Spec:
-    """The spec without what may differ between runs of one problem."""
+    """The spec without the fields that may differ between runs of one problem."""
     return spec.model_copy(
         update={"name": "", "seed": 0, "iterations": 1, "optimizer": PsoSettings()}
     )
@@ -206,8 +199,8 @@ def _choices(
     runs: Sequence[EvaluationColumns],
     near: Sequence[NDArray[np.bool_]],
 ) -> tuple[ChoiceEvidence, ...]:
-    """None for a variable that is not categorical. near: of each run, its best designs."""
-    found = []
+    """Empty for a variable that is not categorical. near: of each run, its equally good designs."""
+    choices = []
     for index, name in enumerate(variable.choices):
         chosen = [run.designs[:, column] == index for run in runs]
         least = tuple(
@@ -215,15 +208,15 @@ def _choices(
             for run, rows in zip(runs, chosen, strict=True)
         )
         remains = any(bool((a & b).any()) for a, b in zip(chosen, near, strict=True))
-        found.append(ChoiceEvidence(name, least, remains))
-    return tuple(found)
+        choices.append(ChoiceEvidence(name, least, remains))
+    return tuple(choices)
 
 
-def _trust(found: ParameterIdentifiability, width: float) -> Trust:
-    """width: of the interval of designs as good as the best, as a share of the range."""
-    if found.choices:
-        remaining = sum(choice.remains for choice in found.choices)
-        if remaining == len(found.choices):
+def _trust(parameter: ParameterIdentifiability, width: float) -> Trust:
+    """width: of the interval of equally good designs, as a share of the range."""
+    if parameter.choices:
+        remaining = sum(choice.remains for choice in parameter.choices)
+        if remaining == len(parameter.choices):
             return Trust.UNKNOWN
         return Trust.TRUSTED if remaining == 1 else Trust.ROUGH
     if width > _ROUGH:

@@ -1,17 +1,16 @@
-"""Which variables matter: first-order Sobol' indices, estimated from the designs that a job has.
+"""Importance of variables: first-order Sobol' indices, estimated from a job's designs
 
-The index of a variable is Var(E[Y | X]) / Var(Y), the share of the variance of an output that goes
-with this variable alone (Sobol' 1993; Saltelli et al., Global Sensitivity Analysis, 2008, 1.2). It
-is estimated from given data, without a further walk, by classes of the variable: the correlation
+The index of a variable is Var(E[Y | X]) / Var(Y), the share of an output's variance explained by
+this variable alone (Sobol' 1993; Saltelli et al., Global Sensitivity Analysis, 2008, 1.2). It is
+estimated from given data, without further simulations, by classes of the variable: the correlation
 ratio (Plischke, An effective algorithm for computing global sensitivity indices, Reliability
-Engineering & System Safety 95, 2010), here with Kelley's correction for chance (PNAS 21, 1935),
-under which a variable that does nothing has 0 on average. Outputs are taken by rank, so that a few
-very bad designs do not decide, and no unit does (Saltelli & Sobol', Reliability Engineering &
-System Safety 50, 1995).
+Engineering & System Safety 95, 2010) with Kelley's correction for chance (PNAS 21, 1935), under
+which an irrelevant variable has 0 on average. Outputs are replaced by ranks, so that neither a few
+very bad designs nor units matter (Saltelli & Sobol', Reliability Engineering & System Safety 50,
+1995).
 
-A search does not draw its designs at random: its variables move together. So an index speaks of the
-designs that were tried, a variable that moved with another one shares its index, and indices do not
-add up to 1.
+A search does not draw its designs at random: its variables move together. So an index describes the
+designs that were tried, correlated variables share their index, and indices do not add up to 1.
 """
 
 from __future__ import annotations
@@ -34,24 +33,22 @@ from gaitswarm.sim.variables import Variable
 Floats = NDArray[np.float64]
 
 LEAST_DESIGNS: Final = 20
-"""Designs below which nothing can be said of an output."""
+"""Minimum number of designs for an estimate."""
 
 MOST_DESIGNS: Final = 10_000
-"""Designs that are looked at; of more, so many that are spread evenly over the iterations."""
+"""Limit on the number of designs; larger histories are thinned evenly over the iterations."""
 
 _RESAMPLES: Final = 200
 _MOST_CLASSES: Final = 24
 _RESAMPLE: Final = 0x1337
-"""Purpose of the random numbers."""
 
 
 @dataclass(frozen=True, slots=True)
 class Companion:
-    """The variable that another one moved with the most.
+    """The variable most strongly correlated with another one.
 
     Attributes:
-        name: Of the variable.
-        correlation: Spearman's rank correlation of the two among the designs, -1 to 1 [1].
+        correlation: Spearman's rank correlation among the designs [1].
     """
 
     name: str
@@ -61,63 +58,57 @@ class Companion:
 def first_order_indices(
     designs: Floats, variables: Sequence[Variable], output: Floats
 ) -> tuple[Interval, ...] | None:
-    """Estimate the first-order Sobol' index of every variable.
+    """Estimate every variable's first-order Sobol' index for an output (r,), by its order alone.
 
-    Args:
-        designs: (r, d) values of the variables, in their units.
-        output: (r,) what they lead to, of any unit; only its order counts.
+    None for too few designs or a constant output.
     """
     if len(output) < LEAST_DESIGNS:
         return None
     rank = average_ranks(output)
-    # Centred, so that sums of squares lose no digits.
+    # Centered, so that sums of squares lose no digits.
     rank -= rank.mean()
     if not rank.any():
         return None
     weights = np.vstack([np.ones(len(rank)), _bootstrap_weights(len(rank))])
-    found = []
+    result = []
     for column, variable in enumerate(variables):
         ratios = _corrected_ratio(_classes(designs[:, column], variable), rank, weights)
-        # A resample repeats designs, which makes its ratio larger: that shift is taken out.
+        # Resamples repeat designs, which increases their ratios: subtract that shift.
         resampled = ratios[1:] - (np.mean(ratios[1:]) - ratios[0])
         index, *around = np.clip([ratios[0], *resampled], 0.0, 1.0)
-        found.append(percentile_interval(float(index), np.array(around)))
-    return tuple(found)
+        result.append(percentile_interval(float(index), np.array(around)))
+    return tuple(result)
 
 
 def companions(designs: Floats, variables: Sequence[Variable]) -> tuple[Companion | None, ...]:
-    """Find for every variable the one that it moved with the most.
-
-    Args:
-        designs: (r, d) values of the variables.
-    """
+    """Return for every variable the one most strongly correlated with it."""
     ranks = np.apply_along_axis(average_ranks, 0, designs)
     ranks -= ranks.mean(axis=0)
     size = np.sqrt((ranks**2).sum(axis=0))
     with np.errstate(divide="ignore", invalid="ignore"):
         correlation = (ranks.T @ ranks) / np.outer(size, size)
     np.fill_diagonal(correlation, np.nan)
-    found: list[Companion | None] = []
+    result: list[Companion | None] = []
     for row in correlation:
         if np.isnan(row).all():
-            found.append(None)
+            result.append(None)
             continue
         other = int(np.nanargmax(np.abs(row)))
-        found.append(Companion(variables[other].name, float(np.clip(row[other], -1.0, 1.0))))
-    return tuple(found)
+        result.append(Companion(variables[other].name, float(np.clip(row[other], -1.0, 1.0))))
+    return tuple(result)
 
 
 def _bootstrap_weights(rows: int) -> Floats:
-    """(resamples, rows): how often each row is in each resample."""
+    """(resamples, rows): multiplicity of each row in each resample."""
     random = RandomNumbers(rows, _RESAMPLE)
     drawn = (random.uniform(_RESAMPLES, rows) * rows).astype(np.intp)
     return np.stack([np.bincount(row, minlength=rows) for row in drawn]).astype(np.float64)
 
 
 def _classes(values: Floats, variable: Variable) -> NDArray[np.intp]:
-    """(r,) class of each value, from 0: classes of equally many designs, as near as ties allow."""
+    """(r,) class of each value, from 0, of equal sizes except for ties."""
     distinct, inverse = np.unique(values, return_inverse=True)
-    # Some ten designs in a class, and more of both the more designs there are.
+    # The number of classes grows with the cube root of the number of designs.
     count = int(np.clip(round(len(values) ** (1 / 3)), 2, _MOST_CLASSES))
     if variable.kind == "categorical" or len(distinct) <= count:
         return np.asarray(inverse, dtype=np.intp)
@@ -126,7 +117,7 @@ def _classes(values: Floats, variable: Variable) -> NDArray[np.intp]:
 
 
 def _corrected_ratio(classes: NDArray[np.intp], rank: Floats, weights: Floats) -> Floats:
-    """(B,) epsilon squared of each row of weights (Kelley 1935); by chance below 0."""
+    """(B,) epsilon squared of each row of weights (Kelley 1935); may be negative."""
     members = np.equal.outer(classes, np.arange(classes.max() + 1)).astype(np.float64)
     count = weights @ members
     sums = weights @ (members * rank[:, np.newaxis])

@@ -1,6 +1,6 @@
-"""Winners of a job's history under many preferences, from which the most robust can be chosen.
+"""Winners of a job's history under many preferences, to choose the most robust of them
 
-The thesis's basis of future research (4.5): a preference chosen so that its optimum is robust.
+The thesis proposes this as future research (4.5): a preference whose optimum is robust.
 """
 
 from __future__ import annotations
@@ -22,10 +22,9 @@ from gaitswarm.services.optimizer.search.random_stream import swarm_uniform
 Floats = NDArray[np.float64]
 
 NAMED: Final[Mapping[str, Preference]] = {name: PREFERENCES[name] for name in ("A", "B", "C")}
-"""Those of table 4.5."""
+"""Preferences of table 4.5."""
 
 _DRAW: Final = 0xB1A5
-"""Purpose of the random numbers."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,9 +33,9 @@ class Winner:
 
     Attributes:
         row: of the job's evaluations.
-        preference: one under which it wins: of table 4.5 if there is one, else the one under which
-            it leads all other winners by the most.
-        named: names of those of table 4.5 under which it wins.
+        preference: one under which it wins: of table 4.5 if possible, else that with the greatest
+            lead.
+        named: names of the preferences of table 4.5 under which it wins.
         share: of the drawn preferences under which it wins [1].
     """
 
@@ -49,13 +48,13 @@ class Winner:
 def drawn_preferences(columns: EvaluationColumns, *, count: int, seed: int) -> list[Preference]:
     """Draw preferences of five objectives.
 
-    Exponents are uniform in 0 to 1, as in table 4.5; their ratios alone matter to a ranking. Biases
-    are uniform between 0 and the median of their objective among the job's walks: a bias of the
-    size of its objective halves what a relative change of it counts.
+    Exponents are uniform in 0 to 1, as in table 4.5; only their ratios affect a ranking. Biases are
+    uniform between 0 and the median of their objective in the job: a bias as large as its objective
+    halves the effect of a relative change.
     """
     size = len(NORMALISED_OBJECTIVES)
-    walked = columns.objectives[columns.statuses == 0][:, :size]
-    scale = np.median(walked[np.isfinite(walked).all(axis=1)], axis=0)
+    values = columns.objectives[columns.statuses == 0][:, :size]
+    scale = np.median(values[np.isfinite(values).all(axis=1)], axis=0)
     numbers = swarm_uniform(seed, _DRAW, iteration=0, particles=count, count=2 * size)
     return [
         Preference(
@@ -72,20 +71,20 @@ def winners(
     *,
     worlds: TuningWorlds | None = None,
 ) -> tuple[Winner, ...]:
-    """Find who wins under any of the preferences."""
+    """Return the winners under any of the preferences."""
     preferences = [*NAMED.values(), *drawn]
     names = [*NAMED, *("" for _ in drawn)]
     best = np.array([fitness_by(columns, p, worlds=worlds).argmin() for p in preferences])
     rows = np.unique(best)
-    # How far each winner leads the others, under every preference.
+    # Lead of each winner over the others, under every preference.
     winning = columns.rows(rows)
     rivals = np.sort([np.log(fitness_by(winning, p, worlds=worlds)) for p in preferences], axis=1)
     lead = rivals[:, 1] - rivals[:, 0] if len(rows) > 1 else np.zeros(len(preferences))
-    found = []
+    result = []
     for row in rows.tolist():
         won = np.flatnonzero(best == row)
         named = tuple(names[index] for index in won if names[index])
         chosen = won[0] if named else won[lead[won].argmax()]
         share = np.count_nonzero(won >= len(NAMED)) / max(1, len(drawn))
-        found.append(Winner(row, preferences[chosen], named, share))
-    return tuple(sorted(found, key=lambda winner: (not winner.named, -winner.share, winner.row)))
+        result.append(Winner(row, preferences[chosen], named, share))
+    return tuple(sorted(result, key=lambda winner: (not winner.named, -winner.share, winner.row)))

@@ -1,4 +1,4 @@
-"""What if another preference had judged: designs ranked anew, without a single walk."""
+"""Rankings of stored designs by another preference"""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ class RankedDesign:
     """One of the best designs.
 
     Attributes:
-        row: of the columns that were ranked.
-        rank: by the new preference, from 1, the earliest of equals first.
-        rank_before: by the job's own preference; None for a design that failed by it.
-        fitness: by the new preference, minimized.
+        row: of the ranked columns.
+        rank: by the new preference, from 1; ties by age.
+        rank_before: by the job's own preference; None if the design failed.
+        fitness: by the new preference.
     """
 
     row: int
@@ -42,12 +42,10 @@ class Ranking:
     """All evaluations under one preference; fitness is minimized.
 
     Attributes:
-        top: the best designs, best first.
-        present_best: fitness of the design that the job itself holds to be the best, None without
-            one.
-        best_so_far: (iterations,), +inf until a design has walked in every scenario.
-        correlation: Spearman's, of the fitness before and now over the designs that have both;
-            None where it is undefined.
+        top: best first.
+        present_best: new fitness of the job's own best design, None without one.
+        best_so_far: (iterations,), +inf until a design succeeds.
+        correlation: Spearman's, between old and new finite fitness; None if undefined.
     """
 
     top: tuple[RankedDesign, ...]
@@ -58,13 +56,7 @@ class Ranking:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RankedJob:
-    """A job's designs by another preference.
-
-    Attributes:
-        spec: of the job, with its own preference.
-        columns: its evaluations, to which the ranking's rows refer.
-        ranking: by the other preference.
-    """
+    """A job's designs by another preference."""
 
     spec: JobSpec
     columns: EvaluationColumns
@@ -72,11 +64,10 @@ class RankedJob:
 
 
 def tuning_of(job: Job) -> JobSpec:
-    """The spec of a job whose designs can be ranked."""
+    """Return the spec of a job whose designs can be ranked."""
     if not isinstance(job.spec, JobSpec):
         raise InvalidRequest(
-            f"job {job.id} is of kind {job.spec.kind}; only the designs of a job that tunes a"
-            " drive are judged by a preference",
+            f"job {job.id} is of kind {job.spec.kind}; only tuning jobs are judged by a preference",
             field="preference",
         )
     return job.spec
@@ -89,7 +80,6 @@ def rank(
     top: int,
     worlds: TuningWorlds | None = None,
 ) -> Ranking:
-    """Judge all rows by another preference."""
     fitness, before = fitness_by(columns, preference, worlds=worlds), columns.fitness
     present, ordered = _best_first(before, 1), np.sort(before)
     return Ranking(
@@ -111,24 +101,15 @@ def rank(
 def fitness_by(
     columns: EvaluationColumns, preference: Preference, *, worlds: TuningWorlds | None = None
 ) -> Floats:
-    """Judge all rows by a preference.
-
-    Returns:
-        (r,) fitness, minimized, +inf for a design that failed.
-    """
+    """Return the (r,) fitness by a preference, +inf for a failed design."""
     logarithms = log_utilities(columns, preference)
     return fitness_of(logarithms if worlds is None else worlds.aggregated(logarithms))
 
 
 def best_so_far(iteration: NDArray[np.int64], fitness: Floats) -> Floats:
-    """The least fitness up to each iteration.
+    """Return the least fitness up to each distinct iteration.
 
-    Args:
-        iteration: (r,) iteration of each row, ascending.
-        fitness: (r,) of each row, +inf for a design that failed.
-
-    Returns:
-        (iterations,), one for each different iteration; it never rises.
+    iteration: (r,) ascending. fitness: (r,), +inf for a failed design.
     """
     if not len(iteration):
         return np.empty(0)
@@ -137,33 +118,25 @@ def best_so_far(iteration: NDArray[np.int64], fitness: Floats) -> Floats:
 
 
 def _best_first(fitness: Floats, most: int) -> NDArray[np.intp]:
-    """Rows of the least finite fitness (r,), the best first and the earliest of equals first."""
+    """Rows of the least finite fitness, best first; ties by age."""
     rows = np.flatnonzero(np.isfinite(fitness))
     if len(rows) > most:
-        # To sort all of them would take longer than to judge them.
+        # Sorting all of them would take longer than judging them.
         worst = np.partition(fitness[rows], most - 1)[most - 1]
         rows = rows[fitness[rows] <= worst]
     return rows[np.argsort(fitness[rows], kind="stable")][:most]
 
 
 def _place(row: int, fitness: Floats, ordered: Floats) -> int | None:
-    """Of a row among all of finite fitness (r,), from 1, the earliest of equals first."""
-    own = fitness[row]
-    if not np.isfinite(own):
+    """Rank of a row among finite fitness, from 1; ties by age."""
+    value = fitness[row]
+    if not np.isfinite(value):
         return None
-    return int(np.searchsorted(ordered, own) + np.count_nonzero(fitness[:row] == own)) + 1
+    return int(np.searchsorted(ordered, value) + np.count_nonzero(fitness[:row] == value)) + 1
 
 
 def rank_correlation(now: Floats, before: Floats) -> float | None:
-    """Spearman's rank correlation, over the rows that are finite in both.
-
-    Args:
-        now: (r,) numbers.
-        before: (r,) those that they are compared with.
-
-    Returns:
-        The correlation [1]; None where it is undefined.
-    """
+    """Spearman's rank correlation over rows that are finite in both; None if undefined."""
     both = np.isfinite(now) & np.isfinite(before)
     if not both.any():
         return None

@@ -1,4 +1,4 @@
-"""Lets a job's reference walk as its own designs do, so that its gain over that is known."""
+"""Simulation of a job's reference design, for the gain of its best design"""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.worlds.walks import PerturbedWalk
 
 NONE: Final = Reference(None, None)
-"""Of a job of a shipped robot for which nothing was published."""
+"""For a job of a shipped robot without a published design."""
 
 _JUDGED_BY: Final = frozenset(
     {"robot", "controller", "scenarios", "preference", "variables", "fixed", "worlds"}
@@ -34,7 +34,7 @@ _log = logging.getLogger(__name__)
 
 
 def walked_reference(spec: Spec) -> Reference:
-    """Let the published or the start design of a job walk in the job's cases."""
+    """Simulate the published or start design of a job in the job's cases."""
     if reference_design(spec) is None:
         return NONE
     return _walked(spec.model_dump_json(include=set(_JUDGED_BY)))
@@ -43,10 +43,10 @@ def walked_reference(spec: Spec) -> Reference:
 @lru_cache(maxsize=64)
 def _walked(judged_by: str) -> Reference:
     spec = JobSpec.model_validate_json(judged_by)
-    found = reference_design(spec)
-    if found is None:
+    reference = reference_design(spec)
+    if reference is None:
         return NONE
-    name, kind, design = found
+    name, kind, design = reference
     cases = [
         replace(case, variables=tuple(design), precision="double")
         for case in spec.cases({})
@@ -61,22 +61,22 @@ def _walked(judged_by: str) -> Reference:
 
 
 def with_reference(store: Store, job: Job) -> tuple[Job, str | None]:
-    """Find out what a job's best is measured against, unless that is known, and store it.
+    """Determine and store a job's reference, unless known; return why there is no gain.
 
-    Nothing that determines results depends on it. A job whose numbers come of other code is left
-    as it is, as its gain would be over what that code has never computed.
+    Results do not depend on it. A job computed by other code is left unchanged, as that code may
+    have computed another reference.
     """
     if job.reference is None:
         if not job.readable or not isinstance(job.spec, JobSpec):
-            return job, "it tunes no drive"
+            return job, "the job is not a tuning job"
         if job.progress.best_fitness is None:
-            return job, "it has found no design yet that walks in every scenario"
+            return job, "no design has succeeded in every scenario yet"
         try:
             if changes_since(job.provenance, job_provenance(job.spec)):
-                return job, "its numbers come of other code, or of other libraries, than there are"
+                return job, "the job was computed by other code or libraries"
             reference = walked_reference(job.spec)
         except (SimulationError, OSError) as error:
-            return job, f"the design that it is compared with cannot walk here: {error}"
+            return job, f"the reference design cannot be simulated here: {error}"
         store.note_reference(job.id, reference)
         job = replace(job, reference=reference)
     return job, None if job.gain is not None else _why_none(job)
@@ -85,25 +85,25 @@ def with_reference(store: Store, job: Job) -> tuple[Job, str | None]:
 def _why_none(job: Job) -> str:
     reference = job.reference or NONE
     if reference.name is None:
-        return "no design was published for its controller and its robot"
+        return "no design was published for this controller and robot"
     if reference.fitness is None:
-        said = START if reference.kind == "start" else f"published design {reference.name}"
-        return f"the {said} does not walk in all of its scenarios"
-    return "it has found no design yet that walks in every scenario"
+        description = START if reference.kind == "start" else f"published design {reference.name}"
+        return f"the {description} fails in one of the scenarios"
+    return "no design has succeeded in every scenario yet"
 
 
 def note_reference(store: Store, job: Job) -> Job:
-    """As `with_reference` of a job that has ended or paused; the log says what went wrong."""
+    """As `with_reference` after a job's end or pause, with errors logged."""
     if job.reference is not None:
         return job
     try:
         job, reason = with_reference(store, job)
     except StoreUnavailable as error:
-        # It is found out when somebody asks for the gain.
-        _log.warning("job %s: its best is compared with nothing yet: %s", job.id, error)
+        # Determined on the next request for the gain.
+        _log.warning("job %s: its reference was not determined: %s", job.id, error)
     except Exception:  # noqa: BLE001
-        # Whatever it is: the job's results are stored, and need it for nothing.
-        _log.exception("job %s: its best is compared with nothing", job.id)
+        # The job's results are stored and do not depend on it.
+        _log.exception("job %s: its reference was not determined", job.id)
     else:
         if reason is not None:
             _log.debug("job %s: no gain: %s", job.id, reason)

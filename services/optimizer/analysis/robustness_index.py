@@ -1,4 +1,4 @@
-"""Robustness index: how strongly a design's objectives answer to small changes of its variables.
+"""Robustness index: sensitivity of a design's objectives to small changes of its variables
 
 The norm of the Jacobian of the normalised objectives with respect to the normalised variables, by
 scenario; the smaller, the more robust (thesis 4.4.3). The objectives are not smooth, so the
@@ -23,24 +23,23 @@ from gaitswarm.sim.variables import Variable
 Floats = NDArray[np.float64]
 
 NORMALISED_OBJECTIVES: Final = OBJECTIVES[:5]
-"""f1 to f5 of table 4.1, which preferences of chapter 4 weigh; f6 changes its sign."""
+"""f1 to f5 of table 4.1, weighed by the preferences of chapter 4; f6 may be negative."""
 
 _RESAMPLES: Final = 400
 _SAMPLE, _RESAMPLE = 0x10CA1, 0xB0075
-"""Purposes of the random numbers."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LocalSample:
-    """A design and others around it, uniform in a box, inside the variables' bounds.
+    """Designs uniform in a box around a design, within the variables' bounds.
 
     Attributes:
-        varied: the d variables whose values differ.
-        held: names of variables that stay: categorical ones, and integers that the box does not
-            reach the neighbours of.
+        varied: the d varied variables.
+        held: names of fixed variables: categorical ones, and integers whose neighbors are outside
+            the box.
         names: v columns of the designs.
-        designs: (1 + n, v), the design itself first, in the variables' units.
-        shift: (1 + n, d) distance from the design, as a share of each variable's bounds.
+        designs: (1 + n, v), the center first.
+        shift: (1 + n, d) distance from the center, as a share of each variable's bounds.
         radius: half the box's width, as a share of the bounds.
     """
 
@@ -54,22 +53,22 @@ class LocalSample:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sensitivity:
-    """What small changes of d variables do to the M objectives in one scenario.
+    """Effect of small changes of d variables on the M objectives in one scenario.
 
-    Numbers are relative changes of an objective over a variable's whole bounds; all are NaN, and
-    `index` is None, where too few walks lasted to their end.
+    Values are relative changes of an objective over a variable's whole bounds; all are NaN, and
+    `index` is None, if too few simulations completed.
 
     Attributes:
         index: Frobenius norm of the Jacobian.
         jacobian: (M, d).
-        standard_error: (M, d) of its entries.
-        spectral_norm: the Jacobian's largest singular value.
-        by_objective: (M,) norms of its rows.
-        by_variable: (d,) norms of its columns.
-        unexplained: (M,) standard deviation of what the Jacobian leaves of the objectives' relative
-            changes: curvature and roughness.
-        walked: walks with all objectives.
-        failed: walks without.
+        standard_error: (M, d) of the Jacobian's entries.
+        spectral_norm: largest singular value.
+        by_objective: (M,) norms of the rows.
+        by_variable: (d,) norms of the columns.
+        unexplained: (M,) standard deviation of the residuals of the objectives' relative changes:
+            curvature and roughness.
+        walked: number of simulations with all objectives.
+        failed: number of simulations without.
     """
 
     index: Interval | None
@@ -89,7 +88,7 @@ class Robustness:
 
     Attributes:
         index: root mean square of the scenarios' indices; None if one has none.
-        scenarios: K sensitivities, in the scenarios' order.
+        scenarios: in the scenarios' order.
     """
 
     index: Interval | None
@@ -107,7 +106,7 @@ class Robustness:
 
 
 def least_samples(varied: int) -> int:
-    """How many designs a sample has at least."""
+    """Return the minimum sample size."""
     return 4 * (varied + 1)
 
 
@@ -119,20 +118,18 @@ def local_sample(
     samples: int,
     seed: int,
 ) -> LocalSample:
-    """Draw designs around one.
+    """Sample designs around one.
 
-    A variable's values are within `radius` times the width of its bounds on either side, and never
-    outside the bounds: near one of them, they are on one side. A design that lies outside its
-    bounds is sampled on the side towards them. More samples begin with the same designs as fewer.
+    Values are within `radius` times the width of the bounds on either side, and within the bounds.
+    A design outside its bounds is sampled on the side towards them. Larger samples extend smaller
+    ones.
     """
     varied = tuple(v for v in variables if _reaches_neighbours(v, radius))
     if not varied:
-        raise ValueError(
-            "variables: none of them can vary, so there is nothing to be robust against"
-        )
+        raise ValueError("variables: none of them can vary; choose others or a greater radius")
     if samples < least_samples(len(varied)):
         raise ValueError(
-            f"samples: {len(varied)} variables need at least {least_samples(len(varied))}"
+            f"samples: {len(varied)} variables require at least {least_samples(len(varied))}"
         )
     names = tuple(design)
     designs = np.tile(np.array(list(design.values()), dtype=np.float64), (1 + samples, 1))
@@ -155,7 +152,7 @@ def _reaches_neighbours(variable: Variable, radius: float) -> bool:
 
 
 def _around(center: float, variable: Variable, radius: float, numbers: Floats) -> Floats:
-    """Values of a variable, from numbers (n,) in [0, 1)."""
+    """Map numbers (n,) in [0, 1) to values of a variable."""
     reach = radius * (variable.high - variable.low)
     low = max(center - reach, min(variable.low, center))
     high = min(center + reach, max(variable.high, center))
@@ -166,31 +163,33 @@ def _around(center: float, variable: Variable, radius: float, numbers: Floats) -
 
 
 def robustness(sample: LocalSample, objectives: Floats, failed: NDArray[np.bool_]) -> Robustness:
-    """Estimate the index from the walks of a sample.
+    """Estimate the index from the results of a sample.
 
-    An objective's logarithm is fitted, so that its derivative is a relative change. What noise
-    adds to the square of a norm is subtracted. Intervals are those of a bootstrap over the designs,
-    which are drawn alike for all scenarios.
+    Logarithms of the objectives are fitted, so that derivatives are relative changes. The
+    contribution of noise to a squared norm is subtracted. Intervals are from a bootstrap over the
+    designs, the same for all scenarios.
     """
     values = objectives[:, :, : len(NORMALISED_OBJECTIVES)]
     usable = ~failed & (np.isfinite(values) & (values > 0.0)).all(axis=2)
     weights = _resamples(len(sample.designs))
     scenarios, squares = [], []
     for k in range(values.shape[1]):
-        found = _sensitivity(sample, values[:, k], usable[:, k], weights)
-        scenarios.append(found[0])
-        squares.append(found[1])
-    known = [s for s in squares if s is not None]
-    complete = bool(known) and len(known) == len(squares)
-    return Robustness(_SquaredNorm.mean(known).interval() if complete else None, tuple(scenarios))
+        sensitivity, norm = _sensitivity(sample, values[:, k], usable[:, k], weights)
+        scenarios.append(sensitivity)
+        squares.append(norm)
+    complete_squares = [s for s in squares if s is not None]
+    complete = bool(complete_squares) and len(complete_squares) == len(squares)
+    return Robustness(
+        _SquaredNorm.mean(complete_squares).interval() if complete else None, tuple(scenarios)
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _SquaredNorm:
-    """Of a Jacobian.
+    """Squared norm of a Jacobian.
 
-    biased: of the sample's regression as it is; unbiased: (1 + B,) without what noise adds, of the
-    sample and of each of its resamples.
+    biased: of the sample's regression; unbiased: (1 + B,) less the contribution of noise, of the
+    sample and of each resample.
     """
 
     biased: float
@@ -204,7 +203,7 @@ class _SquaredNorm:
         )
 
     def interval(self) -> Interval:
-        """Of the norm. In a resample's world the sample's own, biased norm is the true one."""
+        """Interval of the norm. For a resample the sample's biased norm is the true one."""
         estimate, *resampled = np.sqrt(np.maximum(self.unbiased, 0.0)).tolist()
         errors = np.array(resampled) - math.sqrt(self.biased)
         tail = (1.0 - CONFIDENCE) / 2.0
@@ -225,9 +224,9 @@ def _sensitivity(
         return Sensitivity(None, none, none, math.nan, rows, columns, rows, **counts), None
     shift = np.hstack([np.ones((walked, 1)), sample.shift[usable] / sample.radius])
     logarithms = np.log(values[usable])
-    found = _regressions(shift, logarithms - logarithms.mean(axis=0), weights[:, usable])
-    slopes = found.slopes / sample.radius
-    variances = found.variances / sample.radius**2
+    estimated = _regressions(shift, logarithms - logarithms.mean(axis=0), weights[:, usable])
+    slopes = estimated.slopes / sample.radius
+    variances = estimated.variances / sample.radius**2
     squares = slopes**2 - variances
     norm = _SquaredNorm(float((slopes[0] ** 2).sum()), squares.sum(axis=(1, 2)))
     sensitivity = Sensitivity(
@@ -237,7 +236,7 @@ def _sensitivity(
         spectral_norm=float(np.linalg.norm(slopes[0], 2)),
         by_objective=_root(squares[0].sum(axis=0)),
         by_variable=_root(squares[0].sum(axis=1)),
-        unexplained=found.residual[0],
+        unexplained=estimated.residual[0],
         **counts,
     )
     return sensitivity, norm
@@ -245,7 +244,7 @@ def _sensitivity(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Regressions:
-    """slopes, variances of slopes: (1 + B, d, M); residual: (1 + B, M) standard deviation."""
+    """slopes and their variances: (1 + B, d, M); residual: (1 + B, M) standard deviation."""
 
     slopes: Floats
     variances: Floats
@@ -257,7 +256,7 @@ def _regressions(x: Floats, y: Floats, weights: Floats) -> _Regressions:
     n, p = x.shape
     gram = (weights @ (x[:, :, None] * x[:, None, :]).reshape(n, -1)).reshape(-1, p, p)
     moments = (weights @ (x[:, :, None] * y[:, None, :]).reshape(n, -1)).reshape(len(gram), p, -1)
-    # A resample may hold too few values of an integer variable.
+    # A resample may have too few values of an integer variable.
     inverse = np.linalg.pinv(gram, hermitian=True)
     coefficients = inverse @ moments
     squares = weights @ y**2 - (coefficients * moments).sum(axis=1)
@@ -272,7 +271,7 @@ def _regressions(x: Floats, y: Floats, weights: Floats) -> _Regressions:
 
 
 def _resamples(n: int) -> Floats:
-    """(1 + B, n) how often each design counts: once, then as often as a bootstrap draws it."""
+    """(1 + B, n) multiplicity of each design: first 1, then as drawn by a bootstrap."""
     drawn = swarm_uniform(0, _RESAMPLE, iteration=0, particles=_RESAMPLES, count=n)
     picks = (drawn * n).astype(np.intp)
     return np.vstack([np.ones(n), *(np.bincount(row, minlength=n) for row in picks)])

@@ -1,8 +1,8 @@
-"""Which scenarios of a job matter: what jobs with fewer of them would have taken for the best.
+"""Relevance of scenarios: the winners that fewer scenarios would have chosen
 
-From stored objectives alone: designs are judged anew by the geometric mean over some scenarios
-(eq. 4.2), and the winner is judged by that over all. A search with fewer scenarios would have gone
-elsewhere, so what is found here is to be checked by a job.
+From stored objectives alone: designs are judged by the geometric mean over some scenarios (eq.
+4.2), and the winner is judged by that over all. A search with fewer scenarios would have evaluated
+other designs, so results should be verified by a job.
 """
 
 from __future__ import annotations
@@ -25,29 +25,30 @@ Floats = NDArray[np.float64]
 _RESAMPLES: Final = 400
 _LEAST_RESAMPLES: Final = 40
 _RESAMPLED_ROWS: Final = 4_000_000
-"""Of all resamples together: a long history gets fewer of them."""
+"""Of all resamples together: longer histories have fewer resamples."""
 
 _FOREMOST: Final = 64
-"""Rows among which the winner of a resample is looked for first: each is there in two of three."""
+"""Rows among which a resample's winner is first looked for: a resample contains each of them with a
+probability of two thirds.
+"""
 
 _MOST_FAMILIES: Final = 64
-"""Families of one size that are looked at; of more, so many are drawn."""
+"""Limit on the families of one size; beyond it, they are sampled."""
 
 _RESAMPLE, _DRAW = 0xFA71, 0xFA72
-"""Purposes of the random numbers."""
 
 
 @dataclass(frozen=True, slots=True)
 class Family:
-    """Some of a job's scenarios, at least one.
+    """A non-empty subset of a job's scenarios.
 
     Attributes:
-        scenarios: their indices, ascending.
-        correlation: Spearman's, of the fitness over them and over all, among designs that walk in
-            all; None where it is undefined.
-        winner: row of the design that is best by them.
-        regret: by how much the winner is worse than the job's best in the fitness over all, as a
-            share of it; +inf for a winner that fails.
+        scenarios: indices, ascending.
+        correlation: Spearman's, between the fitness over them and over all, among designs that
+            succeed in all; None if undefined.
+        winner: row of the best design by them.
+        regret: relative excess of the winner's fitness over all scenarios above the job's best;
+            +inf for a winner that fails.
     """
 
     scenarios: tuple[int, ...]
@@ -61,12 +62,11 @@ class LeftOut:
     """All scenarios but one.
 
     Attributes:
-        scenario: index of the one.
+        scenario: index of the omitted one.
         family: the others.
-        loss: by how much the family's winner is worse than the job's best in the scenario that was
-            left out, as a share; less than 0 if it is better.
-        similar: index of the scenario whose utilities are most like it in rank; None if there is
-            no other, or the correlations are undefined.
+        loss: relative excess of the family's winner above the job's best in the omitted scenario;
+            negative if it is better.
+        similar: index of the scenario with the most similar ranking; None if undefined.
         similarity: Spearman's correlation of the two.
     """
 
@@ -79,16 +79,16 @@ class LeftOut:
 
 @dataclass(frozen=True, slots=True)
 class ScenarioFamilies:
-    """What fewer scenarios would have done.
+    """Results of judging by fewer scenarios.
 
     Attributes:
-        designs: that walk in all scenarios.
-        failed: those that do not.
-        left_out: each scenario in its turn; none of a job with a single one.
-        families: of every size below all, all of them or some drawn at random, smaller ones first.
-        tolerance: largest loss that is allowed.
-        smallest: the family of fewest scenarios whose regret is within the tolerance up to the
-            upper end of its interval, of these the one of least regret; None if there is none.
+        designs: number of designs that succeed in all scenarios.
+        failed: number of the others.
+        left_out: one entry for each scenario; empty for a single scenario.
+        families: of every smaller size, all of them or a sample, smaller ones first.
+        tolerance: largest acceptable loss.
+        smallest: smallest family whose interval of regret ends within the tolerance, of these the
+            one of least regret; None if there is none.
     """
 
     designs: int
@@ -102,9 +102,7 @@ class ScenarioFamilies:
 def scenario_families(log_utilities: Floats, *, tolerance: float) -> ScenarioFamilies:
     """Judge designs by fewer scenarios.
 
-    Args:
-        log_utilities: (r, K) logarithms of utilities, +inf where a walk failed; in at least one row
-            none did.
+    log_utilities: (r, K), +inf for a failure; at least one row is finite.
     """
     judged = _Judged.of(log_utilities)
     count = log_utilities.shape[1]
@@ -127,7 +125,7 @@ def _order(family: Family) -> tuple[float, ...]:
 
 
 def _families(count: int) -> Iterator[tuple[int, ...]]:
-    """Indices of some of so many scenarios; every single one and all but one are always there."""
+    """Subsets of scenario indices, always including single scenarios and all but one."""
     for size in range(1, count):
         number = math.comb(count, size)
         if number <= _MOST_FAMILIES or size in (1, count - 1):
@@ -146,9 +144,9 @@ def _drawn(count: int, size: int) -> Iterable[tuple[int, ...]]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Judged:
-    """log_utilities: (r, K); fitness: (r,) its mean; complete: rows that walk in all scenarios;
-    drawn: (1 + B, r) whether a row is there, first among all, then in each resample; bests:
-    (1 + B,) best of each by the fitness over all.
+    """log_utilities: (r, K); fitness: (r,) its mean; complete: rows that succeed in all scenarios;
+    drawn: (1 + B, r) whether a row is present, first in the whole, then in each resample; bests:
+    (1 + B,) best row of each by the fitness over all.
     """
 
     log_utilities: Floats
@@ -162,7 +160,7 @@ class _Judged:
         rows = len(log_utilities)
         fitness = log_utilities.mean(axis=1)
         count = min(_RESAMPLES, max(_LEAST_RESAMPLES, _RESAMPLED_ROWS // rows))
-        # How often a row is drawn changes no winner; whether it is takes an eighth of the memory.
+        # Multiplicities do not affect winners; a mask takes an eighth of their memory.
         drawn = np.zeros((1 + count, rows), dtype=np.bool_)
         drawn[0] = True
         for k in range(count):
@@ -211,7 +209,7 @@ class _Judged:
 
 
 def _winners(fitness: Floats, drawn: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """(1 + B,) row of the least fitness (r,) among those in each sample, the earliest of equals."""
+    """(1 + B,) row of the least fitness (r,) in each sample; ties by age."""
     winners = np.empty(len(drawn), dtype=np.intp)
     left, most = np.arange(len(drawn)), _FOREMOST
     while len(left):
@@ -224,7 +222,7 @@ def _winners(fitness: Floats, drawn: NDArray[np.bool_]) -> NDArray[np.intp]:
 
 
 def _best_first(fitness: Floats, most: int) -> NDArray[np.intp]:
-    """So many rows of the least fitness (r,), and all that equal the last of them, in order."""
+    """The `most` rows of least fitness (r,), and all ties with the last of them, in order."""
     if most >= len(fitness):
         return np.argsort(fitness, kind="stable")
     rows = np.flatnonzero(fitness <= np.partition(fitness, most - 1)[most - 1])
@@ -232,11 +230,11 @@ def _best_first(fitness: Floats, most: int) -> NDArray[np.intp]:
 
 
 def _loss(own: Floats, best: Floats) -> Interval:
-    """By how much designs are worse than others, as a share of what those are worth.
+    """Relative excess of designs above others.
 
     own, best: (1 + B,) logarithms, of the designs themselves and of each resample.
     """
-    # A resample may hold no design that walks in all scenarios.
+    # A resample may have no design that succeeds in all scenarios.
     known = np.isfinite(best)
     with np.errstate(over="ignore"):
         losses = np.expm1(own[known] - best[known])

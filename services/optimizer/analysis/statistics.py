@@ -1,4 +1,4 @@
-"""Ranks, medians and their intervals"""
+"""Ranks, medians and confidence intervals"""
 
 from __future__ import annotations
 
@@ -12,46 +12,27 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 
-def spearman(one: Floats, other: Floats) -> float:
-    """Spearman's rank correlation, ties sharing their mean rank.
-
-    Args:
-        one: (M,) values.
-        other: (M,) values of the same things.
-    """
-    a, b = (average_ranks(values) for values in (one, other))
+def spearman(first: Floats, second: Floats) -> float:
+    """Spearman's rank correlation of two samples (M,); ties share their mean rank."""
+    a, b = (average_ranks(values) for values in (first, second))
     a, b = a - a.mean(), b - b.mean()
     scale = math.sqrt(float((a * a).sum()) * float((b * b).sum()))
     return float((a * b).sum()) / scale if scale > 0.0 else math.nan
 
 
 def average_ranks(values: Floats) -> Floats:
-    """Ranks from 1, the least; equal values share their mean rank.
-
-    Args:
-        values: (n,), +inf allowed.
-
-    Returns:
-        (n,).
-    """
+    """Ranks of (n,) values from 1, the least; ties share their mean rank."""
     _, places, sizes = np.unique(values, return_inverse=True, return_counts=True)
     means = np.cumsum(sizes) - 0.5 * (sizes - 1.0)
     return np.asarray(means[places])
 
 
 CONFIDENCE: Final = 0.95
-"""Of all intervals."""
 
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """An estimate with its interval at `CONFIDENCE`.
-
-    Attributes:
-        value: The estimate.
-        low: Lower end of the interval.
-        high: Upper end.
-    """
+    """An estimate with its interval at the level `CONFIDENCE`."""
 
     value: float
     low: float
@@ -59,15 +40,11 @@ class Interval:
 
 
 def percentile_interval(value: float, resampled: NDArray[np.float64]) -> Interval:
-    """Interval between two quantiles of what resamples come to (Efron 1979).
-
-    Args:
-        resampled: (B,) the same of each resample, NaN for one that has none; +-inf allowed.
-    """
-    known = resampled[~np.isnan(resampled)]
-    if not len(known):
+    """Interval between two quantiles of (B,) resampled estimates (Efron 1979); NaN is ignored."""
+    defined = resampled[~np.isnan(resampled)]
+    if not len(defined):
         return Interval(value, math.nan, math.nan)
     tail = 0.5 * (1.0 - CONFIDENCE)
-    # Of ordered values, so that an infinite one is not interpolated.
-    low, high = np.quantile(known, (tail, 1.0 - tail), method="inverted_cdf")
+    # Without interpolation, as values may be infinite.
+    low, high = np.quantile(defined, (tail, 1.0 - tail), method="inverted_cdf")
     return Interval(value, float(low), float(high))

@@ -1,4 +1,4 @@
-"""How near a calibration comes to its targets, and to each of them when it is left out."""
+"""Distances of a calibration from its targets, also with each of them left out"""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from gaitswarm.sim.outcome import Status
 Floats = NDArray[np.float64]
 
 LeaveOut = Literal["target", "walk"]
-"""What is left out together: one target, or all that a walk enters."""
+"""What is left out together: one target, or all targets of a walk."""
 
 
 @dataclass(frozen=True, slots=True)
 class Reached:
-    """What a design comes to in one target.
+    """A design's result for one target.
 
     Attributes:
-        simulated: value, in the target's unit.
-        difference: from the target's, in tolerances; see `CalibrationSpec.differences`.
+        simulated: in the target's unit.
+        difference: in tolerances; see `CalibrationSpec.differences`.
     """
 
     simulated: float
@@ -40,11 +40,10 @@ class TargetResult:
     """One target over all runs.
 
     Attributes:
-        target: that is meant.
-        best: of the best design of all runs; NaN where its walk failed, which only a target that
-            is not fitted may have.
-        left_out: of the design that is best without this target; None if that was not asked for, or
-            the target is not fitted, or nothing would be left to fit.
+        best: of the best design of all runs; NaN if its walk failed (only for targets that are not
+            fitted).
+        left_out: of the best design without this target; None if not requested, if the target is
+            not fitted, or if no target would remain.
     """
 
     target: Target
@@ -54,15 +53,12 @@ class TargetResult:
 
 @dataclass(frozen=True, slots=True)
 class TargetResults:
-    """All targets.
+    """All targets, for the best design of all runs.
 
     Attributes:
-        run: index of the run that found the best design.
-        iteration: that found it.
-        particle: its number in that iteration.
-        design: (v,) its values, as stored.
-        fitness: its misfit, root mean square over fitted targets in tolerances.
-        targets: in the order of the spec.
+        run: index of the run that found it.
+        design: (v,) as stored.
+        fitness: root mean square over fitted targets, in tolerances.
     """
 
     run: int
@@ -82,12 +78,12 @@ def target_results(
 ) -> TargetResults:
     """Compare the best design of all runs with the targets.
 
-    What is left out is predicted from stored objectives: the designs are judged anew without it,
-    and the one that is then best says what it would have been. Nothing is simulated.
+    Left-out targets are predicted from stored objectives: the design that is best without them
+    gives the prediction. Nothing is simulated.
     """
     fitness = np.concatenate([run.fitness for run in runs])
     if not np.isfinite(fitness).any():
-        raise ValueError("there is no design that did not fail")
+        raise ValueError("every design has failed")
     simulated = np.concatenate([spec.simulated(r.objectives, r.failed) for r in runs])
     differences = spec.differences(simulated)
     best = _best_of_all(runs) if bests is None else _best_in_double(bests)
@@ -97,8 +93,8 @@ def target_results(
     for index, target in enumerate(spec.targets):
         left_out = None
         if leave_out is not None and target.use == "fit":
-            kept = spec.fitted & ~_left_out(spec, index, leave_out)
-            chosen = _best_by(differences[:, kept]) if kept.any() else None
+            remaining = spec.fitted & ~_left_out(spec, index, leave_out)
+            chosen = _best_by(differences[:, remaining]) if remaining.any() else None
             if chosen is not None:
                 left_out = _reached(simulated, differences, chosen, index)
         results.append(TargetResult(target, _reached(of_best, off, 0, index), left_out))
@@ -114,7 +110,7 @@ def target_results(
 
 @dataclass(frozen=True, slots=True)
 class _Best:
-    """The best design of all runs; as in `Evaluation`."""
+    """The best design of all runs; see `Evaluation`."""
 
     run: int
     iteration: int
@@ -141,8 +137,8 @@ def _best_of_all(runs: Sequence[EvaluationColumns]) -> _Best:
 
 
 def _best_in_double(bests: Sequence[Evaluation]) -> _Best:
-    anew = [best.reevaluation for best in bests]
-    judged = [(a.fitness, run, a) for run, a in enumerate(anew) if a is not None]
+    reevaluations = [best.reevaluation for best in bests]
+    judged = [(a.fitness, run, a) for run, a in enumerate(reevaluations) if a is not None]
     fitness, run, found = min(judged, key=lambda entry: entry[:2])
     best = bests[run]
     return _Best(
@@ -157,7 +153,7 @@ def _best_in_double(bests: Sequence[Evaluation]) -> _Best:
 
 
 def _left_out(spec: CalibrationSpec, index: int, leave_out: LeaveOut) -> NDArray[np.bool_]:
-    """(T,) which targets go with one."""
+    """(T,) mask of the targets left out together with one."""
     if leave_out == "target":
         return np.array([k == index for k in range(len(spec.targets))], dtype=np.bool_)
     walk = spec.targets[index].walk
@@ -166,7 +162,7 @@ def _left_out(spec: CalibrationSpec, index: int, leave_out: LeaveOut) -> NDArray
 
 
 def _best_by(differences: Floats) -> int | None:
-    """Row of the least sum of squares; None if every one has failed."""
+    """Row of the least sum of squares; None if all failed."""
     squares = np.square(differences).sum(axis=1)
     row = int(np.argmin(squares))
     return row if math.isfinite(squares[row]) else None

@@ -1,7 +1,7 @@
-"""Bias-weighted product and geometric mean (eq. 3.8, 4.1, 4.2) of many designs at once.
+"""Vectorized bias-weighted product and geometric mean (eq. 3.8, 4.1, 4.2)
 
-The same numbers as `services.optimizer.jobs.preference` to twelve digits. numpy's logarithm may
-differ from Python's in the last bit, so that nothing that is stored is computed here.
+The values agree with `services.optimizer.jobs.preference` to twelve digits. numpy's logarithm may
+differ from Python's in the last bit, so stored values are not computed here.
 """
 
 from __future__ import annotations
@@ -21,14 +21,13 @@ from gaitswarm.services.optimizer.jobs.spec import Spec
 Floats = NDArray[np.float64]
 
 _BLOCK: Final = 4096
-"""Rows at a time, so that what is computed stays in the processor's cache."""
+"""Rows at a time, for the processor's cache."""
 
 
 def log_utilities(columns: EvaluationColumns, preference: Preference) -> Floats:
-    """Logarithm of the bias-weighted product (eq. 3.8, 4.1).
+    """Return (r, K) logarithms of the bias-weighted product (eq. 3.8, 4.1).
 
-    Returns:
-        (r, K), +inf where the walk failed or lacks an objective with a weight.
+    +inf if the simulation failed or lacks a weighted objective.
     """
     result = np.empty(columns.statuses.shape)
     weighted = [
@@ -45,7 +44,7 @@ def log_utilities(columns: EvaluationColumns, preference: Preference) -> Floats:
             column = objectives[:, :, m]
             factor = bias + (np.abs(column) if m == HEIGHT_LOSS else column)
             missing |= ~np.isfinite(factor)
-            # A factor of zero or less cannot be improved upon, as in `preference`.
+            # A factor of zero or less cannot be improved, as in `preference`.
             with np.errstate(divide="ignore", invalid="ignore"):
                 total += exponent * np.log(np.maximum(factor, 0.0))
         total[missing] = np.inf
@@ -54,14 +53,7 @@ def log_utilities(columns: EvaluationColumns, preference: Preference) -> Floats:
 
 
 def fitness_of(log_utility: Floats) -> Floats:
-    """Geometric mean over scenarios (eq. 4.2).
-
-    Args:
-        log_utility: (r, K) logarithms of utilities, +inf where a walk failed.
-
-    Returns:
-        (r,) fitness, +inf where any walk failed or a double ends.
-    """
+    """Return the (r,) geometric means over scenarios (eq. 4.2); +inf after failure or overflow."""
     failed = np.isposinf(log_utility).any(axis=1)
     with np.errstate(over="ignore", invalid="ignore"):
         fitness = np.exp(log_utility.mean(axis=1))
@@ -74,15 +66,11 @@ def objective_vectors(
     *,
     worlds: TuningWorlds | None = None,
 ) -> Floats:
-    """What each design comes to in each objective, over all scenarios.
+    """Return each design's (r, M) objectives over all scenarios, minimized.
 
-    Number m of a design is its fitness under a preference that weighs objective m alone. Without
-    worlds, fitness under any preference with these biases is the product of these numbers, each to
-    the power of its exponent.
-
-    Returns:
-        (r, M), each in its objective's unit, minimized; a row is +inf throughout where a walk of
-        the design failed or lacks an objective.
+    Objective m is the fitness under a preference that weighs it alone. Without worlds, fitness
+    under any preference with these biases is the product of the objectives, each raised to its
+    exponent. A row is +inf if a simulation failed or lacks an objective.
     """
     result = np.empty((len(columns), len(bias)))
     for m, exponent in enumerate(np.eye(len(bias)).tolist()):
@@ -94,11 +82,7 @@ def objective_vectors(
 
 
 def utilities(columns: EvaluationColumns, spec: Spec) -> Floats:
-    """What each design is worth in each case by its job's own measure.
-
-    Returns:
-        (r, K) utilities, minimized, +inf where a case failed.
-    """
+    """Return the (r, K) utilities by the job's own measure, +inf after a failure."""
     if isinstance(spec, JobSpec):
         logarithms = log_utilities(columns, spec.resolved_preference())
     else:

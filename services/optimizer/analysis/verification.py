@@ -1,4 +1,4 @@
-"""Whether a job's history is what was committed: its chain, computed again from what is stored."""
+"""Verification of histories: the digest chain, recomputed from what is stored"""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ from gaitswarm.services.optimizer.store.port.reading import StoredLink
 from gaitswarm.services.optimizer.store.rows.evaluation_rows import fitness_summary
 
 _PIECE: Final = 2000
-"""Evaluations read in one transaction."""
+"""Evaluations per transaction."""
 
 _ROUNDING: Final = 1e-12
-"""Relative, of a mean that another processor has added up in another order."""
+"""Relative tolerance for means computed in another order on another processor."""
 
 _UNREADABLE: Final = (
     ArithmeticError,
@@ -41,11 +41,11 @@ _UNREADABLE: Final = (
     TypeError,
     ValueError,
 )
-"""What comes of stored documents that are not what they should be."""
+"""Errors raised by damaged documents."""
 
 
 class BrokenChain(Exception):
-    """What is stored of an iteration is not what was committed."""
+    """A stored iteration differs from what was committed."""
 
     def __init__(self, iteration: int, problem: str) -> None:
         super().__init__(f"iteration {iteration}: {problem}")
@@ -55,14 +55,13 @@ class BrokenChain(Exception):
 
 @dataclass(slots=True)
 class Chain:
-    """A chain that is computed again, iteration by iteration.
+    """A chain being recomputed, iteration by iteration.
 
     Attributes:
-        documents: Of the job.
-        spec: Of the job, to say what is wrong; None if it cannot be read.
-        iterations: How many were looked at.
-        head: Digest of the last; None before the first.
-        places: Index of each digest.
+        spec: for explanations; None if unreadable.
+        iterations: number verified.
+        head: digest of the last; None before the first.
+        places: index of each digest.
     """
 
     documents: ChainDocuments
@@ -72,7 +71,7 @@ class Chain:
     places: dict[str, int] = field(default_factory=dict)
 
     def extend(self, link: Link, outcomes: Outcomes) -> None:
-        """Look at the next iteration."""
+        """Verify the next iteration. Raises BrokenChain."""
         index = self.iterations
         if link.iteration != index:
             raise BrokenChain(index, "it is missing")
@@ -92,15 +91,15 @@ class Chain:
 
 @dataclass(frozen=True, slots=True)
 class HistoryCheck:
-    """What was found of a job's history.
+    """Result of verifying a job's history.
 
     Attributes:
-        iterations: How many are as they were committed, from the first on.
-        head: Digest of the last of them; None if there is none.
-        broken_at: The first that is not as it was committed; None if all are.
-        problem: What is wrong with it or with the job, for people; empty if nothing is.
-        head_found_at: Where the digest that was looked for is; None if it is nowhere.
-        sizes: Designs of each of these iterations.
+        iterations: number of intact iterations, from the first.
+        head: digest of the last of them; None if there is none.
+        broken_at: first damaged iteration; None if all are intact.
+        problem: description of the damage, for people; empty if intact.
+        head_found_at: iteration with the requested digest; None if there is none.
+        sizes: number of designs of each intact iteration.
     """
 
     iterations: int
@@ -112,16 +111,16 @@ class HistoryCheck:
 
 
 def check_history(store: Store, job: Job, *, head: str | None = None) -> HistoryCheck:
-    """Compute a job's chain again from its rows, by pieces."""
+    """Verify a job's chain from its rows, piece by piece."""
     spec = job.spec if job.readable else None
     chain = Chain(store.chain_documents(job.id), spec)
     broken_at, problem, sizes = None, "", list[int]()
     try:
         summary = _Summary(job)
-        for stored, columns, anew in _stored(store, job):
-            chain.extend(stored.link, Outcomes.read(columns, anew))
+        for stored, columns, reevaluation in _stored(store, job):
+            chain.extend(stored.link, Outcomes.read(columns, reevaluation))
             _check_ask(stored)
-            summary.extend(stored, columns, anew)
+            summary.extend(stored, columns, reevaluation)
             sizes.append(len(columns))
         _check_next(store, job)
         problem = summary.problem() or (
@@ -146,15 +145,15 @@ Stored = tuple[StoredLink, EvaluationColumns, Reevaluation | None]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Piece:
-    """Rows of a range of iterations, as they were found."""
+    """Rows of a range of iterations, as stored."""
 
     links: dict[int, StoredLink]
     columns: EvaluationColumns | None
-    anew: tuple[tuple[int, Reevaluation], ...]
+    reevaluations: tuple[tuple[int, Reevaluation], ...]
 
     @classmethod
     def read(cls, store: Store, job_id: str, first: int, last: int) -> _Piece:
-        """Raises one of _UNREADABLE for rows that are damaged."""
+        """Raises one of _UNREADABLE for damaged rows."""
         return cls(
             {stored.link.iteration: stored for stored in store.links(job_id, first, last)},
             store.evaluation_columns(job_id, first, last),
@@ -169,15 +168,15 @@ class _Piece:
         columns = None if self.columns is None else self.columns.of_iteration(index)
         asked = np.arange(len(stored.link.positions))
         if columns is None or not np.array_equal(columns.particle, asked):
-            raise BrokenChain(index, "it has other particles than were asked for")
-        anew = [one for iteration, one in self.anew if iteration == index]
-        if len(anew) > 1:
-            raise BrokenChain(index, "several of its designs were evaluated anew")
-        return stored, columns, anew[0] if anew else None
+            raise BrokenChain(index, "its particles differ from those asked for")
+        reevaluations = [entry for iteration, entry in self.reevaluations if iteration == index]
+        if len(reevaluations) > 1:
+            raise BrokenChain(index, "several of its designs were reevaluated")
+        return stored, columns, reevaluations[0] if reevaluations else None
 
 
 def _stored(store: Store, job: Job) -> Iterator[Stored]:
-    """Iterations that a job has committed, in order. Raises BrokenChain."""
+    """Yield a job's committed iterations, in order. Raises BrokenChain."""
     end = job.progress.iterations
     step = max(1, _PIECE * end // max(1, job.progress.evaluations))
     for first in range(0, end, step):
@@ -191,7 +190,7 @@ def _stored(store: Store, job: Job) -> Iterator[Stored]:
 
 
 def _one_by_one(store: Store, job_id: str, first: int, last: int) -> Iterator[Stored]:
-    """To find out which iteration is damaged. Raises BrokenChain."""
+    """Read one by one to locate the damage. Raises BrokenChain."""
     for index in range(first, last):
         try:
             piece = _Piece.read(store, job_id, index, index + 1)
@@ -201,7 +200,7 @@ def _one_by_one(store: Store, job_id: str, first: int, last: int) -> Iterator[St
 
 
 def _check_ask(stored: StoredLink) -> None:
-    """The search's state, while it is kept, is that of which the chain has the digest."""
+    """Check the search's state, while it is stored, against its digest."""
     link = stored.link
     if link.ask_digest is None or not (stored.state or not stored.committed):
         return
@@ -210,23 +209,23 @@ def _check_ask(stored: StoredLink) -> None:
     except _UNREADABLE:
         digest = ""
     if digest != link.ask_digest:
-        what = "the search's state" if stored.committed else "what is asked, or the search's state,"
-        raise BrokenChain(link.iteration, f"{what} is not what it was when it was asked")
+        what = "the search's state" if stored.committed else "the ask or the search's state"
+        raise BrokenChain(link.iteration, f"{what} was changed after the ask")
 
 
 def _check_next(store: Store, job: Job) -> None:
-    """The iteration under way is the one that was asked."""
+    """Check the iteration in progress."""
     index = job.progress.iterations
     try:
-        found = store.links(job.id, index, index + 1)
+        links = store.links(job.id, index, index + 1)
     except _UNREADABLE as error:
         raise BrokenChain(index, f"it cannot be read: {str(error)[:200]}") from error
-    for stored in found:
+    for stored in links:
         _check_ask(stored)
 
 
 class _Summary:
-    """Columns that follow from fitness: of every iteration, and of the job."""
+    """Summary values derived from fitness, of every iteration and of the job."""
 
     def __init__(self, job: Job) -> None:
         self._progress = job.progress
@@ -237,17 +236,21 @@ class _Summary:
         self._evaluations = 0
 
     def extend(
-        self, stored: StoredLink, columns: EvaluationColumns, anew: Reevaluation | None
+        self, stored: StoredLink, columns: EvaluationColumns, reevaluation: Reevaluation | None
     ) -> None:
-        """Look at the next iteration. Raises BrokenChain."""
+        """Verify the next iteration. Raises BrokenChain."""
         index = stored.link.iteration
         self._evaluations += len(columns)
         if not self._readable:
             return
         particle, best = best_particle(columns.fitness), None
         if self._single:
-            particle = None if anew is None or math.isinf(anew.fitness) else anew.particle
-            best = None if anew is None or particle is None else anew.fitness
+            particle = (
+                None
+                if reevaluation is None or math.isinf(reevaluation.fitness)
+                else reevaluation.particle
+            )
+            best = None if reevaluation is None or particle is None else reevaluation.fitness
         elif particle is not None:
             best = float(columns.fitness[particle])
         expected = fitness_summary(columns.fitness, best, self._best)
@@ -259,15 +262,15 @@ class _Summary:
         self._best = expected["best_so_far"]
 
     def problem(self) -> str:
-        """What the job says that does not follow from its iterations; empty if all does."""
-        said = self._progress
-        if said.evaluations != self._evaluations:
-            return f"it has {self._evaluations} evaluations, not the {said.evaluations} it counts"
+        """Describe a summary value that does not follow from the iterations; empty if all do."""
+        progress = self._progress
+        if progress.evaluations != self._evaluations:
+            return f"it has {self._evaluations} evaluations, not {progress.evaluations} as recorded"
         place = None
-        if said.best_iteration is not None and said.best_particle is not None:
-            place = (said.best_iteration, said.best_particle)
-        if self._readable and (said.best_fitness, place) != (self._best, self._place):
-            return "the best design that it names is not the best of its iterations"
+        if progress.best_iteration is not None and progress.best_particle is not None:
+            place = (progress.best_iteration, progress.best_particle)
+        if self._readable and (progress.best_fitness, place) != (self._best, self._place):
+            return "its recorded best design is not the best of its iterations"
         return ""
 
 
@@ -278,12 +281,8 @@ def _same(expected: Any, stored: Any) -> bool:
 
 
 def judged(spec: AnySpec, columns: EvaluationColumns) -> NDArray[np.float64]:
-    """Judge stored evaluations again.
-
-    Returns:
-        (r,) fitness that follows from their raw objectives.
-    """
-    # What is not finite is stored as nothing, and was infinite where the walk succeeded.
+    """Return the (r,) fitness that follows from stored objectives."""
+    # Non-finite values are stored as null; they were infinite if the simulation succeeded.
     lost = ~columns.failed[:, :, np.newaxis] & np.isnan(columns.objectives)
     with np.errstate(all="ignore"):
         objectives = np.where(lost, np.inf, columns.objectives)
@@ -291,9 +290,9 @@ def judged(spec: AnySpec, columns: EvaluationColumns) -> NDArray[np.float64]:
 
 
 def _why(spec: AnySpec | None, link: Link, outcomes: Outcomes) -> str:
-    """What of an iteration was changed, as far as it can be told from the rest of it."""
+    """Describe what was changed in an iteration, as far as it follows from the rest."""
     generic = (
-        "its digest is not that of what is stored: what was asked, evaluations, provenance, digest"
+        "its digest does not match what is stored: the ask, evaluations, provenance or digest"
         + (" or the job's spec" if link.iteration == 0 else "")
         + " were changed"
     )
@@ -303,7 +302,7 @@ def _why(spec: AnySpec | None, link: Link, outcomes: Outcomes) -> str:
         designs = spec.design_space().designs(link.positions)
         (rows,) = np.nonzero((designs != outcomes.designs).any(axis=1))
         if len(rows):
-            return f"design {rows[0]} is not what was asked for"
+            return f"design {rows[0]} differs from the ask"
         index = np.full(len(designs), link.iteration)
         columns = EvaluationColumns(
             index,
@@ -315,7 +314,7 @@ def _why(spec: AnySpec | None, link: Link, outcomes: Outcomes) -> str:
         )
         fitness = judged(spec, columns).view(np.uint64)
         (rows,) = np.nonzero(fitness != outcomes.fitness.view(np.uint64))
-    except Exception:  # noqa: BLE001 - whatever comes of numbers that nobody has computed
+    except Exception:  # noqa: BLE001 - damaged values may raise any error
         return generic
     if len(rows):
         return f"the fitness of design {rows[0]} does not follow from its objectives and statuses"
@@ -323,13 +322,13 @@ def _why(spec: AnySpec | None, link: Link, outcomes: Outcomes) -> str:
 
 
 _MOST: Final = 20
-"""Findings; what comes after them is not looked at."""
+"""Limit on the number of findings."""
 
 
 def check_histories(store: Store) -> list[str]:
-    """Compute the chain of every job again from its rows, by pieces, one job after the other.
+    """Verify the chain of every job from its rows, one job after the other.
 
-    Jobs may run meanwhile: what they commit after they were read is left out.
+    Jobs may run meanwhile: later commits are ignored.
     """
     return list(islice(_broken(store), _MOST))
 
@@ -340,9 +339,9 @@ def _broken(store: Store) -> Iterator[str]:
             job = store.job(job_id)
             problem = _problem(store, job)
             if problem:
-                # Rows of a job that is deleted meanwhile go piece by piece.
+                # The rows of a job deleted meanwhile disappear piece by piece.
                 store.job(job_id)
-                yield f"job {job_id} is not what was committed: {problem}"
+                yield f"job {job_id} differs from what was committed: {problem}"
         except NotFound:
             continue
 
@@ -358,6 +357,6 @@ def _ids(store: Store) -> Iterator[str]:
 
 
 def _problem(store: Store, job: Job) -> str:
-    found = check_history(store, job)
-    where = "" if found.broken_at is None else f"iteration {found.broken_at}: "
-    return f"{where}{found.problem}" if found.problem else ""
+    check = check_history(store, job)
+    where = "" if check.broken_at is None else f"iteration {check.broken_at}: "
+    return f"{where}{check.problem}" if check.problem else ""

@@ -1,7 +1,7 @@
-"""The preference under which a design that somebody points at is the best of its job.
+"""Preferences under which a chosen design is the best of its job
 
-For given biases the logarithm of fitness is linear in the exponents (eq. 4.1, 4.2), so those under
-which a design leads all others by the most are the solution of a linear program.
+For given biases the logarithm of fitness is linear in the exponents (eq. 4.1, 4.2), so the
+exponents under which a design has the greatest lead solve a linear program.
 """
 
 from __future__ import annotations
@@ -26,41 +26,39 @@ Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
 _DRAWN: Final = 512
-"""Exponents that are drawn for a design that cannot win."""
+"""Sampled exponents for a design that cannot win."""
 
 _DRAW: Final = 0xE4B0
-"""Purpose of the random numbers."""
 
 _AT_ONCE: Final = 4_000_000
-"""Fitnesses that are held in memory at a time."""
+"""Fitness values held in memory at a time."""
 
 _RIVALS: Final = 32
-"""Designs that enter a linear program at once."""
+"""Designs added to a linear program at a time."""
 
 _ROUNDS: Final = 200
-"""Linear programs at most; each has more rivals than the one before."""
+"""Limit on the number of linear programs; each has more rivals than the previous one."""
 
 _DECIMALS: Final = 4
-"""Of exponents, where rounding them costs no place."""
+"""Of exponents, if rounding does not worsen the rank."""
 
 _LP: Final = 1e-10
-"""Tolerance of linear programs; HiGHS has no smaller one."""
+"""Tolerance of linear programs; the smallest that HiGHS supports."""
 
 _TOLERANCE: Final = 1e-9
-"""By how much a lead may miss that of the linear program, in the logarithm of fitness."""
+"""Tolerance of a lead relative to the linear program's, in the logarithm of fitness."""
 
 
 @dataclass(frozen=True, slots=True)
 class PreferenceFit:
-    """How well a preference suits a design; all by ranking the job's designs under it.
+    """Suitability of a preference for a design, by ranking the job's designs.
 
     Attributes:
         preference: exponents sum to about 1.
-        biases_of: whose biases these are: `job`, `A`, `B`, `C`.
-        rank: of the design, from 1: how many are better, and itself.
-        rival: row of the best of all designs that are not equal to it; None if there is none.
-        fitness: of the design.
-        margin: share by which the rival's fitness is worse; below 0 if it is better. With exponents
+        biases_of: origin of the biases: `job`, `A`, `B`, `C`.
+        rank: from 1.
+        rival: row of the best design that is not equal to it; None if there is none.
+        margin: share by which the rival's fitness is worse; negative if it is better. For exponents
             that sum to 1.
     """
 
@@ -73,7 +71,6 @@ class PreferenceFit:
 
     @property
     def wins(self) -> bool:
-        """Whether no design is better."""
         return self.rank == 1
 
 
@@ -86,11 +83,11 @@ def preference_fits(
 ) -> tuple[PreferenceFit, ...]:
     """Find preferences that suit a design, one for each set of biases.
 
-    With the job's own biases and with those of table 4.5, exponents are found by which the design
-    leads by the most. Where it cannot win, they are those of its best rank among the linear
-    program's, where it is least behind, and some that are drawn.
+    For the job's own biases and those of table 4.5, the exponents maximize the design's lead. If it
+    cannot win, they give its best rank among the linear program's solution, where it is least
+    behind, and some samples.
 
-    In worlds the linear program is about an approximation: the aggregate of a product is not the
+    With worlds the linear program is an approximation: the aggregate of a product is not the
     product of the aggregates.
     """
     fits = []
@@ -116,34 +113,34 @@ def preference_fits(
 
 
 def _biases(own: Preference) -> Mapping[tuple[float, ...], tuple[str, ...]]:
-    """Biases with the names of those whose they are."""
-    found: dict[tuple[float, ...], tuple[str, ...]] = {}
+    """Biases with the names of their preferences."""
+    names_by_bias: dict[tuple[float, ...], tuple[str, ...]] = {}
     for name, preference in {"job": own, **NAMED}.items():
-        found[preference.bias] = (*found.get(preference.bias, ()), name)
-    return found
+        names_by_bias[preference.bias] = (*names_by_bias.get(preference.bias, ()), name)
+    return names_by_bias
 
 
 def _exponents(vectors: Floats, row: int, others: Rows) -> Floats:
-    """(M,) exponents under which a design wins by the most, or else has a good rank.
+    """(M,) exponents under which a design has the greatest lead, or else a good rank.
 
-    vectors: (r, M) objectives with their biases, a row of +inf for a design that failed.
+    vectors: (r, M) objectives with their biases, +inf for a failed design.
     """
     rivals = vectors[others[np.isfinite(vectors[others]).all(axis=1)]]
     if not len(rivals):
         return np.full(vectors.shape[1], 1.0 / vectors.shape[1])
-    known = np.vstack([vectors[row], rivals])
-    # An objective of 0, which has no logarithm, counts as the least that is more.
-    least = np.where(known > 0.0, known, np.inf).min(axis=0)
-    logarithms = np.log(np.maximum(known, np.where(np.isfinite(least), least, 1.0)))
+    candidates = np.vstack([vectors[row], rivals])
+    # An objective of 0, which has no logarithm, counts as the least positive one.
+    least = np.where(candidates > 0.0, candidates, np.inf).min(axis=0)
+    logarithms = np.log(np.maximum(candidates, np.where(np.isfinite(least), least, 1.0)))
     lead = logarithms[1:] - logarithms[0]
     exponent, margin = _widest_lead(lead)
     return exponent if margin > 0.0 else _best_rank(lead, exponent)
 
 
 def _widest_lead(lead: Floats) -> tuple[Floats, float]:
-    """Exponents that sum to 1 and the least lead under them, which is as great as can be.
+    """Return exponents that sum to 1 and maximize the least lead, and that lead.
 
-    lead: (n, M) by how much the logarithm of each objective is greater than the design's.
+    lead: (n, M) logarithms of the objectives relative to the design's.
     """
     rivals = lead.argmin(axis=0)
     exponent, promised = _program(lead[rivals])
@@ -158,12 +155,12 @@ def _widest_lead(lead: Floats) -> tuple[Floats, float]:
 
 
 def _program(lead: Floats) -> tuple[Floats, float]:
-    """As `_widest_lead`, of few designs."""
+    """As `_widest_lead`, for few designs."""
     require_room_for_scipy()
     from scipy.optimize import linprog  # noqa: PLC0415 - slow to import
 
     count, size = lead.shape
-    # Variables: exponents, and the least lead, which is to be maximized.
+    # Variables: exponents, and the least lead, which is maximized.
     solved = linprog(
         np.append(np.zeros(size), -1.0),
         A_ub=np.column_stack([-lead, np.ones(count)]),
@@ -173,15 +170,15 @@ def _program(lead: Floats) -> tuple[Floats, float]:
         bounds=[(0.0, 1.0)] * size + [(None, None)],
         options={"primal_feasibility_tolerance": _LP, "dual_feasibility_tolerance": _LP},
     )
-    found = np.asarray(solved.x, dtype=np.float64)
-    return np.clip(found[:size], 0.0, 1.0) + 0.0, float(found[size])
+    solution = np.asarray(solved.x, dtype=np.float64)
+    return np.clip(solution[:size], 0.0, 1.0) + 0.0, float(solution[size])
 
 
 def _best_rank(lead: Floats, exponent: Floats) -> Floats:
-    """Of these exponents, each objective alone and some that are drawn, those of the best rank."""
+    """The best-ranking of these exponents, each objective alone, and samples."""
     size = lead.shape[1]
     numbers = uniform(0, _DRAW, iteration=0, particle=0, count=_DRAWN * size)
-    # Uniform among all that sum to 1.
+    # Uniform on the simplex.
     drawn = -np.log1p(-numbers.reshape(_DRAWN, size))
     drawn /= drawn.sum(axis=1, keepdims=True)
     candidates = np.vstack([exponent, np.eye(size), drawn])
@@ -200,14 +197,14 @@ def _fit(
 ) -> PreferenceFit:
     """Rank a design by the fitness (r,) of all under a preference; others: rows not equal to it."""
     rival = int(others[fitness[others].argmin()]) if len(others) else row
-    known = rival != row and bool(np.isfinite(fitness[rival]))
+    candidates = rival != row and bool(np.isfinite(fitness[rival]))
     with np.errstate(all="ignore"):
         ratio = float((fitness[rival] / fitness[row]) ** (1.0 / sum(preference.exponent)))
     return PreferenceFit(
         preference=preference,
         biases_of=names,
         rank=int(np.count_nonzero(fitness[others] < fitness[row])) + 1,
-        rival=rival if known else None,
+        rival=rival if candidates else None,
         fitness=float(fitness[row]),
-        margin=ratio - 1.0 if known else None,
+        margin=ratio - 1.0 if candidates else None,
     )

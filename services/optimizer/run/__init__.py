@@ -1,1 +1,1 @@
-"""A job under way: the coordinator decides, the runner does."""
+"""Execution of jobs: decisions in the coordinator, effects in the runner"""

@@ -1,7 +1,7 @@
-"""What happens next in a job: a pure function of (state, event) -> (state, actions).
+"""Decisions about a running job: a pure function of (state, event) -> (state, actions).
 
-No I/O, clock or thread is in here; `services.optimizer.run.execution` executes the actions, in
-order, and answers the last of them with an event. An action that raises voids those after it.
+There is no I/O, clock or thread here; `services.optimizer.run.execution` executes the actions in
+order and answers the last one with an event. An action that raises cancels those after it.
 
 event                  in phase         actions                      phase after
 Claimed                start            [Record, Begin,] Evaluate    evaluating
@@ -20,16 +20,16 @@ PauseSeen              waiting          Release(queued)              ended
 StopRequested          any              Release(queued)              ended
 LeaseWasLost           any              -                            ended
 
-A new best is reevaluated where the search is in single precision: what is reported as best is
-judged in double. It is committed with its iteration; what is asked next does not depend on it.
+A new best of a single-precision search is reevaluated in double precision and committed with its
+iteration; the next ask does not depend on it.
 
-A pause that comes while walks are run is the store's to see: the commit then answers `paused`.
-The store likewise pauses a pausing job that is released as queued.
+The store handles a pause during evaluation: the commit then answers `paused`. It also pauses a
+pausing job that is released as queued.
 
-Workers that are away are waited for without end, after pauses that grow to a bound.
+Unreachable workers are waited for indefinitely, with pauses that grow up to a limit.
 
-A claim has changed if the numbers would depend on something else than those that the job has, and
-nobody has accepted that.
+A claim has changed if the provenance differs from that of the job's results, unless the user has
+accepted the change.
 """
 
 from __future__ import annotations
@@ -64,12 +64,12 @@ from gaitswarm.sim.provenance import Provenance
 
 @dataclass(frozen=True, slots=True)
 class Claimed:
-    """The job is ours.
+    """The job was claimed by this process.
 
     Attributes:
-        claim: With the job as it was when it was claimed.
-        provenance: What numbers that are computed from here depend on.
-        accepts_changes: Whether whoever runs the job goes on although that has changed.
+        claim: with the job as of the claim.
+        provenance: of results computed by this process.
+        accepts_changes: whether to continue under a changed provenance.
     """
 
     claim: Claim
@@ -82,9 +82,8 @@ class Evaluated:
     """The ask was evaluated.
 
     Attributes:
-        outcomes: One per case, of all designs.
-        seconds: How long it took [s].
-        keys: As in `CompletedIteration`.
+        seconds: duration [s].
+        keys: see `CompletedIteration`.
     """
 
     outcomes: tuple[Outcome, ...]
@@ -94,49 +93,33 @@ class Evaluated:
 
 @dataclass(frozen=True, slots=True)
 class EvaluationFailed:
-    """The simulation refused the request, or has a bug: trying again would not help.
-
-    Attributes:
-        reason: For people.
-    """
+    """The simulation rejected the request or has a bug: a retry would not help."""
 
     reason: str
 
 
 @dataclass(frozen=True, slots=True)
 class EvaluatorLost:
-    """The workers could not be reached: trying again may help.
-
-    Attributes:
-        reason: For people.
-    """
+    """The workers could not be reached: a retry may help."""
 
     reason: str
 
 
 @dataclass(frozen=True, slots=True)
 class Waited:
-    """The delay is over."""
+    """The pause is over."""
 
 
 @dataclass(frozen=True, slots=True)
 class Committed:
-    """The iteration is stored.
-
-    Attributes:
-        state: Of the job after it.
-    """
+    """The iteration is stored; the job is in `state` now."""
 
     state: JobState
 
 
 @dataclass(frozen=True, slots=True)
 class Extended:
-    """Nothing is stored: the job has another budget, under which what follows is to be asked.
-
-    Attributes:
-        job: With that budget.
-    """
+    """Nothing was stored: the job has another budget, under which to ask again."""
 
     job: Job
 
@@ -148,7 +131,7 @@ class PauseSeen:
 
 @dataclass(frozen=True, slots=True)
 class StopRequested:
-    """This process is to end; the job is to go on elsewhere."""
+    """This process is to end; another one continues the job."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,33 +155,24 @@ Event = (
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """Store what the next iterations depend on.
-
-    Attributes:
-        provenance: Of the process that runs the job.
-    """
+    """Store the provenance of the next iterations."""
 
     provenance: JobProvenance
 
 
 @dataclass(frozen=True, slots=True)
 class Begin:
-    """Store the first ask.
-
-    Attributes:
-        ask: What is to be evaluated first.
-    """
+    """Store the first ask."""
 
     ask: Ask
 
 
 @dataclass(frozen=True, slots=True)
 class Evaluate:
-    """Run the walks of the stored ask.
+    """Evaluate the stored ask.
 
     Attributes:
-        request: Its designs and cases.
-        keys: Of its designs, as `walk_keys` gives them.
+        keys: of its designs, see `walk_keys`.
     """
 
     request: EvaluationRequest
@@ -207,11 +181,10 @@ class Evaluate:
 
 @dataclass(frozen=True, slots=True)
 class Commit:
-    """Store the iteration and the ask that follows it.
+    """Store the iteration and the next ask.
 
     Attributes:
-        done: The iteration, with what it came to.
-        following: The next ask; None at the end of the budget.
+        following: None at the end of the budget.
     """
 
     done: CompletedIteration
@@ -220,11 +193,10 @@ class Commit:
 
 @dataclass(frozen=True, slots=True)
 class Wait:
-    """Let some time pass.
+    """Pause.
 
     Attributes:
-        seconds: How long [s].
-        reason: Why, for people.
+        seconds: [s].
     """
 
     seconds: float
@@ -236,8 +208,8 @@ class Release:
     """Give up the lease.
 
     Attributes:
-        state: In which the job is left.
-        error: Why it failed, for people; None if it did not.
+        state: in which the job is left.
+        error: cause of failure, for people; None if it did not fail.
     """
 
     state: JobState
@@ -248,7 +220,7 @@ Action = Record | Begin | Evaluate | Commit | Wait | Release
 
 
 def iteration_of(action: Action) -> int | None:
-    """Which iteration an action is about."""
+    """Return the iteration that an action concerns."""
     match action:
         case Begin(ask=ask):
             return ask.iteration
@@ -261,13 +233,13 @@ def iteration_of(action: Action) -> int | None:
 
 
 KEY_BYTES: Final = 16
-"""Of 10^12 different designs, two have the same key with a chance of 10^-15."""
+"""Among 10^12 different designs, two share a key with a probability of 10^-15."""
 
 
 def walk_keys(
     spec: Spec, provenance: Provenance, simulated: NDArray[np.float64]
 ) -> tuple[bytes, ...]:
-    """Name the outcomes of designs in all cases of a job.
+    """Return the cache keys of designs' outcomes in all cases of a job.
 
     A key is a digest of all that an outcome depends on: the simulated design by name, the spec
     without its `outcome_independent_fields`, and the provenance. It depends neither on the order of
@@ -276,14 +248,14 @@ def walk_keys(
     names = spec.design_space().names
     order = sorted(range(len(names)), key=names.__getitem__)
     document = spec.model_dump_json(exclude=set(spec.outcome_independent_fields))
-    walked = [document, provenance.model_dump_json(), [names[j] for j in order]]
-    common = blake2b(json.dumps(walked).encode(), digest_size=32).digest()
+    determinants = [document, provenance.model_dump_json(), [names[j] for j in order]]
+    common = blake2b(json.dumps(determinants).encode(), digest_size=32).digest()
     rows = np.ascontiguousarray(simulated[:, order])
     return tuple(blake2b(common + row.tobytes(), digest_size=KEY_BYTES).digest() for row in rows)
 
 
 class Phase(StrEnum):
-    """What the coordinator waits for."""
+    """The coordinator's expected event."""
 
     START = "start"
     EVALUATING = "evaluating"
@@ -295,24 +267,20 @@ class Phase(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Coordination:
-    """Where one run of one job is. Never changed, only replaced.
+    """State of one run of one job. Immutable.
 
-    The optimizer is not kept: it is made from the stored ask whenever it is needed, so that going
-    on and resuming are one and the same path.
+    The optimizer is not stored: it is created from the stored ask when needed, so that continuing
+    and resuming follow the same path.
 
     Attributes:
-        backoff: How to wait for workers.
-        phase: What is waited for.
-        job: As it was last read.
-        recordings: Recorded walks that its cases need.
-        provenance: What its numbers depend on.
-        answered: The last answered ask, where the claim brought no other to go on with.
-        best_fitness: Of the best committed design, in double precision; +inf if there is none.
-        evaluations: Designs judged in committed iterations.
-        ask: What is being evaluated.
-        done: The iteration, once its ask is evaluated and until it is committed.
-        following: Of a commit under way: the ask after it.
-        failures: Of the workers, in a row.
+        backoff: pauses while workers are unreachable.
+        job: as last read.
+        answered: the last answered ask, if the claim had no open one.
+        best_fitness: of the best committed design, in double precision; +inf if there is none.
+        evaluations: designs in committed iterations.
+        done: the evaluated iteration until it is committed.
+        following: the ask after the commit in progress.
+        failures: consecutive failures of the workers.
     """
 
     backoff: Backoff = field(default_factory=Backoff)
@@ -330,7 +298,7 @@ class Coordination:
 
 
 def handle(state: Coordination, event: Event) -> tuple[Coordination, tuple[Action, ...]]:
-    """Answer one event."""
+    """Return the next state and the actions for an event."""
     match state.phase, event:
         case Phase.ENDED, _:
             return state, ()
@@ -353,13 +321,13 @@ def _proceed(state: Coordination, event: Event) -> tuple[Coordination, tuple[Act
         ):
             return _answer(state, event)
         case Phase.WAITING, Waited():
-            return _walk(state)
+            return _evaluate_next(state)
         case Phase.COMMITTING, Committed(state=stored):
-            return _go_on(state, stored)
+            return _continue(state, stored)
         case Phase.COMMITTING, Extended(job=job):
-            return _ask_anew(state, job)
+            return _ask_again(state, job)
         case phase, _:
-            raise ValueError(f"{type(event).__name__} makes no sense while {phase}")
+            raise ValueError(f"unexpected {type(event).__name__} while {phase}")
 
 
 def _answer(
@@ -367,7 +335,7 @@ def _answer(
 ) -> tuple[Coordination, tuple[Action, ...]]:
     match event:
         case EvaluatorLost(reason=reason):
-            return _try_again(state, reason)
+            return _retry(state, reason)
         case EvaluationFailed(reason=reason):
             return _release(state, JobState.FAILED, reason)
         case Evaluated() if state.phase is Phase.REEVALUATING:
@@ -392,8 +360,8 @@ def _start(state: Coordination, event: Claimed) -> tuple[Coordination, tuple[Act
         evaluations=job.progress.evaluations,
         ask=claim.ask,
     )
-    is_known = job.provenance and refused is None and not job.accepts_changes
-    record = () if is_known else (Record(event.provenance),)
+    is_recorded = job.provenance and refused is None and not job.accepts_changes
+    record = () if is_recorded else (Record(event.provenance),)
     if claim.ask is not None:
         return state, (*record, _evaluate(state))
     state, actions = _begin(state, job)
@@ -401,11 +369,11 @@ def _start(state: Coordination, event: Claimed) -> tuple[Coordination, tuple[Act
 
 
 def _begin(state: Coordination, job: Job) -> tuple[Coordination, tuple[Action, ...]]:
-    """From the last answered ask if there is one, under the job's present budget."""
+    """Start from the last answered ask, if any, under the job's present budget."""
     if state.answered is not None:
-        came = state.answered.columns
-        told = job.spec.search_feedback(came.objectives, came.failed, came.fitness)
-        first = _following(job.spec, state.answered.ask, told)
+        columns = state.answered.columns
+        feedback = job.spec.search_feedback(columns.objectives, columns.failed, columns.fitness)
+        first = _following(job.spec, state.answered.ask, feedback)
     else:
         first = _ask(job.spec, job.spec.create_search())
     if first is None:
@@ -428,14 +396,14 @@ def _complete(state: Coordination, event: Evaluated) -> tuple[Coordination, tupl
     )
     state = replace(state, done=done, failures=0)
     if done.precision != "double" and fitness.min() < state.best_fitness:
-        return _walk(state)
+        return _evaluate_next(state)
     return _commit(state, done)
 
 
 def _reevaluated(state: Coordination, event: Evaluated) -> tuple[Coordination, tuple[Action, ...]]:
     job, _ = _current(state)
     done = _done(state)
-    anew = Reevaluation(
+    reevaluation = Reevaluation(
         particle=int(np.argmin(done.fitness)),
         objectives=np.concatenate([outcome.objectives for outcome in event.outcomes]),
         statuses=np.concatenate([outcome.statuses for outcome in event.outcomes]),
@@ -443,7 +411,8 @@ def _reevaluated(state: Coordination, event: Evaluated) -> tuple[Coordination, t
     )
     seconds = done.evaluate_seconds + event.seconds
     return _commit(
-        replace(state, failures=0), replace(done, reevaluation=anew, evaluate_seconds=seconds)
+        replace(state, failures=0),
+        replace(done, reevaluation=reevaluation, evaluate_seconds=seconds),
     )
 
 
@@ -451,39 +420,39 @@ def _commit(
     state: Coordination, done: CompletedIteration
 ) -> tuple[Coordination, tuple[Action, ...]]:
     job, ask = _current(state)
-    told = job.spec.search_feedback(*by_design(done.outcomes), done.fitness)
-    following = _following(job.spec, ask, told)
+    feedback = job.spec.search_feedback(*by_design(done.outcomes), done.fitness)
+    following = _following(job.spec, ask, feedback)
     state = replace(state, phase=Phase.COMMITTING, done=done, following=following)
     return state, (Commit(done, following),)
 
 
-def _ask_anew(state: Coordination, job: Job) -> tuple[Coordination, tuple[Action, ...]]:
+def _ask_again(state: Coordination, job: Job) -> tuple[Coordination, tuple[Action, ...]]:
     return _commit(replace(state, job=job), _done(state))
 
 
-def _go_on(state: Coordination, stored: JobState) -> tuple[Coordination, tuple[Action, ...]]:
+def _continue(state: Coordination, stored: JobState) -> tuple[Coordination, tuple[Action, ...]]:
     if stored is not JobState.RUNNING or state.following is None:
         return replace(state, phase=Phase.ENDED), ()
-    found = _done(state).best
+    best = _done(state).best
     state = replace(
         state,
-        best_fitness=min(state.best_fitness, math.inf if found is None else found[1]),
+        best_fitness=min(state.best_fitness, math.inf if best is None else best[1]),
         evaluations=state.evaluations + len(_done(state).fitness),
         ask=state.following,
         following=None,
         done=None,
     )
-    return _walk(state)
+    return _evaluate_next(state)
 
 
-def _walk(state: Coordination) -> tuple[Coordination, tuple[Action, ...]]:
-    """Have the ask evaluated, or what is done of it reevaluated."""
+def _evaluate_next(state: Coordination) -> tuple[Coordination, tuple[Action, ...]]:
+    """Evaluate the ask, or reevaluate the best design of the evaluated one."""
     if state.done is None:
         return replace(state, phase=Phase.EVALUATING), (_evaluate(state),)
     return replace(state, phase=Phase.REEVALUATING), (_reevaluate(state, state.done),)
 
 
-def _try_again(state: Coordination, reason: str) -> tuple[Coordination, tuple[Action, ...]]:
+def _retry(state: Coordination, reason: str) -> tuple[Coordination, tuple[Action, ...]]:
     failures = state.failures + 1
     wait = Wait(state.backoff.pause(failures), reason)
     return replace(state, phase=Phase.WAITING, failures=failures), (wait,)
@@ -497,43 +466,46 @@ def _release(
 
 def _evaluate(state: Coordination) -> Evaluate:
     job, ask = _current(state)
-    return _walks_of(state, job.spec, job.spec.design_space().designs(ask.positions))
+    return _evaluation_of(state, job.spec, job.spec.design_space().designs(ask.positions))
 
 
 def _reevaluate(state: Coordination, done: CompletedIteration) -> Evaluate:
-    """The best design of the iteration, in double precision."""
+    """Reevaluate the best design of the iteration in double precision."""
     job, _ = _current(state)
     best = int(np.argmin(done.fitness))
-    return _walks_of(state, job.spec.in_double(), done.designs[best : best + 1])
+    return _evaluation_of(state, job.spec.in_double(), done.designs[best : best + 1])
 
 
-def _walks_of(state: Coordination, spec: Spec, designs: NDArray[np.float64]) -> Evaluate:
+def _evaluation_of(state: Coordination, spec: Spec, designs: NDArray[np.float64]) -> Evaluate:
     job, ask = _current(state)
     if state.provenance is None:
         raise ValueError(f"no job was claimed, while {state.phase}")
-    asked = len(ask.positions)
+    designs_per_iteration = len(ask.positions)
     request = EvaluationRequest(
         job_id=job.id,
         cases=spec.cases(state.recordings),
         designs=spec.design_space().simulated(designs),
         provenance=state.provenance.simulation.model_copy(update={"precision": spec.precision}),
-        # As many as there are if the next ones are as large as this one.
+        # Assuming that the next iterations are as large as this one.
         iteration=ask.iteration,
-        iterations_left=max(0, -(-(spec.budget - state.evaluations - asked) // asked)),
+        iterations_left=max(
+            0,
+            -(-(spec.budget - state.evaluations - designs_per_iteration) // designs_per_iteration),
+        ),
     )
     return Evaluate(request, walk_keys(spec, request.provenance, request.designs))
 
 
-def _following(spec: Spec, ask: Ask, told: NDArray[np.float64]) -> Ask | None:
-    """The ask after one that was answered; None at the end of the budget."""
+def _following(spec: Spec, ask: Ask, feedback: NDArray[np.float64]) -> Ask | None:
+    """Return the ask after an answered one; None at the end of the budget."""
     optimizer = spec.create_search()
     optimizer.load(ask.state)
-    optimizer.tell(told)
+    optimizer.tell(feedback)
     return _ask(spec, optimizer)
 
 
 def _ask(spec: Spec, optimizer: Optimizer) -> Ask | None:
-    """At most what is left of the budget; None at its end."""
+    """Ask for at most the remaining budget; None at its end."""
     left = spec.budget - optimizer.evaluations
     if left <= 0:
         return None
@@ -542,7 +514,7 @@ def _ask(spec: Spec, optimizer: Optimizer) -> Ask | None:
 
 
 def _as_stored(state: dict[str, Any]) -> dict[str, Any]:
-    """What the store will give back: a state that JSON would change is found out at once."""
+    """The state as the store will return it; raises at once if JSON cannot represent it."""
     stored: dict[str, Any] = json.loads(json.dumps(state, allow_nan=False))
     return stored
 

@@ -1,4 +1,4 @@
-"""One job for the process that asked for it: run here, or followed where another one runs it."""
+"""Jobs run by the calling process, or followed while another process runs them"""
 
 from __future__ import annotations
 
@@ -13,38 +13,38 @@ from gaitswarm.services.optimizer.errors import GaitswarmError, LeaseLost
 from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration, Iteration
 from gaitswarm.services.optimizer.jobs.job import Claim, Job, JobState
 from gaitswarm.services.optimizer.run.evaluator import EvaluationStopped, Evaluator
-from gaitswarm.services.optimizer.run.execution import OnCommit, OnRetry, Surroundings, run_claim
+from gaitswarm.services.optimizer.run.execution import OnCommit, OnRetry, RunContext, run_claim
 from gaitswarm.services.optimizer.run.heartbeat import Heartbeat
 from gaitswarm.services.optimizer.run.runner import runner_name
 from gaitswarm.services.optimizer.store.port.base import Store
 
 EMBEDDED_LEASE_SECONDS: Final = 5.0
-"""Short, because a person waits for it when the process before was killed."""
+"""Short, because a user waits for its end when the previous process was killed."""
 
 OnFollow = Callable[[Iteration], None]
-"""Called for an iteration that another process has stored."""
+"""Called for an iteration stored by another process."""
 
 OnNews = Callable[[str], None]
-"""Called with a sentence for people when the job changes hands."""
+"""Called with a message for people when another process takes or releases the job."""
 
 _POLL_SECONDS: Final = 0.5
-"""Between looks at a job that another process holds."""
+"""Poll interval of a job that another process holds."""
 
 _GLANCE: Final = 0.05
-"""Between looks, meanwhile, whether it is to stop."""
+"""Poll interval of the stop event meanwhile."""
 
 _UNDER_WAY: Final = (JobState.QUEUED, JobState.RUNNING, JobState.PAUSING)
 
-_HELD: Final = "another process runs this job, or was killed while it did; following it"
+_HELD: Final = "another process runs this job, or was killed while running it; following it"
 
 _LOST: Final = (
-    f"this process was not heard of for {EMBEDDED_LEASE_SECONDS:g} s, and another one has taken the"
-    " job over"
+    f"this process lost its lease after {EMBEDDED_LEASE_SECONDS:g} s without contact, and another"
+    " process has taken the job over"
 )
 
 _TAKEN: Final = f"{_LOST}; following it there"
 
-_FREE: Final = "no other process holds the job any more; it goes on here"
+_FREE: Final = "no other process holds the job now; continuing it here"
 
 
 def run_embedded(
@@ -59,12 +59,12 @@ def run_embedded(
     stop: threading.Event | None = None,
     accepts_changes: bool = False,
     cache: bool = False,
-    known: int | None = None,
+    followed_iterations: int | None = None,
 ) -> Job:
-    """Run one job here and now, until it ends or is paused; nothing is done if it has or is.
+    """Run one job until it ends or is paused; return immediately if it has.
 
-    While another process holds the job, it is followed instead. As soon as that one gives it back,
-    or is not heard of for the time of its lease, the job goes on here.
+    While another process holds the job, follow it. Once that process releases the job or its lease
+    expires, continue the job here.
     """
     claim = None if isinstance(job, str) else job
     begun = store.job(job) if isinstance(job, str) else job.job
@@ -80,14 +80,15 @@ def run_embedded(
         accepts_changes,
         cache,
         runner=runner_name() if claim is None else claim.runner,
-        seen=(begun.progress.iterations if known is None else known) - 1,
+        seen=(begun.progress.iterations if followed_iterations is None else followed_iterations)
+        - 1,
     )
     return run.to_the_end(claim)
 
 
 @dataclass(slots=True)
 class _EmbeddedRun:
-    """job: as it was last read; seen: index of the last iteration that a callback was told of."""
+    """job: as last read; seen: index of the last iteration reported to a callback."""
 
     store: Store
     evaluator: Evaluator | Callable[[], Evaluator]
@@ -120,7 +121,7 @@ class _EmbeddedRun:
                 self.store.release(claim, JobState.QUEUED)
             self.job = self.store.job(self.job.id)
         if self.job.state.terminal and self.seen + 1 < self.job.progress.iterations:
-            # It was lost and ended elsewhere before anybody here looked.
+            # The lease was lost, and the job ended elsewhere before the next poll.
             self.on_news(_LOST)
             self._catch_up()
         if self.job.state.terminal:
@@ -136,7 +137,7 @@ class _EmbeddedRun:
         except EvaluationStopped:
             self.job = self.store.job(self.job.id)
             return
-        around = Surroundings(
+        around = RunContext(
             self.store,
             evaluator,
             lease_seconds=EMBEDDED_LEASE_SECONDS,
@@ -146,11 +147,11 @@ class _EmbeddedRun:
             cache=self.cache,
         )
         self.job = run_claim(claim, around, self.stop)
-        # Whoever has it now has taken it from here.
+        # A new holder has taken the job from this process.
         self.news, self.following = _TAKEN, False
 
     def _opened(self, claim: Claim) -> Evaluator:
-        """The evaluator. The job is kept while it is opened, and queued if it cannot be."""
+        """Open the evaluator, keeping the lease meanwhile; queue the job on failure."""
         if not callable(self.evaluator):
             return self.evaluator
         try:
@@ -166,20 +167,20 @@ class _EmbeddedRun:
         self.on_commit(done, state)
 
     def _follow(self) -> None:
-        # The job first: whatever it counts as committed is then among the iterations.
+        # The job first: the iterations read next include all that it counts.
         self.job = self.store.job(self.job.id)
         if self.job.state in _UNDER_WAY and not self.following:
             self.on_news(self.news)
             self.following = True
         self._catch_up()
         if self.job.state in _UNDER_WAY:
-            # `stop.wait` would hold the lock that a signal's handler takes when it sets `stop`.
+            # `stop.wait` would hold the lock that a signal handler takes to set `stop`.
             until = time.monotonic() + _POLL_SECONDS
             while time.monotonic() < until and not self.stop.is_set():
                 time.sleep(_GLANCE)
 
     def _catch_up(self) -> None:
-        """Tell of the iterations that another process has stored meanwhile."""
+        """Report the iterations that another process has stored meanwhile."""
         more = True
         while more:
             page = self.store.iterations(self.job.id, after=self.seen)

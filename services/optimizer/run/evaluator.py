@@ -1,4 +1,4 @@
-"""The port through which walks are run, wherever they run."""
+"""The evaluator port: simulations, independent of where they run"""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from gaitswarm.sim.provenance import Provenance
 
 @dataclass(frozen=True, slots=True)
 class TaskReport:
-    """Some of a request's walks, as a worker ran them.
+    """A task of a request, as run by a worker.
 
     Attributes:
-        walks: Their number.
-        seconds: From when a worker was given them to its answer [s].
-        compute_seconds: Of these, how long the worker computed [s].
-        host: Name of the worker's machine; "" if it did not answer.
-        error: Why there is no result, for people; None if there is one.
+        walks: number of simulations.
+        seconds: from the dispatch to the answer [s].
+        compute_seconds: computing time of the worker [s].
+        host: name of the worker's machine; "" without an answer.
+        error: cause of failure, for people; None for a result.
     """
 
     walks: int
@@ -41,14 +41,13 @@ class EvaluationRequest:
     """One iteration of one job: every design in every case.
 
     Attributes:
-        job_id: Of the job; jobs share the workers by their weights.
-        cases: What every design is put to.
+        job_id: jobs share the workers by their weights.
+        cases: evaluated for every design.
         designs: (n, v) float64.
-        provenance: That of the process that asks; the outcomes are to have it.
-        iterations_left: Iterations of the job that follow this one, as far as is known.
-        iteration: Index of the iteration, from 0.
-        on_task: Is told of every task that ends; it must return at once.
-        weight: Of the job, which gets that many times the share of the workers of one of weight 1.
+        provenance: of this process; the workers must match it.
+        iterations_left: estimated number of later iterations.
+        on_task: called after every task; must return at once.
+        weight: share of the workers relative to a job of weight 1.
     """
 
     job_id: str
@@ -62,48 +61,47 @@ class EvaluationRequest:
 
 
 class Evaluator(Protocol):
-    """Runs walks. Implementations are thread-safe: several jobs may evaluate at once.
+    """Evaluates designs. Thread-safe: several jobs may evaluate concurrently.
 
-    Results depend on the request alone, bit for bit; not on where, in what order, in what
-    chunks, or how often a walk was run. Arrays are neither kept nor changed.
+    Results depend on the request alone, bit for bit; not on place, order, chunks or retries of
+    simulations. Arrays are neither kept nor modified.
     """
 
     @property
     def slots(self) -> int:
-        """Number of walks' chunks that run at the same time."""
+        """Number of tasks that run concurrently."""
 
     def evaluate(
         self, request: EvaluationRequest, should_stop: Callable[[], bool]
     ) -> tuple[Outcome, ...]:
-        """Run every design in every case.
+        """Evaluate every design in every case.
 
         Args:
-            request: What is to be run.
+            request: Designs and cases.
             should_stop: Polled at least once a second, from any thread, while kernels are built,
-                workers connected and walks run. When true, the caller is let go and work under way
-                is dropped.
+                workers connected and simulations run. When true, work in progress is dropped.
 
         Returns:
             One outcome per case, in the request's order, of n designs each, in index order.
 
         Raises:
-            EvaluationStopped: `should_stop` said so.
+            EvaluationStopped: `should_stop` returned true.
             EvaluatorUnavailable: The workers cannot be reached after retries.
-            ProvenanceChanged: One of them does not compute what the request expects.
-            Exception: Errors of the simulation itself (bugs, bad input) come through as they are.
+            ProvenanceChanged: A worker's provenance differs from the request's.
+            Exception: Errors of the simulation itself (bugs, bad input) are raised unchanged.
         """
 
     def close(self) -> None:
-        """Release what was started. Idempotent."""
+        """Release all resources. Idempotent."""
 
 
 @runtime_checkable
 class Watched(Protocol):
-    """An evaluator that knows whether it can work."""
+    """An evaluator that reports its health."""
 
     def trouble(self) -> str | None:
-        """Why walks cannot be run now, for people; None if they can. Answers at once."""
+        """Return why designs cannot be evaluated now; None if they can. Returns at once."""
 
 
 class EvaluationStopped(Exception):
-    """`should_stop` said so."""
+    """`should_stop` returned true."""

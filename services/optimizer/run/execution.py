@@ -1,7 +1,7 @@
-"""Runs one claimed job: a shell around the coordinator.
+"""Execution of one claimed job: a shell context the coordinator
 
-The coordinator's actions are executed with store, evaluator and heartbeat. What is missing of the
-machine or its services is waited for, however long that takes; only the job's own faults fail it.
+The coordinator's actions are executed with store, evaluator and heartbeat. Missing resources of the
+machine or its services are waited for indefinitely; only the job's own faults fail it.
 """
 
 from __future__ import annotations
@@ -66,109 +66,106 @@ from gaitswarm.services.optimizer.run.outage import Backoff, Outage, is_infrastr
 from gaitswarm.services.optimizer.store.port.base import Store
 from gaitswarm.sim.outcome import Outcome, Status
 
-_NEW: Final = -1
+_CACHED: Final = -1
 
 Keys = tuple[bytes | None, ...]
 
 _log = logging.getLogger(__name__)
 
 
-def evaluate_unknown(
+def evaluate_uncached(
     evaluator: Evaluator,
     store: Store | None,
     request: EvaluationRequest,
     keys: Sequence[bytes],
     should_stop: Callable[[], bool],
 ) -> tuple[tuple[Outcome, ...], Keys]:
-    """Evaluate a request, but for what the store knows and what occurs in it twice.
+    """Evaluate a request without its cached and duplicate designs.
 
-    The outcomes are those of evaluating all of it, to the bit, because a walk's outcome depends on
-    design and case alone. A store that does not answer knows nothing.
+    The outcomes equal those of a full evaluation, bit for bit, because an outcome depends on design
+    and case alone. An unavailable store has nothing cached.
     """
     if store is None or not keys:
         return evaluator.evaluate(request, should_stop), tuple(keys)
     first = {key: index for index, key in reversed(list(enumerate(keys)))}
-    known = _known(store, request, tuple(first))
-    walked = sorted(index for key, index in first.items() if key not in known)
-    if len(walked) == len(keys):
+    cached = _cached(store, request, tuple(first))
+    new = sorted(index for key, index in first.items() if key not in cached)
+    if len(new) == len(keys):
         return evaluator.evaluate(request, should_stop), tuple(keys)
-    found: tuple[Outcome, ...] | None = None
-    if walked:
-        found = evaluator.evaluate(replace(request, designs=request.designs[walked]), should_stop)
-    row_of = {index: row for row, index in enumerate(walked)}
-    rows = np.array([row_of.get(first[key], _NEW) for key in keys])
+    evaluated: tuple[Outcome, ...] | None = None
+    if new:
+        evaluated = evaluator.evaluate(replace(request, designs=request.designs[new]), should_stop)
+    row_of = {index: row for row, index in enumerate(new)}
+    rows = np.array([row_of.get(first[key], _CACHED) for key in keys])
     outcomes = []
     for number, case in enumerate(request.cases):
         objectives = np.empty((len(keys), len(case.objectives)))
         statuses = np.empty(len(keys), dtype=np.uint8)
-        if found is not None:
-            here = rows != _NEW
-            objectives[here] = found[number].objectives[rows[here]]
-            statuses[here] = found[number].statuses[rows[here]]
-        for index in np.flatnonzero(rows == _NEW).tolist():
-            earlier = known[keys[index]]
-            objectives[index] = earlier.objectives[number]
-            statuses[index] = earlier.statuses[number]
+        if evaluated is not None:
+            here = rows != _CACHED
+            objectives[here] = evaluated[number].objectives[rows[here]]
+            statuses[here] = evaluated[number].statuses[rows[here]]
+        for index in np.flatnonzero(rows == _CACHED).tolist():
+            outcome = cached[keys[index]]
+            objectives[index] = outcome.objectives[number]
+            statuses[index] = outcome.statuses[number]
         outcomes.append(Outcome(objectives, statuses))
-    new = set(walked)
-    return tuple(outcomes), tuple(key if i in new else None for i, key in enumerate(keys))
+    return tuple(outcomes), tuple(key if i in row_of else None for i, key in enumerate(keys))
 
 
-def _known(
+def _cached(
     store: Store, request: EvaluationRequest, keys: tuple[bytes, ...]
 ) -> dict[bytes, CachedOutcome]:
-    """What the store has of these keys, as far as it is fit for use."""
+    """Return the usable cached outcomes of keys."""
     try:
-        found = store.known(keys)
+        stored = store.known(keys)
     except StoreUnavailable as error:
-        _log.warning("job %s: all is walked anew: %s", request.job_id, error)
+        _log.warning("job %s: simulating all designs without the cache: %s", request.job_id, error)
         return {}
     widths = {len(case.objectives) for case in request.cases}
     shapes = {(len(request.cases), width) for width in widths}
     return {
-        key: known
-        for key, known in found.items()
-        if known.objectives.shape in shapes and _complete(known)
+        key: outcome
+        for key, outcome in stored.items()
+        if outcome.objectives.shape in shapes and _complete(outcome)
     }
 
 
-def _complete(known: CachedOutcome) -> bool:
-    """Not so where a number was stored as null, as infinities are."""
-    ok = known.statuses == Status.OK
-    return bool(np.isfinite(known.objectives[ok]).all())
+def _complete(outcome: CachedOutcome) -> bool:
+    """False if a number was stored as null, as infinities are."""
+    ok = outcome.statuses == Status.OK
+    return bool(np.isfinite(outcome.objectives[ok]).all())
 
 
 OnCommit = Callable[[CompletedIteration, JobState], None]
-"""Called after an iteration is stored, in the thread that runs the job."""
+"""Called after an iteration is stored, in the job's thread."""
 
 OnRetry = Callable[[float, str], None]
-"""Called before a wait for the workers: seconds to wait, and why."""
+"""Called before waiting for the workers, with the pause [s] and the reason."""
 
 _GLANCE: Final = 0.1
-"""Seconds between looks at what has changed, while waiting."""
+"""Poll interval while waiting [s]."""
 
 _STORE: Final = Backoff(first=0.1, longest=5.0)
-"""Pauses while the store does not answer; an evaluated iteration may wait to be stored."""
+"""Pauses while the store does not answer; short, as an evaluated iteration may be waiting."""
 
 T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
-class Surroundings:
-    """What a run needs beside its job.
+class RunContext:
+    """Dependencies of a run besides its job.
 
     Attributes:
-        store: Where the job is kept.
-        evaluator: Where its walks run.
-        lease_seconds: After so long without a word from here another runner takes the job over [s].
-        backoff: How to wait for workers that cannot be reached.
-        on_commit: Called after an iteration that was stored.
-        on_retry: Called before a wait for the workers.
-        provenance: Of what is computed from here for a spec.
-        accepts_changes: Whether the job goes on although that has changed.
-        cache: Whether a design is walked only if no job has walked it before.
-        clock: Monotonic time [s]; replaced in tests.
-        sleep: Lets seconds pass; replaced in tests.
+        lease_seconds: time without renewal after which another runner may take the job over [s].
+        backoff: pauses while workers are unreachable.
+        on_commit: called after a commit.
+        on_retry: called before waiting for the workers.
+        provenance: provenance of what this process computes for a spec.
+        accepts_changes: whether to continue under a changed provenance.
+        cache: whether to reuse outcomes of other jobs.
+        clock: monotonic time [s], injectable in tests.
+        sleep: injectable in tests.
     """
 
     store: Store
@@ -186,16 +183,15 @@ class Surroundings:
 
 def run_claim(
     claim: Claim,
-    around: Surroundings,
+    context: RunContext,
     stop: threading.Event | None = None,
     drain: threading.Event | None = None,
 ) -> Job:
-    """Run a claimed job until it ends, is paused, or is no longer ours.
+    """Run a claimed job until it ends, pauses or the lease is lost.
 
-    Workers or a store that are away are waited for, however long that takes, as long as nobody else
-    has taken the job over.
+    Unreachable workers or an unavailable store are waited for as long as the lease holds.
     """
-    run = _Run.of(claim, around, stop or threading.Event(), drain or threading.Event())
+    run = _Run.of(claim, context, stop or threading.Event(), drain or threading.Event())
     try:
         with log_context(job=claim.job.id), run.heartbeat:
             state, actions = run.begin()
@@ -205,9 +201,9 @@ def run_claim(
         raise
     except BaseException:
         with suppress(GaitswarmError):
-            around.store.release(claim, JobState.QUEUED)
+            context.store.release(claim, JobState.QUEUED)
         raise
-    return around.store.job(claim.job.id)
+    return context.store.job(claim.job.id)
 
 
 Decision = tuple[Coordination, tuple[Action, ...]]
@@ -221,55 +217,55 @@ def _fail(state: Coordination, error: Exception, what: str) -> Decision:
 
 @dataclass(slots=True)
 class _Run:
-    """claim: that of the heartbeat, its job as it was when it was last read.
+    """claim: that of the heartbeat, with the job as last read.
 
-    workers, memory: what is known of the evaluator and of the store.
+    worker_outage, store_outage: outages of the evaluator and of the store.
     """
 
     claim: Claim
-    around: Surroundings
+    context: RunContext
     heartbeat: Heartbeat
     stop: threading.Event
     drain: threading.Event
-    workers: Outage
-    memory: Outage
+    worker_outage: Outage
+    store_outage: Outage
 
     @classmethod
     def of(
-        cls, claim: Claim, around: Surroundings, stop: threading.Event, drain: threading.Event
+        cls, claim: Claim, context: RunContext, stop: threading.Event, drain: threading.Event
     ) -> _Run:
-        workers, memory = Outage(around.clock), Outage(around.clock)
+        worker_outage, store_outage = Outage(context.clock), Outage(context.clock)
         heartbeat = Heartbeat(
-            around.store,
+            context.store,
             claim,
-            lease_seconds=around.lease_seconds,
-            waiting=lambda: workers.reason,
-            outage=memory,
+            lease_seconds=context.lease_seconds,
+            waiting=lambda: worker_outage.reason,
+            outage=store_outage,
         )
-        return cls(claim, around, heartbeat, stop, drain, workers, memory)
+        return cls(claim, context, heartbeat, stop, drain, worker_outage, store_outage)
 
     def begin(self) -> Decision:
-        """What to do first; a job whose robot cannot be read fails, as in `decide`."""
-        state = Coordination(backoff=self.around.backoff)
+        """Decide on the first actions; a job whose robot cannot be read fails."""
+        state = Coordination(backoff=self.context.backoff)
         try:
-            here = self._in_time(lambda: self.around.provenance(self.claim.job.spec))
+            here = self._computed(lambda: self.context.provenance(self.claim.job.spec))
         except EvaluationStopped:
             return handle(state, self._stopped())
         except Exception as error:  # noqa: BLE001
-            return _fail(state, error, f"job {self.claim.job.id}: its provenance cannot be told")
-        return self.decide(state, Claimed(self.claim, here, self.around.accepts_changes))
+            return _fail(state, error, f"job {self.claim.job.id}: cannot determine its provenance")
+        return self.decide(state, Claimed(self.claim, here, self.context.accepts_changes))
 
     def decide(self, state: Coordination, event: Event) -> Decision:
-        """As `handle`; a job that it cannot handle fails, or it would be claimed over and over."""
+        """As `handle`, but fail a job that raises, as it would be claimed again and again."""
         try:
-            return self._in_time(lambda: handle(state, event))
+            return self._computed(lambda: handle(state, event))
         except EvaluationStopped:
             return handle(state, self._stopped())
         except Exception as error:  # noqa: BLE001
-            return _fail(state, error, f"a job cannot go on after {type(event).__name__}")
+            return _fail(state, error, f"a job cannot continue after {type(event).__name__}")
 
     def execute(self, actions: tuple[Action, ...]) -> Event:
-        """Do them in order; the event that answers the last, or the one that broke off."""
+        """Execute actions in order; return the event that answers the last, or an interruption."""
         try:
             return self._do_all(actions)
         except LeaseLost:
@@ -287,7 +283,7 @@ class _Run:
                 with log_context(iteration=iteration_of(action)):
                     answer = self._do(action)
         except BudgetChanged:
-            job = self._stored(lambda: self.around.store.job(self.claim.job.id))
+            job = self._stored(lambda: self.context.store.job(self.claim.job.id))
             self.claim = replace(self.claim, job=job)
             return Extended(job)
         if answer is None:
@@ -297,35 +293,35 @@ class _Run:
     def _do(self, action: Action) -> Event | None:
         match action:
             case Record(provenance=provenance):
-                self._stored(lambda: self.around.store.record_provenance(self.claim, provenance))
+                self._stored(lambda: self.context.store.record_provenance(self.claim, provenance))
                 return None
             case Begin(ask=ask):
-                self._stored(lambda: self.around.store.begin(self.claim, ask))
+                self._stored(lambda: self.context.store.begin(self.claim, ask))
                 return None
             case Evaluate(request=request, keys=keys):
                 return self._evaluate(request, keys)
             case Commit(done=done, following=following):
-                state = self._stored(lambda: self.around.store.commit(self.claim, done, following))
-                if self.around.on_commit is not None:
-                    self.around.on_commit(done, state)
+                state = self._stored(lambda: self.context.store.commit(self.claim, done, following))
+                if self.context.on_commit is not None:
+                    self.context.on_commit(done, state)
                 if state is JobState.RUNNING and self.drain.is_set():
                     return StopRequested()
                 return Committed(state)
             case Wait(seconds=seconds, reason=reason):
                 return self._wait(seconds, reason)
             case Release(state=state, error=error):
-                self._stored(lambda: self.around.store.release(self.claim, state, error=error))
+                self._stored(lambda: self.context.store.release(self.claim, state, error=error))
                 return LeaseWasLost()
 
     def _evaluate(self, request: EvaluationRequest, keys: tuple[bytes, ...]) -> Event:
         if self._should_stop():
             raise EvaluationStopped
-        self.workers.attempted()
-        begun = self.around.clock()
+        self.worker_outage.attempted()
+        begun = self.context.clock()
         try:
-            outcomes, walked = evaluate_unknown(
-                self.around.evaluator,
-                self.around.store if self.around.cache else None,
+            outcomes, walked = evaluate_uncached(
+                self.context.evaluator,
+                self.context.store if self.context.cache else None,
                 replace(request, weight=weight(self.heartbeat.priority)),
                 keys,
                 self._should_stop,
@@ -340,14 +336,14 @@ class _Run:
                 return EvaluatorLost(_in_words(error))
             _log.exception("job %s: the evaluation failed", request.job_id)
             return EvaluationFailed(f"the simulation failed: {type(error).__name__}: {error}")
-        self._over(self.workers)
-        return Evaluated(outcomes, self.around.clock() - begun, walked)
+        self._note_success(self.worker_outage)
+        return Evaluated(outcomes, self.context.clock() - begun, walked)
 
     def _wait(self, seconds: float, reason: str) -> Event:
-        self._away(self.workers, reason)
-        if self.around.on_retry is not None:
-            self.around.on_retry(seconds, reason)
-        for _ in self._glances(seconds):
+        self._note_failure(self.worker_outage, reason)
+        if self.context.on_retry is not None:
+            self.context.on_retry(seconds, reason)
+        for _ in self._ticks(seconds):
             if self.heartbeat.state is JobState.PAUSING:
                 return PauseSeen()
             if self.drain.is_set():
@@ -355,10 +351,10 @@ class _Run:
         return Waited()
 
     def _stored(self, access: Callable[[], T]) -> T:
-        """What the store answers, however long it takes: an evaluated iteration is expensive.
+        """Access the store, retrying indefinitely: an evaluated iteration is expensive.
 
-        Raises EvaluationStopped when the process is to end, or another one has the job, and
-        StoreReplaced, which waiting does not end.
+        Raises EvaluationStopped if the process is to end or the lease is lost, and StoreReplaced,
+        which retries cannot resolve.
         """
         failures = 0
         while True:
@@ -369,16 +365,16 @@ class _Run:
             except Exception as error:
                 if not is_infrastructure(error):
                     raise
-                self._away(self.memory, _in_words(error))
+                self._note_failure(self.store_outage, _in_words(error))
             else:
-                self._over(self.memory)
+                self._note_success(self.store_outage)
                 return answer
             failures += 1
-            for _ in self._glances(_STORE.pause(failures)):
+            for _ in self._ticks(_STORE.pause(failures)):
                 pass
 
-    def _in_time(self, compute: Callable[[], T]) -> T:
-        """What is computed here, as soon as the machine has what that takes.
+    def _computed(self, compute: Callable[[], T]) -> T:
+        """Compute, retrying while the machine lacks resources.
 
         Raises EvaluationStopped as `_stored`, and when the job is to pause.
         """
@@ -389,35 +385,39 @@ class _Run:
             except Exception as error:
                 if not is_infrastructure(error):
                     raise
-                self._away(self.workers, _in_words(error))
+                self._note_failure(self.worker_outage, _in_words(error))
             else:
                 return answer
             failures += 1
-            for _ in self._glances(self.around.backoff.pause(failures)):
+            for _ in self._ticks(self.context.backoff.pause(failures)):
                 if self.heartbeat.state is JobState.PAUSING or self.drain.is_set():
                     raise EvaluationStopped
 
-    def _away(self, outage: Outage, reason: str) -> None:
-        """Take note, in one line of the log for each outage."""
+    def _note_failure(self, outage: Outage, reason: str) -> None:
+        """Log the first failure of each outage."""
         if outage.failed(reason):
-            _log.warning("job %s waits, and goes on by itself: %s", self.claim.job.id, reason)
+            _log.warning(
+                "job %s is waiting and continues once this is resolved: %s",
+                self.claim.job.id,
+                reason,
+            )
 
-    def _over(self, outage: Outage) -> None:
+    def _note_success(self, outage: Outage) -> None:
         seconds = outage.ended()
         if seconds is not None:
-            _log.info("job %s goes on after %.0f s", self.claim.job.id, seconds)
+            _log.info("job %s continues after %.0f s", self.claim.job.id, seconds)
 
-    def _glances(self, seconds: float) -> Iterator[None]:
-        """Moments at which to look at what has changed, while so many seconds pass.
+    def _ticks(self, seconds: float) -> Iterator[None]:
+        """Yield at intervals until the time has passed [s].
 
-        Raises EvaluationStopped if what has changed is that nothing more is to be done.
+        Raises EvaluationStopped when the run is to stop.
         """
-        until = self.around.clock() + seconds
-        while (left := until - self.around.clock()) > 0.0:
+        until = self.context.clock() + seconds
+        while (left := until - self.context.clock()) > 0.0:
             if self._should_stop():
                 raise EvaluationStopped
             yield
-            self.around.sleep(min(left, _GLANCE))
+            self.context.sleep(min(left, _GLANCE))
 
     def _should_stop(self) -> bool:
         return self.stop.is_set() or self.heartbeat.lost

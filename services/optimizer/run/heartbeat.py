@@ -1,4 +1,4 @@
-"""Keeps a lease alive while its job runs, and sees what users have asked of the job meanwhile."""
+"""Heartbeats: renewal of a lease, and detection of users' commands"""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from gaitswarm.services.optimizer.store.port.base import Store
 
 _BEATS_PER_LEASE: Final = 3
 _LONGEST_INTERVAL: Final = 1.0
-"""Seconds after which a cancellation or a pause is seen at the latest."""
+"""Longest time to notice a cancellation or a pause [s]."""
 
 _log = logging.getLogger(__name__)
 
 
 class Heartbeat:
-    """Renews a claim from a thread of its own, from entering to leaving the `with` block.
+    """Renews a claim from its own thread, inside the `with` block.
 
-    A store that does not answer is tried again, however long that takes: it refuses whatever is
-    written under a claim that another runner has taken over meanwhile.
+    An unavailable store is retried indefinitely: it rejects writes under a claim that another
+    runner has taken over meanwhile.
     """
 
     def __init__(
@@ -53,17 +53,17 @@ class Heartbeat:
 
     @property
     def lost(self) -> bool:
-        """The job was cancelled, or is another runner's."""
+        """Whether the job was cancelled, or belongs to another runner."""
         return self._lost.is_set()
 
     @property
     def state(self) -> JobState:
-        """State of the job at the last beat."""
+        """The job's state at the last beat."""
         return self._state
 
     @property
     def priority(self) -> int:
-        """Priority of the job at the last beat."""
+        """The job's priority at the last beat."""
         return self._priority
 
     def __enter__(self) -> Self:
@@ -92,7 +92,7 @@ class Heartbeat:
                 )
                 self._state, self._priority = renewal.state, renewal.priority
             except LeaseLost as error:
-                # A commit that ends the job gives up the lease between two beats.
+                # A commit that ends the job releases the lease between two beats.
                 if not self._ended.is_set():
                     _log.info("job %s: %s", self._claim.job.id, error)
                 self._lost.set()
@@ -104,7 +104,7 @@ class Heartbeat:
                 if self._outage.failed(str(error)):
                     _log.warning("job %s: no heartbeat: %s", self._claim.job.id, error)
             else:
-                # A beat that was sent before another access failed says nothing of that.
+                # A beat sent before another access failed does not end its outage.
                 if failed:
                     self._outage.ended()
                 failed = False

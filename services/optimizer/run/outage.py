@@ -1,4 +1,4 @@
-"""Outages: which errors are of the machine, how long to wait, what to say."""
+"""Outages: classification of errors, and backoff"""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Final
 from gaitswarm.services.optimizer.errors import Unavailable
 from gaitswarm.sim.errors import KernelBuildError
 
-_OF_THE_MACHINE: Final = frozenset(
+_TRANSIENT_ERRNOS: Final = frozenset(
     {
         # Space and files.
         *(errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.ESTALE),
@@ -25,22 +25,21 @@ _OF_THE_MACHINE: Final = frozenset(
         *(errno.EHOSTUNREACH, errno.ENETUNREACH),
     }
 )
-"""Numbers of system errors that end when somebody makes room, or a service is back."""
+"""System errors that end when resources or a service become available again."""
 
-_SAID_BY_COMPILERS: Final = tuple(
+_COMPILER_MESSAGES: Final = tuple(
     os.strerror(number)
     for number in (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EAGAIN, errno.EMFILE)
 )
 
-_SAID_BY_LOADERS: Final = (
+_LOADER_MESSAGES: Final = (
     "failed to map segment",
     *(os.strerror(number) for number in (errno.ENOMEM, errno.EMFILE, errno.ENFILE, errno.EIO)),
 )
-"""In the ImportError of a compiled module that the system could not load."""
+"""Texts of the ImportError of a compiled module that the system could not load."""
 
-_TAKEN_UP: Final = 5.0
-"""Seconds after which an attempt counts as one that has reached what was away: those that do not
-fail sooner."""
+_CONNECTED_SECONDS: Final = 5.0
+"""Duration after which an attempt counts as connected [s]; failures are faster."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,10 +47,9 @@ class Backoff:
     """Exponential backoff: `first` [s], doubled at each attempt up to `longest` [s].
 
     Attributes:
-        first: The first delay [s].
-        longest: No delay is longer [s].
-        attempts: How often a failure is answered by another try before giving up. A job never
-            gives up.
+        first: first pause [s].
+        longest: upper bound on pauses [s].
+        attempts: number of retries of `delay`. Jobs retry indefinitely.
     """
 
     first: float = 1.0
@@ -59,40 +57,34 @@ class Backoff:
     attempts: int = 8
 
     def pause(self, failures: int) -> float:
-        """How long to wait before the next attempt, however many there were.
+        """Return the pause before the next attempt [s].
 
         Args:
             failures: In a row, so far (>= 1).
-
-        Returns:
-            Seconds to wait.
         """
-        # The exponent is bounded, so that a long row of attempts cannot overflow.
+        # The exponent is bounded, so that many attempts cannot overflow.
         return float(min(self.first * 2.0 ** min(failures - 1, 60), self.longest))
 
     def delay(self, failures: int) -> float | None:
-        """How long to wait before the next attempt, if there is to be one.
+        """Return the pause before the next attempt [s]; None to give up.
 
         Args:
             failures: In a row, so far (>= 1).
-
-        Returns:
-            Seconds to wait; None: give up.
         """
         return None if failures > self.attempts else self.pause(failures)
 
 
 def is_infrastructure(error: BaseException) -> bool:
-    """Whether an error is of the machine, its memory, disks, processes or services.
+    """Return whether an error is caused by the machine, its resources or services.
 
-    Such an error says nothing of the job: the same work may succeed later, so it is tried again.
-    Any other is the job's own fault or a bug, and would come again.
+    Such an error is independent of the job, so the work is retried. Any other error is the job's
+    own fault or a bug, and would recur.
     """
-    return any(_is_of_the_machine(link) for link in _causes(error)) or (
+    return any(_is_transient(link) for link in _causes(error)) or (
         isinstance(error, KernelBuildError)
         and (
             any(isinstance(link, OSError) for link in _causes(error))
-            or any(phrase in str(error) for phrase in _SAID_BY_COMPILERS)
+            or any(phrase in str(error) for phrase in _COMPILER_MESSAGES)
         )
     )
 
@@ -103,20 +95,20 @@ def _causes(error: BaseException | None) -> Iterator[BaseException]:
         error = error.__cause__
 
 
-def _is_of_the_machine(error: BaseException) -> bool:
+def _is_transient(error: BaseException) -> bool:
     if isinstance(error, OSError):
-        return error.errno in _OF_THE_MACHINE
+        return error.errno in _TRANSIENT_ERRNOS
     if isinstance(error, ImportError):
-        return any(phrase in str(error) for phrase in _SAID_BY_LOADERS)
-    # What `Thread.start` raises where the system refuses another thread.
+        return any(phrase in str(error) for phrase in _LOADER_MESSAGES)
+    # Raised by `Thread.start` if the system refuses another thread.
     no_thread = isinstance(error, RuntimeError) and "can't start new thread" in str(error)
     return no_thread or isinstance(error, (Unavailable, MemoryError))
 
 
 class Outage:
-    """What is known of something that may be away. Thread-safe.
+    """Availability of a service. Thread-safe.
 
-    failed("refused")                  ->  True: news, to be logged
+    failed("refused")                  ->  True: the first failure, to be logged
     attempted(); failed("refused")     ->  False
     ended()                            ->  seconds since the first failure
     ended()                            ->  None
@@ -132,20 +124,20 @@ class Outage:
 
     @property
     def reason(self) -> str | None:
-        """Why it is away; None if it is not, or an attempt seems to have reached it."""
+        """Why it is unavailable; None if it is not, or if an attempt seems to have connected."""
         with self._lock:
             begun = self._attempt_since
-            if begun is not None and self._clock() - begun > _TAKEN_UP:
+            if begun is not None and self._clock() - begun > _CONNECTED_SECONDS:
                 return None
             return self._reason
 
     @property
     def failures(self) -> int:
-        """Attempts in a row that failed."""
+        """Consecutive failed attempts."""
         return self._failures
 
     def failed(self, reason: str) -> bool:
-        """Note a failure."""
+        """Record a failure; return whether it is the first."""
         with self._lock:
             is_news = self._reason is None
             if is_news:
@@ -155,12 +147,12 @@ class Outage:
             return is_news
 
     def attempted(self) -> None:
-        """Note that an attempt begins."""
+        """Record the start of an attempt."""
         with self._lock:
             self._attempt_since = self._clock()
 
     def ended(self) -> float | None:
-        """Note a success."""
+        """Record a success; return the duration of the outage [s], if there was one."""
         with self._lock:
             was_away = self._reason is not None
             self._reason, self._attempt_since, self._failures = None, None, 0

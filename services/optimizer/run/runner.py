@@ -1,7 +1,7 @@
-"""A process's share of the queue: claims jobs, and runs several at once.
+"""Runners, which claim jobs and run several concurrently
 
-A runner ends in one of two ways: `drain` lets every job commit its iteration under way, `stop`
-drops that. Either gives the jobs back to the queue, where another runner finds them at once.
+A runner ends in one of two ways: `drain` lets every job commit its iteration in progress, `stop`
+drops it. Both return the jobs to the queue, where another runner can claim them at once.
 """
 
 from __future__ import annotations
@@ -21,34 +21,35 @@ from gaitswarm.services.optimizer.jobs.job import QUARANTINE_AFTER, Claim, Job, 
 from gaitswarm.services.optimizer.jobs.provenance import optimizer_digest
 from gaitswarm.services.optimizer.log_context import log_context
 from gaitswarm.services.optimizer.run.evaluator import Evaluator
-from gaitswarm.services.optimizer.run.execution import Surroundings, run_claim
+from gaitswarm.services.optimizer.run.execution import RunContext, run_claim
 from gaitswarm.services.optimizer.run.outage import Backoff, Outage, is_infrastructure
 from gaitswarm.services.optimizer.store.port.base import Store
 from gaitswarm.sim.provenance import simulator_digest
 
 _PAUSES: Final = Backoff(first=0.5, longest=10.0)
-"""Between attempts to claim a job while the store, or a thread for the job, is not to be had."""
+"""Between attempts to claim a job while the store or a thread is unavailable."""
 
 STUCK_SECONDS: Final = 120.0
-"""A runner that has not looked for jobs for so long is stuck: a database that does not answer holds
-it up for a fraction of that."""
+"""Time without polling after which a runner counts as stuck; an unavailable database blocks it for
+a fraction of that.
+"""
 
 _LONGEST_CLAIM: Final = 20.0
-"""Seconds that the end of a claim under way is waited for."""
+"""Time to wait for a claim in progress when stopping [s]."""
 
 _GLANCE: Final = 0.05
-"""Seconds between looks at jobs that are drained."""
+"""Poll interval of jobs that are drained [s]."""
 
 _log = logging.getLogger(__name__)
 
 
 def runner_name() -> str:
-    """A name for this process that no other one has: host, process id, random."""
+    """Return a unique name for this process: host, process id, random."""
     return f"{socket.gethostname()}:{os.getpid()}:{uuid.uuid4().hex[:8]}"
 
 
 class Runner:
-    """Runs up to `concurrency` jobs, each in a thread of its own, from start() to stop()."""
+    """Runs up to `concurrency` jobs, each in its own thread, from start() to stop()."""
 
     def __init__(
         self,
@@ -66,7 +67,7 @@ class Runner:
     ) -> None:
         if concurrency < 1:
             raise ValueError(f"concurrency must be at least 1, it is {concurrency}")
-        self._around = Surroundings(store, evaluator, lease_seconds=lease_seconds, cache=cache)
+        self._context = RunContext(store, evaluator, lease_seconds=lease_seconds, cache=cache)
         self._poll_seconds = poll_seconds
         self._quarantine_after = quarantine_after
         self._name = name or runner_name()
@@ -74,7 +75,7 @@ class Runner:
         self._clock = clock
         self._drain = threading.Event()
         self._stop = threading.Event()
-        self._looked = clock()
+        self._polled_at = clock()
         self._room = threading.Semaphore(concurrency)
         self._scheduler: threading.Thread | None = None
         self._jobs: set[threading.Thread] = set()
@@ -82,32 +83,32 @@ class Runner:
 
     @property
     def running(self) -> bool:
-        """Whether jobs are being claimed, as from start() to drain() or stop() they should be."""
+        """Whether the scheduler thread is alive."""
         return self._scheduler is not None and self._scheduler.is_alive()
 
     def trouble(self) -> str | None:
-        """Why no jobs are claimed although they should be; None if they are."""
+        """Return why no jobs are claimed although they should be; None if they are."""
         if self._scheduler is None or self._drain.is_set() or self._stop.is_set():
             return None
         if not self.running:
             return "it has ended and runs no more jobs; restart this process"
-        silent = self._clock() - self._looked
+        silent = self._clock() - self._polled_at
         if silent > STUCK_SECONDS:
-            return f"it has not looked for jobs for {silent:.0f} s; restart it if that stays"
+            return f"it has not polled for jobs for {silent:.0f} s; restart it if this persists"
         return None
 
     def start(self) -> None:
-        """Begin to claim jobs. Returns at once."""
+        """Start claiming jobs. Returns at once."""
         if self._scheduler is not None:
-            raise RuntimeError("a runner is started once")
-        # Now, while the files are those that were imported.
+            raise RuntimeError("a runner can be started only once")
+        # While the files are still those that were imported.
         simulator_digest()
         optimizer_digest()
         self._scheduler = threading.Thread(target=self._schedule, name="runner", daemon=True)
         self._scheduler.start()
 
     def drain(self, seconds: float, at_once: threading.Event | None = None) -> None:
-        """Let every job commit its iteration under way, and give it back to the queue; then stop"""
+        """Let every job commit its iteration in progress and return to the queue, then stop."""
         hurry = at_once or threading.Event()
         self._drain.set()
         until = self._clock() + seconds
@@ -117,11 +118,11 @@ class Runner:
         self.stop()
 
     def stop(self) -> None:
-        """Drop the work under way and give its jobs back to the queue. Idempotent."""
+        """Drop work in progress and return the jobs to the queue. Idempotent."""
         self._drain.set()
         self._stop.set()
         if self._scheduler is not None:
-            # A database that never answers must not keep the process from ending.
+            # A database that never answers must not block the process.
             self._scheduler.join(timeout=_LONGEST_CLAIM)
         for thread in tuple(self._jobs):
             thread.join()
@@ -132,7 +133,7 @@ class Runner:
 
     def _schedule(self) -> None:
         while not self._drain.is_set():
-            self._looked = self._clock()
+            self._polled_at = self._clock()
             if not self._room.acquire(timeout=self._poll_seconds):
                 continue
             claim = self._claim()
@@ -141,7 +142,7 @@ class Runner:
                 self._drain.wait(self._poll_seconds)
 
     def _started(self, claim: Claim) -> bool:
-        """Run a job in a thread of its own; false if it is given back to the queue."""
+        """Run a job in its own thread; False if it was returned to the queue."""
         thread = threading.Thread(target=self._run, args=(claim,), name=f"job-{claim.job.id}")
         if self._drain.is_set():
             self._give_back(claim)
@@ -149,9 +150,9 @@ class Runner:
         try:
             thread.start()
         except RuntimeError as error:
-            # This machine has no thread left for it.
+            # The system refuses another thread.
             self._give_back(claim)
-            self._pause(f"job {claim.job.id} goes back to the queue: {error}")
+            self._pause(f"job {claim.job.id} returns to the queue: {error}")
             return False
         self._outage.ended()
         self._jobs = {other for other in self._jobs if other.is_alive()} | {thread}
@@ -159,29 +160,29 @@ class Runner:
 
     def _give_back(self, claim: Claim) -> None:
         with suppress(GaitswarmError):
-            self._around.store.release(claim, JobState.QUEUED)
+            self._context.store.release(claim, JobState.QUEUED)
 
     def _claim(self) -> Claim | None:
         try:
-            claim = self._around.store.claim(
+            claim = self._context.store.claim(
                 self._name,
-                lease_seconds=self._around.lease_seconds,
+                lease_seconds=self._context.lease_seconds,
                 quarantine_after=self._quarantine_after,
             )
         except Exception as error:  # noqa: BLE001
             if not is_infrastructure(error):
-                # Whatever is wrong with one job must not keep this process from all the others.
-                _log.exception("no job can be claimed")
-            self._pause(f"no job can be claimed: {error}")
+                # A fault of one job must not block the others.
+                _log.exception("cannot claim a job")
+            self._pause(f"cannot claim a job: {error}")
             return None
         if claim is None:
             self._outage.ended()
         return claim
 
     def _pause(self, reason: str) -> None:
-        """Until the next attempt; one line of the log for each outage."""
+        """Wait for the next attempt; log the first failure of each outage."""
         if self._outage.failed(reason):
-            _log.warning("%s; tried again until it can be", reason)
+            _log.warning("%s; retrying", reason)
         self._drain.wait(_PAUSES.pause(self._outage.failures))
 
     def _run(self, claim: Claim) -> None:
@@ -189,9 +190,9 @@ class Runner:
             self._run_job(claim)
 
     def _run_job(self, claim: Claim) -> None:
-        # The job stays as last committed; whoever claims it next goes on from there.
+        # The job stays as last committed; the next claim continues from there.
         try:
-            job = run_claim(claim, self._around, self._stop, self._drain)
+            job = run_claim(claim, self._context, self._stop, self._drain)
             _log.info("job %s: %s after %d iterations", job.id, job.state, job.progress.iterations)
             if self._on_ended is not None and not self._stop.is_set():
                 self._on_ended(job)
@@ -199,8 +200,8 @@ class Runner:
             _log.info("job %s was deleted: %s", claim.job.id, error)
         except Exception as error:  # noqa: BLE001
             if is_infrastructure(error):
-                _log.warning("job %s: broken off: %s", claim.job.id, error)
+                _log.warning("job %s: interrupted: %s", claim.job.id, error)
             else:
-                _log.exception("job %s: broken off", claim.job.id)
+                _log.exception("job %s: interrupted", claim.job.id)
         finally:
             self._room.release()

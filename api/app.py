@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Final
 
@@ -42,6 +41,7 @@ from gaitswarm.services.monitoring.activity import Activity
 from gaitswarm.services.monitoring.collectors import QueueCollector
 from gaitswarm.services.monitoring.hosts import HostNames
 from gaitswarm.services.monitoring.metrics import Metrics
+from gaitswarm.services.optimizer.jobs.provenance import installed_version
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.settings import Settings
 
@@ -73,7 +73,7 @@ def create_app(
         redoc_url=None,
         static_url=ASSETS,
         title="gaitswarm",
-        version=_version(),
+        version=installed_version(),
         summary="Robust drive controllers for walking robots",
         description=DESCRIPTION,
         openapi_tags=TAGS,
@@ -138,10 +138,3 @@ def _add_metrics(app: FastAPI, metrics: Metrics) -> None:
         return Response(text, headers={"Content-Type": media_type, "Cache-Control": "no-store"})
 
     app.add_route(METRICS_PATH, answer, include_in_schema=False)
-
-
-def _version() -> str:
-    try:
-        return version("gaitswarm")
-    except PackageNotFoundError:
-        return "0+unknown"

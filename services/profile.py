@@ -1,4 +1,4 @@
-"""What the time of a job goes into: physics, control, tables, workers."""
+"""Profile of a job's time: physics, control, tables, workers"""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ from gaitswarm.sim.robot import DEFAULT_ROBOT, load_robot
 
 @dataclass(frozen=True, slots=True)
 class JobProfile:
-    """What a job's time went into, from its first committed iteration to its last.
+    """Distribution of a job's time from its first committed iteration to its last.
 
     Attributes:
-        evaluator: Where its walks ran.
-        slots: Tasks that ran at the same time.
-        precision: Of the physics' numbers.
-        walks: Designs times scenarios.
-        seconds: Wall time [s].
-        walks_per_second: Of all slots together.
-        lane_use: Share of the kernel's lanes' time that was walked [1].
-        shares: Of the slots' time, by what it went into [1]; they add up to 1.
+        evaluator: kind.
+        slots: number of tasks that run concurrently.
+        precision: of the physics.
+        walks: designs times scenarios.
+        seconds: wall time [s].
+        walks_per_second: of all slots together.
+        lane_use: used share of the kernel's lanes [1].
+        shares: of the slots' time [1]; the sum is 1.
     """
 
     evaluator: EvaluatorKind
@@ -52,7 +52,7 @@ class JobProfile:
 
 @dataclass(frozen=True, slots=True)
 class _Reading:
-    """All clocks at a commit [s]. evaluated, stored: since the job began."""
+    """All clocks at a commit [s]. evaluated, stored: since the job's start."""
 
     at: float
     evaluated: float
@@ -68,10 +68,10 @@ def profile_job(
     iterations: int = 25,
     cpus: int | None = None,
 ) -> JobProfile:
-    """Run the job of chapter 4 in a database of its own, and say what its time goes into.
+    """Run the job of chapter 4 in a temporary database and profile it.
 
-    Workers time their tasks, and in them kernels and tables; this process times evaluations and the
-    store. The kernel times some of its rounds, and in them control ticks.
+    Workers time their tasks, with the time in kernels and tables; this process times evaluations
+    and the store. The kernel times a sample of its rounds, with their control ticks.
     """
     kernel_of(load_robot(DEFAULT_ROBOT), "native", precision=precision)
     spec = JobSpec(
@@ -144,7 +144,7 @@ def _open(evaluator: EvaluatorKind, cpus: int | None) -> InProcessEvaluator | Ra
 
 
 class _TimedStore:
-    """A store that times what is asked of it by the thread that made it: not the heartbeat's."""
+    """Times the operations of the thread that created it, without the heartbeat's."""
 
     def __init__(self, store: Store) -> None:
         self._store = store

@@ -1,4 +1,4 @@
-"""The composition root: store, evaluator and runner meet here."""
+"""Composition root of store, evaluator and runner"""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def open_evaluator(
     should_stop: Callable[[], bool] = lambda: False,
     patient: bool = False,
 ) -> InProcessEvaluator | HybridEvaluator | RayEvaluator:
-    """Open workers for walks."""
+    """Create the evaluator of a kind."""
     check_address(address)
     if kind == "in-process":
         return InProcessEvaluator(cpus)
@@ -58,23 +58,22 @@ def open_evaluator(
 
 
 def check_address(address: str | None) -> None:
-    """Check an address of a Ray cluster, before anything is begun with it."""
+    """Check the address of a Ray cluster. Raises InvalidRequest."""
     if address is not None and "://" in address:
         raise InvalidRequest(
-            f"{address!r} is no address of a cluster's head: Ray Client is not used, as it loses"
-            " its tasks with its connection; give HOST:6379, or auto on a machine that is a node",
+            f"{address!r} is not the address of a cluster's head: Ray Client is not supported, as"
+            " it loses its tasks with its connection; use HOST:6379, or auto on a node",
             field="ray_address",
         )
 
 
 @dataclass(frozen=True, slots=True)
 class Runtime:
-    """What was opened.
+    """An opened runtime.
 
     Attributes:
-        service: On the database's jobs.
-        evaluator: Where walks run; None in a process that runs no jobs.
-        runner: What runs the jobs; None in a process that runs none.
+        evaluator: None in a process that runs no jobs.
+        runner: None in a process that runs no jobs.
     """
 
     service: JobService
@@ -83,13 +82,13 @@ class Runtime:
 
     @property
     def slots(self) -> int:
-        """Tasks that run at the same time; 0 while workers are away, and where there are none."""
+        """Number of tasks that run concurrently; 0 without workers."""
         if self.evaluator is None or self.workers_trouble() is not None:
             return 0
         return self.evaluator.slots
 
     def workers_trouble(self) -> str | None:
-        """Why walks cannot be run now; None if they can, or nothing is known against it."""
+        """Why designs cannot be evaluated now; None if they can or it is unknown."""
         watched: object = self.evaluator
         return watched.trouble() if isinstance(watched, Watched) else None
 
@@ -106,7 +105,7 @@ def open_runtime(
     cache: bool = False,
     quarantine_after: int = QUARANTINE_AFTER,
     longest_job: float = math.inf,
-    keeps_house: bool = False,
+    housekeeping: bool = False,
     retention_days: float | None = None,
     audit_days: float | None = None,
     longest_fork: float = math.inf,
@@ -117,7 +116,7 @@ def open_runtime(
     webhook_secret: str | None = None,
     activity: Activity | None = None,
 ) -> Iterator[Runtime]:
-    """Open a database and run its queued jobs until the block is left; then close all."""
+    """Open a database and run its queued jobs inside the block."""
     with ExitStack() as stack:
         store: Store = open_store(database)
         stack.callback(store.close)
@@ -136,10 +135,10 @@ def open_runtime(
             stack.callback(notifier.stop)
             notifier.start()
         service = JobService(store, longest_job=longest_job, longest_fork=longest_fork)
-        if keeps_house:
-            keeper = Housekeeping(store, retention_days, audit_days)
-            keeper.start()
-            stack.callback(keeper.stop)
+        if housekeeping:
+            housekeeper = Housekeeping(store, retention_days, audit_days)
+            housekeeper.start()
+            stack.callback(housekeeper.stop)
         if evaluator is None:
             yield Runtime(service, None, None)
             return
@@ -155,13 +154,13 @@ def open_runtime(
             from gaitswarm.services.monitoring.collectors import WorkersCollector  # noqa: PLC0415
 
             metrics.registry.register(WorkersCollector(lambda: workers.loads))
-        seen: Evaluator = workers
+        watched: Evaluator = workers
         if activity is not None:
-            stack.enter_context(activity.log_kept())
-            seen = activity.watched_evaluator(seen)
+            stack.enter_context(activity.recorded_log())
+            watched = activity.watched_evaluator(watched)
         runner = Runner(
             runners_store,
-            seen if tracing is None else tracing.traced_evaluator(seen),
+            watched if tracing is None else tracing.traced_evaluator(watched),
             concurrency=concurrent_jobs,
             lease_seconds=lease_seconds,
             cache=cache,
@@ -175,24 +174,24 @@ def open_runtime(
 
 @contextmanager
 def _set_by_signals() -> Iterator[Callable[[threading.Event], None]]:
-    """Let handlers of signals set events that their own thread may be waiting for.
+    """Yield a function with which signal handlers set events safely.
 
-    A handler comes upon its thread anywhere, within `Event.wait` as well, which holds the lock
-    that `Event.set` takes: the thread would wait for itself, for ever.
+    A handler may interrupt its thread inside `Event.wait`, which holds the lock that `Event.set`
+    needs: setting the event directly would deadlock.
     """
-    asked: SimpleQueue[threading.Event | None] = SimpleQueue()
+    events: SimpleQueue[threading.Event | None] = SimpleQueue()
 
     def set_them() -> None:
-        while (event := asked.get()) is not None:
+        while (event := events.get()) is not None:
             event.set()
 
     thread = threading.Thread(target=set_them, name="signals", daemon=True)
     thread.start()
     try:
-        # Unlike all else that wakes a thread, it may be interrupted by another call of itself.
-        yield asked.put
+        # Unlike other means to wake a thread, it is reentrant.
+        yield events.put
     finally:
-        asked.put(None)
+        events.put(None)
         thread.join()
 
 
@@ -200,9 +199,9 @@ def _set_by_signals() -> Iterator[Callable[[threading.Event], None]]:
 def stop_on_signals(
     stop: threading.Event, at_once: threading.Event | None = None
 ) -> Iterator[None]:
-    """Let SIGINT and SIGTERM set events inside the block. The main thread's to use.
+    """Set events on SIGINT and SIGTERM inside the block. For the main thread only.
 
-    A SIGINT when all of them are set raises KeyboardInterrupt, for those who cannot wait.
+    A SIGINT after all of them are set raises KeyboardInterrupt.
     """
     left = deque(event for event in (stop, at_once) if event is not None)
 
@@ -223,7 +222,7 @@ def stop_on_signals(
             yield
         finally:
             for caught, handler in before.items():
-                # None stands for a handler that was not set from Python, which cannot be put back.
+                # None: a handler that was not set from Python and cannot be restored.
                 if handler is not None:
                     signal.signal(caught, handler)
 

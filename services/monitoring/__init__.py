@@ -1,1 +1,1 @@
-"""What monitoring systems are told of a process."""
+"""Metrics, traces, activity and notifications of a process"""

@@ -1,7 +1,7 @@
-"""What happens to the jobs that this process runs: iterations, tasks by worker, and messages.
+"""Recent activity of the jobs run by this process: iterations, tasks by worker, and log messages
 
-Kept in memory, a bounded part of it, and gone with the process: nothing that a job comes to depends
-on it (docs/decisions/0023-monitoring.md).
+Bounded, in memory, and lost with the process; results do not depend on it
+(docs/decisions/0023-monitoring.md).
 """
 
 from __future__ import annotations
@@ -20,25 +20,24 @@ from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, Evalua
 from gaitswarm.sim.outcome import Outcome
 
 _JOBS: Final = 32
-"""Jobs of which anything is known: those that were heard of last."""
+"""Number of jobs remembered, the most recently active ones."""
 
 _ITERATIONS: Final = 200
 _TASKS: Final = 2000
 _MESSAGES: Final = 200
 _LONGEST_MESSAGE: Final = 2000
-"""Characters of a message that are kept."""
+"""Characters of a message."""
 
 
 @dataclass(frozen=True, slots=True)
 class IterationSpan:
-    """An iteration as it was evaluated.
+    """Evaluation of an iteration.
 
     Attributes:
-        iteration: Index, from 0.
-        begun: When it was, in seconds since 1970 [s].
-        seconds: From then to its end [s]; None while it is under way.
-        designs: That walk for it.
-        error: Why it has no result; None if it has one, or is under way.
+        begun: Unix time [s].
+        seconds: duration [s]; None while in progress.
+        designs: number simulated.
+        error: cause of failure; None for a result or while in progress.
     """
 
     iteration: int
@@ -50,16 +49,15 @@ class IterationSpan:
 
 @dataclass(frozen=True, slots=True)
 class TaskSpan:
-    """Some walks of an iteration, as a worker ran them.
+    """A task of an iteration, as run by a worker.
 
     Attributes:
-        iteration: Index, from 0.
-        worker: Name of the worker's machine; "" if it did not answer.
-        begun: When it was given them, in seconds since 1970 [s].
-        seconds: From then to its answer [s].
-        compute_seconds: Of these, how long it computed [s].
-        walks: Their number.
-        error: Why there is no result; None if there is one.
+        worker: name of the worker's machine; "" without an answer.
+        begun: Unix time of the dispatch [s].
+        seconds: from the dispatch to the answer [s].
+        compute_seconds: computing time [s].
+        walks: number of simulations.
+        error: cause of failure; None for a result.
     """
 
     iteration: int
@@ -73,13 +71,12 @@ class TaskSpan:
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """A line of the log.
+    """A log message.
 
     Attributes:
-        at: When it was written, in seconds since 1970 [s].
-        level: Such as "WARNING".
-        text: What it says.
-        iteration: To which it belongs, if to any.
+        at: Unix time [s].
+        level: such as "WARNING".
+        iteration: None if it belongs to none.
     """
 
     at: float
@@ -90,16 +87,16 @@ class Message:
 
 @dataclass(frozen=True, slots=True)
 class WorkerHealth:
-    """A machine that has run walks of a job.
+    """Statistics of a machine that has run tasks of a job.
 
     Attributes:
-        name: Of the machine; "" for tasks that nobody answered.
-        tasks: That it has ended.
-        walks: Of these tasks.
-        failures: Of the tasks, those without a result.
-        compute_seconds: That it has computed [s].
-        last_seen: When it answered last, in seconds since 1970 [s].
-        error: Of the last task without a result; None if all have one.
+        name: of the machine; "" for tasks without an answer.
+        tasks: number of finished tasks.
+        walks: simulations in these tasks.
+        failures: tasks without a result.
+        compute_seconds: total computing time [s].
+        last_seen: Unix time of the last answer [s].
+        error: of the last failed task; None if there is none.
     """
 
     name: str
@@ -111,7 +108,7 @@ class WorkerHealth:
     error: str | None = None
 
     def after(self, task: TaskSpan) -> WorkerHealth:
-        """With another task."""
+        """Return the statistics with another task."""
         failed = task.error is not None
         return replace(
             self,
@@ -126,13 +123,13 @@ class WorkerHealth:
 
 @dataclass(frozen=True, slots=True)
 class JobActivity:
-    """What is known of a job's run here; the last of each.
+    """Recent activity of a job in this process.
 
     Attributes:
-        iterations: In the order in which they began.
-        tasks: In the order in which they ended.
-        messages: The oldest first.
-        workers: By name, over all of the run here.
+        iterations: in order of start.
+        tasks: in order of completion.
+        messages: oldest first.
+        workers: by name, over the whole run here.
     """
 
     iterations: tuple[IterationSpan, ...] = ()
@@ -142,7 +139,7 @@ class JobActivity:
 
 
 @dataclass(slots=True)
-class _Kept:
+class _Records:
     iterations: deque[IterationSpan] = field(default_factory=lambda: deque(maxlen=_ITERATIONS))
     tasks: deque[TaskSpan] = field(default_factory=lambda: deque(maxlen=_TASKS))
     messages: deque[Message] = field(default_factory=lambda: deque(maxlen=_MESSAGES))
@@ -150,32 +147,32 @@ class _Kept:
 
 
 class Activity:
-    """The last of what happened to the jobs that were heard of last. Thread-safe."""
+    """Recent activity of the most recently active jobs. Thread-safe."""
 
     def __init__(self, clock: Callable[[], float] = time.time) -> None:
         self._clock = clock
         self._lock = threading.Lock()
-        self._jobs: OrderedDict[str, _Kept] = OrderedDict()
+        self._jobs: OrderedDict[str, _Records] = OrderedDict()
 
     def of(self, job_id: str) -> JobActivity | None:
-        """What is known of a job."""
+        """Return the activity of a job."""
         with self._lock:
-            kept = self._jobs.get(job_id)
-            if kept is None:
+            records = self._jobs.get(job_id)
+            if records is None:
                 return None
-            workers = tuple(kept.workers[name] for name in sorted(kept.workers))
+            workers = tuple(records.workers[name] for name in sorted(records.workers))
             return JobActivity(
-                tuple(kept.iterations), tuple(kept.tasks), tuple(kept.messages), workers
+                tuple(records.iterations), tuple(records.tasks), tuple(records.messages), workers
             )
 
     def watched_evaluator(self, inner: Evaluator) -> Evaluator:
-        """Wrap an evaluator, so that what it is asked for is taken note of."""
+        """Wrap an evaluator so that its requests are recorded."""
         return cast(Evaluator, _WatchedEvaluator(inner, self))
 
     @contextmanager
-    def log_kept(self) -> Iterator[None]:
-        """Take note of messages that belong to a job, as far as the log has them, in the block."""
-        handler = _Keeper(self)
+    def recorded_log(self) -> Iterator[None]:
+        """Record log messages that belong to jobs, inside the block."""
+        handler = _LogRecorder(self)
         root = logging.getLogger()
         root.addHandler(handler)
         try:
@@ -184,13 +181,13 @@ class Activity:
             root.removeHandler(handler)
 
     def begun(self, request: EvaluationRequest) -> None:
-        """Note that an iteration is evaluated."""
+        """Record the start of an evaluation."""
         span = IterationSpan(request.iteration, self._clock(), len(request.designs))
         with self._lock:
             self._of(request.job_id).iterations.append(span)
 
     def ended(self, request: EvaluationRequest, error: str | None) -> None:
-        """Note what came of it."""
+        """Record the end of an evaluation."""
         now = self._clock()
         with self._lock:
             spans = self._of(request.job_id).iterations
@@ -199,7 +196,6 @@ class Activity:
                 spans.append(replace(span, seconds=now - span.begun, error=error))
 
     def task(self, request: EvaluationRequest, report: TaskReport) -> None:
-        """Note a task that has ended."""
         span = TaskSpan(
             request.iteration,
             report.host,
@@ -210,23 +206,22 @@ class Activity:
             report.error,
         )
         with self._lock:
-            kept = self._of(request.job_id)
-            kept.tasks.append(span)
-            known = kept.workers.get(span.worker, WorkerHealth(span.worker))
-            kept.workers[span.worker] = known.after(span)
+            records = self._of(request.job_id)
+            records.tasks.append(span)
+            health = records.workers.get(span.worker, WorkerHealth(span.worker))
+            records.workers[span.worker] = health.after(span)
 
     def message(self, job_id: str, message: Message) -> None:
-        """Note a line of the log."""
         with self._lock:
             self._of(job_id).messages.append(message)
 
-    def _of(self, job_id: str) -> _Kept:
+    def _of(self, job_id: str) -> _Records:
         """The caller holds the lock."""
-        kept = self._jobs.setdefault(job_id, _Kept())
+        records = self._jobs.setdefault(job_id, _Records())
         self._jobs.move_to_end(job_id)
         while len(self._jobs) > _JOBS:
             self._jobs.popitem(last=False)
-        return kept
+        return records
 
 
 class _WatchedEvaluator:
@@ -248,19 +243,19 @@ class _WatchedEvaluator:
 
         self._activity.begun(request)
         try:
-            found = self._inner.evaluate(replace(request, on_task=on_task), should_stop)
+            outcomes = self._inner.evaluate(replace(request, on_task=on_task), should_stop)
         except BaseException as error:
             self._activity.ended(request, f"{type(error).__name__}: {error}".rstrip(": "))
             raise
         self._activity.ended(request, None)
-        return found
+        return outcomes
 
     def close(self) -> None:
         self._inner.close()
 
 
-class _Keeper(logging.Handler):
-    """Takes note of what is logged in the name of a job."""
+class _LogRecorder(logging.Handler):
+    """Records log messages whose context has a job."""
 
     def __init__(self, activity: Activity) -> None:
         super().__init__()

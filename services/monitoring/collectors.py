@@ -1,4 +1,4 @@
-"""Metrics that are looked up when somebody asks: the queue in the database, the workers' load."""
+"""Metrics collected on request: the queue in the database, the workers' load"""
 
 from __future__ import annotations
 
@@ -15,20 +15,19 @@ from gaitswarm.services.optimizer.store.port.base import Store
 
 
 class QueueCollector(Collector):
-    """Jobs of a database, counted anew whenever metrics are asked for.
+    """Jobs of a database, counted at each request for metrics.
 
-    While the database is away, the counts are missing and `gaitswarm_database_up` is 0.
+    While the database is unavailable, the counts are missing and `gaitswarm_database_up` is 0.
     """
 
     def __init__(self, store: Callable[[], Store]) -> None:
         self._store = store
 
     def describe(self) -> list[Metric]:
-        """Nothing: to register a collector needs no database."""
+        """Nothing, so that registering a collector needs no database."""
         return []
 
     def collect(self) -> Iterator[Metric]:
-        """Count the jobs."""
         up = GaugeMetricFamily("gaitswarm_database_up", "Whether the database answers: 1 or 0")
         try:
             queue = self._store().queue()
@@ -57,44 +56,41 @@ class QueueCollector(Collector):
         yield failed
         wait = GaugeMetricFamily(
             "gaitswarm_queue_longest_wait_seconds",
-            "Since when the job that waits longest for a runner is queued",
+            "Longest time that a queued job has waited for a runner",
         )
         wait.add_metric([], queue.longest_wait)
         yield wait
 
 
 class WorkerLoad(Protocol):
-    """What the workers of one kind have to do."""
+    """Load of the workers of one kind."""
 
     @property
     def slots(self) -> int:
-        """Tasks that can run at the same time."""
+        """Number of tasks that can run concurrently."""
 
     @property
     def used(self) -> int:
-        """Slots that have a task."""
+        """Slots in use."""
 
     @property
     def waiting(self) -> int:
-        """Tasks that wait for a slot."""
+        """Tasks waiting for a slot."""
 
 
 class WorkersCollector(Collector):
-    """Slots and queues of the workers, as they are when metrics are asked for."""
+    """Slots and queues of the workers at each request for metrics."""
 
     def __init__(self, loads: Callable[[], Mapping[str, WorkerLoad]]) -> None:
         self._loads = loads
 
     def collect(self) -> Iterator[Metric]:
-        """Look at the workers."""
         slots = GaugeMetricFamily(
-            "gaitswarm_worker_slots", "Tasks that can run at the same time", labels=["workers"]
+            "gaitswarm_worker_slots", "Tasks that can run concurrently", labels=["workers"]
         )
-        used = GaugeMetricFamily(
-            "gaitswarm_worker_slots_used", "Slots that have a task", labels=["workers"]
-        )
+        used = GaugeMetricFamily("gaitswarm_worker_slots_used", "Slots in use", labels=["workers"])
         waiting = GaugeMetricFamily(
-            "gaitswarm_worker_tasks_waiting", "Tasks that wait for a slot", labels=["workers"]
+            "gaitswarm_worker_tasks_waiting", "Tasks waiting for a slot", labels=["workers"]
         )
         for name, load in self._loads().items():
             slots.add_metric([name], load.slots)

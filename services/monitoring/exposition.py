@@ -1,4 +1,4 @@
-"""Where metrics are served: who may read them, and the port of a process without an API."""
+"""Access to metrics, and the metrics server of a process without an API"""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ _REMEMBERED_SECONDS: Final = 5.0
 _MOST_REMEMBERED: Final = 64
 
 REFUSAL: Final = (
-    "metrics need a token here: let Prometheus send one of scope `read` as `Authorization: Bearer"
-    " TOKEN`; `gaitswarm token create NAME --scope read` makes one"
+    "metrics require a token: let Prometheus send one of scope `read` as `Authorization: Bearer"
+    " TOKEN`; create one with `gaitswarm token create NAME --scope read`"
 )
 
 
 class MetricsAccess:
-    """Whether whoever asks may read metrics. Thread-safe.
+    """Authorization of requests for metrics. Thread-safe.
 
-    While the database is away, a token that was valid when it was last looked up still is: metrics
-    are needed most then.
+    While the database is unavailable, tokens that were valid at their last lookup remain valid, as
+    metrics are most important then.
     """
 
     def __init__(
@@ -49,7 +49,7 @@ class MetricsAccess:
         self._looked_up: dict[str, float] = {}
 
     def allows(self, authorization: str) -> bool:
-        """Look a request's token up. Every token may read."""
+        """Look up a request's token. Every scope may read."""
         scheme, _, secret = authorization.partition(" ")
         if scheme.lower() != "bearer":
             return not self._required
@@ -81,7 +81,7 @@ def metrics_server(
     host: str,
     port: int,
 ) -> Iterator[str]:
-    """Serve metrics and a probe of liveness on a port of their own inside the block."""
+    """Serve metrics and a liveness probe on a separate port inside the block."""
 
     def answer(environ: dict[str, Any], start: Callable[..., Any]) -> Iterable[bytes]:
         def plain(status: HTTPStatus, text: str, *headers: tuple[str, str]) -> Iterable[bytes]:
@@ -94,12 +94,12 @@ def metrics_server(
             return plain(HTTPStatus.MISDIRECTED_REQUEST, f"{unknown}\n")
         path = environ.get("PATH_INFO")
         if path not in ("/metrics", "/healthz") or environ["REQUEST_METHOD"] != "GET":
-            return plain(HTTPStatus.NOT_FOUND, "there are GET /metrics and GET /healthz here\n")
+            return plain(HTTPStatus.NOT_FOUND, "available: GET /metrics and GET /healthz\n")
         if path == "/healthz":
-            said = trouble()
-            if said is None:
+            problem = trouble()
+            if problem is None:
                 return plain(HTTPStatus.OK, "ok\n")
-            return plain(HTTPStatus.SERVICE_UNAVAILABLE, f"{said}\n")
+            return plain(HTTPStatus.SERVICE_UNAVAILABLE, f"{problem}\n")
         try:
             allowed = access.allows(environ.get("HTTP_AUTHORIZATION", ""))
         except StoreUnavailable as error:
@@ -131,7 +131,7 @@ def metrics_server(
 
 
 class _Server(ThreadingMixIn, WSGIServer):
-    """Answers each request in a thread, so that a slow reader keeps nobody waiting."""
+    """Answers each request in its own thread, so that slow readers do not block others."""
 
     daemon_threads = True
 
@@ -141,7 +141,7 @@ class _ServerOnIpv6(_Server):
 
 
 class _Silent(WSGIRequestHandler):
-    """Without a line of the log for every scrape; slow clients are let go."""
+    """Does not log every scrape; disconnects slow clients."""
 
     timeout = 10.0
 

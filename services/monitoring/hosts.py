@@ -1,8 +1,8 @@
-"""The names that a server goes by. A browser is not answered that calls it by another one.
+"""Host names of a server. Requests from browsers under other names are rejected
 
-A page of another site can have its name resolve to this server's address (DNS rebinding), and is
-then of the same origin to a browser; but it cannot help naming itself in the header Host. An
-address is nobody's name, and programs that send no Host are no browsers.
+A page of another site can make its name resolve to this server's address (DNS rebinding), and then
+has the same origin for a browser; but the browser sends that name in the Host header. Addresses
+cannot be rebound, and programs that send no Host are no browsers.
 """
 
 from __future__ import annotations
@@ -13,19 +13,19 @@ from ipaddress import ip_address
 
 
 class HostNames:
-    """Names of one server, beside its addresses."""
+    """Names of a server, besides its addresses."""
 
     def __init__(self, host: str, allowed: Iterable[str]) -> None:
-        own = ("localhost", host, socket.gethostname())
-        self._names = frozenset(name.lower() for name in (*own, *allowed))
+        default = ("localhost", host, socket.gethostname())
+        self._names = frozenset(name.lower() for name in (*default, *allowed))
 
     def refusal(self, host: str | None) -> str | None:
-        """Why a request is not answered."""
+        """Return why a request is rejected; None if it is not."""
         if host is None or self._knows(host.lower()):
             return None
         return (
-            f"this server does not go by the name {host!r}; if it should, add the name to"
-            " GAITSWARM_API_ALLOWED_HOSTS where it is started"
+            f"unknown host name {host!r}; to allow it, add it to the server's"
+            " GAITSWARM_API_ALLOWED_HOSTS"
         )
 
     def _knows(self, host: str) -> bool:
@@ -34,7 +34,7 @@ class HostNames:
 
 
 def _name(host: str) -> str:
-    """Of `name:port`, `[address]:port`, or one of both without port."""
+    """Host part of `name:port`, `[address]:port`, or of either without a port."""
     if host.startswith("["):
         return host[1:].partition("]")[0]
     return host.partition(":")[0]

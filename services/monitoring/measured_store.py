@@ -1,4 +1,4 @@
-"""A store whose operations are measured, and whose commits, failures and leases are counted."""
+"""Store wrapper that measures operations and counts commits, failures and leases"""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from gaitswarm.services.optimizer.jobs.job import Claim, Command, Job, JobState
 from gaitswarm.services.optimizer.store.port.base import Store
 from gaitswarm.sim.outcome import Status
 
-_LOSSES_KEPT: Final = 256
-"""Leases whose loss is remembered, so that it is counted once."""
+_REMEMBERED_LOSSES: Final = 256
+"""Lost leases remembered, so that each is counted once."""
 
 
 def measured(store: Store, metrics: Metrics) -> Store:
-    """Wrap a store, so that what passes through it is measured."""
+    """Wrap a store so that its operations are measured."""
     return cast(Store, _MeasuredStore(store, metrics))
 
 
 class _Measured:
-    """An object each of whose methods is timed as one operation."""
+    """An object whose method calls are timed."""
 
     def __init__(self, inner: Any, metrics: Metrics, prefix: str = "") -> None:
         self._inner = inner
@@ -36,8 +36,8 @@ class _Measured:
         self._prefix = prefix
 
     def __getattr__(self, name: str) -> Any:
-        found = getattr(self._inner, name)
-        return self._timed(name, found) if callable(found) else found
+        member = getattr(self._inner, name)
+        return self._timed(name, member) if callable(member) else member
 
     def _timed(self, name: str, method: Callable[..., Any]) -> Callable[..., Any]:
         operation = f"{self._prefix}{name}"
@@ -58,7 +58,7 @@ class _Measured:
 
 
 class _MeasuredStore(_Measured):
-    """Beside the times, it counts what the operations of runners and users come to."""
+    """Also counts the results of operations by runners and users."""
 
     def __init__(self, store: Store, metrics: Metrics) -> None:
         super().__init__(store, metrics)
@@ -109,7 +109,7 @@ class _MeasuredStore(_Measured):
         return job
 
     def _held(self, name: str, claim: Claim, *args: Any, **kwargs: Any) -> Any:
-        """An operation of whoever holds a claim, which may have been lost."""
+        """Time an operation under a claim, which may have been lost."""
         try:
             return self._timed(name, getattr(self._inner, name))(claim, *args, **kwargs)
         except LeaseLost as error:
@@ -118,13 +118,13 @@ class _MeasuredStore(_Measured):
             raise
 
     def _count_loss(self, claim: Claim) -> None:
-        """Once, however many operations find that the lease is lost."""
+        """Count a lost lease once, however many operations detect it."""
         lease = (claim.job.id, claim.token)
         with self._losing:
             if lease in self._lost:
                 return
             self._lost[lease] = None
-            if len(self._lost) > _LOSSES_KEPT:
+            if len(self._lost) > _REMEMBERED_LOSSES:
                 del self._lost[next(iter(self._lost))]
         self._metrics.lease_losses.inc()
 

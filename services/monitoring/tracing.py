@@ -1,6 +1,6 @@
-"""Spans for OpenTelemetry: a job's run by this process, its iterations, and their tasks.
+"""OpenTelemetry spans of jobs, iterations and tasks
 
-Nothing here is imported unless spans are sent, or without the extra `telemetry`.
+Imported only if spans are sent, as it requires the extra `telemetry`.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from gaitswarm.sim.outcome import Outcome
 
 
 def exporting_tracing() -> Tracing:
-    """Tracing that sends its spans by OTLP over HTTP, as OpenTelemetry's variables say."""
+    """Create tracing that exports by OTLP over HTTP, configured by OpenTelemetry's variables."""
     from opentelemetry.exporter.otlp.proto.http.trace_exporter import (  # noqa: PLC0415
         OTLPSpanExporter,
     )
@@ -35,10 +35,10 @@ def exporting_tracing() -> Tracing:
 
 
 class Tracing:
-    """Spans of the jobs that this process runs. Thread-safe.
+    """Spans of the jobs run by this process. Thread-safe.
 
     A job's span is from its claim to its release or end; an iteration's from its evaluation to its
-    commit; a task's as long as workers had it.
+    commit; a task's from dispatch to answer.
     """
 
     def __init__(self, processor: SpanProcessor) -> None:
@@ -52,19 +52,19 @@ class Tracing:
         self._iterations: dict[str, tuple[int, Span]] = {}
 
     def traced_store(self, store: Store) -> Store:
-        """Wrap a store, so that claims, commits and releases begin and end spans."""
+        """Wrap a store so that claims, commits and releases start and end spans."""
         return cast(Store, _TracedStore(store, self))
 
     def traced_evaluator(self, evaluator: Evaluator) -> Evaluator:
-        """Wrap an evaluator, so that evaluations and tasks have spans."""
+        """Wrap an evaluator so that evaluations and tasks have spans."""
         return _TracedEvaluator(evaluator, self)
 
     def close(self) -> None:
-        """Send what has not been sent. Idempotent."""
+        """Export pending spans. Idempotent."""
         self._provider.shutdown()
 
     def job_begins(self, claim: Claim) -> None:
-        """Begin the span of a job's run."""
+        """Start the span of a job's run."""
         job = claim.job
         attributes: dict[str, str | int] = {
             "gaitswarm.job.id": job.id,
@@ -76,7 +76,7 @@ class Tracing:
             self._jobs[job.id] = self._tracer.start_span("job", attributes=attributes)
 
     def job_ends(self, job_id: str, state: str, error: str | None = None) -> None:
-        """End the span of a job's run, and of an iteration that is under way."""
+        """End the span of a job's run, and of an iteration in progress."""
         with self._lock:
             job = self._jobs.pop(job_id, None)
             _, iteration = self._iterations.pop(job_id, (0, None))
@@ -88,7 +88,7 @@ class Tracing:
                 span.end()
 
     def iteration(self, request: EvaluationRequest) -> Span | None:
-        """Find the span of an iteration, which begins with its first evaluation."""
+        """Return the span of an iteration, started by its first evaluation."""
         with self._lock:
             job = self._jobs.get(request.job_id)
             if job is None:
@@ -108,7 +108,7 @@ class Tracing:
             return span
 
     def iteration_ends(self, job_id: str, done: CompletedIteration) -> None:
-        """End the span of an iteration that is committed."""
+        """End the span of a committed iteration."""
         with self._lock:
             _, span = self._iterations.pop(job_id, (0, None))
         if span is not None:
@@ -116,7 +116,7 @@ class Tracing:
             span.end()
 
     def task(self, parent: Span, report: TaskReport) -> None:
-        """Make the span of a task that has ended."""
+        """Record the span of a finished task."""
         ended = time.time_ns()
         span = self._tracer.start_span(
             "task",

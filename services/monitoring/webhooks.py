@@ -1,6 +1,6 @@
-"""Tells others that jobs have ended: POSTs notifications until they are taken.
+"""Webhooks: POST notifications about ended jobs until they are accepted
 
-Headers and signature are those of Standard Webhooks (https://www.standardwebhooks.com).
+Headers and signature follow Standard Webhooks (https://www.standardwebhooks.com).
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ from gaitswarm.services.optimizer.jobs.notification import Notification, refused
 from gaitswarm.services.optimizer.store.port.base import Store
 
 _TIMEOUT: Final = 10.0
-"""Longest silence of a receiver [s]."""
+"""Of a receiver [s]."""
 
 _LEASE_SECONDS: Final = 60.0
-"""An attempt is over by then, or whoever made it has gone."""
+"""Longer than any attempt, unless its process died."""
 
 _POLL_SECONDS: Final = 1.0
 
 _STORE_PAUSE: Final = 10.0
-"""Seconds until a store that did not answer is asked again."""
+"""Pause after a failure of the store [s]."""
 
 _log = logging.getLogger(__name__)
 
 
 def signature(secret: str, message_id: str, timestamp: int, body: bytes) -> str:
-    """Sign a notification."""
+    """Return the signature of a notification."""
     signed = b".".join((message_id.encode(), str(timestamp).encode(), body))
     digest = hmac.new(_key(secret), signed, hashlib.sha256).digest()
     return f"v1,{base64.b64encode(digest).decode()}"
@@ -53,10 +53,10 @@ def _key(secret: str) -> bytes:
 
 
 class Notifier:
-    """Sends what is due from a thread of its own, from start() to stop().
+    """Sends due notifications from its own thread, from start() to stop().
 
-    Any number of processes may have one: each notification is one's at a time. A notification is
-    delivered at least once; a receiver knows by `webhook-id` what it has had.
+    Several processes may run one: each notification is leased by one at a time. Delivery is at
+    least once; receivers detect repetitions by `webhook-id`.
     """
 
     def __init__(self, store: Store, hosts: Collection[str], secret: str | None) -> None:
@@ -67,30 +67,30 @@ class Notifier:
         self._thread = threading.Thread(target=self._run, name="notifier", daemon=True)
 
     def start(self) -> None:
-        """Begin to send. Returns at once."""
+        """Start sending. Returns at once."""
         self._thread.start()
 
     def stop(self) -> None:
-        """End after the attempt under way. Idempotent."""
+        """End after the current attempt. Idempotent."""
         self._stop.set()
         self._thread.join()
 
     def _run(self) -> None:
-        # No proxy and no credentials of this process's environment.
+        # Ignore proxies and credentials in the environment.
         with httpx2.Client(timeout=_TIMEOUT, follow_redirects=False, trust_env=False) as client:
             while not self._stop.is_set():
                 try:
                     pause = 0.0 if self._send_next(client) else _POLL_SECONDS
                 except StoreUnavailable as error:
-                    _log.warning("no notification can be sent: %s", error)
+                    _log.warning("cannot send notifications: %s", error)
                     pause = _STORE_PAUSE
-                except Exception:  # noqa: BLE001 - one notification must not keep all others
-                    _log.exception("a notification cannot be sent")
+                except Exception:  # noqa: BLE001 - one notification must not block the others
+                    _log.exception("cannot send a notification")
                     pause = _STORE_PAUSE
                 self._stop.wait(pause)
 
     def _send_next(self, client: httpx2.Client) -> bool:
-        """Make one attempt, if any is due; whether there was one."""
+        """Make one attempt, if any is due; return whether there was one."""
         due = self._store.outbox.take(lease_seconds=_LEASE_SECONDS)
         if due is None:
             return False
@@ -102,7 +102,7 @@ class Notifier:
         return True
 
     def _post(self, client: httpx2.Client, due: Notification) -> str | None:
-        """What went wrong, for people; None if it was taken."""
+        """Return the error, for people; None on success."""
         body = json.dumps(due.document, separators=(",", ":")).encode()
         now = int(time.time())
         headers = {
@@ -114,9 +114,9 @@ class Notifier:
         if self._secret is not None:
             headers["webhook-signature"] = signature(self._secret, due.id, now, body)
         try:
-            # What a receiver answers is not read: there may be much of it.
+            # The response's body, of unknown size, is not read.
             with client.stream("POST", due.url, content=body, headers=headers) as answer:
                 status = answer.status_code
         except (httpx2.HTTPError, httpx2.InvalidURL) as error:
-            return f"it could not be sent: {type(error).__name__}"
+            return f"sending failed: {type(error).__name__}"
         return None if 200 <= status < 300 else f"the receiver answered {status}"

@@ -369,7 +369,7 @@ def test_an_address_that_is_none_of_a_cluster_leaves_no_job_behind(
     gaitswarm: Gaitswarm, db: Path, small_spec: Path
 ) -> None:
     told = gaitswarm("optimize", "--spec", small_spec, "--db", db, "--ray-address", "ray://x:1")
-    assert told.code == ExitCode.BAD_INPUT and "is no address of a cluster's head" in told.err
+    assert told.code == ExitCode.BAD_INPUT and "is not the address of a cluster's head" in told.err
     assert gaitswarm("list", "--db", db, "--json").json == []
 
 

@@ -101,7 +101,7 @@ def test_what_is_kept_is_bounded(
 
 def test_messages_of_a_job_are_kept_and_no_others() -> None:
     activity, log = Activity(), logging.getLogger("tests.activity")
-    with activity.log_kept():
+    with activity.recorded_log():
         log.warning("of nobody")
         with log_context(job="job", iteration=7):
             log.warning("node %s is slow", "x" * 5000)
@@ -126,7 +126,7 @@ def test_a_server_tells_what_it_knows_and_why_it_knows_nothing(
         assert "has not run the job" in client.get(here).json()["reason"]
         assert client.get("/v1/jobs/nowhere/activity").status_code == 404
         activity.task(replace(request_, job_id=job.id), TaskReport(5, 0.2, 0.1, "node"))
-        with activity.log_kept(), log_context(job=job.id):
+        with activity.recorded_log(), log_context(job=job.id):
             logging.getLogger("tests.activity").warning("slow")
             logging.getLogger("tests.activity").error("lost")
         found = client.get(here, params={"level": "ERROR"}).json()

@@ -158,7 +158,9 @@ def test_an_answer_that_an_outage_cuts_off_is_one_line(
     finally:
         server.close()
     (entry,) = [e for e in written() if e["logger"] == "gaitswarm.api"]
-    assert entry["request"] == "cut" and "response aborted: the database is away" in entry["message"]
+    assert (
+        entry["request"] == "cut" and "response aborted: the database is away" in entry["message"]
+    )
     assert not any("traceback" in e for e in written())
 
 

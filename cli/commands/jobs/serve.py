@@ -85,7 +85,7 @@ def serve(
     activity = None if no_runner else Activity()
     runs_jobs = not no_runner
     with _runtime(
-        settings, metrics, runs_jobs=runs_jobs, keeps_house=True, activity=activity
+        settings, metrics, runs_jobs=runs_jobs, housekeeping=True, activity=activity
     ) as opened:
         beside = opened.runner
         components = _components(opened, beside)
@@ -202,7 +202,7 @@ def _runtime(
     metrics: Metrics | None,
     *,
     runs_jobs: bool = True,
-    keeps_house: bool = False,
+    housekeeping: bool = False,
     should_stop: Callable[[], bool] = lambda: False,
     activity: Activity | None = None,
 ) -> AbstractContextManager[Runtime]:
@@ -219,7 +219,7 @@ def _runtime(
         quarantine_after=settings.quarantine_after,
         cache=settings.cache,
         longest_job=settings.api_max_job_seconds,
-        keeps_house=keeps_house,
+        housekeeping=housekeeping,
         retention_days=settings.retention_days,
         audit_days=settings.audit_days,
         longest_fork=settings.api_max_fork_seconds,

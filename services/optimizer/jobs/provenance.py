@@ -80,7 +80,7 @@ RECORDS: Final = TypeAdapter(ProvenanceRecords)
 def job_provenance(spec: Spec) -> JobProvenance:
     """Return the provenance of what this process computes for a job."""
     return JobProvenance(
-        gaitswarm=_version(),
+        gaitswarm=installed_version(),
         optimizer_digest=optimizer_digest(),
         search_libraries=spec.search_libraries,
         simulation=provenance_of(
@@ -123,7 +123,7 @@ def optimizer_digest() -> str:
 
 
 @lru_cache(maxsize=1)
-def _version() -> str:
+def installed_version() -> str:
     try:
         return metadata.version("gaitswarm")
     except metadata.PackageNotFoundError:

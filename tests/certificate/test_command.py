@@ -89,7 +89,7 @@ def test_another_engine_is_compared_by_scenario_and_objective(files: Path) -> No
         assert words in shown.out
 
 
-def test_the_same_command_walks_nothing_again_and_more_worlds_only_the_rest(files: Path) -> None:
+def test_the_same_command_simulates_only_new_worlds(files: Path) -> None:
     first = certify(files, "--worlds", 20, "--json").json
     again = certify(files, "--worlds", 20, "--json")
     assert again.json == first and "iteration" not in again.err
@@ -146,7 +146,7 @@ def test_the_best_of_a_job_is_certified_with_its_robot_and_preference(files: Pat
     assert (more["job"], more["worlds"]) == (found["job"], 8)
 
 
-def test_ranges_and_held_values_are_the_users_to_choose(files: Path) -> None:
+def test_users_choose_ranges_and_fixed_values(files: Path) -> None:
     result = certify(
         files, "--worlds", 6, "--range", "friction_factor=0.2:0.3", "--range", "angle_delay=1:3",
         "--set", "slope_added=4", "--most", 6, "--json",
@@ -195,10 +195,10 @@ def test_bad_input_names_the_option(
 
 @pytest.mark.thorough(
     "test_resumed_job_equals_one_never_killed",
-    "test_the_same_command_walks_nothing_again_and_more_worlds_only_the_rest",
+    "test_the_same_command_simulates_only_new_worlds",
 )
 @pytest.mark.slow
-def test_a_certificate_that_is_killed_and_goes_on_has_the_same_numbers(files: Path) -> None:
+def test_a_killed_and_continued_certificate_has_the_same_results(files: Path) -> None:
     asked = ("--worlds", "240", "--engine", "mujoco", "--json")
     whole = certify(files, *asked).json
     assert whole["engines"]["mujoco"]["scenarios"]["short"]["theirs"] == "ok"

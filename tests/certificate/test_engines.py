@@ -61,7 +61,7 @@ def test_iterations_follow_from_worlds_and_engines() -> None:
     assert SPECS.validate_python(by_iterations).budget == 20
 
 
-def test_a_certificate_is_stored_with_its_engines_and_without_any_reads_as_before() -> None:
+def test_a_certificate_is_stored_with_its_engines() -> None:
     spec = small(engines=["mujoco"]).resolved()
     assert SPECS.validate_json(spec.model_dump_json()) == spec
     assert list(spec.world_space().names) == DOCUMENT["variables"]
@@ -75,12 +75,12 @@ def test_a_certificate_is_stored_with_its_engines_and_without_any_reads_as_befor
     ("engines", "words"),
     [(["ode"], "'mujoco' or 'mujoco-contacts'"), (["mujoco"] * 2, "'mujoco' is named twice")],
 )
-def test_engines_that_make_no_sense_are_refused(engines: list[str], words: str) -> None:
+def test_invalid_engines_are_refused(engines: list[str], words: str) -> None:
     with pytest.raises(ValueError, match=words):
         small(engines=engines)
 
 
-def test_the_version_of_the_library_is_part_of_what_its_numbers_depend_on() -> None:
+def test_the_version_of_the_library_is_part_of_the_provenance() -> None:
     with_engine, without = (job_provenance(small(engines=e)).simulation for e in (["mujoco"], []))
     assert with_engine.libraries.keys() - without.libraries.keys() == {"mujoco-core"}
     other = {"libraries": with_engine.libraries | {"mujoco-core": "3.0"}}
@@ -156,7 +156,7 @@ def test_under_the_runner_our_rows_have_the_bits_of_a_certificate_without_engine
 
 
 @pytest.mark.slow
-def test_evidence_of_it_is_verified_where_there_is_no_such_engine(
+def test_evidence_is_verified_without_the_engine(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with gaitswarm.open(tmp_path / "jobs.db") as jobs:

@@ -35,7 +35,7 @@ def held_out(*tuned: Scenario, **design: float) -> dict[str, Scenario]:
     return {scenario.name: scenario for scenario in found[len(tuned) :]}
 
 
-def test_they_are_the_fastest_walk_turned_sloped_loaded_and_at_another_pace() -> None:
+def test_they_are_variations_of_the_fastest_scenario() -> None:
     found = held_out(own(), own(name="slow", stride=0.06))
     assert {
         name: {k: v for k, v in walk.model_dump().items() if v != own().model_dump()[k]}
@@ -53,7 +53,7 @@ def test_they_are_the_fastest_walk_turned_sloped_loaded_and_at_another_pace() ->
     }
 
 
-def test_there_are_eight_walks_in_all_and_two_held_out_ones_at_least() -> None:
+def test_there_are_eight_scenarios_and_at_least_two_are_held_out() -> None:
     many = tuple(own(name=f"walk-{k}", stride=0.08 - 0.001 * k) for k in range(7))
     assert len(held_out(own())) == CASES - 1
     assert list(held_out(*many)) == ["walk-0-turn-left", "walk-0-downhill"]
@@ -72,14 +72,14 @@ def test_a_pace_that_the_design_chooses_is_not_changed() -> None:
     }  # fmt: skip
 
 
-def test_what_the_legs_do_not_reach_or_no_scenario_can_have_is_left_out() -> None:
+def test_unreachable_or_invalid_scenarios_are_left_out() -> None:
     # No walk of half a metre from the body's axis can be begun.
     assert held_out(own(radius=0.5)) == {}
     # A shorter cycle than 0.2 s is none.
     assert "fast-faster" not in held_out(own(cycle_time=0.2))
 
 
-def test_robots_that_ship_have_the_presets_whatever_they_were_tuned_in() -> None:
+def test_shipped_robots_have_the_presets() -> None:
     tuned = (own(),)
     found = certificate_walks(tuned, "szabadka2", PI)
     assert found.keys() == {"scenarios"}

@@ -82,14 +82,14 @@ def test_an_extended_certificate_keeps_its_worlds_and_adds_others(
     assert [row[2:] for row in after] == [row[2:] for row in whole]
 
 
-def test_more_worlds_walk_only_what_no_job_has_walked(store: Store, evaluator: Evaluator) -> None:
+def test_more_worlds_simulate_only_new_ones(store: Store, evaluator: Evaluator) -> None:
     run(store, evaluator, small(worlds=5))
     longer = store.job(run(store, evaluator, small(worlds=9, preference="C", name="other")))
     assert longer.progress.evaluations == 10
     assert longer.progress.evaluations_saved == 6
 
 
-def test_a_fork_goes_on_with_the_same_worlds_and_another_preference(
+def test_a_fork_continues_with_the_same_worlds_and_another_preference(
     store: Store, evaluator: Evaluator
 ) -> None:
     parent, service = run(store, evaluator, small()), JobService(store)
@@ -101,7 +101,7 @@ def test_a_fork_goes_on_with_the_same_worlds_and_another_preference(
 
 
 @pytest.mark.parametrize("given", [{"scenarios": ("normal-slow",)}, {"robot": "szabadka2"}])
-def test_worlds_are_no_start_so_it_is_not_forked_into_other_walks(
+def test_a_certificate_is_not_forked_into_other_scenarios(
     store: Store, evaluator: Evaluator, given: dict[str, Any]
 ) -> None:
     parent = run(store, evaluator, small())

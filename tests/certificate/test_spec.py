@@ -61,7 +61,7 @@ def test_iterations_follow_from_worlds_and_worlds_from_iterations() -> None:
 
 
 @pytest.mark.parametrize("given", [{"worlds": 11.0}, {"worlds": "11"}, {"iterations": "3"}])
-def test_counts_that_are_written_otherwise_are_counts_too(given: dict[str, Any]) -> None:
+def test_counts_may_be_floats_or_strings(given: dict[str, Any]) -> None:
     document = {key: value for key, value in DOCUMENT.items() if key != "worlds"}
     spec = SPECS.validate_python(document | given)
     assert isinstance(spec, CertificateSpec)
@@ -79,7 +79,7 @@ def test_a_single_iteration_of_the_nominal_world_becomes_the_least_certificate()
     assert (spec.worlds, spec.iterations) == (1, 2)
 
 
-def test_the_nominal_world_is_brought_into_ranges_that_leave_it_out() -> None:
+def test_the_nominal_world_is_clipped_to_the_ranges() -> None:
     spec = small(variables=[{"name": "friction_factor", "low": 0.2, "high": 0.4}])
     assert asked(spec)[0][0].tolist() == [0.4]
 
@@ -90,7 +90,7 @@ def test_a_perturbation_that_is_held_is_the_same_in_every_world() -> None:
     assert len(spec.design_space().variables) == len(PERTURBATIONS) - 1
 
 
-def test_eight_scenarios_those_that_were_tuned_and_held_out_ones() -> None:
+def test_the_default_is_the_tuned_and_held_out_scenarios() -> None:
     names = [scenario.name for scenario in certificate_scenarios()]
     assert names == [*(s.name for s in SCENARIOS), "turn-left-fast", "downhill-fast"]
     assert len(certificate_scenarios(SCENARIOS[:1])) == CASES
@@ -123,7 +123,7 @@ def test_a_stored_certificate_reads_back_as_it_was() -> None:
         ({"scenarios": ["1", "normal-fast"]}, "scenarios: 'normal-fast' is named twice"),
     ],
 )
-def test_what_makes_no_sense_is_refused(change: dict[str, Any], words: str) -> None:
+def test_invalid_values_are_refused(change: dict[str, Any], words: str) -> None:
     with pytest.raises(ValidationError, match=re.escape(words)):
         small(**change)
 

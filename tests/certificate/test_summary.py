@@ -52,7 +52,7 @@ def test_the_conditional_value_at_risk_is_the_mean_of_the_tail() -> None:
     assert conditional_value_at_risk(values, level=0.0) == pytest.approx(50.5)
 
 
-def test_spreads_are_of_the_drawn_worlds_beside_the_nominal_one() -> None:
+def test_spreads_are_of_the_drawn_worlds_without_the_nominal_one() -> None:
     found = summary([[7.0, 28.0], *([float(k), 4.0 * k] for k in range(1, 101))])
     level = found.cases[0].utility
     assert level.nominal == pytest.approx(7.0)
@@ -92,7 +92,7 @@ def test_a_design_that_always_fails_has_no_values_but_a_probability() -> None:
     assert found.influences == ()
 
 
-def test_the_worst_worlds_come_first_with_the_scenario_that_broke_them() -> None:
+def test_the_worst_worlds_come_first_with_their_worst_scenario() -> None:
     ok, fell = int(Status.OK), int(Status.FELL)
     values = [[10.0, 20.0], [11.0, 21.0], [30.0, 20.0], [10.0, 50.0], [1.0, 1.0], [1.0, 1.0]]
     statuses = [[ok, ok], [ok, ok], [ok, ok], [ok, ok], [ok, fell], [fell, fell]]
@@ -106,7 +106,7 @@ def test_the_worst_worlds_come_first_with_the_scenario_that_broke_them() -> None
     assert (found.worst[1].iteration, found.worst[1].particle) == (1, 0)
 
 
-def test_what_goes_with_bad_worlds_is_named_by_rank_correlation() -> None:
+def test_influences_are_rank_correlations() -> None:
     spec = plain(60)
     friction = np.array([spec.world(k)["friction_factor"] for k in range(60)])
     noise = np.array([spec.world(k)["slope_added"] for k in range(60)])
@@ -137,7 +137,7 @@ def test_fewer_worlds_are_the_first_ones() -> None:
     assert few.cases[0].utility.worst == pytest.approx(11.0)
 
 
-def test_without_a_drawn_world_there_is_nothing_to_say() -> None:
+def test_a_certificate_without_a_drawn_world_is_refused() -> None:
     spec = plain(5)
     with pytest.raises(Conflict, match="no drawn world has been simulated yet"):
         certificate(spec, columns(spec, np.ones((1, 2))))

@@ -1,4 +1,4 @@
-"""A receiver of notifications on this machine, which answers as it is told to."""
+"""A local receiver of notifications with given responses"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What Prometheus reads: samples of an answer by name and labels, and a job whose metrics move."""
+"""Samples of an exposition by name and labels, and a job that changes metrics"""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def of(metrics: Metrics) -> Scrape:
 
 @contextmanager
 def serving(database: Path, **settings: Any) -> Iterator[Server]:
-    """A server with a runner beside it, as `gaitswarm serve` has them, walking in threads."""
+    """A server with a runner, as in `gaitswarm serve`, simulating in threads."""
     metrics = Metrics()
     with open_runtime(str(database), evaluator="in-process", cpus=1, metrics=metrics) as opened:
         server = Server(opened.service, metrics=metrics, **settings)

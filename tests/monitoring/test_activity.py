@@ -1,4 +1,4 @@
-"""What is kept of the jobs that a process runs: bounded, by job, and told over HTTP."""
+"""Activity of the jobs that a process runs: bounded, by job, and served over HTTP"""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tests.examples.servers import Server
 
 
 class Worker:
-    """An evaluator that reports the tasks it is told to, and fails if it is told to."""
+    """An evaluator that reports given tasks, and fails if given an error."""
 
     slots = 1
 
@@ -48,15 +48,15 @@ def request_() -> EvaluationRequest:
     return EvaluationRequest("job", (), np.zeros((3, 2)), provenance, iteration=4)
 
 
-def test_iterations_tasks_and_workers_are_taken_note_of(request_: EvaluationRequest) -> None:
+def test_iterations_tasks_and_workers_are_recorded(request_: EvaluationRequest) -> None:
     activity = Activity(clock=lambda: 1000.0)
-    told: list[TaskReport] = []
+    reports: list[TaskReport] = []
     good = TaskReport(24, 2.0, 1.5, "node-1")
     bad = TaskReport(24, 3.0, error="it died")
     watched = activity.watched_evaluator(Worker(good, bad, good))
-    watched.evaluate(replace(request_, on_task=told.append), lambda: False)
+    watched.evaluate(replace(request_, on_task=reports.append), lambda: False)
 
-    assert told == [good, bad, good]
+    assert reports == [good, bad, good]
     found = activity.of("job")
     assert found is not None
     (iteration,) = found.iterations
@@ -66,10 +66,15 @@ def test_iterations_tasks_and_workers_are_taken_note_of(request_: EvaluationRequ
         ("", 997.0, "it died"),
         ("node-1", 998.0, None),
     ]
-    nobody, node = found.workers
+    unanswered, node = found.workers
     assert (node.name, node.tasks, node.walks, node.failures) == ("node-1", 2, 48, 0)
-    assert (nobody.name, nobody.tasks, nobody.walks, nobody.failures) == ("", 1, 0, 1)
-    assert nobody.error == "it died"
+    assert (unanswered.name, unanswered.tasks, unanswered.walks, unanswered.failures) == (
+        "",
+        1,
+        0,
+        1,
+    )
+    assert unanswered.error == "it died"
     assert activity.of("other") is None
 
 
@@ -83,9 +88,7 @@ def test_an_iteration_that_fails_says_why(request_: EvaluationRequest) -> None:
     assert found.iterations[0].error == "ValueError: no such robot"
 
 
-def test_what_is_kept_is_bounded(
-    request_: EvaluationRequest, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_records_are_bounded(request_: EvaluationRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kept, "_JOBS", 2)
     activity = Activity()
     report = TaskReport(1, 0.1, 0.1, "node")
@@ -99,10 +102,10 @@ def test_what_is_kept_is_bounded(
     assert (len(found.tasks), found.workers[0].tasks) == (2000, 2500)
 
 
-def test_messages_of_a_job_are_kept_and_no_others() -> None:
+def test_only_messages_of_a_job_are_recorded() -> None:
     activity, log = Activity(), logging.getLogger("tests.activity")
     with activity.recorded_log():
-        log.warning("of nobody")
+        log.warning("of no job")
         with log_context(job="job", iteration=7):
             log.warning("node %s is slow", "x" * 5000)
     with log_context(job="job"):
@@ -114,7 +117,7 @@ def test_messages_of_a_job_are_kept_and_no_others() -> None:
     assert message.text.startswith("node xxx") and len(message.text) == 2000
 
 
-def test_a_server_tells_what_it_knows_and_why_it_knows_nothing(
+def test_a_server_returns_its_records_or_why_there_are_none(
     store: SqlStore, request_: EvaluationRequest
 ) -> None:
     job, _ = store.create_job(JobSpec(iterations=2))

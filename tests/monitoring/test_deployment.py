@@ -92,9 +92,7 @@ def test_prometheus_reads_what_docker_compose_opens() -> None:
 
 
 @pytest.mark.parametrize("query", QUERIES)
-def test_every_query_asks_for_metrics_that_there_are(
-    walked: tuple[str, Scrape], query: str
-) -> None:
+def test_every_query_asks_for_existing_metrics(walked: tuple[str, Scrape], query: str) -> None:
     known = exposed(walked[1])
     asked = metrics_of(query)
     assert asked or query.startswith("up{")
@@ -126,7 +124,7 @@ def test_every_metric_is_documented_with_its_labels(walked: tuple[str, Scrape]) 
             assert set(sample.labels) - {"le"} == known[name], name
 
 
-def test_panels_are_told_apart_and_say_what_they_show() -> None:
+def test_panels_have_distinct_titles_and_descriptions() -> None:
     panels = DASHBOARD["panels"]
     assert len({panel["id"] for panel in panels}) == len(panels) > 20
     places = {(p["gridPos"]["x"], p["gridPos"]["y"]) for p in panels}

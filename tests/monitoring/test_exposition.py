@@ -23,7 +23,7 @@ from tests.examples.servers import Server
 from tests.monitoring.scraped import Scrape, parsed, scraped
 
 
-def test_metrics_are_for_every_token_where_tokens_are_asked_for(store: SqlStore) -> None:
+def test_every_token_reads_metrics_where_tokens_are_required(store: SqlStore) -> None:
     secret = store.tokens.create("prometheus", Scope.READ)[1]
     server = Server(JobService(store), api_access="token")
     try:
@@ -39,7 +39,7 @@ def test_metrics_are_for_every_token_where_tokens_are_asked_for(store: SqlStore)
         server.close()
 
 
-def test_without_tokens_metrics_are_for_everybody_on_the_machine(store: SqlStore) -> None:
+def test_without_tokens_every_local_client_reads_metrics(store: SqlStore) -> None:
     server = Server(JobService(store))
     try:
         answer = server.client.get("/metrics")
@@ -67,7 +67,7 @@ class _Tokens:
         return Token("p", Scope.READ, None) if secret in self.known else None  # type: ignore[arg-type]
 
 
-def test_a_known_token_reads_metrics_while_the_database_is_away() -> None:
+def test_a_cached_token_reads_metrics_while_the_database_is_unavailable() -> None:
     now, tokens = [0.0], _Tokens()
     access = MetricsAccess(lambda: tokens, required=True, clock=lambda: now[0])  # type: ignore[arg-type, return-value]
     assert access.allows("Bearer right")
@@ -114,7 +114,7 @@ def served(
         check(url)
 
 
-def test_a_port_of_its_own_serves_metrics_and_nothing_else() -> None:
+def test_a_separate_port_serves_only_metrics() -> None:
     def check(url: str) -> None:
         assert url.endswith("/metrics")
         assert parsed(httpx2.get(url).text).value("gaitswarm_lease_losses_total") == 0
@@ -124,7 +124,7 @@ def test_a_port_of_its_own_serves_metrics_and_nothing_else() -> None:
     served(check)
 
 
-def test_a_port_of_its_own_refuses_whoever_has_no_token_and_stops() -> None:
+def test_a_separate_port_requires_a_token_and_closes() -> None:
     ended = []
 
     def check(url: str) -> None:
@@ -139,7 +139,7 @@ def test_a_port_of_its_own_refuses_whoever_has_no_token_and_stops() -> None:
 
 
 @pytest.mark.parametrize("path", ["/metrics", "/healthz", "/other"])
-def test_a_site_whose_name_is_made_to_resolve_to_a_port_of_its_own_sees_nothing(path: str) -> None:
+def test_a_separate_port_rejects_other_host_names(path: str) -> None:
     def check(url: str) -> None:
         def status(host: str) -> int:
             return httpx2.get(url.replace("/metrics", path), headers={"Host": host}).status_code
@@ -153,7 +153,7 @@ def test_a_site_whose_name_is_made_to_resolve_to_a_port_of_its_own_sees_nothing(
     served(check)
 
 
-def test_a_known_token_reads_metrics_of_a_server_while_its_database_is_away(
+def test_a_cached_token_reads_metrics_of_a_server_without_its_database(
     store: SqlStore, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("gaitswarm.api.access.CACHE_SECONDS", 0.0)
@@ -172,7 +172,7 @@ def test_a_known_token_reads_metrics_of_a_server_while_its_database_is_away(
         server.close()
 
 
-def test_a_port_that_is_taken_is_named() -> None:
+def test_a_port_in_use_is_named() -> None:
     def check(url: str) -> None:
         port = int(url.split(":")[2].split("/", maxsplit=1)[0])
         with pytest.raises(EvaluatorUnavailable, match="GAITSWARM_METRICS_PORT"):
@@ -181,7 +181,7 @@ def test_a_port_that_is_taken_is_named() -> None:
     served(check)
 
 
-def test_a_probe_is_told_without_a_token_whether_the_process_works() -> None:
+def test_a_probe_needs_no_token() -> None:
     said: list[str | None] = [None]
 
     def check(url: str) -> None:

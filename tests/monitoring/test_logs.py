@@ -78,7 +78,7 @@ def lose_the_database(path: Path, client: httpx2.Client) -> None:
 
 
 @pytest.mark.slow
-def test_in_json_every_line_is_an_object_and_says_what_it_belongs_to(database: Path) -> None:
+def test_in_json_every_line_is_an_object_with_its_context(database: Path) -> None:
     def visit(client: httpx2.Client) -> None:
         run_a_job(client)
         lose_the_database(database, client)
@@ -132,7 +132,7 @@ def test_a_bug_in_an_evaluation_is_one_line_with_job_iteration_and_traceback(
     assert log_fields() == {}
 
 
-def test_what_a_message_belongs_to_ends_with_its_block() -> None:
+def test_a_context_ends_with_its_block() -> None:
     with log_context(job="a", iteration=None):
         with log_context(iteration=3):
             assert log_fields() == {"job": "a", "iteration": 3}
@@ -140,7 +140,7 @@ def test_what_a_message_belongs_to_ends_with_its_block() -> None:
     assert log_fields() == {}
 
 
-def test_an_answer_that_an_outage_cuts_off_is_one_line(
+def test_an_aborted_response_is_one_line(
     store: SqlStore, written: Callable[[], list[Entry]]
 ) -> None:
     async def pieces() -> AsyncIterator[bytes]:
@@ -164,7 +164,7 @@ def test_an_answer_that_an_outage_cuts_off_is_one_line(
     assert not any("traceback" in e for e in written())
 
 
-def test_ids_of_requests_that_are_none_are_replaced(store: SqlStore) -> None:
+def test_invalid_request_ids_are_replaced(store: SqlStore) -> None:
     server = Server(JobService(store))
     try:
         for bad in ("a b", "x" * 129, 'a"b', "é"):

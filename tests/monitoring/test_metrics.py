@@ -36,7 +36,7 @@ LABELS = {
 """Each has as many values as the code has words for it, whatever users do."""
 
 
-def test_names_say_what_is_counted_and_in_which_unit(walked: tuple[str, Scrape]) -> None:
+def test_names_contain_the_unit(walked: tuple[str, Scrape]) -> None:
     own = [f for f in walked[1].families if not f.name.startswith("process_")]
     assert len(own) > 15
     for family in own:
@@ -62,7 +62,7 @@ def test_no_label_grows_with_jobs_paths_or_people(walked: tuple[str, Scrape]) ->
     assert {"/v1/jobs", "/v1/jobs/{job_id}/events", "none"} <= routes
 
 
-def test_counters_are_those_of_a_job_that_walked(walked: tuple[str, Scrape]) -> None:
+def test_counters_match_a_finished_job(walked: tuple[str, Scrape]) -> None:
     scrape = walked[1]
     assert scrape.value("gaitswarm_iterations_committed_total", kind="tuning") == 2
     assert scrape.value("gaitswarm_jobs_ended_total", kind="tuning", state="succeeded") == 1
@@ -85,7 +85,7 @@ def test_counters_are_those_of_a_job_that_walked(walked: tuple[str, Scrape]) -> 
     assert scrape.value("gaitswarm_http_request_duration_seconds_count", **asked) == 1
 
 
-def test_the_stream_of_a_job_that_walked_says_how_late_its_events_were(
+def test_a_stream_records_the_lag_of_its_events(
     walked: tuple[str, Scrape],
 ) -> None:
     scrape = walked[1]
@@ -93,7 +93,7 @@ def test_the_stream_of_a_job_that_walked_says_how_late_its_events_were(
     assert scrape.value("gaitswarm_event_stream_lag_seconds_sum") < 2 * 10.0
 
 
-def test_streams_count_as_long_as_somebody_listens(service: JobService, store: SqlStore) -> None:
+def test_streams_count_while_they_are_open(service: JobService, store: SqlStore) -> None:
     job, _ = store.create_job(SPEC)
     metrics = Metrics()
     server = Server(service, metrics=metrics)
@@ -115,7 +115,7 @@ def service(store: SqlStore) -> JobService:
     return JobService(store)
 
 
-def test_the_queue_is_counted_by_state_and_kind_when_it_is_asked_for(
+def test_the_queue_is_counted_by_state_and_kind_on_request(
     service: JobService, store: SqlStore
 ) -> None:
     paused = store.create_job(SPEC)[0]
@@ -169,7 +169,7 @@ def test_a_lease_that_is_taken_over_counts_once_on_either_side(database: Path) -
     assert of(loser).value("gaitswarm_lease_losses_total") == 1
     assert of(winner).value("gaitswarm_lease_takeovers_total") == 1
     assert of(winner).value("gaitswarm_lease_losses_total") == 0
-    # Whoever cancels a job takes it from nobody.
+    # A cancellation is no takeover.
     quick.command(taken.job.id, Command.CANCEL)
     with pytest.raises(LeaseLost):
         quick.renew(taken, lease_seconds=30.0)
@@ -222,7 +222,7 @@ def test_quarantined_jobs_are_counted_among_the_failed_ones(database: Path) -> N
     store.close()
 
 
-def test_operations_that_find_no_database_are_counted(database: Path) -> None:
+def test_operations_without_a_database_are_counted(database: Path) -> None:
     class Away:
         def job(self, job_id: str) -> None:
             raise StoreUnavailable("the database is away")

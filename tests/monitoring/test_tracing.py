@@ -111,10 +111,10 @@ def test_a_job_that_is_lost_ends_its_span(
     assert (span.attributes or {})["gaitswarm.job.state"] == "lost"
 
 
-def test_every_end_of_a_task_is_told() -> None:
-    told: list[TaskReport] = []
+def test_every_end_of_a_task_is_reported() -> None:
+    reports: list[TaskReport] = []
     dispatcher = Dispatcher(1, lambda _: 4)
-    asked = replace(request(2), on_task=told.append)
+    asked = replace(request(2), on_task=reports.append)
     with ThreadPoolExecutor(1) as pool:
         waiting = pool.submit(dispatcher.evaluate, asked, never)
         lost = dispatcher.take(timeout=10.0)
@@ -125,11 +125,11 @@ def test_every_end_of_a_task_is_told() -> None:
         dispatcher.fail(failed, ZeroDivisionError("of the test"))
         with pytest.raises(ZeroDivisionError):
             waiting.result()
-    assert [report.error for report in told] == [
+    assert [report.error for report in reports] == [
         "its worker was lost",
         "ZeroDivisionError: of the test",
     ]
-    assert all(report.walks > 0 and report.seconds >= 0.0 for report in told)
+    assert all(report.walks > 0 and report.seconds >= 0.0 for report in reports)
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""Notifications: left by the end of a job, delivered at least once, and only where allowed."""
+"""Notifications: created by a job's end, delivered at least once, to allowed hosts only"""
 
 from __future__ import annotations
 
@@ -50,21 +50,24 @@ def notifying(
 
 
 def cancelled(store: SqlStore, url: str) -> str:
-    """A job that has ended, with a URL to be told."""
+    """A job that has ended, with a URL to notify."""
     job, _ = store.create_job(SPEC, notify_url=url)
     store.command(job.id, Command.CANCEL)
     return job.id
 
 
-def test_the_end_of_a_job_is_told_once_and_signed(store: SqlStore, receiver: Receiver) -> None:
+def test_the_end_of_a_job_is_notified_once_and_signed(store: SqlStore, receiver: Receiver) -> None:
     job_id = cancelled(store, receiver.url)
     store.create_job(SPEC)
     with notifying(store, receiver):
         eventually(lambda: store.outbox.about(job_id)[0].delivered_at is not None)
     ((headers, body),) = receiver.received
-    (told,) = receiver.documents()
-    assert (told["type"], told["data"]["id"]) == ("job.cancelled", job_id)
-    assert told["data"] | {"state": "cancelled", "iterations": 0, "error": None} == told["data"]
+    (notification,) = receiver.documents()
+    assert (notification["type"], notification["data"]["id"]) == ("job.cancelled", job_id)
+    assert (
+        notification["data"] | {"state": "cancelled", "iterations": 0, "error": None}
+        == notification["data"]
+    )
     (stored,) = store.outbox.about(job_id)
     assert (stored.id, stored.attempts, stored.error) == (headers["webhook-id"], 1, None)
     signed = f"{stored.id}.{headers['webhook-timestamp']}.".encode() + body
@@ -73,7 +76,7 @@ def test_the_end_of_a_job_is_told_once_and_signed(store: SqlStore, receiver: Rec
     assert "authorization" not in headers and "cookie" not in headers
 
 
-def test_failed_and_succeeded_jobs_are_told_and_pauses_are_not(store: SqlStore) -> None:
+def test_failed_and_succeeded_jobs_are_notified_and_pauses_are_not(store: SqlStore) -> None:
     url = "http://ci.example/"
     job, _ = store.create_job(SPEC, notify_url=url)
     for state in (JobState.QUEUED, JobState.PAUSED, JobState.FAILED):
@@ -93,7 +96,7 @@ def test_failed_and_succeeded_jobs_are_told_and_pauses_are_not(store: SqlStore) 
 
 
 @pytest.mark.parametrize("answer", [500, 404, "http://127.0.0.1:9/elsewhere"])
-def test_what_is_not_taken_is_sent_again_with_the_same_id_and_no_redirection_is_followed(
+def test_failed_deliveries_are_repeated_with_the_same_id_and_redirections_are_not_followed(
     database: Path, receiver: Receiver, answer: int | str
 ) -> None:
     clock = Clock()
@@ -115,14 +118,14 @@ def test_what_is_not_taken_is_sent_again_with_the_same_id_and_no_redirection_is_
     store.close()
 
 
-def test_pauses_grow_to_an_hour_and_end_some_day() -> None:
+def test_pauses_grow_to_an_hour_and_end() -> None:
     pauses = [pause_after(attempts) for attempts in range(1, MOST_ATTEMPTS)]
     assert None not in pauses and pauses == sorted(pauses, key=float)  # type: ignore[arg-type]
     assert (pauses[0], pauses[-1]) == (5.0, 3600.0)
     assert pause_after(MOST_ATTEMPTS) is None
 
 
-def test_one_that_nobody_takes_is_given_up(database: Path) -> None:
+def test_a_notification_that_is_never_accepted_is_given_up(database: Path) -> None:
     clock = Clock()
     store = open_store(str(database), clock=clock)
     job_id = cancelled(store, "http://ci.example/")
@@ -138,7 +141,7 @@ def test_one_that_nobody_takes_is_given_up(database: Path) -> None:
     store.close()
 
 
-def test_a_notification_is_one_senders_at_a_time_and_anothers_when_that_has_gone(
+def test_a_notification_is_leased_by_one_sender_at_a_time(
     database: Path,
 ) -> None:
     clock = Clock()
@@ -164,7 +167,7 @@ ALLOWED = ("ci.example", "hooks.example:8443", "[::1]:80")
         "http://[::1]/",
     ],
 )
-def test_hosts_that_are_allowed_may_be_told(url: str) -> None:
+def test_allowed_hosts_are_notified(url: str) -> None:
     check_url(url, ALLOWED, field="Notify-URL")
 
 
@@ -198,13 +201,15 @@ def test_all_others_are_refused(url: str) -> None:
         check_url(url, ALLOWED, field="Notify-URL")
 
 
-def test_unless_hosts_are_allowed_nobody_is_told() -> None:
+def test_without_allowed_hosts_nothing_is_sent() -> None:
     assert Settings().webhook_hosts == ()
     with pytest.raises(InvalidRequest, match="GAITSWARM_WEBHOOK_HOSTS"):
         check_url("https://ci.example/", Settings().webhook_hosts, field="Notify-URL")
 
 
-def test_a_host_that_is_allowed_no_more_is_not_told(store: SqlStore, receiver: Receiver) -> None:
+def test_a_host_that_is_no_longer_allowed_is_not_notified(
+    store: SqlStore, receiver: Receiver
+) -> None:
     job_id = cancelled(store, receiver.url)
     with notifying(store, receiver, hosts=("ci.example",)):
         eventually(lambda: store.outbox.about(job_id)[0].attempts == 1)
@@ -213,7 +218,7 @@ def test_a_host_that_is_allowed_no_more_is_not_told(store: SqlStore, receiver: R
     assert receiver.received == []
 
 
-def test_a_url_is_a_header_of_the_submission_and_what_came_of_it_is_seen_at_the_job(
+def test_the_url_is_a_header_and_deliveries_are_listed_at_the_job(
     store: SqlStore, receiver: Receiver
 ) -> None:
     server = Server(JobService(store), webhook_hosts=receiver.host)
@@ -238,7 +243,7 @@ def test_a_url_is_a_header_of_the_submission_and_what_came_of_it_is_seen_at_the_
 
 
 @pytest.mark.slow
-def test_a_server_that_is_killed_between_end_and_delivery_tells_after_its_restart(
+def test_a_server_killed_before_the_delivery_delivers_after_its_restart(
     database: Path, receiver: Receiver
 ) -> None:
     options = ("--db", str(database), "--port", "0", "--evaluator", "in-process", "--cpus", "1")

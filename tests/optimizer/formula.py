@@ -1,4 +1,4 @@
-"""Walks by formula: an evaluator that is fast, deterministic and fails when it is told to."""
+"""Simulations by formula: a fast, deterministic evaluator with given failures"""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def walk(request: EvaluationRequest) -> tuple[Outcome, ...]:
 class FormulaEvaluator:
     """`Evaluator`. errors: raised by the first calls, one each; None lets a call succeed.
 
-    hold: while set, evaluations wait until they are told to stop or it is cleared.
+    hold: while set, evaluations wait until they are stopped or it is cleared.
     """
 
     slots = 1

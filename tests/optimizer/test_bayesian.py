@@ -98,7 +98,7 @@ def test_a_region_that_has_shrunk_to_nothing_is_given_up_for_a_new_sample() -> N
     assert np.ptp(asked[again]) > 5.0 and np.ptp(asked[again - 1]) < 0.5
 
 
-@pytest.mark.thorough("how good it is beside another method")
+@pytest.mark.thorough("comparison with another method")
 def test_it_needs_fewer_designs_than_differential_evolution() -> None:
     """To come within 0.1 of the optimum with integers and choices."""
     best = {

@@ -1,4 +1,4 @@
-"""Digests of a job's history: exact bytes of exact numbers, whoever computes them."""
+"""Digests of a job's history: exact bytes of exact numbers"""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_documents_are_encoded_as_the_standard_has_it(value: Any, expected: str)
     assert encoded(value).hex() == expected
 
 
-def test_keys_are_in_the_order_of_their_bytes_whatever_order_they_came_in() -> None:
+def test_keys_are_sorted_by_their_bytes() -> None:
     assert encoded({"bb": 1, "c": 2, "a": 3}) == encoded({"a": 3, "c": 2, "bb": 1})
     assert encoded({"bb": 1, "c": 2}).hex() == "a2" + "616302" + "62626201"
 
@@ -77,7 +77,7 @@ def test_an_array_is_its_shape_and_its_numbers() -> None:
     assert encoded(array) != encoded(array.T)
 
 
-def test_all_that_is_not_finite_is_the_same_as_it_is_stored_as_none() -> None:
+def test_all_non_finite_numbers_are_equal() -> None:
     kinds = [math.nan, math.inf, -math.inf, struct.unpack("<d", b"\1\0\0\0\0\0\xf0\xff")[0]]
     assert len({encoded(np.array([value])) for value in kinds}) == 1
 
@@ -106,7 +106,7 @@ def digest(
     return iteration_digest(before, documents, link, outcomes)
 
 
-def test_a_digest_is_what_the_documentation_says_and_stays_so() -> None:
+def test_a_digest_is_as_documented() -> None:
     """Version 1: another encoding needs another version, as digests are stored."""
     parts = [
         "gaitswarm iteration",
@@ -122,11 +122,11 @@ def test_a_digest_is_what_the_documentation_says_and_stays_so() -> None:
     statuses = bytes([0x82]) + encoded(labels)
     nested = b"\xd8\x28\x82\x82\x02\x01\xd8\x40\x42\x01\x00"
     tail = [OUTCOMES.fitness, LINK.ask_digest, {"from_iteration": 0, "code": "a"}]
-    anew = b"\x84\x00" + encoded(np.array([[1.5, 2.0]]))
-    anew += b"\x82" + encoded([Status.OK.label]) + b"\xd8\x28\x82\x81\x01\xd8\x40\x41\x00"
-    anew += encoded(np.array([2.5]))
+    reevaluation = b"\x84\x00" + encoded(np.array([[1.5, 2.0]]))
+    reevaluation += b"\x82" + encoded([Status.OK.label]) + b"\xd8\x28\x82\x81\x01\xd8\x40\x41\x00"
+    reevaluation += encoded(np.array([2.5]))
     whole = b"\x8c" + b"".join(map(encoded, parts)) + statuses + nested
-    whole += b"".join(map(encoded, tail)) + anew
+    whole += b"".join(map(encoded, tail)) + reevaluation
     assert digest() == hashlib.sha256(whole).hexdigest()
     assert DOCUMENTS.digest.startswith("0a57a34d2a75cd42")
     assert digest().startswith("17fd1d620f1fa360")

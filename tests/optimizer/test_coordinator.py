@@ -147,7 +147,7 @@ def test_a_job_that_crashes_at_every_step_resumes_to_the_same_bits() -> None:
     assert bits(broken) == bits(whole)
 
 
-def test_what_is_committed_is_the_fitness_of_the_preference() -> None:
+def test_the_committed_fitness_is_by_the_preference() -> None:
     state, actions = begin()
     event = evaluated(actions)
     _, (commit,) = handle(state, event)
@@ -165,7 +165,7 @@ def test_a_pause_takes_effect_when_the_iteration_is_committed() -> None:
     assert (state.phase, actions) == (Phase.ENDED, ())
 
 
-def test_workers_out_of_reach_are_tried_again_after_growing_bounded_delays_without_end() -> None:
+def test_unreachable_workers_are_retried_indefinitely_after_growing_bounded_pauses() -> None:
     state, _ = begin()
     delays = []
     for _ in range(100):
@@ -178,7 +178,7 @@ def test_workers_out_of_reach_are_tried_again_after_growing_bounded_delays_witho
     assert set(delays[4:]) == {4.0}
 
 
-def test_an_iteration_that_succeeds_restores_patience() -> None:
+def test_a_successful_iteration_resets_the_pauses() -> None:
     state, actions = begin()
     state, _ = handle(state, EvaluatorLost("gone"))
     state, actions = handle(state, Waited())
@@ -188,7 +188,7 @@ def test_an_iteration_that_succeeds_restores_patience() -> None:
     assert isinstance(wait, Wait) and wait.seconds == 1.0
 
 
-def test_a_pause_while_waiting_for_workers_need_not_wait_for_them() -> None:
+def test_a_pause_does_not_wait_for_workers() -> None:
     state, _ = begin()
     state, _ = handle(state, EvaluatorLost("gone"))
     _, actions = handle(state, PauseSeen())
@@ -196,14 +196,14 @@ def test_a_pause_while_waiting_for_workers_need_not_wait_for_them() -> None:
     assert actions == (Release(JobState.QUEUED),)
 
 
-def test_a_simulation_that_fails_fails_the_job_with_its_reason() -> None:
+def test_a_failed_simulation_fails_the_job_with_its_reason() -> None:
     state, _ = begin()
     state, actions = handle(state, EvaluationFailed("torque table: broken"))
     assert actions == (Release(JobState.FAILED, "torque table: broken"),)
     assert state.phase is Phase.ENDED
 
 
-def test_a_stop_gives_the_job_back_to_the_queue() -> None:
+def test_a_stop_returns_the_job_to_the_queue() -> None:
     state, _ = begin()
     assert handle(state, StopRequested())[1] == (Release(JobState.QUEUED),)
 
@@ -216,7 +216,7 @@ def test_after_the_lease_is_lost_nothing_is_written() -> None:
     assert handle(state, late) == (state, ())
 
 
-def test_an_event_that_makes_no_sense_is_refused() -> None:
+def test_an_unexpected_event_is_refused() -> None:
     state, _ = begin()
     with pytest.raises(ValueError, match="unexpected Committed while evaluating"):
         handle(state, Committed(JobState.RUNNING))

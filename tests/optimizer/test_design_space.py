@@ -55,7 +55,7 @@ def test_positions_are_not_changed() -> None:
     assert positions.tolist() == [[0.3, 1.4]]
 
 
-def test_own_bounds_keep_the_unit_of_the_catalogue() -> None:
+def test_custom_bounds_keep_the_unit_of_the_catalogue() -> None:
     narrow = Variable(name="gain", low=0.5, high=0.6, unit="furlong")
     (variable, _) = build([narrow, "shape"]).variables
     assert (variable.low, variable.high, variable.unit) == (0.5, 0.6, "1")
@@ -110,7 +110,7 @@ def test_fewer_choices_are_searched_in_their_own_order_and_simulated_by_the_cata
         (None, {"gain": "stick"}, "fixed: gain: 'stick' is not a number"),
     ],
 )
-def test_a_space_that_makes_no_sense_is_refused_by_name(
+def test_an_invalid_space_is_refused_by_name(
     chosen: list[str | Variable] | None, fixed: dict[str, float | str], message: str
 ) -> None:
     with pytest.raises(ValueError, match=message):

@@ -65,9 +65,9 @@ def test_a_member_is_replaced_by_a_trial_that_is_no_worse_and_by_no_other() -> N
     first = optimizer.ask()
     optimizer.tell(np.ones(10))
     trials = optimizer.ask()
-    told = np.array([0.5, 1.0, 1.5, math.inf, 0.9] * 2)
-    optimizer.tell(told)
-    expected = np.where((told <= 1.0)[:, np.newaxis], trials, first)
+    fitness = np.array([0.5, 1.0, 1.5, math.inf, 0.9] * 2)
+    optimizer.tell(fitness)
+    expected = np.where((fitness <= 1.0)[:, np.newaxis], trials, first)
     np.testing.assert_array_equal(optimizer.population, expected)
 
 
@@ -81,7 +81,7 @@ def test_the_population_falls_evenly_over_the_budget_and_then_stays() -> None:
         assert abs(size - max(4.0, 24.0 - 20.0 * evaluations / 600)) <= 0.5
 
 
-def test_those_that_go_are_the_worst() -> None:
+def test_the_worst_members_are_removed() -> None:
     optimizer = search(budget=40, population=20, population_end=4)
     first = optimizer.ask()
     optimizer.tell(np.arange(20.0))
@@ -171,7 +171,7 @@ def test_the_population_never_grows() -> None:
         ("positions", [[0.0] * 9] * 30),
     ],
 )
-def test_a_state_that_cannot_be_is_refused(field: str, value: object) -> None:
+def test_an_impossible_state_is_refused(field: str, value: object) -> None:
     optimizer = search(population_end=25)
     generation(optimizer)
     optimizer.ask()

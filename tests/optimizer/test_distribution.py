@@ -52,11 +52,11 @@ def test_no_iteration_has_no_distribution() -> None:
     assert found.fitness.shape == (0, len(QUANTILES))
 
 
-def test_few_evaluations_are_all_kept() -> None:
+def test_few_evaluations_are_not_thinned() -> None:
     assert thinned(fitness_only((1.0, 2.0), (3.0, 4.0)), 4).tolist() == [0, 1, 2, 3]
 
 
-def test_whole_iterations_are_kept_evenly_from_the_first_to_the_last() -> None:
+def test_whole_iterations_are_chosen_evenly_from_the_first_to_the_last() -> None:
     swarms = [(9.0, 9.0)] * 101
     swarms[77] = (9.0, 1.0)
     rows = thinned(fitness_only(*swarms), 11)

@@ -69,13 +69,13 @@ def bits(outcomes: tuple[Outcome, ...]) -> list[tuple[bytes, bytes]]:
 
 
 class Knows(SqlStore):
-    """A store that knows what it is told to."""
+    """A store with given cached outcomes."""
 
     def __init__(self, known: dict[bytes, CachedOutcome]) -> None:
-        self.told = known
+        self.cached = known
 
     def known(self, keys: Any) -> dict[bytes, CachedOutcome]:
-        return {key: self.told[key] for key in keys if key in self.told}
+        return {key: self.cached[key] for key in keys if key in self.cached}
 
 
 def test_a_multi_objective_job_under_another_preference_needs_no_walk(store: Store) -> None:

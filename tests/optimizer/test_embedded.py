@@ -1,4 +1,4 @@
-"""One job run by the process that asked for it, beside others that run jobs of the same store."""
+"""Jobs run by the calling process, next to other runners of the same store"""
 
 from __future__ import annotations
 
@@ -88,8 +88,8 @@ def running(store: Store, claim: Claim, *, after: threading.Event) -> Iterator[N
     thread.join()
 
 
-class Told:
-    """What the callbacks of an embedded run were told."""
+class Reports:
+    """Calls of an embedded run's callbacks."""
 
     def __init__(self) -> None:
         self.committed: list[int] = []
@@ -113,14 +113,16 @@ class Told:
 
 
 @pytest.fixture
-def told() -> Told:
-    return Told()
+def reports() -> Reports:
+    return Reports()
 
 
-def test_a_job_that_was_submitted_for_itself_runs_to_its_end(store: Store, told: Told) -> None:
-    job = run_embedded(store, FormulaEvaluator(), submitted(store), **told.callbacks())
+def test_a_job_that_was_submitted_for_itself_runs_to_its_end(
+    store: Store, reports: Reports
+) -> None:
+    job = run_embedded(store, FormulaEvaluator(), submitted(store), **reports.callbacks())
     assert job.state is JobState.SUCCEEDED
-    assert (told.committed, told.followed, told.news) == (ALL, [], [])
+    assert (reports.committed, reports.followed, reports.news) == (ALL, [], [])
 
 
 def test_a_job_is_kept_while_its_workers_are_opened_however_long_that_takes(
@@ -161,7 +163,7 @@ def test_a_job_whose_workers_cannot_be_opened_is_queued(store: Store) -> None:
     assert store.job(claim.job.id).state is JobState.QUEUED
 
 
-def test_a_run_that_is_told_to_stop_while_its_workers_are_opened_leaves_the_job_queued(
+def test_a_run_that_is_asked_to_stop_while_its_workers_are_opened_leaves_the_job_queued(
     store: Store,
 ) -> None:
     stop = threading.Event()
@@ -174,28 +176,30 @@ def test_a_run_that_is_told_to_stop_while_its_workers_are_opened_leaves_the_job_
     assert (job.state, job.progress.iterations) == (JobState.QUEUED, 0)
 
 
-def test_a_job_that_another_process_runs_is_followed_to_its_end(store: Store, told: Told) -> None:
+def test_a_job_that_another_process_runs_is_followed_to_its_end(
+    store: Store, reports: Reports
+) -> None:
     claim = held_by_another(store)
-    with running(store, claim, after=told.any_news):
-        job = run_embedded(store, no_workers, claim.job.id, **told.callbacks())
+    with running(store, claim, after=reports.any_news):
+        job = run_embedded(store, no_workers, claim.job.id, **reports.callbacks())
     assert job.state is JobState.SUCCEEDED
-    assert (told.committed, told.followed) == ([], ALL)
-    assert len(told.news) == 1 and "another process runs" in told.news[0]
+    assert (reports.committed, reports.followed) == ([], ALL)
+    assert len(reports.news) == 1 and "another process runs" in reports.news[0]
 
 
 def test_following_begins_after_the_iterations_that_the_caller_knows_of(
-    store: Store, told: Told
+    store: Store, reports: Reports
 ) -> None:
     first, stop = held_by_another(store), threading.Event()
     run_claim(first, RunContext(store, FormulaEvaluator(), on_commit=lambda *_: stop.set()), stop)
     claim = store.claim("another", lease_seconds=60.0)
     assert claim is not None and claim.job.progress.iterations == 1
-    with running(store, claim, after=told.any_news):
-        run_embedded(store, no_workers, claim.job.id, followed_iterations=0, **told.callbacks())
-    assert told.followed == ALL
+    with running(store, claim, after=reports.any_news):
+        run_embedded(store, no_workers, claim.job.id, followed_iterations=0, **reports.callbacks())
+    assert reports.followed == ALL
 
 
-def test_a_job_that_another_process_gives_back_goes_on_here(store: Store, told: Told) -> None:
+def test_a_job_released_by_another_process_continues_here(store: Store, reports: Reports) -> None:
     claim = held_by_another(store)
     stop = threading.Event()
 
@@ -204,36 +208,36 @@ def test_a_job_that_another_process_gives_back_goes_on_here(store: Store, told: 
             stop.set()
 
     def run() -> None:
-        told.any_news.wait()
+        reports.any_news.wait()
         run_claim(claim, RunContext(store, FormulaEvaluator(), on_commit=give_back), stop)
 
     another = threading.Thread(target=run)
     another.start()
-    job = run_embedded(store, FormulaEvaluator(), claim.job.id, **told.callbacks())
+    job = run_embedded(store, FormulaEvaluator(), claim.job.id, **reports.callbacks())
     another.join()
     assert job.state is JobState.SUCCEEDED
-    assert (told.followed, told.committed) == (ALL[:2], ALL[2:])
-    assert "continuing it here" in told.news[-1]
+    assert (reports.followed, reports.committed) == (ALL[:2], ALL[2:])
+    assert "continuing it here" in reports.news[-1]
 
 
-def test_a_job_whose_process_was_killed_goes_on_here_when_its_lease_has_run_out(
-    store: Store, told: Told
+def test_a_job_whose_process_was_killed_continues_here_when_its_lease_has_expired(
+    store: Store, reports: Reports
 ) -> None:
     claim = held_by_another(store, lease_seconds=0.4)
-    job = run_embedded(store, FormulaEvaluator(), claim.job.id, **told.callbacks())
+    job = run_embedded(store, FormulaEvaluator(), claim.job.id, **reports.callbacks())
     assert job.state is JobState.SUCCEEDED
-    assert "killed" in told.news[0] and "continuing it here" in told.news[1]
+    assert "killed" in reports.news[0] and "continuing it here" in reports.news[1]
 
 
-def test_a_job_that_is_lost_to_another_process_is_followed_there_and_nothing_is_told_twice(
-    store: Store, clock: Clock, told: Told
+def test_a_job_lost_to_another_process_is_followed_there_and_nothing_is_reported_twice(
+    store: Store, clock: Clock, reports: Reports
 ) -> None:
     mine = submitted(store)
     evaluator = FormulaEvaluator()
     evaluator.hold.set()
     ended = []
     here = threading.Thread(
-        target=lambda: ended.append(run_embedded(store, evaluator, mine, **told.callbacks()))
+        target=lambda: ended.append(run_embedded(store, evaluator, mine, **reports.callbacks()))
     )
     here.start()
     assert evaluator.entered.wait(timeout=10.0)
@@ -242,11 +246,11 @@ def test_a_job_that_is_lost_to_another_process_is_followed_there_and_nothing_is_
         # As after a sleep of the machine. A heartbeat may just have come in between.
         clock.advance(EMBEDDED_LEASE_SECONDS + 1.0)
         theirs = store.claim("another", lease_seconds=60.0)
-    with running(store, theirs, after=told.any_news):
+    with running(store, theirs, after=reports.any_news):
         here.join()
     assert [job.state for job in ended] == [JobState.SUCCEEDED]
-    assert "lost its lease" in told.news[0]
-    assert (told.committed, told.followed) == ([], ALL)
+    assert "lost its lease" in reports.news[0]
+    assert (reports.committed, reports.followed) == ([], ALL)
 
 
 class Asleep(FormulaEvaluator):
@@ -269,20 +273,20 @@ class Asleep(FormulaEvaluator):
         return super().evaluate(request, should_stop)
 
 
-def test_a_job_that_another_process_took_and_ended_unnoticed_is_told_to_its_end(
-    store: Store, clock: Clock, told: Told
+def test_a_job_ended_unnoticed_by_another_process_is_reported_to_its_end(
+    store: Store, clock: Clock, reports: Reports
 ) -> None:
-    job = run_embedded(store, Asleep(store, clock), submitted(store), **told.callbacks())
+    job = run_embedded(store, Asleep(store, clock), submitted(store), **reports.callbacks())
     assert job.state is JobState.SUCCEEDED
-    assert (told.committed, told.followed) == ([], ALL)
-    assert len(told.news) == 1 and "lost its lease" in told.news[0]
+    assert (reports.committed, reports.followed) == ([], ALL)
+    assert len(reports.news) == 1 and "lost its lease" in reports.news[0]
 
 
 def test_a_job_that_is_cancelled_while_it_is_followed_is_returned_cancelled(
-    store: Store, told: Told
+    store: Store, reports: Reports
 ) -> None:
     claim = held_by_another(store)
-    callbacks = told.callbacks()
+    callbacks = reports.callbacks()
     callbacks["on_news"] = lambda _: store.command(claim.job.id, Command.CANCEL)
     job = run_embedded(store, no_workers, claim.job.id, **callbacks)
     assert job.state is JobState.CANCELLED
@@ -295,7 +299,7 @@ def test_a_job_that_is_not_under_way_is_returned_as_it_is(store: Store, command:
     assert run_embedded(store, no_workers, job.id) == store.job(job.id)
 
 
-def test_a_run_that_is_told_to_stop_leaves_the_job_queued(store: Store) -> None:
+def test_a_run_that_is_asked_to_stop_leaves_the_job_queued(store: Store) -> None:
     stop = threading.Event()
     claim = submitted(store)
     job = run_embedded(store, FormulaEvaluator(), claim, on_commit=lambda *_: stop.set(), stop=stop)
@@ -303,12 +307,12 @@ def test_a_run_that_is_told_to_stop_leaves_the_job_queued(store: Store) -> None:
 
 
 def test_a_job_whose_process_was_killed_with_its_clock_ahead_is_taken_over(
-    store: Store, clock: Clock, told: Told
+    store: Store, clock: Clock, reports: Reports
 ) -> None:
     with clock_ahead(clock, 86400.0):
         claim = held_by_another(store)
-    job = run_embedded(store, FormulaEvaluator(), claim.job.id, **told.callbacks())
-    assert (job.state, told.committed) == (JobState.SUCCEEDED, ALL)
+    job = run_embedded(store, FormulaEvaluator(), claim.job.id, **reports.callbacks())
+    assert (job.state, reports.committed) == (JobState.SUCCEEDED, ALL)
 
 
 def test_a_run_ends_when_its_database_file_is_removed(store: Store, tmp_path: Path) -> None:
@@ -319,13 +323,13 @@ def test_a_run_ends_when_its_database_file_is_removed(store: Store, tmp_path: Pa
         run_embedded(store, FormulaEvaluator(), submitted(store), on_commit=remove)
 
 
-def test_a_run_that_is_told_to_stop_before_it_begins_leaves_the_job_queued(store: Store) -> None:
+def test_a_run_that_is_asked_to_stop_before_it_begins_leaves_the_job_queued(store: Store) -> None:
     stop = threading.Event()
     stop.set()
     assert run_embedded(store, no_workers, submitted(store), stop=stop).state is JobState.QUEUED
 
 
-def test_a_run_that_is_told_to_stop_leaves_a_job_alone_that_another_process_took(
+def test_a_run_that_is_asked_to_stop_leaves_a_job_alone_that_another_process_took(
     store: Store, clock: Clock
 ) -> None:
     stop = threading.Event()
@@ -337,7 +341,7 @@ def test_a_run_that_is_told_to_stop_leaves_a_job_alone_that_another_process_took
 
 
 class NeverWaitedFor(threading.Event):
-    """Whoever waits for it holds its lock, which a signal's handler in the same thread needs."""
+    """Waiting holds the lock that a signal handler in the same thread needs."""
 
     def wait(self, timeout: float | None = None) -> bool:
         raise AssertionError(f"waited {timeout} s for what a handler is to set")

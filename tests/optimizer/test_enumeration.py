@@ -30,7 +30,7 @@ def test_positions_are_asked_for_in_order_whatever_they_are_worth() -> None:
     assert (search.iteration, search.evaluations) == (2, 5)
 
 
-def test_a_state_goes_on_where_it_was_and_does_not_grow() -> None:
+def test_a_restored_state_continues_and_does_not_grow() -> None:
     search, sizes = enumeration(), set()
     for _ in range(9):
         state = json.loads(json.dumps(search.dump()))
@@ -51,7 +51,7 @@ def test_what_is_no_state_of_it_is_refused_and_changes_nothing() -> None:
         ({"optimizer": "pso"}, "not a state of random: optimizer: pso"),
         ({"asked": 4}, "asked: 4 positions, more than random asks for"),
         ({"schema_version": 2}, "schema_version"),
-        ({"told": []}, "told"),
+        ({"feedback": []}, "feedback"),
     ):
         with pytest.raises(ValueError, match=words):
             search.load(before | change)

@@ -130,7 +130,7 @@ def test_a_method_that_asks_for_one_design_at_a_time_is_measured_so(
 
 
 @pytest.mark.slow
-def test_where_no_process_is_told_its_processors_a_walk_is_measured_for_all(
+def test_without_an_affinity_a_measurement_is_scaled_to_all_processors(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.delattr(os, "sched_getaffinity", raising=False)

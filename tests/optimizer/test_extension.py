@@ -69,7 +69,7 @@ def until(found: list[Bits], iterations: int) -> list[Bits]:
     return [row for row in found if row[0] < iterations]
 
 
-def test_a_job_that_succeeded_goes_on_from_its_last_iteration(store: Store) -> None:
+def test_a_job_that_succeeded_continues_from_its_last_iteration(store: Store) -> None:
     job_id = finished(store)
     before = history(store, job_id)
     again = store.extend(job_id, BUDGET + 3)
@@ -191,7 +191,7 @@ def test_a_job_that_pauses_in_the_iteration_in_which_it_is_extended_is_paused(
     assert (paused.state, paused.progress.iterations) == (JobState.PAUSED, 3)
 
 
-def test_what_follows_is_asked_anew_when_the_budget_changed_under_a_commit() -> None:
+def test_the_next_ask_is_repeated_when_the_budget_changed_under_a_commit() -> None:
     state, actions = handle(Coordination(), Claimed(Claim(job(), "runner", 1, None), HERE))
     evaluate = actions[-1]
     assert isinstance(evaluate, Evaluate)
@@ -217,7 +217,7 @@ def test_a_job_that_was_cancelled_cannot_be_extended() -> None:
 
 
 @pytest.mark.parametrize("iterations", [-1, 0, 4, 5, LARGEST_BUDGET + 1])
-def test_a_budget_that_is_spent_or_beyond_reason_is_refused_by_name(iterations: int) -> None:
+def test_a_spent_or_excessive_budget_is_refused_by_name(iterations: int) -> None:
     with pytest.raises(InvalidRequest, match="it is the total") as refused:
         extended(JobState.PAUSED, 5, iterations)
     assert refused.value.field == "iterations"

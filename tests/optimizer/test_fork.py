@@ -69,7 +69,7 @@ def objectives(store: SqlStore, job: Job, iterations: int) -> list[bytes]:
 @pytest.mark.variants("3-*")
 @pytest.mark.parametrize("method", ["pso", "hype", *REPLAYED])
 @pytest.mark.parametrize("iteration", [1, 3, 6])
-def test_a_fork_with_the_same_settings_goes_on_bit_for_bit_as_its_parent(
+def test_a_fork_with_the_same_settings_continues_bit_for_bit_as_its_parent(
     store: SqlStore, method: str, iteration: int
 ) -> None:
     optimizer = {"name": method, "particles": PARTICLES}
@@ -87,9 +87,7 @@ def test_a_fork_with_the_same_settings_goes_on_bit_for_bit_as_its_parent(
 
 
 @pytest.mark.parametrize("method", ["pso", "pso-ps"])
-def test_a_search_that_takes_too_long_to_bring_to_where_it_was_is_not_waited_for(
-    store: SqlStore, method: str
-) -> None:
+def test_a_search_that_takes_too_long_to_restore_is_refused(store: SqlStore, method: str) -> None:
     job = parent(store, optimizer={"name": method, "particles": PARTICLES})
     hasty = JobService(store, longest_fork=0.0)
     request = ForkRequest(from_iteration=3)
@@ -173,7 +171,7 @@ def test_a_fork_of_a_fork_and_of_an_extended_job_go_on_as_the_first_would(store:
 
 
 @pytest.mark.parametrize("method", ["pso", "random"])
-def test_another_preference_judges_the_history_anew_and_the_search_is_told(
+def test_another_preference_rejudges_the_history_and_the_search(
     store: SqlStore, method: str
 ) -> None:
     job = parent(store, optimizer={"name": method, "particles": PARTICLES})
@@ -192,7 +190,7 @@ def test_another_preference_judges_the_history_anew_and_the_search_is_told(
     assert done.progress.evaluations == SPEC.budget
 
 
-def test_a_swarm_that_is_judged_anew_flies_on_from_its_place_towards_other_bests(
+def test_a_rejudged_swarm_continues_from_its_place_towards_other_bests(
     store: SqlStore,
 ) -> None:
     job = parent(store)
@@ -200,8 +198,8 @@ def test_a_swarm_that_is_judged_anew_flies_on_from_its_place_towards_other_bests
     claim = store.claim("runner", lease_seconds=30.0, job_id=forked.id)
     assert claim is not None and claim.answered is not None
     state, asked = claim.answered.ask.state, store.asked(job.id, 0, 4)
-    told = [row.fitness for row in store.evaluations_between(forked.id, 0, 3)]
-    by_particle = np.array(told).reshape(3, PARTICLES)
+    feedback = [row.fitness for row in store.evaluations_between(forked.id, 0, 3)]
+    by_particle = np.array(feedback).reshape(3, PARTICLES)
     assert state["positions"] == asked[3].tolist()
     best = by_particle.argmin(axis=0)
     by_parent = [row.fitness for row in store.evaluations_between(job.id, 0, 3)]
@@ -212,7 +210,7 @@ def test_a_swarm_that_is_judged_anew_flies_on_from_its_place_towards_other_bests
 
 
 @pytest.mark.parametrize("method", ["de", "pso-ps"])
-def test_a_method_that_cannot_be_told_anew_starts_from_the_best_designs_by_the_preference(
+def test_a_method_that_cannot_be_rejudged_starts_from_the_best_designs_by_the_preference(
     store: SqlStore, method: str
 ) -> None:
     job = parent(store, optimizer={"name": method, "particles": PARTICLES}, iterations=25)
@@ -263,8 +261,8 @@ def test_a_search_in_single_precision_is_forked_with_its_designs_in_double(
     same = run(store, fork(store, job, 3))
     assert history(store, same.id) == history(store, job.id)
     assert store.reevaluations(same.id) != ()
-    assert [(k, anew.fitness) for k, anew in store.reevaluations(same.id)] == [
-        (k, anew.fitness) for k, anew in store.reevaluations(job.id)
+    assert [(k, reevaluation.fitness) for k, reevaluation in store.reevaluations(same.id)] == [
+        (k, reevaluation.fitness) for k, reevaluation in store.reevaluations(job.id)
     ]
     assert same.progress.best_particle == job.progress.best_particle
     other = fork(store, job, 3, preference="B").lineage
@@ -281,7 +279,7 @@ def test_a_search_in_single_precision_is_forked_with_its_designs_in_double(
         ({"from_iteration": 3, "scenarios": ["1", "normal-fast"]}, "scenarios"),
     ],
 )
-def test_a_fork_that_makes_no_sense_is_refused_by_field_and_nothing_is_stored(
+def test_an_invalid_fork_is_refused_by_field_and_nothing_is_stored(
     store: SqlStore, given: dict[str, Any], field: str
 ) -> None:
     job = parent(store)
@@ -301,9 +299,7 @@ def test_a_fork_of_other_code_is_refused_unless_that_is_accepted(store: SqlStore
     assert forked.provenance == job.provenance[:1]
 
 
-def test_a_job_without_a_design_that_walks_has_nothing_to_start_from(
-    store: SqlStore, database: Path
-) -> None:
+def test_a_job_of_failed_designs_has_nothing_to_start_from(store: SqlStore, database: Path) -> None:
     job = parent(store)
     edit(database, "UPDATE evaluations SET fitness = NULL")
     with pytest.raises(Conflict, match="there is none to start from"):

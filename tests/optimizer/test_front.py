@@ -97,7 +97,7 @@ def test_a_front_that_bends_twice_has_two_knees_the_sharper_one_first() -> None:
     assert found[0].distance == pytest.approx((1.0 - 0.5) / math.sqrt(2.0))
 
 
-def test_what_lies_beside_a_knee_is_none_and_neither_is_a_front_that_bulges() -> None:
+def test_neighbors_of_a_knee_are_none_and_neither_is_a_front_that_bulges() -> None:
     straight = [(x, 1.0 - x) for x in np.linspace(0.0, 1.0, 11)]
     assert knees(*normalised_front([*straight, (0.4, 0.4), (0.45, 0.36)]))[0].row == 11
     bulging = [(math.sin(a), math.cos(a)) for a in np.linspace(0.0, math.pi / 2.0, 30)]
@@ -116,7 +116,7 @@ def test_c_without_biases_always_wins_on_the_front_and_the_others_are_placed() -
     assert front.winners["C"].row in front.rows
 
 
-def test_a_winner_may_be_dominated_and_then_it_is_told_by_how_much() -> None:
+def test_a_winner_may_be_dominated_and_then_its_distance_is_given() -> None:
     # In one scenario biases hide what the first design is better in; the mean without biases is not
     # so blind.
     objectives = np.ones((2, 2, 5))

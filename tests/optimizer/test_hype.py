@@ -133,9 +133,9 @@ def test_the_first_members_are_the_start_and_more_than_there_is_room_for_are_sel
     positions = optimizer.ask()
     assert positions.tolist() == start.tolist()
     # All but the last three are dominated by the third.
-    told = np.column_stack([np.abs(positions[:, 0] - 0.25), np.full(10, 1.0)])
-    told[7:] = [[9.0, 0.5], [8.0, 0.7], [7.0, 0.8]]
-    optimizer.tell(told)
+    feedback = np.column_stack([np.abs(positions[:, 0] - 0.25), np.full(10, 1.0)])
+    feedback[7:] = [[9.0, 0.5], [8.0, 0.7], [7.0, 0.8]]
+    optimizer.tell(feedback)
     assert optimizer.population[0].tolist() == start[[2, 7, 8, 9]].tolist()
 
 
@@ -187,7 +187,7 @@ def test_a_converged_population_is_given_up_for_a_new_one() -> None:
         ("fitness", [1.0]),
     ],
 )
-def test_a_state_that_cannot_be_is_refused(field: str, value: object) -> None:
+def test_an_impossible_state_is_refused(field: str, value: object) -> None:
     optimizer = search(LINE, population=4, offspring=4, particles=2)
     for _ in range(3):
         positions = optimizer.ask()
@@ -222,21 +222,21 @@ def by_nsga2(seed: int) -> Floats:
     class Dtlz2(Problem):  # type: ignore[misc]
         def __init__(self) -> None:
             super().__init__(n_var=9, n_obj=5, xl=0.0, xu=1.0)
-            self.told: list[Floats] = []
+            self.feedback: list[Floats] = []
 
         def _evaluate(self, x: Floats, out: dict[str, Floats], *_: object, **__: object) -> None:
             out["F"] = dtlz2(x)
-            self.told.append(out["F"])
+            self.feedback.append(out["F"])
 
     runs = []
     for population in (25, 50):
         problem = Dtlz2()
         minimize(problem, NSGA2(pop_size=population), ("n_eval", 625), seed=seed)
-        runs.append(np.vstack(problem.told)[:625])
+        runs.append(np.vstack(problem.feedback)[:625])
     return max(runs, key=hypervolume)
 
 
-@pytest.mark.thorough("how good it is beside another method")
+@pytest.mark.thorough("comparison with another method")
 def test_it_finds_more_hypervolume_of_five_objectives_than_nsga_ii() -> None:
     own = [hypervolume(found_by(search(seed=seed))) for seed in range(3)]
     others = [hypervolume(by_nsga2(seed)) for seed in range(2)]

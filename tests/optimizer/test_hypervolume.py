@@ -73,7 +73,7 @@ def test_a_front_of_hundreds_agrees_with_points_drawn_at_random() -> None:
     assert hypervolume_curve(points).values[-1] == pytest.approx(dominated.mean(), abs=5.0 * error)
 
 
-def test_an_estimate_is_told_with_its_error_and_agrees_with_the_exact_curve() -> None:
+def test_an_estimate_has_an_error_and_agrees_with_the_exact_curve() -> None:
     points = sphere(200, seed=5)
     exact, estimate = hypervolume_curve(points), hypervolume_curve(points, most_bounds=100)
     assert exact.standard_error == 0.0

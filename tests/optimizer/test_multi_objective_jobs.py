@@ -1,4 +1,4 @@
-"""Jobs whose search is told objective vectors: what these are, and all that tells them again."""
+"""Jobs whose search learns from objective vectors, and the replay of these"""
 
 from __future__ import annotations
 
@@ -67,18 +67,20 @@ def by_iteration(store: Store, job: Job, column: Floats) -> list[Floats]:
     return np.split(column, np.cumsum(sizes)[:-1])
 
 
-def test_the_search_is_told_geometric_means_of_each_objective_without_biases(store: Store) -> None:
+def test_the_search_learns_geometric_means_of_each_objective_without_biases(store: Store) -> None:
     job = run(store, spec(preference="A"))
     columns = store.evaluation_columns(job.id, 0, 100)
     assert columns is not None
     assert columns.failed.any()
     vectors = np.exp(np.log(columns.objectives[:, :, :5]).mean(axis=1))
     vectors[columns.failed.any(axis=1)] = math.inf
-    told = spec().search_feedback(columns.objectives, columns.failed, columns.fitness)
-    np.testing.assert_allclose(told, vectors, rtol=1e-12)
+    feedback = spec().search_feedback(columns.objectives, columns.failed, columns.fitness)
+    np.testing.assert_allclose(feedback, vectors, rtol=1e-12)
     asked = store.asked(job.id, 0, job.progress.iterations)
-    retraced(job.spec, [job.spec.iterations], asked, by_iteration(store, job, told))
-    worse = by_iteration(store, job, told[:, ::-1] * np.arange(1.0, len(told) + 1.0)[:, None])
+    retraced(job.spec, [job.spec.iterations], asked, by_iteration(store, job, feedback))
+    worse = by_iteration(
+        store, job, feedback[:, ::-1] * np.arange(1.0, len(feedback) + 1.0)[:, None]
+    )
     with pytest.raises(ValueError, match="asks for other designs"):
         retraced(job.spec, [job.spec.iterations], asked, worse)
 
@@ -107,9 +109,11 @@ def test_a_job_killed_after_every_iteration_equals_one_that_never_was(
     whole = run(store, wanted)
     killed = run_through_kills(store, store.create_job(wanted)[0].id)
     assert history(store, killed.id) == history(store, whole.id)
-    anew = [[(k, one.fitness) for k, one in store.reevaluations(j.id)] for j in (killed, whole)]
-    assert anew[0] == anew[1]
-    assert bool(anew[0]) == (precision == "single")
+    reevaluated = [
+        [(k, one.fitness) for k, one in store.reevaluations(j.id)] for j in (killed, whole)
+    ]
+    assert reevaluated[0] == reevaluated[1]
+    assert bool(reevaluated[0]) == (precision == "single")
     assert killed.progress.best_fitness == whole.progress.best_fitness
 
 
@@ -123,7 +127,7 @@ def test_an_extended_job_equals_one_with_the_greater_budget_from_the_start(store
     )
 
 
-def test_a_fork_under_another_preference_goes_on_bit_for_bit_as_its_parent(store: Store) -> None:
+def test_a_fork_under_another_preference_continues_bit_for_bit_as_its_parent(store: Store) -> None:
     service = JobService(store)
     job, _ = service.submit(spec(iterations=9))
     run_embedded(store, TradeOff(), job.id)
@@ -160,15 +164,15 @@ def test_in_worlds_an_objective_is_worth_what_a_preference_for_it_alone_would_sa
     failed[0] = True
     failed[1, 3] = True
     robust = spec(worlds=worlds)
-    told = robust.search_feedback(objectives, failed, np.zeros(6))
-    assert told.shape == (6, 5)
+    feedback = robust.search_feedback(objectives, failed, np.zeros(6))
+    assert feedback.shape == (6, 5)
     for m in range(5):
         alone = {"bias": [0.0] * 5, "exponent": np.eye(5)[m].tolist()}
         expected = spec(worlds=worlds, preference=alone).judge(objectives, failed).fitness
-        np.testing.assert_array_equal(told[:, m], expected)
-    assert np.isinf(told[0]).all()
+        np.testing.assert_array_equal(feedback[:, m], expected)
+    assert np.isinf(feedback[0]).all()
     # One walk in four may fail where a quantile does not see it.
-    assert np.isinf(told[1]).all() == (aggregate != "quantile")
+    assert np.isinf(feedback[1]).all() == (aggregate != "quantile")
 
 
 def test_an_objective_that_is_missing_or_infinite_makes_a_failed_design() -> None:
@@ -177,10 +181,10 @@ def test_an_objective_that_is_missing_or_infinite_makes_a_failed_design() -> Non
     objectives[2, 1, 4] = math.nan
     for worlds in (None, {"count": 2, "aggregate": "mean"}):
         cases = objectives if worlds is None else np.repeat(objectives, 2, axis=1)
-        told = spec(worlds=worlds).search_feedback(
+        feedback = spec(worlds=worlds).search_feedback(
             cases, np.zeros(cases.shape[:2], bool), np.ones(3)
         )
-        assert told.tolist() == [[1.0] * 5, [math.inf] * 5, [math.inf] * 5]
+        assert feedback.tolist() == [[1.0] * 5, [math.inf] * 5, [math.inf] * 5]
 
 
 def test_a_kind_of_job_without_objectives_to_trade_refuses_the_method_by_name() -> None:

@@ -19,7 +19,7 @@ INSTALLED = [name for name, method in METHODS.built_in.items() if not method.mis
 """Methods whose libraries are installed; with the development lock, all."""
 
 REPLAYED_UNTIL = {"bayesian": 24}
-"""Evaluations of methods whose loads repeat all that was told, which takes the square of them."""
+"""Evaluations of methods that replay all feedback when loaded, in quadratic time."""
 
 
 def test_every_method_is_tested() -> None:
@@ -37,7 +37,7 @@ class TestBuiltIn(SearchContract):
             self.seeds = 3
 
 
-def test_another_process_goes_on_with_the_same_bits() -> None:
+def test_another_process_continues_with_the_same_bits() -> None:
     given, expected = {}, {}
     for method in INSTALLED:
         stopped = search(method)

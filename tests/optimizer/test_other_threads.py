@@ -58,7 +58,7 @@ def longest_call(compute: Callable[[], object]) -> float:
     before = time.thread_time()
     compute()
     total = time.thread_time() - before
-    # Again, for to be told of every call takes longer than most of them.
+    # Again, as tracing every call takes longer than most of them.
     sys.setprofile(note)
     try:
         compute()

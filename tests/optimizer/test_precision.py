@@ -1,4 +1,4 @@
-"""A search in single precision: its best design is judged in double, and committed with it."""
+"""Searches in single precision: their best designs are reevaluated in double"""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def precision_of(request: EvaluationRequest) -> str:
 
 
 def falls_in_double(request: EvaluationRequest) -> tuple[Outcome, ...]:
-    """No design that is evaluated anew walks to the end."""
+    """Every reevaluated design fails."""
     outcomes = walk(request)
     if precision_of(request) == "single":
         return outcomes
@@ -103,7 +103,7 @@ def falls_in_double(request: EvaluationRequest) -> tuple[Outcome, ...]:
 
 
 def better_in_double(request: EvaluationRequest) -> tuple[Outcome, ...]:
-    """Evaluated anew, a design is so good that none of single precision comes near."""
+    """A reevaluated design is far better than any of single precision."""
     share = 1.0 if precision_of(request) == "single" else 0.01
     return tuple(Outcome(share * o.objectives, o.statuses) for o in walk(request))
 
@@ -133,22 +133,26 @@ def test_the_swarm_walks_in_single_and_only_new_bests_in_double() -> None:
     assert 1 < asked.count(("double", 1)) < SINGLE.iterations
 
 
-def test_a_new_best_is_committed_with_what_it_comes_to_in_double() -> None:
+def test_a_new_best_is_committed_with_its_result_in_double() -> None:
     memory = Memory()
     run(memory)
-    first, anew = memory.done[0], memory.done[0].reevaluation
-    assert anew is not None
-    assert anew.particle == int(np.argmin(first.fitness))
-    design = first.designs[anew.particle : anew.particle + 1]
+    first, reevaluation = memory.done[0], memory.done[0].reevaluation
+    assert reevaluation is not None
+    assert reevaluation.particle == int(np.argmin(first.fitness))
+    design = first.designs[reevaluation.particle : reevaluation.particle + 1]
     expected = walk(replace(memory.requests[0], cases=SPEC.cases({}), designs=design))
-    np.testing.assert_array_equal(anew.objectives, np.concatenate([o.objectives for o in expected]))
-    assert anew.fitness == judge_outcomes(SPEC, expected).fitness[0]
-    assert anew.fitness != first.fitness[anew.particle], "in single it is another number"
-    assert first.best == (anew.particle, anew.fitness)
+    np.testing.assert_array_equal(
+        reevaluation.objectives, np.concatenate([o.objectives for o in expected])
+    )
+    assert reevaluation.fitness == judge_outcomes(SPEC, expected).fitness[0]
+    assert reevaluation.fitness != first.fitness[reevaluation.particle], (
+        "in single it is another number"
+    )
+    assert first.best == (reevaluation.particle, reevaluation.fitness)
     assert first.evaluate_seconds == 1.0
 
 
-def test_a_search_in_double_evaluates_nothing_anew() -> None:
+def test_a_search_in_double_reevaluates_nothing() -> None:
     state, actions = handle(Coordination(), Claimed(Claim(job(), "runner", 1, None), HERE))
     (evaluate,) = [action for action in actions if isinstance(action, Evaluate)]
     _, (commit,) = handle(state, Evaluated(walk(evaluate.request), 0.5))
@@ -156,7 +160,7 @@ def test_a_search_in_double_evaluates_nothing_anew() -> None:
     assert commit.done.best is not None and commit.done.best[1] == commit.done.fitness.min()
 
 
-def test_what_is_asked_next_depends_on_the_search_alone() -> None:
+def test_the_next_ask_depends_on_the_search_alone() -> None:
     usual, other = Memory(), Memory()
     run(usual)
     run(other, better_in_double)
@@ -165,7 +169,7 @@ def test_what_is_asked_next_depends_on_the_search_alone() -> None:
         np.testing.assert_array_equal(one.fitness, same.fitness)
 
 
-def test_a_best_that_no_later_design_comes_near_stays_the_only_one_judged_anew() -> None:
+def test_a_best_without_a_rival_is_the_only_one_reevaluated() -> None:
     memory = Memory()
     run(memory, better_in_double)
     assert [done.reevaluation is not None for done in memory.done] == [True, *5 * [False]]
@@ -192,16 +196,16 @@ def test_a_job_that_crashed_before_any_action_resumes_to_the_same_bits() -> None
         assert bits(broken) == bits(whole), crash_before
 
 
-def test_workers_that_were_lost_meanwhile_repeat_the_reevaluation_alone() -> None:
+def test_lost_workers_repeat_only_the_reevaluation() -> None:
     state, actions = handle(Coordination(), Memory().claimed())
     (evaluate,) = [action for action in actions if isinstance(action, Evaluate)]
-    state, (anew,) = handle(state, Evaluated(walk(evaluate.request), 0.5))
-    assert state.phase is Phase.REEVALUATING and isinstance(anew, Evaluate)
+    state, (reevaluation,) = handle(state, Evaluated(walk(evaluate.request), 0.5))
+    assert state.phase is Phase.REEVALUATING and isinstance(reevaluation, Evaluate)
     state, (wait,) = handle(state, EvaluatorLost("no route to host"))
     assert isinstance(wait, Wait)
     state, (again,) = handle(state, Waited())
     assert isinstance(again, Evaluate) and precision_of(again.request) == "double"
-    np.testing.assert_array_equal(again.request.designs, anew.request.designs)
+    np.testing.assert_array_equal(again.request.designs, reevaluation.request.designs)
     _, (commit,) = handle(state, Evaluated(walk(again.request), 0.5))
     assert isinstance(commit, Commit) and commit.done.reevaluation is not None
 

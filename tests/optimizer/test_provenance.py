@@ -1,4 +1,4 @@
-"""Jobs that meet another provenance: they go on with none that nobody has accepted."""
+"""Jobs under another provenance: they continue only with consent"""
 
 from __future__ import annotations
 
@@ -95,12 +95,14 @@ def recorded(store: Store, job_id: str) -> list[tuple[int, JobProvenance]]:
 
 
 @pytest.mark.parametrize(("now", "said"), CHANGES)
-def test_a_change_is_told_in_words(now: JobProvenance, said: str) -> None:
+def test_a_change_is_described(now: JobProvenance, said: str) -> None:
     assert HERE.changes(now) == (said,)
     assert HERE.changes(HERE) == ()
 
 
-def test_a_job_does_not_go_on_with_something_else_and_says_how_it_would(store: Store) -> None:
+def test_a_job_does_not_continue_with_another_provenance_and_says_how_it_would(
+    store: Store,
+) -> None:
     job_id = paused(store).id
     store.command(job_id, Command.RESUME)
     refused = run(store, OTHER_CODE)
@@ -144,7 +146,7 @@ def test_changes_that_are_accepted_are_recorded_since_their_iteration_and_accept
     assert recorded(store, job_id) == [(0, HERE), (2, OTHER_CODE)]
 
 
-def test_consent_that_was_not_needed_is_not_kept(store: Store) -> None:
+def test_unneeded_consent_is_not_stored(store: Store) -> None:
     job_id = paused(store).id
     store.command(job_id, Command.RESUME, accept_changes=True)
 
@@ -165,13 +167,13 @@ def test_consent_is_withdrawn_by_resuming_without_it(store: Store) -> None:
     assert run(store, OTHER_CODE).state is JobState.FAILED
 
 
-def test_a_job_that_was_never_begun_is_not_begun_with_something_else(store: Store) -> None:
+def test_a_new_job_does_not_begin_with_another_provenance(store: Store) -> None:
     made, _ = store.create_job(SPEC, provenance=HERE)
     assert run(store, OTHER_CODE).state is JobState.FAILED
     assert store.job(made.id).progress.iterations == 0
 
 
-def test_a_job_that_is_extended_is_not_extended_with_something_else(store: Store) -> None:
+def test_an_extended_job_does_not_continue_with_another_provenance(store: Store) -> None:
     made, _ = store.create_job(SPEC, provenance=HERE)
     run(store, HERE)
     store.extend(made.id, SPEC.iterations + 1)
@@ -179,7 +181,7 @@ def test_a_job_that_is_extended_is_not_extended_with_something_else(store: Store
     assert (refused.state, refused.progress.iterations) == (JobState.FAILED, SPEC.iterations)
 
 
-def test_a_job_is_not_taken_over_by_a_runner_that_computes_something_else(store: Store) -> None:
+def test_a_job_is_not_taken_over_by_a_runner_with_another_provenance(store: Store) -> None:
     made, _ = store.create_job(SPEC, provenance=HERE)
     assert store.claim("killed", lease_seconds=0.0) is not None
     assert run(store, OTHER_CODE).state is JobState.FAILED
@@ -193,7 +195,7 @@ def test_a_submitted_job_has_the_provenance_of_the_process_that_submits_it(store
         assert recorded(store, made.id) == [(0, job_provenance(SPEC))]
 
 
-def test_whoever_goes_on_with_a_job_can_ask_before_it_is_queued(store: Store) -> None:
+def test_a_resume_can_be_checked_before_the_job_is_queued(store: Store) -> None:
     found = paused(store)
     JobService(store, provenance=lambda _: HERE).check_unchanged(found)
     with pytest.raises(ProvenanceChanged, match="changed simulation code"):
@@ -214,7 +216,7 @@ def test_a_job_whose_robot_cannot_be_read_fails_with_the_reason(store: Store) ->
     assert failed.error is not None and "robot.toml: motors: Field required" in failed.error
 
 
-def test_a_worker_that_computes_something_else_fails_the_job_with_its_reason(store: Store) -> None:
+def test_a_worker_with_another_provenance_fails_the_job_with_its_reason(store: Store) -> None:
     store.create_job(SPEC, provenance=HERE)
     claim = store.claim("runner", lease_seconds=30.0)
     assert claim is not None
@@ -225,7 +227,7 @@ def test_a_worker_that_computes_something_else_fails_the_job_with_its_reason(sto
     assert failed.progress.iterations == 1
 
 
-def test_walks_are_asked_for_with_the_provenance_of_whoever_claimed_the_job() -> None:
+def test_requests_have_the_provenance_of_the_runner_that_claimed_the_job() -> None:
     going_on = Claimed(Claim(job(), "runner", 1, None), OTHER_CODE, accepts_changes=True)
     _, actions = handle(Coordination(), going_on)
     assert [type(action) for action in actions] == [Record, Begin, Evaluate]
@@ -238,7 +240,7 @@ def test_a_refused_claim_sends_nothing() -> None:
     assert [type(action) for action in actions] == [Release]
 
 
-def test_all_code_that_asks_and_judges_is_in_the_digest() -> None:
+def test_all_code_of_search_and_judgement_is_in_the_digest() -> None:
     kinds = (JobSpec, IdentificationSpec, CalibrationSpec, CertificateSpec)
     specs = (*kinds, Spec)
     used = (*specs, optimizer_settings, DesignSpace, Preference, root_mean_square, EarlierJobs)

@@ -65,15 +65,15 @@ def test_then_it_polls_around_the_best_design_of_the_swarm() -> None:
 def test_polls_of_several_searches_fill_a_batch() -> None:
     settings = settings_of(searches=3)
     *swarm, polls = batches(settings, 6)
-    bests, _ = best_members(told(settings, swarm), 3)
+    bests, _ = best_members(swarm_after(settings, swarm), 3)
     assert len(polls) == 3 * 2 * BOX.dimension
     for k, poll in enumerate(np.split(polls, 3)):
         steps = np.abs(BOX.to_unit(poll) - BOX.to_unit(bests[k : k + 1]))
         np.testing.assert_allclose(steps.max(axis=1), settings.initial_mesh)
 
 
-def told(settings: PsoPsSettings, iterations: list[Floats]) -> ParticleSwarm:
-    """The swarm that was told a bowl."""
+def swarm_after(settings: PsoPsSettings, iterations: list[Floats]) -> ParticleSwarm:
+    """The swarm after iterations on a bowl."""
     swarm = ParticleSwarm(settings, BOX, 50, RandomNumbers(1, STREAM).seed())
     for positions in iterations:
         swarm.ask()

@@ -95,7 +95,7 @@ class StandingStore:
         return renewal
 
     def outlive(self, lease_seconds: float) -> None:
-        """Let two leases' time pass, and whoever renews them do so in time."""
+        """Let two lease times pass, with renewals in time."""
         for _ in range(4):
             self._clock.advance(0.5 * lease_seconds)
             # One may have been under way, by the time before.
@@ -196,7 +196,7 @@ class AwayEvaluator(FormulaEvaluator):
         return super().evaluate(request, should_stop)
 
 
-def test_a_job_says_what_it_waits_for_keeps_its_lease_and_goes_on_by_itself(
+def test_a_waiting_job_says_why_keeps_its_lease_and_continues_automatically(
     standing: StandingStore,
 ) -> None:
     store = standing.store
@@ -286,7 +286,7 @@ def test_walks_that_kill_worker_after_worker_fail_their_job_with_the_reason(stor
     assert job.progress.iterations == 1
 
 
-def test_a_pause_need_not_wait_for_workers_out_of_reach(store: Store) -> None:
+def test_a_pause_does_not_wait_for_unreachable_workers(store: Store) -> None:
     job_id = queue(store)
     gone = EvaluatorUnavailable("no route to host")
     evaluator = FormulaEvaluator([gone] * 100)

@@ -33,7 +33,7 @@ def test_a_runner_runs_jobs_side_by_side_to_the_bits_of_jobs_run_alone(store: St
     assert [history(store, job_id) for job_id in together] == alone
 
 
-def test_a_runner_that_stops_gives_its_jobs_back_at_once(store: Store) -> None:
+def test_a_runner_that_stops_returns_its_jobs_at_once(store: Store) -> None:
     jobs = [queue(store), queue(store), queue(store)]
     evaluator = FormulaEvaluator()
     evaluator.hold.set()
@@ -47,7 +47,7 @@ def test_a_runner_that_stops_gives_its_jobs_back_at_once(store: Store) -> None:
     assert {store.job(job_id).state for job_id in jobs} == {JobState.QUEUED}
 
 
-def test_a_runner_that_is_drained_commits_what_is_under_way_and_gives_its_jobs_back(
+def test_a_drained_runner_commits_iterations_in_progress_and_returns_its_jobs(
     store: Store,
 ) -> None:
     jobs = [queue(store), queue(store), queue(store)]
@@ -73,9 +73,7 @@ def test_a_runner_that_is_drained_commits_what_is_under_way_and_gives_its_jobs_b
 
 
 @pytest.mark.parametrize("hurried", [False, True])
-def test_a_drain_drops_what_takes_longer_than_it_may_or_is_not_wanted_any_more(
-    store: Store, hurried: bool
-) -> None:
+def test_a_drain_ends_at_its_limit_or_on_request(store: Store, hurried: bool) -> None:
     job_id = queue(store)
     evaluator = FormulaEvaluator()
     evaluator.hold.set()
@@ -116,7 +114,7 @@ def test_a_runner_says_that_its_thread_has_ended(store: Store) -> None:
     runner.stop()
 
 
-def test_a_runner_says_that_its_thread_is_stuck_and_then_that_it_goes_on(store: Store) -> None:
+def test_a_runner_reports_that_its_thread_is_stuck_and_that_it_has_recovered(store: Store) -> None:
     now = [0.0]
     answers, asked = threading.Event(), threading.Event()
 

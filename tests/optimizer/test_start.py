@@ -44,7 +44,7 @@ def fitness_of(positions: Floats) -> Floats:
 
 
 def answer(optimizer: Optimizer, positions: Floats) -> Floats:
-    """What a method is told: fitness, or two bowls that are in each other's way."""
+    """Feedback of a method: fitness, or two conflicting bowls."""
     fitness = fitness_of(positions)
     if not isinstance(optimizer, Hype):
         return fitness
@@ -125,7 +125,7 @@ def test_a_start_outside_the_bounds_or_too_late_is_refused(method: MethodName) -
 
 @pytest.mark.variants(without="bayesian")
 @METHOD
-def test_no_start_is_the_search_as_ever(method: MethodName) -> None:
+def test_without_a_start_the_search_is_unchanged(method: MethodName) -> None:
     none = np.empty((0, SPACE.dimension))
     assert bits(path(search(method, none))) == bits(path(search(method, None)))
 
@@ -142,7 +142,7 @@ def test_the_other_members_of_a_swarm_are_those_of_one_without_a_start() -> None
     assert started[len(GOOD) :].tobytes() == cold[len(GOOD) :].tobytes()
 
 
-def test_a_generator_is_told_of_the_start_and_of_the_budget_that_is_left() -> None:
+def test_a_generator_receives_the_start_and_the_remaining_budget() -> None:
     seen: list[tuple[int, Start | None]] = []
 
     def near_the_best(

@@ -79,9 +79,9 @@ def test_no_settings_and_no_fitness_lead_out_of_the_box_or_off_the_bits(
         reloaded = spec.create_search()
         reloaded.load(state)
         assert reloaded.ask().tobytes() == positions.tobytes()
-        told = np.roll(np.array(fitness), k)[:particles]
-        straight.tell(told)
-        reloaded.tell(told)
+        feedback = np.roll(np.array(fitness), k)[:particles]
+        straight.tell(feedback)
+        reloaded.tell(feedback)
 
 
 def test_inertia_that_rises_is_refused() -> None:

@@ -65,7 +65,7 @@ def test_in_a_ring_news_travels_by_one_particle_in_an_iteration() -> None:
     assert moved.tolist() == [False, True, False, False, False, True]
 
 
-def test_informants_are_drawn_anew_when_the_best_is_not_improved() -> None:
+def test_informants_are_redrawn_when_the_best_is_not_improved() -> None:
     optimizer = swarm(topology="random")
     since = []
     for best in (5.0, 4.0, 4.0, 3.0, math.inf):
@@ -108,7 +108,7 @@ def test_topologies_take_different_paths() -> None:
     assert len(paths) == 3
 
 
-def test_a_global_swarm_stores_what_it_always_did() -> None:
+def test_a_global_swarm_stores_no_informants() -> None:
     assert "informed_since" not in swarm().dump()
 
 

@@ -135,7 +135,7 @@ def test_one_nominal_world_is_the_model(store: Store, evaluator: Evaluator) -> N
     assert bits[0] == bits[1]
 
 
-def test_a_perturbation_of_whole_numbers_stays_one_within_bounds_of_ones_own() -> None:
+def test_an_integer_perturbation_stays_one_within_custom_bounds() -> None:
     spec = robust(count=100, ranges=[{"name": "angle_delay", "low": 1, "high": 2}]).resolved()
     assert spec.worlds is not None
     drawn = [dict(world)["angle_delay"] for world in spec.worlds.drawn()]
@@ -168,7 +168,7 @@ def test_worlds_are_all_perturbations_by_default_and_stored_with_their_bounds() 
         ({"count": 0}, "greater than or equal to 1"),
     ],
 )
-def test_what_makes_no_sense_is_refused(worlds: dict[str, Any], words: str) -> None:
+def test_invalid_values_are_refused(worlds: dict[str, Any], words: str) -> None:
     with pytest.raises(ValidationError) as raised:
         robust(**worlds)
     assert words in str(raised.value)

@@ -29,7 +29,7 @@ def history(rows: int, seed: int, scenarios: int = 2) -> np.ndarray:
     seed=st.integers(0, 1000),
 )
 @settings(max_examples=25, deadline=None)
-def test_whatever_wins_under_some_preference_is_found_to_win(
+def test_every_winner_under_some_preference_is_found_to_win(
     exponent: list[float], owner: str, seed: int
 ) -> None:
     own = PREFERENCES[owner]  # type: ignore[index]
@@ -60,7 +60,7 @@ def test_it_wins_by_as_much_as_it_can() -> None:
         assert np.delete(fitness, row).min() / fitness[row] - 1.0 <= best.margin + 1e-3
 
 
-def test_a_design_that_is_dominated_cannot_win_and_what_beats_it_is_named() -> None:
+def test_a_dominated_design_cannot_win_and_its_rival_is_named() -> None:
     objectives = history(30, seed=3)
     objectives[7] = objectives[4] * 1.01
     columns = columns_of(objectives, own=A)

@@ -14,19 +14,19 @@ from gaitswarm.services.worker.ray_evaluator import RayEvaluator
 from gaitswarm.sim.outcome import Outcome
 
 
-def main(url: str, job_id: str, kind: str, told: Connection) -> None:
+def main(url: str, job_id: str, kind: str, connection: Connection) -> None:
     """Evaluate on `kind`; the state of the job's search is sent after every commit."""
     store = open_store(url)
     # On Ray from the first walk on, however short the job is.
     evaluator = RayEvaluator(cpus=2) if kind == "ray" else open_evaluator("in-process", cpus=2)
-    run_embedded(store, evaluator, job_id, on_commit=lambda _, state: told.send(str(state)))
+    run_embedded(store, evaluator, job_id, on_commit=lambda _, state: connection.send(str(state)))
     evaluator.close()
     store.close()
 
 
-def run_to_the_middle(url: str, middles: Mapping[str, int], told: Connection) -> None:
+def run_to_the_middle(url: str, middles: Mapping[str, int], connection: Connection) -> None:
     """Run jobs at once, each up to an iteration whose walks never end; send its id then."""
-    evaluator = _Halting(middles, told.send)
+    evaluator = _Halting(middles, connection.send)
     Runner(open_store(url), evaluator, concurrency=len(middles), poll_seconds=0.01).start()
     threading.Event().wait()
 

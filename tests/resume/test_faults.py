@@ -1,4 +1,4 @@
-"""A short fault campaign: whatever happens, histories keep their bits and nobody has to help."""
+"""A short fault campaign: histories keep their bits without intervention"""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ KINDS_OF: dict[DatabaseKind, list[str]] = {
 )
 @pytest.mark.slow
 @pytest.mark.parametrize("database", KINDS_OF)
-def test_processes_and_services_that_fail_cost_no_bit_and_nobodys_time(
+def test_failing_processes_and_services_change_no_bit(
     database: DatabaseKind,
 ) -> None:
     if database == "postgresql":

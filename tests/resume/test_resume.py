@@ -1,4 +1,4 @@
-"""A job killed at any instant ends as one that never was; two jobs at once end as each alone."""
+"""A job killed at any instant equals one never killed; concurrent jobs equal single ones"""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def run_alone(store: Store, evaluator: Evaluator, spec: JobSpec = SPEC) -> str:
 
 
 Walked = tuple[list[Any], tuple[bytes, float] | None, list[str | None]]
-"""All iterations of a job, what its best design was evaluated anew to, and chained digests."""
+"""All iterations of a job, the reevaluation of its best design, and the chained digests."""
 
 
 def walked(store: Store, job_id: str) -> Walked:
@@ -87,26 +87,28 @@ def alone(evaluator: Evaluator, tmp_path_factory: pytest.TempPathFactory) -> Wal
 
 
 def best_in_double(store: Store, job_id: str) -> tuple[bytes, float] | None:
-    """What the best design was evaluated anew to; None for a search in double precision."""
+    """Reevaluation of the best design; None for a search in double precision."""
     best = store.best(job_id)
     assert best is not None
-    anew = best.reevaluation
-    assert (anew is None) == (store.job(job_id).spec.precision == "double")
-    return None if anew is None else (anew.objectives.tobytes(), anew.fitness)
+    reevaluation = best.reevaluation
+    assert (reevaluation is None) == (store.job(job_id).spec.precision == "double")
+    return (
+        None if reevaluation is None else (reevaluation.objectives.tobytes(), reevaluation.fitness)
+    )
 
 
 class Life:
     """A process that runs a job."""
 
     def __init__(self, url: str, job_id: str, kind: str = "in-process") -> None:
-        self._told, told = PROCESSES.Pipe(duplex=False)
-        self._process = PROCESSES.Process(target=job_process.main, args=(url, job_id, kind, told))
+        self._states, sender = PROCESSES.Pipe(duplex=False)
+        self._process = PROCESSES.Process(target=job_process.main, args=(url, job_id, kind, sender))
         self._process.start()
-        told.close()
+        sender.close()
 
     def wait_for_a_commit(self) -> None:
         """Until it has committed an iteration, so that start-up is not all that is killed."""
-        self._told.recv()
+        self._states.recv()
 
     def kill(self) -> None:
         self._process.kill()
@@ -116,14 +118,14 @@ class Life:
         """Its exit code, once it has ended by itself."""
         with suppress(EOFError):
             while True:
-                self._told.recv()
+                self._states.recv()
         return self._end()
 
     def _end(self) -> int | None:
         self._process.join(120.0)
         code = self._process.exitcode
         self._process.close()
-        self._told.close()
+        self._states.close()
         return code
 
 
@@ -166,7 +168,7 @@ def test_resumed_job_equals_one_never_killed(
 
 @pytest.mark.thorough(
     "test_resumed_job_equals_one_never_killed",
-    "test_another_process_goes_on_with_the_same_bits, for all methods",
+    "test_another_process_continues_with_the_same_bits, for all methods",
 )
 def test_a_job_of_any_method_killed_in_its_middle_equals_one_never_killed(
     store: Store, url: str, evaluator: Evaluator
@@ -182,10 +184,10 @@ def test_a_job_of_any_method_killed_in_its_middle_equals_one_never_killed(
         jobs[name] = run_alone(store, evaluator, spec), queue(store, spec)
         whole, killed = jobs[name]
         middles[killed] = store.job(whole).progress.iterations // 2
-    halted, told = PROCESSES.Pipe(duplex=False)
-    life = PROCESSES.Process(target=job_process.run_to_the_middle, args=(url, middles, told))
+    halted, sender = PROCESSES.Pipe(duplex=False)
+    life = PROCESSES.Process(target=job_process.run_to_the_middle, args=(url, middles, sender))
     life.start()
-    told.close()
+    sender.close()
     assert {halted.recv() for _ in middles} == set(middles)
     life.kill()
     life.join()
@@ -251,7 +253,7 @@ def test_two_jobs_at_once_equal_the_same_jobs_run_alone(
     assert [walked(store, job_id) for job_id in together] == apart
 
 
-def test_a_job_that_is_stopped_and_taken_up_again_and_again_equals_one_never_stopped(
+def test_a_job_stopped_and_resumed_repeatedly_equals_one_never_stopped(
     store: Store, evaluator: Evaluator, alone: Walked
 ) -> None:
     job_id = queue(store)
@@ -267,7 +269,7 @@ def test_a_job_that_is_stopped_and_taken_up_again_and_again_equals_one_never_sto
     assert walked(store, job_id) == alone
 
 
-def test_a_job_of_which_a_part_is_known_has_the_bits_of_one_that_walks_all(
+def test_a_partly_cached_job_equals_one_that_simulates_all(
     store: Store, evaluator: Evaluator
 ) -> None:
     earlier = store.evaluations(run_alone(store, evaluator), 3)

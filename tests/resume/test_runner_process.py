@@ -45,7 +45,7 @@ def runner(**settings: str) -> Iterator[ForkedCommand]:
 
 
 @pytest.mark.parametrize("ending", [signal.SIGTERM, signal.SIGINT])
-def test_runs_what_is_queued_and_gives_back_what_it_has_not_finished(
+def test_runs_queued_jobs_and_returns_unfinished_ones(
     store: SqlStore, database: Path, ending: signal.Signals
 ) -> None:
     short, _ = store.create_job(spec(2))
@@ -70,14 +70,14 @@ def test_a_signal_lets_the_iteration_under_way_be_committed(
     job, _ = store.create_job(LONG)
     with runner(DB=str(database), CPUS="1") as started:
         before = begun(store, job.id)
-        told = datetime.now(UTC)
+        signalled_at = datetime.now(UTC)
         started.send_signal(signal.SIGTERM)
         assert started.wait(timeout=60) == 0
     ended = store.job(job.id)
     assert (ended.state, ended.progress.iterations) == (JobState.QUEUED, before + 1)
     (last,) = store.iterations(job.id, after=before - 1).items
-    assert last.committed_at > told
-    # It waits for nobody's lease.
+    assert last.committed_at > signalled_at
+    # It does not wait for a lease.
     claim = store.claim("another", lease_seconds=60.0, job_id=job.id)
     assert claim is not None and claim.ask is not None
     assert claim.ask.iteration == before + 1
@@ -105,7 +105,7 @@ def test_without_settings_it_runs_the_jobs_of_the_users_own_database() -> None:
 @pytest.mark.parametrize(
     ("name", "value"), [("CPUS", "none"), ("LEASE_SECONDS", "0"), ("EVALUATOR", "abacus")]
 )
-def test_a_setting_that_makes_no_sense_is_named(name: str, value: str) -> None:
+def test_an_invalid_setting_is_named(name: str, value: str) -> None:
     with runner(**{name: value}) as started:
         _, said = started.communicate(timeout=60)
     assert started.returncode == ExitCode.BAD_INPUT

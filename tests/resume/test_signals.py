@@ -43,7 +43,7 @@ def told_once_more_than_can_be_heard() -> None:
     stop = threading.Event()
     stop.set()
     with stop_on_signals(stop):
-        # To be told to stop again changes nothing; who presses Ctrl-C again cannot wait.
+        # Another stop request has no effect; another Ctrl-C ends at once.
         signal.raise_signal(signal.SIGTERM)
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
@@ -57,7 +57,7 @@ def told_once_more_than_can_be_heard() -> None:
         told_once_more_than_can_be_heard,
     ],
 )
-def test_a_process_that_waits_for_a_signal_goes_on_when_it_comes(
+def test_a_process_that_waits_for_a_signal_continues_when_it_comes(
     program: Callable[[], None],
 ) -> None:
     process = ForkedCommand(program=program, stdout=None, stderr=None)

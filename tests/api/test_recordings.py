@@ -119,7 +119,7 @@ def test_parameters_of_a_job_without_results_are_a_conflict(client: httpx2.Clien
     job_id = client.post("/v1/jobs", json=spec).json()["id"]
     answer = client.get(f"/v1/jobs/{job_id}/parameters")
     assert answer.status_code == 409
-    assert "no design yet" in answer.json()["detail"]
+    assert "no successful design yet" in answer.json()["detail"]
 
 
 @pytest.fixture(scope="module")

@@ -118,7 +118,7 @@ def test_runs_of_different_problems_are_not_compared(store: SqlStore, twin: Twin
     with pytest.raises(InvalidRequest, match="another problem") as refused:
         service.identifiability([first, other])
     assert refused.value.field == "also"
-    with pytest.raises(Conflict, match="has failed so far"):
+    with pytest.raises(Conflict, match="no successful design yet"):
         service.identifiability([first])
 
 

@@ -105,7 +105,7 @@ def with_start_designs(
             space, count = job.spec.design_space(), spec.start.count
             best = list(best_designs(space, columns_of(job), searched, count))
             if not best:
-                raise InvalidRequest(f"every design of job {job_id} has failed")
+                raise InvalidRequest(f"job {job_id} has no successful design")
             _check(spec, best)
         except (GaitswarmError, ValueError) as error:
             raise InvalidRequest(str(error), field=f"start.jobs.{index}") from error

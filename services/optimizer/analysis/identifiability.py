@@ -176,7 +176,7 @@ def check_comparable(jobs: Sequence[Job]) -> None:
     for job in jobs:
         if job.progress.best_fitness is None:
             raise Conflict(
-                f"every design of job {job.id} has failed so far; try again after its next"
+                f"job {job.id} has no successful design yet; try again after its next"
                 " iteration, or omit it"
             )
 

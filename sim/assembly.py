@@ -115,7 +115,6 @@ def control_steps(robot: Robot, physics_rate: int = PHYSICS_RATE) -> tuple[Codin
 
 
 def check_stuck_leg(robot: Robot, scenario: Scenario) -> None:
-    """Check that the scenario's stuck leg exists."""
     legs = [leg.name for leg in robot.legs]
     if scenario.stuck_leg is not None and scenario.stuck_leg not in legs:
         raise SimulationInputError(

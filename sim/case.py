@@ -119,22 +119,18 @@ class Walk:
 
     @property
     def name(self) -> str:
-        """Name of the scenario."""
         return self.scenario.name
 
     @property
     def robots(self) -> tuple[RobotSource, ...]:
-        """The simulated robot."""
         return (self.robot,)
 
     @property
     def duration(self) -> float:
-        """Simulated time of one design [s]."""
         return self.scenario.duration
 
     @property
     def objectives(self) -> tuple[Objective, ...]:
-        """f1 to f6 of table 4.1."""
         return OBJECTIVES
 
     def run(self, designs: NDArray[np.float64]) -> Outcome:
@@ -181,7 +177,6 @@ class MeasuredWalk(Walk):
 
     @property
     def objectives(self) -> tuple[Objective, ...]:
-        """f1 to f6 of table 4.1, then `MEASUREMENTS`."""
         measured = (Objective(m.name, m.unit, m.description) for m in MEASUREMENTS)
         return (*OBJECTIVES, *measured)
 

@@ -69,8 +69,8 @@ def create_case(settings: CaseSettings, walk: Walk) -> Case:
         )
     case = family.create(settings, walk)
     if case.objectives != OBJECTIVES:
-        known = ", ".join(objective.name for objective in OBJECTIVES)
+        names = ", ".join(objective.name for objective in OBJECTIVES)
         raise SimulationInputError(
-            f"{settings.name} does not have the objectives of a walk: {known}"
+            f"{settings.name} does not have the objectives of a walk: {names}"
         )
     return case

@@ -37,13 +37,12 @@ def check_design(controller: str, design: Mapping[str, float | str]) -> None:
 
 
 def design_numbers(controller: str, design: Mapping[str, float | str]) -> dict[str, float]:
-    """Convert a design's choices to numbers."""
     catalogue = design_catalogue(controller)
     numbers = {}
     for name, value in design.items():
         try:
-            known = catalogue.get(name)
-            numbers[name] = float(value) if known is None else known.number(value)
+            variable = catalogue.get(name)
+            numbers[name] = float(value) if variable is None else variable.number(value)
         except ValueError as error:
             raise SimulationInputError(str(error)) from error
     return numbers

@@ -162,6 +162,6 @@ def with_gait(scenario: Scenario, gait: Mapping[str, float]) -> Scenario:
         return Scenario.model_validate(scenario.model_dump() | values)
     except ValidationError as error:
         first = error.errors()[0]
-        said = message_of(first).removeprefix("by_group.")
+        message = message_of(first).removeprefix("by_group.")
         where = ".".join(str(part) for part in first["loc"])
-        raise SimulationInputError(f"{where}: {said}" if where else said) from error
+        raise SimulationInputError(f"{where}: {message}" if where else message) from error

@@ -23,8 +23,6 @@ _KEY: Final = "[key]"
 def alternatives(
     expected: str, *, among_own: Callable[[Any], str] = lambda _: OWN
 ) -> Discriminator:
-    """Discriminate between a name and objects."""
-
     def tag(value: Any) -> str | None:
         if isinstance(value, str):
             return NAME
@@ -98,14 +96,13 @@ def message_of(error: Mapping[str, Any]) -> str:
         return f"must be {context['expected']}{f'; did you mean {near!r}?' if near else ''}"
     if kind in _PLAIN:
         return _PLAIN[kind].format_map({name: _number(value) for name, value in context.items()})
-    said = str(error["msg"]).removeprefix("Value error, ")
-    return said.replace("Input should be", "must be").replace("Input should", "must")
+    message = str(error["msg"]).removeprefix("Value error, ")
+    return message.replace("Input should be", "must be").replace("Input should", "must")
 
 
 def with_known_keys(
     errors: Sequence[Mapping[str, Any]], model: Any
 ) -> tuple[Mapping[str, Any], ...]:
-    """Add the known keys to errors about unknown keys."""
     return tuple(
         {**error, "ctx": {"known": [*known], "inner": _inner_keys(known)}}
         if error["type"] == "extra_forbidden" and (known := _known_keys(model, error["loc"]))
@@ -128,11 +125,11 @@ def _known_keys(model: Any, location: Sequence[str | int]) -> dict[str, Any]:
 
 def _inner_keys(known: Mapping[str, Any]) -> dict[str, str]:
     """Paths of the fields of nested objects by their names; the first of duplicates."""
-    found: dict[str, str] = {}
+    paths: dict[str, str] = {}
     for outer, annotation in known.items():
         for name, _ in _fields(annotation):
-            found.setdefault(name, f"{outer}.{name}")
-    return found
+            paths.setdefault(name, f"{outer}.{name}")
+    return paths
 
 
 def _fields(annotation: Any) -> Iterator[tuple[str, Any]]:
@@ -143,7 +140,6 @@ def _fields(annotation: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _inner(annotation: Any, part: str | int) -> Iterator[Any]:
-    """Yield the annotations of one part of a location."""
     for tag, one in _alternatives(annotation):
         if tag is not None and tag == part:
             yield one

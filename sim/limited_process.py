@@ -77,7 +77,6 @@ class LimitedProcesses:
         return answer
 
     def close(self) -> None:
-        """End all idle processes."""
         for _ in range(self._idle.qsize()):
             process = self._idle.get()
             if process is not None:
@@ -125,8 +124,8 @@ class LimitedProcesses:
         if not answer.endswith("\n"):
             process.kill()
             raise ProcessEnded(self._reason(process.wait(), late=late.is_set()))
-        found: dict[str, Any] = json.loads(answer)
-        return found
+        document: dict[str, Any] = json.loads(answer)
+        return document
 
     def _reason(self, status: int, *, late: bool) -> str:
         if late:
@@ -150,14 +149,14 @@ def serve(answer: Callable[[Document], Document]) -> None:
     for line in sys.stdin:
         _limit("RLIMIT_CPU", int(sum(os.times()[:2])) + 1 + cpu_seconds)
         try:
-            said = answer(json.loads(line))
+            response = answer(json.loads(line))
         except SimulationInputError as error:
-            said = {"refused": str(error)}
+            response = {"refused": str(error)}
         except MemoryError:
-            said = {"ended": f"took more than {memory >> 20} MiB of memory"}
+            response = {"ended": f"took more than {memory >> 20} MiB of memory"}
         except Exception as error:  # noqa: BLE001 - the calling process must survive any error
-            said = {"ended": f"failed: {type(error).__name__}: {error}"[:1000]}
-        answers.write(json.dumps(said) + "\n")
+            response = {"ended": f"failed: {type(error).__name__}: {error}"[:1000]}
+        answers.write(json.dumps(response) + "\n")
         answers.flush()
 
 

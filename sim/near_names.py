@@ -14,7 +14,6 @@ _ALIKE: Final = 0.7
 
 
 def nearest(name: str, known: Iterable[str]) -> str | None:
-    """Return the most similar known name."""
     if len(name) > _LONGEST_NAME or name.isdigit():
         return None
     plain = {one.lower(): one for one in known}
@@ -23,7 +22,6 @@ def nearest(name: str, known: Iterable[str]) -> str | None:
 
 
 def instead_of(name: str, known: Iterable[str], listed: Iterable[str] | None = None) -> str:
-    """Suggest a name, or list the known ones."""
     names = list(known)
     near = nearest(name, names)
     if near is not None:

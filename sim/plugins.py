@@ -43,14 +43,12 @@ class Plugin:
 
     @property
     def module(self) -> str:
-        """The module to import."""
         return self.place.partition(":")[0].strip()
 
     def __str__(self) -> str:
         return f"{self.kind} {self.name!r} of {self.distribution} {self.version}"
 
     def load(self) -> object:
-        """Import the plug-in."""
         try:
             return metadata.EntryPoint(self.name, self.place, GROUPS[self.kind]).load()
         except (Exception, SystemExit) as error:
@@ -64,7 +62,7 @@ def find_plugins() -> tuple[Plugin, ...]:
     """Return all installed entry points for gaitswarm, as of the first call."""
     # Query once: each query reads the metadata of all distributions.
     points = metadata.entry_points()
-    found = {
+    plugins = {
         Plugin(
             kind,
             point.name,
@@ -75,7 +73,7 @@ def find_plugins() -> tuple[Plugin, ...]:
         for kind, group in GROUPS.items()
         for point in points.select(group=group)
     }
-    return tuple(sorted(found, key=lambda p: (KINDS.index(p.kind), p.name, p.distribution)))
+    return tuple(sorted(plugins, key=lambda p: (KINDS.index(p.kind), p.name, p.distribution)))
 
 
 MISSING: Final = "none"
@@ -90,7 +88,6 @@ _SUFFIXES: Final = (".py", ".c", ".h", ".so")
 
 
 def source_digest(root: Path, files: Iterable[Path]) -> str:
-    """Return a digest of source files."""
     digest = hashlib.sha256()
     for file in files:
         content = file.read_bytes()
@@ -100,10 +97,9 @@ def source_digest(root: Path, files: Iterable[Path]) -> str:
 
 
 def version_of(distribution: str) -> str:
-    """Return a distribution's installed version."""
-    known = plugin_versions()
-    if distribution in known:
-        return known[distribution]
+    versions = plugin_versions()
+    if distribution in versions:
+        return versions[distribution]
     try:
         return _installed(distribution)
     except metadata.PackageNotFoundError:
@@ -181,12 +177,10 @@ class Registry(MutableMapping[str, T]):
 
     @property
     def kind(self) -> Kind:
-        """Kind of the objects."""
         return self._kind
 
     @property
     def built_in(self) -> Mapping[str, T]:
-        """Built-in objects by name."""
         return self._built_in
 
     def __getitem__(self, name: str) -> T:
@@ -234,7 +228,6 @@ class Registry(MutableMapping[str, T]):
         )
 
     def unknown(self, name: str) -> str:
-        """Return an error message about an unknown name."""
         return f"unknown {self._kind} {name!r}; {self.instead_of(name, self)}"
 
     def instead_of(self, name: str, known: Iterable[str]) -> str:
@@ -289,13 +282,11 @@ class KnownName:
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        """Validate a name."""
         return core_schema.no_info_after_validator_function(self._known, handler(source))
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
-        """List the known names."""
         return {**handler(schema), "enum": list(self._names)}
 
     def _known(self, name: str) -> str:
@@ -340,10 +331,10 @@ class PluginSettings(Generic[T]):
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
         """Add settings with the names of installed plug-ins."""
-        found = handler(schema)
+        annotated = handler(schema)
         names = [name for name in self._registry if name not in self._registry.built_in]
         if not names:
-            return found
+            return annotated
         own = {
             "title": "PluginSettings",
             "type": "object",
@@ -352,9 +343,9 @@ class PluginSettings(Generic[T]):
             "description": f"Settings of a plug-in's {self._registry.kind}; see {self._seen}.",
         }
         for union in ("oneOf", "anyOf"):
-            if union in found:
-                return {**found, union: [*found[union], own]}
-        return {"anyOf": [found, own]}
+            if union in annotated:
+                return {**annotated, union: [*annotated[union], own]}
+        return {"anyOf": [annotated, own]}
 
     def _read(self, value: Any, otherwise: Callable[[Any], Any]) -> Any:
         if isinstance(value, Mapping):

@@ -81,24 +81,23 @@ class Provenance(BaseModel):
 
     def changes(self, now: Provenance) -> tuple[str, ...]:
         """Describe the changes since."""
-        found: list[str] = []
+        differences: list[str] = []
         if now.robot != self.robot:
-            found.append(f"the robot {now.robot} instead of {self.robot}")
+            differences.append(f"the robot {now.robot} instead of {self.robot}")
         elif now.robot_digest != self.robot_digest:
-            found.append(f"the robot {self.robot} has changed")
+            differences.append(f"the robot {self.robot} has changed")
         if now.code_digest != self.code_digest:
-            found.append("changed simulation code")
-        found += version_changes(self.libraries, now.libraries)
+            differences.append("changed simulation code")
+        differences += version_changes(self.libraries, now.libraries)
         if now.backend != self.backend:
             cause = "no C compiler: " if now.backend == "reference" else ""
-            found.append(f"{cause}backend {now.backend} instead of {self.backend}")
+            differences.append(f"{cause}backend {now.backend} instead of {self.backend}")
         if now.precision != self.precision:
-            found.append(f"precision {now.precision} instead of {self.precision}")
-        return tuple(found)
+            differences.append(f"precision {now.precision} instead of {self.precision}")
+        return tuple(differences)
 
 
 def version_changes(before: Mapping[str, str], now: Mapping[str, str]) -> list[str]:
-    """Describe changes of libraries."""
     return [
         f"{name} {now.get(name, MISSING)} instead of {before.get(name, MISSING)}"
         for name in sorted(before.keys() | now.keys())

@@ -32,7 +32,6 @@ ground a little after another one has landed."""
 
 
 def with_duty_factor(document: Any) -> Any:
-    """Add the default duty factor of a scenario's gait."""
     if not isinstance(document, Mapping) or "duty_factor" in document:
         return document
     support = USUAL_SUPPORT.get(str(document.get("gait")))
@@ -308,7 +307,6 @@ class Scenario(BaseModel):
 
 @lru_cache
 def _bounds_of(field: str) -> TypeAdapter[float]:
-    """Return the allowed values of a scenario's field."""
     return TypeAdapter(Annotated[float, Scenario.model_fields[field]])
 
 
@@ -371,7 +369,6 @@ PRESETS: Final[tuple[Scenario, ...]] = (
 
 
 def find_scenario(name: str) -> Scenario:
-    """Return a preset."""
     for number, scenario in enumerate(PRESETS, start=1):
         if name in (scenario.name, str(number)):
             return scenario

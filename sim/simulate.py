@@ -247,7 +247,6 @@ def prepare(
     backend: Backend = "auto",
     precision: Precision = "double",
 ) -> str:
-    """Build a robot's kernel, or load it from the cache."""
     return kernel_of(load_robot(robot), backend, precision=precision).backend
 
 

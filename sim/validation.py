@@ -72,7 +72,6 @@ def intensity(signal: Floats, timestep: float) -> float:
 
 
 def mean_absolute(signal: Floats) -> float:
-    """Mean |X| over all samples."""
     return float(np.mean(np.abs(_samples(signal))))
 
 
@@ -249,7 +248,6 @@ class Comparison(_Data):
     quantities: tuple[QuantityComparison, ...]
 
     def quantity(self, quantity: Quantity) -> QuantityComparison:
-        """The comparison of one quantity."""
         for known in self.quantities:
             if known.quantity is quantity:
                 return known
@@ -270,7 +268,6 @@ def compare(
 
 
 def compare_synchronised(pair: Synchronised, repeats: Sequence[MeasuredLog] = ()) -> Comparison:
-    """Compare synchronised logs."""
     return Comparison(
         lag=pair.lag_seconds,
         correlation=pair.correlation,
@@ -288,7 +285,6 @@ def compare_synchronised(pair: Synchronised, repeats: Sequence[MeasuredLog] = ()
 
 
 def columns_of(log: MeasuredLog, quantity: Quantity, channels: Sequence[str]) -> Floats:
-    """Return some columns of a log, (T, channels)."""
     there = log.channels(quantity)
     return log.values(quantity)[:, [there.index(channel) for channel in channels]]
 

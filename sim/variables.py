@@ -47,7 +47,6 @@ _NUMBER: Final = "<number>"
 
 
 def _number_or_name(value: Any) -> str:
-    """Return the tag of a value; numeric text is a number."""
     if not isinstance(value, str):
         return _NUMBER
     try:
@@ -222,9 +221,9 @@ class VariableCatalogue(Mapping[str, Variable]):
         self._variables = {variable.name: variable for variable in variables}
 
     def __getitem__(self, name: str) -> Variable:
-        found = self._variables.get(name)
-        if found is not None:
-            return found
+        variable = self._variables.get(name)
+        if variable is not None:
+            return variable
         base, group = split_name(name)
         known = self._variables.get(base)
         if not group or known is None or not known.by_leg_group:

@@ -67,7 +67,6 @@ def proposed_control(
 
 
 def drive_names(drives: Sequence[Sequence[DriveNumbers]]) -> dict[DriveNumbers, str]:
-    """Name all distinct drives."""
     kinds = dict.fromkeys(drive for of_leg in drives for drive in of_leg)
     return {drive: f"drive{number}" for number, drive in enumerate(kinds, start=1)}
 
@@ -173,5 +172,4 @@ def _sensors(largest: float) -> list[str]:
 
 
 def quoted(text: str) -> str:
-    """Quote text as a TOML string."""
     return json.dumps(text, ensure_ascii=False)

@@ -50,15 +50,15 @@ def stood_up(urdf: str, frame: Frame, bounds: MeshBounds) -> tuple[str, FoundLeg
     root, *others = parse_urdf(urdf).links
     text = turned(urdf, root, [root, *others], frame)
     tree = parse_urdf(text)
-    found = find_legs(tree, upright=frame != AS_IT_IS, bounds=bounds)
-    legs = [chain_leg(tree, leg.joints, leg.end) for leg in found.legs]
+    legs_found = find_legs(tree, upright=frame != AS_IT_IS, bounds=bounds)
+    legs = [chain_leg(tree, leg.joints, leg.end) for leg in legs_found.legs]
     level = float(f"{np.mean([leg.hip[2] for leg in legs]):.3g}")
     if abs(level) <= _LEVEL * max(sum(leg.lengths) for leg in legs):
-        return text, _at_their_lowest(text, found), []
+        return text, _at_their_lowest(text, legs_found), []
     side = "above" if level > 0.0 else "below"
     note = f"the body's frame is {abs(level):g} m {side} that of {root!r}, level with the hips"
     text = turned(urdf, root, [root, *others], frame, level)
-    return text, _at_their_lowest(text, found), [note]
+    return text, _at_their_lowest(text, legs_found), [note]
 
 
 def _at_their_lowest(urdf: str, found: FoundLegs) -> FoundLegs:
@@ -80,7 +80,6 @@ def _at_their_lowest(urdf: str, found: FoundLegs) -> FoundLegs:
 
 
 def with_feet(urdf: str, legs: Sequence[FoundLeg]) -> tuple[str, list[str]]:
-    """Add a frame at the end of every leg without one."""
     feet = [leg.foot or f"{leg.link}_foot" for leg in legs]
     missing = [(leg, foot) for leg, foot in zip(legs, feet, strict=True) if leg.foot is None]
     if not missing:
@@ -130,7 +129,6 @@ class Proposal:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Guesses, and problems as warnings."""
         return (*self.guesses, *(f"warning: {problem}" for problem in self.problems))
 
     def with_guesses(self, more: Sequence[str], **changed: Any) -> Proposal:
@@ -147,7 +145,6 @@ def propose_robot(
     frame: Frame = AS_IT_IS,
     bounds: MeshBounds = no_meshes,
 ) -> Proposal:
-    """Propose a robot for a URDF."""
     with by_line(urdf):
         urdf, found, moved = stood_up(urdf, frame, bounds)
     text, feet = with_feet(urdf, found.legs)

@@ -97,7 +97,6 @@ def propose_drives(
 
 
 def chosen_kind(choice: ActuatorChoice, drives: Sequence[Sequence[DriveNumbers]]) -> ActuatorKind:
-    """Choose the kind of actuators to propose."""
     if choice != "auto":
         return choice
     of_joints = [drive for of_leg in drives for drive in of_leg]
@@ -125,9 +124,9 @@ def propose_sole(
     urdf: Urdf, legs: Sequence[ChainLeg], stance: Stance, spheres: Sequence[float | None]
 ) -> tuple[SoleNumbers, str]:
     """Propose the soles' spring and damper, with feet's spheres by radius [m] (None: no sphere)."""
-    known = [radius for radius in spheres if radius is not None]
-    length = float(np.median(known)) if known else _SOLE * sum(legs[0].lengths)
-    note = "radius of the feet's spheres" if known else "guessed from the legs' length"
+    radii = [radius for radius in spheres if radius is not None]
+    length = float(np.median(radii)) if radii else _SOLE * sum(legs[0].lengths)
+    note = "radius of the feet's spheres" if radii else "guessed from the legs' length"
     carried = urdf.total_mass / (len(legs) / 2.0)
     stiffness = carried * GRAVITY / (_SINKS * stance.height)
     damping = 1.4 * math.sqrt(stiffness * carried)

@@ -85,10 +85,10 @@ def _mesh_ends(urdf: Urdf, part: str, bounds: MeshBounds) -> Iterable[Floats]:
     """Yield centres of the faces of boxes around a link's meshes, in its body's frame."""
     place = urdf.places[part]
     for mesh in visual_meshes(urdf.links[part], {}):
-        found = bounds(mesh.name)
-        if found is None:
+        extent = bounds(mesh.name)
+        if extent is None:
             continue
-        ends = found * mesh.scale
+        ends = extent * mesh.scale
         middle, half = ends.mean(axis=0), np.ptp(ends, axis=0) / 2.0
         faces = np.concatenate([middle + np.diag(half), middle - np.diag(half)])
         # Slow to import, but already imported where origins are read.

@@ -99,19 +99,18 @@ def _no_room(robot: Robot, refused: UnreachablePose | BeyondJointLimit | None) -
 
 
 def walk_of_robot(values: Mapping[str, Any], file: str) -> Scenario:
-    """Build a scenario with a robot's own lengths."""
     try:
         return Scenario.model_validate(dict(values))
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         if not first["loc"]:
-            said = message_of(first)
+            problem = message_of(first)
         else:
-            said = (
+            problem = (
                 f"a walk of this robot has a {first['loc'][0]} of {first['input']:.4g}, which"
                 f" {first['msg'].removeprefix('Input ')}"
             )
         raise RobotFileError(
-            f"{file}: {said}; lengths are in metres: check those of the legs, the stance and"
+            f"{file}: {problem}; lengths are in metres: check those of the legs, the stance and"
             " contact.sole"
         ) from error

@@ -46,7 +46,6 @@ def check_look_alikes(urdf: Urdf, legs: Sequence[str]) -> None:
 
 
 def _path(urdf: Urdf, link: str) -> list[Joint]:
-    """Return joints from the body to a link."""
     carriers = {joint.child: joint for joint in urdf.joints}
     path: list[Joint] = []
     while link in carriers:
@@ -73,9 +72,9 @@ def _difference(path: Sequence[Joint], leg: Sequence[Joint]) -> str:
                 f" leg of joint {first.name!r}, where {its.name!r} is {its.kind}: change it,"
                 f" {_BY_HAND}"
             )
-    own = next(joint for joint in path if not joint.fixed)
+    odd = next(joint for joint in path if not joint.fixed)
     return (
-        f"robot.urdf: joint {own.name!r} begins a chain that is built like the leg of joint"
+        f"robot.urdf: joint {odd.name!r} begins a chain that is built like the leg of joint"
         f" {first.name!r}, but has more joints or does not reach as far down within"
         f" its limits; check these and its orientation, {_BY_HAND}"
     )
@@ -213,12 +212,14 @@ def _why_none(urdf: Urdf, chains: Sequence[Sequence[Joint]]) -> str:
         return "robot.urdf: it has no movable joint; legs need three revolute joints"
     counts = sorted({len(chain) for chain in chains})
     kinds = sorted({j.kind for chain in chains for j in chain} - TURNS)
-    found = f"{len(chains)} chain{'s' * (len(chains) > 1)} of {', '.join(map(str, counts))} joints"
+    chains_text = (
+        f"{len(chains)} chain{'s' * (len(chains) > 1)} of {', '.join(map(str, counts))} joints"
+    )
     if kinds:
-        found += f", some of them {', '.join(kinds)}"
+        chains_text += f", some of them {', '.join(kinds)}"
     return (
         f"robot.urdf: legs need three revolute joints, but"
-        f" {next(iter(urdf.links))!r} carries {found}"
+        f" {next(iter(urdf.links))!r} carries {chains_text}"
     )
 
 

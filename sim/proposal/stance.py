@@ -40,7 +40,6 @@ class Stance:
 
     @property
     def radius(self) -> float:
-        """Median of all radii [m]."""
         return float(np.median(self.radii))
 
 
@@ -58,9 +57,9 @@ def choose_stance(legs: Sequence[ChainLeg]) -> Stance:
     chosen = [_best(leg, *of, ground, hips - ground) for leg, of in zip(legs, tried, strict=True)]
     feet = np.array([leg.foot(angles.tolist()) for leg, angles in zip(legs, chosen, strict=True)])
     radius = float(np.median(np.abs(feet[:, 1])))
-    beside = [_beside(*of, radius, ground) for of in zip(legs, chosen, feet, strict=True)]
-    if all(angles is not None for angles in beside):
-        even = tuple(_rounded(angles) for angles in beside if angles is not None)
+    aside = [_moved_aside(*of, radius, ground) for of in zip(legs, chosen, feet, strict=True)]
+    if all(angles is not None for angles in aside):
+        even = tuple(_rounded(angles) for angles in aside if angles is not None)
         return Stance(even, hips - ground, (radius,) * len(legs))
     apart = []
     for leg, angles, (x, y, _) in zip(legs, chosen, feet, strict=True):
@@ -71,7 +70,6 @@ def choose_stance(legs: Sequence[ChainLeg]) -> Stance:
 
 
 def _best(leg: ChainLeg, angles: Floats, feet: Floats, ground: float, height: float) -> Floats:
-    """Return the best candidate angles (3,)."""
     near = np.abs(feet[:, 2] - ground) < _BAND * height
     if not near.any():
         raise RobotFileError(
@@ -95,7 +93,7 @@ def _best(leg: ChainLeg, angles: Floats, feet: Floats, ground: float, height: fl
     return np.asarray(angles[int(worth.argmax())])
 
 
-def _beside(
+def _moved_aside(
     leg: ChainLeg, angles: Floats, foot: Floats, radius: float, ground: float
 ) -> Floats | None:
     """Return angles with the foot at the common radius; None if the mounting forbids it."""
@@ -112,9 +110,9 @@ def _beside(
 
 def _reached(leg: ChainLeg, angles: Floats, target: Floats) -> Floats | None:
     """Return nearby angles with the foot at a target, or None if it is out of reach."""
-    found, miss = chain_angles(replace(leg, stance=angles), target[None])
-    within = (found >= leg.limits[:, 0]) & (found <= leg.limits[:, 1])
-    return np.asarray(found[0]) if within.all() and not miss.any() else None
+    angles_at_target, miss = chain_angles(replace(leg, stance=angles), target[None])
+    within = (angles_at_target >= leg.limits[:, 0]) & (angles_at_target <= leg.limits[:, 1])
+    return np.asarray(angles_at_target[0]) if within.all() and not miss.any() else None
 
 
 def _rounded(angles: Floats) -> tuple[float, float, float]:

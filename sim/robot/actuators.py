@@ -161,7 +161,6 @@ class TorqueActuator(Shaft):
 
 
 def _kind_of(actuator: Any) -> str:
-    """Return an actuator's tag; the default kind is dc."""
     kind = actuator.get("kind", "dc") if isinstance(actuator, dict) else actuator.kind
     return kind if isinstance(kind, str) else repr(kind)
 

@@ -93,7 +93,6 @@ Sentence = Annotated[
 
 
 def check_toml(text: str) -> None:
-    """Check the size of a robot.toml."""
     _check_text("robot.toml", text, LONGEST_TOML)
     depth, parts, values = 0, 1, 0
     for token in _TOML.finditer(text):
@@ -175,7 +174,6 @@ class _UrdfScan:
 
 
 def shortened(text: str, longest: int = LONGEST_NAME) -> str:
-    """Shorten a text for a message."""
     return text if len(text) <= longest else f"{text[:longest]}..."
 
 

@@ -45,7 +45,6 @@ class Chain:
 
 
 def chain_of(urdf: Urdf, leg: Leg) -> Chain:
-    """Find a leg in a URDF."""
     named = {joint.name: joint for joint in urdf.joints}
     before, placements, limits = next(iter(urdf.links)), [], []
     for name in leg.joints:
@@ -120,7 +119,6 @@ def _check_limits(joint: Joint) -> None:
 
 
 def check_owners(legs: tuple[Leg, ...]) -> None:
-    """Check that no joint belongs to two legs."""
     owned = [name for leg in legs for name in leg.joints]
     twice = sorted({name for name in owned if owned.count(name) > 1})
     if twice:
@@ -130,7 +128,6 @@ def check_owners(legs: tuple[Leg, ...]) -> None:
 
 
 def check_joints(urdf: Urdf, legs: tuple[Leg, ...]) -> None:
-    """Check that every movable joint belongs to a leg."""
     owned = {name for leg in legs for name in leg.joints}
     others = [joint.name for joint in urdf.joints if not joint.fixed and joint.name not in owned]
     if others:

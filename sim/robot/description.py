@@ -151,12 +151,10 @@ class Leg(Data):
 
     @property
     def joints(self) -> tuple[str, str, str]:
-        """Joint names in the URDF."""
         return self.own_joints or (f"{self.name}_coxa", f"{self.name}_femur", f"{self.name}_tibia")
 
     @property
     def foot(self) -> str:
-        """Frame at the end of the last link."""
         return self.own_foot or f"{self.name}_foot"
 
 
@@ -287,7 +285,6 @@ class RobotDescription(Data):
 
     @property
     def actuator_kind(self) -> ActuatorKind:
-        """Kind of all actuators."""
         return self.actuators[self.legs[0].actuators[0]].kind
 
     @property

@@ -47,7 +47,6 @@ class Origin:
 
 
 def origin_of(element: ET.Element, whose: str) -> Origin:
-    """Read the pose of an element's frame."""
     origin = element.find("origin")
     if origin is None:
         return Origin(np.zeros(3), np.zeros(3))

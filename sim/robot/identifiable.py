@@ -150,7 +150,6 @@ def with_parameters(robot: Robot, values: Mapping[str, float | str]) -> Robot:
 
 
 def _check_gearheads(robot: Robot, values: Mapping[str, float | str]) -> None:
-    """Reject efficiencies of actuators that have none."""
     if not robot.is_torque_controlled:
         return
     for name in ("efficiency", *(f"efficiency_{joint}" for joint in robot.joint_names)):
@@ -171,7 +170,6 @@ def _conventions(values: Mapping[str, float | str]) -> dict[str, float | str]:
 
 
 def _numbers(values: Mapping[str, float | str]) -> dict[str, float]:
-    """Select values of variables without choices."""
     for name, value in values.items():
         if isinstance(value, str):
             raise SimulationInputError(f"{name}: {value!r} is not a number")

@@ -27,7 +27,6 @@ class BodyInertia:
         return BodyInertia(self.mass, product(rotation, self.centre) + position, turned)
 
     def joined(self, other: BodyInertia) -> BodyInertia:
-        """Combine two bodies into one."""
         mass = self.mass + other.mass
         per_mass = 1.0 / max(mass, float(np.finfo(np.float64).eps))
         reduced = self.mass * other.mass * per_mass

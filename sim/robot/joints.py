@@ -42,12 +42,10 @@ class Joint:
 
     @property
     def fixed(self) -> bool:
-        """Whether the joint never moves."""
         return self.kind == "fixed"
 
 
 def joint_of(element: ET.Element) -> Joint:
-    """Read a joint."""
     name = element.get("name", "")
     parent, child = (_linked(element, end) for end in ("parent", "child"))
     whose = f"joint {name!r}"

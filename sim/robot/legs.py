@@ -55,7 +55,6 @@ class KneeUpLeg:
     limits: Floats  # of the joints, (3, 2) [rad]
 
     def foot(self, angles: Sequence[float]) -> tuple[float, float, float]:
-        """Return the tibia's end in the body's frame."""
         (x, y, z), (coxa, femur, tibia) = self.hip, self.lengths
         alpha, theta1, theta2 = angles
         outward = coxa + femur * math.cos(theta1) + tibia * math.cos(theta1 + theta2)
@@ -80,7 +79,6 @@ class ChainLeg:
 
     @property
     def hip(self) -> tuple[float, float, float]:
-        """Origin of the first joint in the body's frame [m]."""
         x, y, z = self.offsets[0].tolist()
         return x, y, z
 
@@ -109,7 +107,6 @@ class ChainLeg:
         return _stand_of(self)
 
     def foot(self, angles: Sequence[float]) -> tuple[float, float, float]:
-        """Return the foot in the body's frame."""
         x, y, z = self.ends(np.asarray([angles], dtype=np.float64))[0].tolist()
         return x, y, z
 

@@ -64,7 +64,6 @@ class Limb:
 
 @lru_cache(maxsize=64)
 def limbs_of(robot: Robot) -> tuple[Limb, ...]:
-    """Return the legs of a robot, in its order."""
     chains = [chain_of(robot.urdf, leg) for leg in robot.description.legs]
     check_joints(robot.urdf, robot.description.legs)
     return tuple(

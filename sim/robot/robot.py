@@ -58,7 +58,6 @@ _PARTS: Final[tuple[type[BaseModel], ...]] = (
 
 
 def first_problem(error: ValidationError, text: str) -> str:
-    """Describe the first validation error."""
     first = with_known_keys(error.errors(), RobotDescription)[0]
     location = _without_kind(first["loc"])
     where = shortened(".".join(str(part) for part in location))
@@ -80,18 +79,20 @@ def by_leg(text: str, legs: Sequence[str]) -> Iterator[None]:
     try:
         yield
     except RobotFileError as error:
-        said = str(error)
-        named = [k for k, leg in enumerate(legs) if said.startswith(f"robot.toml: leg {leg!r}: ")]
+        message = str(error)
+        named = [
+            k for k, leg in enumerate(legs) if message.startswith(f"robot.toml: leg {leg!r}: ")
+        ]
         line = None
         if named:
-            line = line_of(text, ["legs", named[0], *_FIELD.findall(said)[-1:]])
-        elif said.startswith("robot.toml: held_joints"):
+            line = line_of(text, ["legs", named[0], *_FIELD.findall(message)[-1:]])
+        elif message.startswith("robot.toml: held_joints"):
             line = line_of(text, ["held_joints"])
         if line is None:
             raise
-        raise RobotFileError(said.replace("robot.toml: ", f"robot.toml, line {line}: ", 1)) from (
-            error.__cause__ or error
-        )
+        raise RobotFileError(
+            message.replace("robot.toml: ", f"robot.toml, line {line}: ", 1)
+        ) from (error.__cause__ or error)
 
 
 def line_of(text: str, path: Sequence[str | int]) -> int | None:
@@ -198,7 +199,6 @@ class Robot:
 
     @property
     def n_joints(self) -> int:
-        """Number of joints."""
         return JOINTS_PER_LEG * len(self.legs)
 
     @property
@@ -217,7 +217,6 @@ class Robot:
 
     @property
     def has_static_friction(self) -> bool:
-        """Whether any joint's gearhead has static friction."""
         return bool(self.actuators().static_friction.any())
 
     @property
@@ -246,7 +245,6 @@ class Robot:
         return (self.description.contact.sole,) * len(self.legs)
 
     def actuators(self) -> JointActuators:
-        """Return motor and gear values by joint."""
         return self._actuators
 
     @cached_property
@@ -268,7 +266,6 @@ class Robot:
 
 
 def _dc_row(d: RobotDescription, actuator: Actuator) -> tuple[float, ...]:
-    """Row of `JointActuators` for a motor with gearhead."""
     motor, gear = d.motors[actuator.motor], d.gearheads[actuator.gearhead]
     ratio = gear.ratio * actuator.bevel
     return (
@@ -321,7 +318,6 @@ def with_shafts(robot: Robot) -> Robot:
 
 
 def parse_robot(toml: str, urdf: str) -> Robot:
-    """Build a robot from its two files."""
     check_toml(toml)
     try:
         document = tomllib.loads(toml)
@@ -391,7 +387,6 @@ def _check_stance(leg: Leg, stance: Floats, limits: Floats) -> None:
 
 
 def rows_of(legs: Sequence[LegKinematics]) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Return the legs of each side."""
     of_sides: tuple[list[int], list[int]] = [], []
     for number, leg in enumerate(legs):
         of_sides[leg.side < 0.0].append(number)
@@ -400,7 +395,6 @@ def rows_of(legs: Sequence[LegKinematics]) -> tuple[tuple[int, ...], tuple[int, 
 
 
 def leg_groups(robot: Robot) -> dict[str, tuple[int, ...]]:
-    """Return a robot's groups of legs."""
     rows = rows_of(robot.legs)
     first = {row[0] for row in rows if row}
     last = {row[-1] for row in rows if row} - first
@@ -421,7 +415,6 @@ def leg_groups(robot: Robot) -> dict[str, tuple[int, ...]]:
 
 
 def values_by_leg(robot: Robot, values: Mapping[str, float], parameter: str) -> dict[int, float]:
-    """Resolve values of groups of legs to values of legs."""
     groups = leg_groups(robot)
     for name in values:
         if name not in groups:
@@ -429,15 +422,15 @@ def values_by_leg(robot: Robot, values: Mapping[str, float], parameter: str) -> 
                 f"{parameter}[{name}]: {robot.description.name} has no such group of legs; it has"
                 f" {', '.join(groups)}"
             )
-    found: dict[int, tuple[int, str]] = {}
+    by_leg: dict[int, tuple[int, str]] = {}
     for name in sorted(values, key=lambda name: len(groups[name])):
         group = groups[name]
         for leg in group:
-            size, other = found.setdefault(leg, (len(group), name))
+            size, other = by_leg.setdefault(leg, (len(group), name))
             if size == len(group) and other != name:
                 raise SimulationInputError(
                     f"{parameter}[{name}]: leg {robot.legs[leg].name!r} is also in {other!r},"
                     " of the same size; set a value for the leg, or for a smaller"
                     " group"
                 )
-    return {leg: values[name] for leg, (_, name) in found.items()}
+    return {leg: values[name] for leg, (_, name) in by_leg.items()}

@@ -119,7 +119,6 @@ def _trunk(robot: Robot) -> Shape:
 
 
 def _capsule(end: Floats, radius: float, role: Role) -> Shape:
-    """A capsule from the link's origin to `end`."""
     # Slow to import, and only needed for display.
     require_room_for_scipy()
     from scipy.spatial.transform import Rotation  # noqa: PLC0415
@@ -169,12 +168,12 @@ class VisualMesh:
 def material_colours(urdf: str) -> Mapping[str, Colour]:
     """Return the colours of a URDF's materials, which any link may name."""
     root = ET.fromstring(urdf)  # noqa: S314 - it was checked when it was parsed
-    found: dict[str, Colour] = {}
+    colours: dict[str, Colour] = {}
     for material in root.iter("material"):
         colour = _colour(material)
         if colour is not None:
-            found.setdefault(material.get("name", ""), colour)
-    return found
+            colours.setdefault(material.get("name", ""), colour)
+    return colours
 
 
 def visual_meshes(link: Link, colours: Mapping[str, Colour]) -> tuple[VisualMesh, ...]:

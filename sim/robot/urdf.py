@@ -109,7 +109,6 @@ class Urdf:
 
     @property
     def total_mass(self) -> float:
-        """Mass of all bodies [kg]."""
         return sum(body.mass for body in self.bodies.values())
 
 
@@ -217,8 +216,8 @@ def _rigid_bodies(
     while waiting:
         name, place = waiting.pop()
         places[name] = place
-        own = links[name].inertia.seen_from(place.rotation, place.position)
-        bodies[place.body] = bodies.get(place.body, NO_INERTIA).joined(own)
+        inertia = links[name].inertia.seen_from(place.rotation, place.position)
+        bodies[place.body] = bodies.get(place.body, NO_INERTIA).joined(inertia)
         for joint in carried[name]:
             if joint.fixed:
                 turned = product(place.rotation, joint.origin.matrix())
@@ -269,24 +268,24 @@ def unphysical(urdf: Urdf, text: str) -> Iterator[str]:
         parts[place.body].append(link)
     for name, body in urdf.bodies.items():
         if body.mass == 0.0:
-            said = (
+            problem = (
                 f"link {name!r} and the links fixed to it have no mass: give it an <inertial>, or"
                 " only the rotors' inertia resists its joints"
             )
-            yield with_line(text, f"robot.urdf: {said}")
+            yield with_line(text, f"robot.urdf: {problem}")
             continue
         if _possible(body):
             continue
-        own = ((link, urdf.links[link].inertia) for link in parts[name])
-        wrong = {link: of for link, of in own if of.mass and not _possible(of)}
+        inertias = ((link, urdf.links[link].inertia) for link in parts[name])
+        wrong = {link: of for link, of in inertias if of.mass and not _possible(of)}
         for link, inertia in (wrong or {name: body}).items():
             moments = ", ".join(f"{moment:.3g}" for moment in _moments(inertia))
-            said = (
+            problem = (
                 f"link {link!r}: a body of {inertia.mass:g} kg cannot have the principal moments"
                 f" {moments} kg m2: each must be positive and at most the sum of the others; check"
                 " its <inertia>"
             )
-            yield with_line(text, f"robot.urdf: {said}")
+            yield with_line(text, f"robot.urdf: {problem}")
 
 
 def _possible(inertia: BodyInertia) -> bool:

@@ -22,26 +22,26 @@ def by_line(text: str) -> Iterator[None]:
     try:
         yield
     except RobotFileError as error:
-        said = with_line(text, str(error))
-        if said == str(error):
+        message = with_line(text, str(error))
+        if message == str(error):
             raise
-        raise RobotFileError(said) from (error.__cause__ or error)
+        raise RobotFileError(message) from (error.__cause__ or error)
 
 
-def with_line(text: str, said: str) -> str:
+def with_line(text: str, message: str) -> str:
     """Add the line number to a message that begins with a link or a joint of a URDF."""
-    line = _line(text, said)
+    line = _line(text, message)
     if line is None:
-        return said
-    return said.replace("robot.urdf: ", f"robot.urdf, line {line}: ", 1)
+        return message
+    return message.replace("robot.urdf: ", f"robot.urdf, line {line}: ", 1)
 
 
-def _line(text: str, said: str) -> int | None:
+def _line(text: str, message: str) -> int | None:
     """Find the line of the last part with that name, the duplicate of two, or of its attribute."""
-    part = _PART.match(said)
+    part = _PART.match(message)
     if part is None:
         return None
-    inner = _INNER.search(said, part.end())
+    inner = _INNER.search(message, part.end())
     depth, inside, line = 0, False, None
     parser = expat.ParserCreate()
 

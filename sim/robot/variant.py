@@ -34,7 +34,6 @@ _REMEMBERED: Final = 1024
 
 
 def digest_of(toml: str, urdf: str) -> bytes:
-    """Return the digest that identifies two files."""
     # Invalid Unicode is rejected later, by name.
     texts = (text.encode(errors="surrogatepass") for text in (toml, urdf))
     return hashlib.sha256(b"%d " % len(toml) + b"".join(texts)).digest()
@@ -49,10 +48,10 @@ class _Digests:
 
     def has(self, digest: bytes) -> bool:
         with self._lock:
-            known = digest in self._digests
-            if known:
+            present = digest in self._digests
+            if present:
                 self._digests.move_to_end(digest)
-            return known
+            return present
 
     def add(self, digest: bytes) -> None:
         with self._lock:
@@ -95,8 +94,8 @@ def shipped_robot(name: str) -> Robot:
         return replace(robot, ships=True)
     document = tomllib.loads(parameters.read_text(encoding="utf-8"))
     robot = with_parameters(shipped_robot(document["base"]), document["parameters"])
-    said = {field: document[field] for field in ("name", "description")}
-    return replace(robot, description=robot.description.model_copy(update=said))
+    texts = {field: document[field] for field in ("name", "description")}
+    return replace(robot, description=robot.description.model_copy(update=texts))
 
 
 Degrees = tuple[float, float, float]

@@ -124,14 +124,18 @@ def _add_masses(
     further = values["body_mass_factor"][:, np.newaxis] - 1.0
     load = (scenario.load + values["load_added"])[:, np.newaxis]
     at = np.array([[0.0, 0.0, robot.description.load_height]])
-    moved = at + np.stack([values[f"load_{way}"] for way in ("ahead", "left", "raised")], axis=1)
+    load_position = at + np.stack(
+        [values[f"load_{way}"] for way in ("ahead", "left", "raised")], axis=1
+    )
     packed[:, slices["base_mass"]] += further * body.mass + (load - scenario.load)
     packed[:, slices["base_moment"]] += further * (body.mass * body.centre) + (
-        load * moved - scenario.load * at
+        load * load_position - scenario.load * at
     )
-    own = body.rotational[_ROWS, _COLUMNS] + body.mass * _parallel_axes(body.centre[np.newaxis])
-    packed[:, slices["base_inertia"]] += further * own + (
-        load * _parallel_axes(moved) - scenario.load * _parallel_axes(at)
+    body_inertia = body.rotational[_ROWS, _COLUMNS] + body.mass * _parallel_axes(
+        body.centre[np.newaxis]
+    )
+    packed[:, slices["base_inertia"]] += further * body_inertia + (
+        load * _parallel_axes(load_position) - scenario.load * _parallel_axes(at)
     )
 
 
@@ -221,26 +225,21 @@ class PerturbedWalk:
 
     @property
     def robots(self) -> tuple[RobotSource, ...]:
-        """The robot as described."""
         return (self.robot,)
 
     @property
     def duration(self) -> float:
-        """Simulated time of one walk [s]."""
         return self.scenario.duration
 
     @property
     def objectives(self) -> tuple[Objective, ...]:
-        """f1 to f6 of table 4.1."""
         return OBJECTIVES
 
     def run(self, designs: Floats) -> Outcome:
-        """Simulate every design."""
         (outcome,) = walk_together([self.walking(designs)])
         return outcome
 
     def walking(self, designs: Floats) -> Walking[Outcome]:
-        """Simulate every design together with other cases."""
         walked = yield from self._simulating(designs, log=False)
         return walked.outcome
 
@@ -305,12 +304,10 @@ class MeasuredPerturbedWalk(PerturbedWalk):
 
     @property
     def objectives(self) -> tuple[Objective, ...]:
-        """f1 to f6 of table 4.1, then `MEASUREMENTS`."""
         measured = (Objective(m.name, m.unit, m.description) for m in MEASUREMENTS)
         return (*OBJECTIVES, *measured)
 
     def walking(self, designs: Floats) -> Walking[Outcome]:
-        """Simulate every design together with other cases."""
         walked = yield from self._simulating(designs, log=False)
         columns = [walked.outcome.objectives, walked.measurements.array()]
         return Outcome(np.concatenate(columns, axis=1), walked.outcome.statuses)
@@ -341,12 +338,10 @@ class WorldWalk:
 
     @property
     def name(self) -> str:
-        """Name of the scenario."""
         return self.scenario.name
 
     @property
     def robots(self) -> tuple[RobotSource, ...]:
-        """The robot as described."""
         return (self.robot,)
 
     @property
@@ -357,11 +352,9 @@ class WorldWalk:
 
     @property
     def objectives(self) -> tuple[Objective, ...]:
-        """f1 to f6 of table 4.1."""
         return OBJECTIVES
 
     def run(self, designs: Floats) -> Outcome:
-        """Simulate the design in every world."""
         (outcome,) = walk_together([self.walking(designs)])
         return outcome
 
@@ -427,17 +420,14 @@ class EngineWalk:
 
     @property
     def name(self) -> str:
-        """Name of the scenario."""
         return self.walk.name
 
     @property
     def robots(self) -> tuple[RobotSource, ...]:
-        """The robot as described."""
         return self.walk.robots
 
     @property
     def duration(self) -> float:
-        """Simulated time of one world [s]."""
         return self.walk.duration
 
     @property
@@ -447,11 +437,9 @@ class EngineWalk:
 
     @property
     def objectives(self) -> tuple[Objective, ...]:
-        """f1 to f6 of table 4.1."""
         return self.walk.objectives
 
     def run(self, designs: Floats) -> Outcome:
-        """Simulate the design in every world."""
         return self.run_until(designs, lambda: False)
 
     def run_until(self, designs: Floats, should_stop: Callable[[], bool]) -> Outcome:
@@ -463,8 +451,8 @@ class EngineWalk:
         for engine in np.unique(engines).tolist():
             rows = np.flatnonzero(engines == engine)
             kernel = self._kernel(engine, should_stop) if engine else None
-            found = self.walk.run_with(kernel, worlds[rows])
-            objectives[rows], statuses[rows] = found.objectives, found.statuses
+            outcome = self.walk.run_with(kernel, worlds[rows])
+            objectives[rows], statuses[rows] = outcome.objectives, outcome.statuses
         return Outcome(objectives, statuses)
 
     def _kernel(self, engine: int, should_stop: Callable[[], bool]) -> Kernel:

@@ -1,4 +1,4 @@
-"""Every controller of gaitswarm keeps to the contract that plug-ins' controllers keep to."""
+"""Every built-in controller satisfies the contract of plug-ins' controllers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Plug-ins that are broken, or in each other's way: named with their distribution, never fatal."""
+"""Broken or conflicting plug-ins are named with their distribution, and never fatal."""
 
 from __future__ import annotations
 

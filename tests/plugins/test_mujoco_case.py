@@ -1,4 +1,4 @@
-"""The example: a package with a case that walks in MuJoCo, installed, tested and optimized with."""
+"""The example package with a case in MuJoCo: installed, tested and used in a job."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ def test_with_other_code_of_the_plug_in_or_without_it_a_job_does_not_go_on(
 
 @contextmanager
 def without(site: Path) -> Iterator[None]:
-    """Processes that are started meanwhile have no package of a folder."""
+    """Processes started meanwhile cannot import packages of the folder."""
     sys.path.remove(str(site))
     yield
     sys.path.insert(0, str(site))

@@ -1,4 +1,4 @@
-"""URDFs of other people's robots: those of the PyPI package example-robot-data, unedited."""
+"""URDFs of the PyPI package example-robot-data, unedited."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ QUADRUPEDS: Final = {
     "solo12": "solo_description/robots/solo12.urdf",
     "hyq": "hyq_description/robots/hyq_no_sensors.urdf",
 }
-"""Those of the package whose legs have three joints, by name."""
+"""Robots of the package whose legs have three joints, by name."""
 
 BIPED: Final = "bolt_description/robots/bolt.urdf"
 """The only other one with such legs."""

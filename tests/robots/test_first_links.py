@@ -1,4 +1,4 @@
-"""First links that are no body, as simulators have them: a robot's body is free all the same."""
+"""First links without a body, as for simulators: the robot's body is free anyway."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tests.robots.test_proposal import QUADRUPED, dog
 
 
 def in_world(urdf: str, kind: str, first: str, xyz: str = "0 0 0", between: bool = False) -> str:
-    """A robot that a joint of some type hangs on `world`, or on a link that is fixed to it."""
+    """A robot attached to `world`, or to a link fixed to it, by a joint of some type."""
     place = ""
     if between:
         place = (

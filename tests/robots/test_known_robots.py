@@ -1,4 +1,4 @@
-"""Other people's robots, unedited: `robot init`, kinematics, inertia, acceleration, standing."""
+"""Published robots, unedited: `robot init`, kinematics, inertia, acceleration, standing."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def read(folder: Path) -> Robot:
 
 @pytest.fixture(scope="module", params=QUADRUPEDS)
 def folder(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Of a robot that was made of its URDF as the package has it."""
+    """A robot made from its unedited URDF."""
     path = tmp_path_factory.mktemp("known") / request.param
     init_robot(urdf_of(QUADRUPEDS[request.param]), path)
     return path
@@ -183,8 +183,8 @@ def test_it_stands_with_its_weight_on_all_feet(robot: Robot) -> None:
     assert abs(sunk) < 0.1 * log.base_position[0, 2]
 
 
-def test_every_other_file_of_the_package_is_refused_with_what_is_supported() -> None:
-    """Arms, hands, humanoids with legs of six joints, quadrotors, wheels, no robot at all."""
+def test_other_files_of_the_package_are_refused_with_the_supported_kinds() -> None:
+    """Arms, hands, humanoids with legs of six joints, quadrotors, wheels, objects."""
     urdf_of(BIPED)
     legged = {FOLDER / file for file in (*QUADRUPEDS.values(), BIPED)}
     others = sorted(set(FOLDER.glob("**/*.urdf")) - legged)

@@ -1,4 +1,4 @@
-"""A leg that is none by its author's mistake: refused, not held as an arm is."""
+"""Legs that are not recognized because of a mistake are refused, not held like an arm."""
 
 from __future__ import annotations
 

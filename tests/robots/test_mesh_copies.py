@@ -1,4 +1,4 @@
-"""Meshes that `gaitswarm robot init` copies beside the URDF."""
+"""Meshes that `gaitswarm robot init` copies next to the URDF."""
 
 from __future__ import annotations
 
@@ -44,9 +44,9 @@ def test_the_folder_shows_its_meshes_wherever_it_goes(
     output = tmp_path / "dog"
     command = ["robot", "init", str(urdf), "--package-path", str(tmp_path / "elsewhere"), "-o"]
     assert run([*command, str(output), "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)["meshes"]
-    assert told["copied"] == list(contents)
-    for left, (name, why) in zip(told["left_out"], lost.items(), strict=True):
+    meshes = json.loads(capsys.readouterr().out)["meshes"]
+    assert meshes["copied"] == list(contents)
+    for left, (name, why) in zip(meshes["left_out"], lost.items(), strict=True):
         assert left["name"] == name and why in left["problem"]
 
     moved = output.rename(tmp_path / "elsewhere" / "moved")

@@ -44,7 +44,7 @@ Init = Callable[[str], tuple[Robot, list[str]]]
 
 @pytest.fixture
 def init(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Init:
-    """Makes a robot of a URDF beside a package with its mesh."""
+    """Makes a robot from a URDF next to a package with its mesh."""
 
     def made(urdf: str) -> tuple[Robot, list[str]]:
         robots = tmp_path / "dog_description" / "robots"
@@ -104,7 +104,7 @@ def test_simple_shapes_go_before_meshes(init: Init) -> None:
 
 
 @pytest.mark.parametrize("content", [None, "no mesh", ""], ids=["missing", "broken", "empty"])
-def test_a_mesh_that_is_not_at_hand_is_named_with_what_to_add(
+def test_a_missing_mesh_is_named_with_the_remedy(
     content: str | None, init: Init, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     mesh = tmp_path / "dog_description" / "meshes" / "calf.obj"
@@ -120,7 +120,7 @@ def test_a_mesh_that_is_not_at_hand_is_named_with_what_to_add(
     assert not (tmp_path / "made").exists()
 
 
-def test_what_the_message_says_to_add_is_a_foot() -> None:
+def test_the_element_in_the_message_is_a_foot() -> None:
     with pytest.raises(RobotFileError, match="link 'FL_calf' has no foot: add a link") as refused:
         propose_robot(BARE, "dog")
     example = str(refused.value).split(": ")[-1]

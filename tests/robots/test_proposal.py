@@ -1,4 +1,4 @@
-"""A robot that is proposed from a URDF alone: legs, feet, stance, actuators, gaits, refusals."""
+"""Proposals from a URDF alone: legs, feet, stance, actuators, gaits, errors."""
 
 from __future__ import annotations
 
@@ -161,7 +161,7 @@ def test_a_foot_is_a_link_a_sphere_or_the_far_end_of_the_last_shape(
         assert robot.description.contact.sole == sole
 
 
-def test_an_arm_is_held_within_its_limits_and_told() -> None:
+def test_an_arm_is_held_within_its_limits_and_reported() -> None:
     proposal = propose_robot(dog(arm=ARM), "mine")
     robot = parse_robot(proposal.toml, proposal.urdf)
     assert robot.description.held_joints == {"arm0": 0.0, "arm1": 0.5, "arm2": 0.0}

@@ -1,4 +1,4 @@
-"""Robots with legs all round: each leg stands where it points, and walks as far as it reaches."""
+"""Robots with legs all around: legs stand where they point, and walk within reach."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def test_of_some_designs_a_round_robot_walks_both_of_its_walks(layout: str) -> N
         assert ahead > least * scenario.stride * scenario.cycles
 
 
-def test_steps_are_as_long_as_narrow_joints_allow_and_that_is_told() -> None:
+def test_steps_are_as_long_as_narrow_joints_allow_and_that_is_reported() -> None:
     proposal, robot = made("six", limit=0.15)
     usual, _ = made("six")
     for walk, whole in zip(proposal.job["scenarios"], usual.job["scenarios"], strict=True):

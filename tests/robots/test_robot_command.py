@@ -17,7 +17,7 @@ from tests.robots.radial import radial_robot
 from tests.robots.test_proposal import ARM, dog
 
 
-def test_init_makes_the_actuators_that_are_asked_for(
+def test_init_makes_the_requested_actuators(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "dog.urdf").write_text(dog(), encoding="utf-8")
@@ -64,7 +64,7 @@ def test_init_writes_a_folder_that_loads_and_stands(
     assert "soles carry" in capsys.readouterr().out
 
 
-def test_check_tells_masses_by_group_of_links_and_what_init_guessed(
+def test_check_prints_masses_by_group_of_links_and_guesses_of_init(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "dog.urdf").write_text(dog(arm=ARM), encoding="utf-8")
@@ -127,7 +127,7 @@ def test_check_draws_how_it_stands_and_says_the_same(
     assert "draw" in (error := capsys.readouterr().err) and ".svg" in error
 
 
-def test_check_tells_where_legs_and_mass_are(
+def test_check_prints_legs_and_centre_of_mass(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run(["robot", "check", str(folder), "--json"]) == 0
@@ -151,7 +151,7 @@ def test_check_tells_where_legs_and_mass_are(
         np.testing.assert_allclose(found["points"][3], foot, atol=0.01)
 
 
-def test_check_finds_meshes_beside_the_urdf_and_in_packages(
+def test_check_finds_meshes_next_to_the_urdf_and_in_packages(
     folder: Path,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,

@@ -1,4 +1,4 @@
-"""Robots whose file has other axes up and ahead: seen, told, and turned when that is asked for."""
+"""Robots whose URDF has other axes up and ahead: detected, reported, rotated on request."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def test_a_robot_whose_z_does_not_point_up_is_refused_with_the_axis_that_does(
         propose_robot(urdf, "mine")
 
 
-def test_who_says_that_z_points_up_is_believed() -> None:
+def test_explicit_z_up_overrides_the_check() -> None:
     urdf = in_frame(QUADRUPED, f"{math.pi!r} 0 0")
     assert len(feet_of(urdf, Frame(up="z"))) == 4
 

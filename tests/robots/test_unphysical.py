@@ -1,4 +1,4 @@
-"""Masses and inertias that no body has: `init` and `check` warn of each, with its line."""
+"""Impossible masses and inertias: `init` and `check` warn of each, with its line."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def warnings_of(urdf: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> 
     ],
     ids=["negative", "triangle", "negative off the diagonal", "all zero", "no inertial"],
 )
-def test_init_and_check_warn_of_what_no_body_has_by_line(
+def test_init_and_check_warn_of_impossible_inertia_by_line(
     urdf: str, link: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     line = urdf[: urdf.index(link)].count("\n") + 1

@@ -1,4 +1,4 @@
-"""Wrong robot files: messages name file, line and way out, on the command line and over HTTP."""
+"""Wrong robot files: messages name file, line and remedy, in commands and over HTTP."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ import pytest
 from gaitswarm.cli.main import run
 from tests.robots.wrong_files import SOURCE, TOML, URDF, WRONG_TOMLS, WRONG_URDFS, Wrong
 
-Told = Callable[..., str]
+Message = Callable[..., str]
 ALL = (*WRONG_URDFS, *WRONG_TOMLS)
 
 
 def check_said(said: str, wrong: Wrong, file: str) -> None:
-    """File, line and way out."""
+    """File, line and remedy."""
     assert file in said
     assert re.search(wrong.said, said), said
     assert "Traceback" not in said
@@ -34,7 +34,7 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str | Path) -> str:
 
 
 @pytest.mark.parametrize("wrong", WRONG_URDFS, ids=lambda wrong: wrong.name)
-def test_init_names_file_line_and_way_out(
+def test_init_names_file_line_and_remedy(
     wrong: Wrong, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     source = tmp_path / "mine.urdf"
@@ -45,7 +45,7 @@ def test_init_names_file_line_and_way_out(
 
 
 @pytest.mark.parametrize("wrong", ALL, ids=lambda wrong: wrong.name)
-def test_check_names_file_line_and_way_out(
+def test_check_names_file_line_and_remedy(
     wrong: Wrong, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "robot.toml").write_text(TOML if wrong.is_urdf else wrong.text, encoding="utf-8")
@@ -97,7 +97,7 @@ def test_a_robots_name_is_one_that_a_file_can_have(
 
 
 @pytest.mark.slow
-def test_a_server_names_file_line_and_way_out_and_lives(
+def test_a_server_names_file_line_and_remedy_and_keeps_running(
     serve_database: Callable[[Path], str], database: Path
 ) -> None:
     with httpx2.Client(base_url=serve_database(database), timeout=60.0) as client:

@@ -1,4 +1,4 @@
-"""A robot's files as they come from hands, exporters and damaged disks: what is wrong, where."""
+"""Wrong files of robots, with the error and its place."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Two logs of one walk are put on one time axis."""
+"""Synchronization of two logs of one walk."""
 
 from __future__ import annotations
 

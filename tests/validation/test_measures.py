@@ -152,7 +152,7 @@ def test_the_relative_error_of_a_signal_that_is_zero_is_none_or_infinite() -> No
 def test_signals_that_do_not_fit_are_refused() -> None:
     with pytest.raises(SimulationInputError, match="shapes"):
         measures.mean_absolute_error(X, X[:3])
-    with pytest.raises(SimulationInputError, match="without samples"):
+    with pytest.raises(SimulationInputError, match="at least one sample"):
         measures.mean_absolute(np.empty(0))
     with pytest.raises(SimulationInputError, match="two samples"):
         measures.intensity(X[:1], 0.002)

@@ -256,7 +256,7 @@ def _how_to_go_on(job_id: str, place: str) -> str:
 
 def _report(job: JobView, place: str, *, compare: bool, beside: Mapping[str, JobView]) -> None:
     from gaitswarm.cli.comparison import published_beside
-    from gaitswarm.cli.tables.views import design_table, results_table, search_line, worth
+    from gaitswarm.cli.tables import design_table, results_table, search_line, worth
 
     console = stdout_console()
     if job.best is None:

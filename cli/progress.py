@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final, Protocol
 
 from gaitswarm.cli.exit_codes import JobEnded
 from gaitswarm.cli.output import note, stderr_console
-from gaitswarm.cli.tables.views import duration, number
+from gaitswarm.cli.tables import duration, number
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar

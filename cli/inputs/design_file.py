@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from gaitswarm.cli.inputs.job_ids import full_id
+from gaitswarm.cli.inputs.options import full_id
 from gaitswarm.cli.inputs.robots import chosen_robot, robot_defaults
 from gaitswarm.cli.inputs.spec_file import json_object, read_json_object
 from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound

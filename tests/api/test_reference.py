@@ -8,7 +8,7 @@ from unittest.mock import patch
 import httpx2
 import pytest
 
-from gaitswarm.cli.tables.views import jobs_table
+from gaitswarm.cli.tables import jobs_table
 from gaitswarm.services.optimizer.analysis import reference as references
 from gaitswarm.services.optimizer.analysis.reference import (
     note_reference,

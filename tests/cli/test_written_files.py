@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from gaitswarm.cli.atomic_file import replacing
+from gaitswarm.cli.files import replacing
 from gaitswarm.errors import InvalidRequest
 
 

@@ -1,0 +1,128 @@
+"""`gaitswarm gaits` and `gaitswarm mjcf`: planned gaits, and a robot's model for MuJoCo."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gaitswarm.cli.inputs.options import Json, RobotOption
+
+if TYPE_CHECKING:
+    from gaitswarm.gaits import GaitsView, GaitView
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands."""
+    app.command()(gaits)
+    app.command()(mjcf)
+
+
+def gaits(
+    gait: Annotated[
+        str | None, typer.Argument(metavar="[GAIT]", help="Draw this one [default: list all].")
+    ] = None,
+    *,
+    robot: RobotOption = None,
+    scenario: Annotated[
+        str | None,
+        typer.Option(
+            help="Whose posture, stride and sway are planned: name, number or FILE.json [default:"
+            " the first of the robot's own folder, or normal-slow]."
+        ),
+    ] = None,
+    duty_factor: Annotated[
+        float | None,
+        typer.Option(help="Support's share of the cycle [default: the gait's usual one]."),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """List gaits: order of footfalls, feet that stand, and whether they are statically stable."""
+    from gaitswarm.cli.inputs.robots import chosen_robot, one_scenario
+    from gaitswarm.cli.output import print_json, print_text
+    from gaitswarm.gaits import planned_gaits
+
+    view = planned_gaits(
+        chosen_robot(robot),
+        one_scenario(scenario, robot, preset="normal-slow"),
+        name=gait,
+        duty_factor=duty_factor,
+    )
+    if as_json:
+        print_json(view)
+        return
+    heading = f"{view.robot} in the scenario {view.scenario}\n\n"
+    print_text(heading + (_list(view) if gait is None else diagram(view.items[0])))
+
+
+def _list(view: GaitsView) -> str:
+    lines = []
+    for item in view.items:
+        order = sorted(item.lags, key=lambda leg: item.lags[leg])
+        footfalls = ", ".join(f"{leg} {item.lags[leg]:.2f}" for leg in order)
+        said = footfalls or f"for {' or '.join(map(str, item.legs))} legs"
+        lines += [f"{item.name:12} {item.description}", f"{'':12} {said}"]
+        if item.suits:
+            lines.append(f"{'':12} {_plan(item)}")
+    return "\n".join(lines) + "\n"
+
+
+def diagram(item: GaitView) -> str:
+    """A gait's footfall diagram, as people read it."""
+    if not item.suits:
+        return f"{item.name}: for {' or '.join(map(str, item.legs))} legs\n"
+    lines = [f"{leg:14} {columns}" for leg, columns in item.support.items()]
+    return "\n".join([*lines, "", f"{item.name}: {_plan(item)}", ""])
+
+
+def _plan(item: GaitView) -> str:
+    from gaitswarm.cli.tables import gait_in_words
+
+    return "out of the legs' reach" if item.planned is None else gait_in_words(item.planned)
+
+
+def mjcf(
+    *,
+    robot: RobotOption = None,
+    scenario: Annotated[
+        str | None,
+        typer.Option(
+            help="Whose load, slope and first pose the model has: name, number or FILE [default:"
+            " the first of the robot's folder, else normal-fast]."
+        ),
+    ] = None,
+    contacts: Annotated[
+        bool,
+        typer.Option(help="Let soles meet the ground, by MuJoCo's own contacts fitted to ours."),
+    ] = True,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="FILE.xml", help="Default: standard output."),
+    ] = None,
+) -> None:
+    """Write a robot as MJCF, which MuJoCo's viewer opens: with voltages or torques as controls.
+
+    Needs pip install 'gaitswarm[mujoco]'. The viewer comes with pip install mujoco:
+    python -m mujoco.viewer --mjcf=FILE.xml.
+    """
+    from gaitswarm.cli.inputs.robots import chosen_robot, one_scenario
+    from gaitswarm.cli.output import note, print_text
+    from gaitswarm.services.optimizer.errors import InvalidRequest
+    from gaitswarm.sim.mujoco.engines import check_installed
+    from gaitswarm.sim.robot import load_robot
+
+    machine = load_robot(chosen_robot(robot))
+    chosen = one_scenario(scenario, robot, preset="normal-fast")
+    check_installed()
+    from gaitswarm.sim.mujoco.model import exported
+
+    text = exported(machine, chosen, contacts=contacts)
+    if output is None:
+        print_text(text)
+        return
+    try:
+        output.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InvalidRequest(f"cannot write {output}: {error}", field="output") from error
+    note(f"model written to {output}")

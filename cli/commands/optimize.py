@@ -1,0 +1,156 @@
+"""`gaitswarm optimize`, and lists of search methods, plug-ins and cases."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from gaitswarm.cli.inputs.options import (
+    AcceptChanges,
+    Json,
+    SpecOptions,
+    WorkerOptions,
+    completed,
+    with_groups,
+)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands."""
+    app.command()(optimize)
+    app.command()(optimizers)
+    app.command()(plugins)
+    app.command()(cases)
+
+
+@with_groups
+def optimize(
+    options: SpecOptions,
+    *,
+    resume: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ID",
+            callback=completed,
+            help="Go on with this job, to the same bits as if it had never stopped.",
+        ),
+    ] = None,
+    accept_changes: AcceptChanges = False,
+    compare_published: Annotated[
+        bool,
+        typer.Option(
+            "--compare-published", help="Show the best design beside the one of the literature."
+        ),
+    ] = False,
+    compare_optimizer: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Run the same job with another search method, too, and show what that found.",
+        ),
+    ] = None,
+    workers: WorkerOptions,
+    as_json: Json = False,
+) -> None:
+    """Run a job here and now, without a server. Ctrl-C stops it; --resume goes on with it."""
+    from contextlib import closing
+    from dataclasses import asdict
+
+    from gaitswarm.cli.embedded import Embedded, finish, job_run, resumed_job
+    from gaitswarm.cli.inputs.spec_file import build_spec, by_other_optimizer, check_optimizer_name
+    from gaitswarm.cli.output import note
+    from gaitswarm.jobs.database.jobs import DatabaseJobs
+    from gaitswarm.jobs.open import database_to_write
+    from gaitswarm.services.optimizer.errors import InvalidRequest
+    from gaitswarm.services.optimizer.masking import masked_url
+    from gaitswarm.services.optimizer.service import JobService
+    from gaitswarm.services.runtime import open_store
+    from gaitswarm.settings import read_settings
+
+    for option, given in {
+        "compare-published": compare_published,
+        "compare-optimizer": compare_optimizer,
+    }.items():
+        if as_json and given:
+            raise InvalidRequest("is for people; leave it out with --json", field=option)
+    if accept_changes and resume is None:
+        raise InvalidRequest("a new job has nothing to go on from", field="accept-changes")
+    settings = read_settings(**asdict(workers))
+    asked = build_spec(options) if resume is None or options.given else None
+    if compare_optimizer is not None:
+        check_optimizer_name(compare_optimizer, "compare-optimizer")
+    url = database_to_write(settings)
+    with (
+        closing(open_store(url)) as store,
+        closing(Embedded(settings, accepts_changes=accept_changes)) as embedded,
+    ):
+        service = JobService(store)
+        jobs = DatabaseJobs(service, url)
+        claim = None
+        if asked is not None and resume is None:
+            claim = service.submit_embedded(asked)
+            job = claim.job
+        else:
+            job = resumed_job(service, resume or "", asked, accept_changes=accept_changes)
+        note(f"job {job.id} in database {masked_url(url)}")
+        interrupted = embedded.run(jobs, store, job, claim)
+        beside = {}
+        if compare_optimizer is not None and not interrupted:
+            other = job_run(by_other_optimizer(job.spec, compare_optimizer), store, jobs, embedded)
+            beside[compare_optimizer] = jobs.job(other.id)
+        finish(jobs, job.id, interrupted, as_json=as_json, compare=compare_published, beside=beside)
+
+
+def optimizers(as_json: Json = False) -> None:
+    """List search methods with what can be set of them."""
+    from gaitswarm.cli.output import print_json_list, stdout_console
+    from gaitswarm.cli.tables import optimizers_table
+    from gaitswarm.views import optimizer_views
+
+    if as_json:
+        print_json_list(optimizer_views())
+    else:
+        stdout_console().print(optimizers_table(optimizer_views()))
+
+
+def plugins(as_json: Json = False) -> None:
+    """List plug-ins: controllers, cases and search methods of other packages that are installed."""
+    from rich.text import Text
+
+    from gaitswarm.cli.output import print_json_list, stdout_console
+    from gaitswarm.cli.tables import Table
+    from gaitswarm.views import plugin_views
+
+    if as_json:
+        print_json_list(plugin_views())
+        return
+    table = Table("kind", "name", "distribution", "version", "state", box=None)
+    for view in plugin_views():
+        state = Text(view.state if view.reason is None else f"{view.state}: {view.reason}")
+        table.add_row(view.kind, view.name, view.distribution, view.version, state)
+    stdout_console().print(table)
+
+
+def cases(as_json: Json = False) -> None:
+    """List cases of plug-ins, which evaluate designs in place of walks, with their settings."""
+    from rich.text import Text
+
+    from gaitswarm.cli.output import print_json_list, stdout_console
+    from gaitswarm.cli.tables import Table
+    from gaitswarm.views import case_views
+
+    if as_json:
+        print_json_list(case_views())
+        return
+    table = Table("name", "description", "settings", box=None)
+    for view in case_views():
+        needs = "" if view.needs is None else f"; needs {view.needs}"
+        settings = view.settings_schema.get("properties", {})
+        lines = (
+            f"{name} {field.get('default', '')}"
+            for name, field in settings.items()
+            if name != "name"
+        )
+        table.add_row(view.name, Text(f"{view.description}{needs}"), Text("\n".join(lines)))
+    stdout_console().print(table)

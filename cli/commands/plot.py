@@ -1,0 +1,135 @@
+"""`gaitswarm plot`: pictures of convergence, fronts, controllers and robustness."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gaitswarm.cli.commands.robustness import (
+    Radius,
+    Samples,
+    Scenarios,
+    Seed,
+    estimate,
+    robustness_request,
+)
+from gaitswarm.cli.inputs.options import ControllerOption, Db, JobId, Precision, RobotOption, Server
+
+if TYPE_CHECKING:
+    from gaitswarm.requests.robustness import RobustnessRequest
+
+Output = Annotated[
+    Path, typer.Option("--output", "-o", metavar="FILE", help="FILE.png, .svg or .pdf.")
+]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands."""
+    plots = typer.Typer(
+        help="Draw a job's convergence or front, a controller's surface, or how robust designs are."
+    )
+    plots.command()(convergence)
+    plots.command()(front)
+    plots.command()(surface)
+    plots.command()(robustness)
+    app.add_typer(plots, name="plot")
+
+
+def convergence(job_id: JobId, output: Output, server: Server = None, db: Db = None) -> None:
+    """Draw a job's fitness over its iterations: best so far, and its designs."""
+    from gaitswarm.cli.output import note
+    from gaitswarm.cli.pictures import draw_convergence, save
+    from gaitswarm.jobs.open import open_jobs
+
+    with open_jobs(server, db) as jobs:
+        job = jobs.job(job_id)
+        iterations = list(jobs.iterations(job_id))
+    save(draw_convergence(iterations, title=job.name or f"job {job.id}"), output)
+    note(f"picture written to {output}")
+
+
+def front(job_id: JobId, output: Output, server: Server = None, db: Db = None) -> None:
+    """Draw the Pareto front of a job in every pair of objectives, with its knees and winners."""
+    from gaitswarm.cli.front import draw_front
+    from gaitswarm.cli.output import note
+    from gaitswarm.cli.pictures import save
+    from gaitswarm.jobs.open import open_jobs
+
+    with open_jobs(server, db) as jobs:
+        job = jobs.job(job_id)
+        view = jobs.front(job_id, most=10_000)
+    save(draw_front(view, title=f"Pareto front of {job.name or f'job {job.id}'}"), output)
+    note(f"picture written to {output}")
+
+
+def surface(
+    output: Output,
+    design: Annotated[
+        str,
+        typer.Option(
+            metavar="JSON|FILE|published:NAME|job:ID",
+            help="Design as for `simulate`, or as published:A.",
+        ),
+    ] = "published:A",
+    server: Server = None,
+    db: Db = None,
+) -> None:
+    """Draw the output of a Fuzzy-PI design over angle error and motor current, as quantised."""
+    from gaitswarm.cli.inputs.design_file import given_design
+    from gaitswarm.cli.output import note
+    from gaitswarm.cli.pictures import draw_surface, save
+    from gaitswarm.sim.controllers import CONTROLLERS
+    from gaitswarm.sim.controllers.surface import surface as surface_of
+
+    given = given_design(design, "fuzzy-pi", server=server, db=db)
+    (inference,) = CONTROLLERS["fuzzy-pi"].inferences(given.values)
+    drawn = surface_of(inference, error_points=129, current_points=65)
+    save(draw_surface(drawn, title=f"Fuzzy-P of {given.label}"), output)
+    note(f"picture written to {output}")
+
+
+def robustness(
+    designs: Annotated[
+        list[str], typer.Argument(metavar="DESIGN|ID", help="One or several, as for `robustness`.")
+    ],
+    output: Output,
+    samples: Samples = 256,
+    radius: Radius = 0.02,
+    seed: Seed = 1,
+    scenarios: Scenarios = None,
+    controller: ControllerOption = None,
+    robot: RobotOption = None,
+    precision: Precision = None,
+    title: Annotated[str, typer.Option(help="Of the picture.")] = "Robustness",
+    server: Server = None,
+    db: Db = None,
+) -> None:
+    """Draw designs' robustness indices by scenario side by side, with their intervals."""
+    from gaitswarm.cli.inputs.design_file import given_design
+    from gaitswarm.cli.output import note
+    from gaitswarm.cli.pictures import save
+    from gaitswarm.cli.robustness import draw_robustness
+    from gaitswarm.services.optimizer.errors import InvalidRequest
+
+    requests: dict[str, RobustnessRequest] = {}
+    for design in designs:
+        given = given_design(design, controller, robot=robot, server=server, db=db)
+        label = f"{given.label} ({design})" if given.label in requests else given.label
+        requests[label] = robustness_request(
+            given,
+            samples=samples,
+            radius=radius,
+            seed=seed,
+            scenarios=scenarios,
+            robot=robot,
+            precision=precision,
+        )
+    if len({request.resolved_scenarios() for request in requests.values()}) > 1:
+        raise InvalidRequest(
+            "the designs' jobs have different ones; choose some", field="scenarios"
+        )
+    views = {label: estimate(request) for label, request in requests.items()}
+    save(draw_robustness(views, title=title), output)
+    note(f"picture written to {output}")

@@ -1,1 +1,0 @@
-"""Commands that bring a robot's model nearer to measured walks and printed tables."""

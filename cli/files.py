@@ -1,0 +1,74 @@
+"""Output files: atomic replacement, and logs of walks."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, TYPE_CHECKING
+
+from gaitswarm.services.optimizer.errors import InvalidRequest
+
+if TYPE_CHECKING:
+    from gaitswarm.views import WalkLogView
+
+
+@contextmanager
+def replacing(path: Path, option: str) -> Iterator[IO[bytes]]:
+    """A binary file that takes the path's place when the block ends without an exception.
+
+    A link stays, and what it points to is replaced; a device or pipe stays, and is written to.
+
+    option: which option named the path, for the message of InvalidRequest if it cannot be written.
+    """
+    try:
+        special = path.exists() and not path.is_file()
+        target = path.resolve()
+    except (OSError, RuntimeError) as error:  # RuntimeError: links in a circle, before Python 3.13
+        reason = getattr(error, "strerror", None) or "its links lead in a circle"
+        raise InvalidRequest(f"cannot write {path}: {reason}", field=option) from error
+    if special:
+        try:
+            with path.open("wb") as file:
+                yield file
+        except OSError as error:
+            raise InvalidRequest(f"cannot write {path}: {error.strerror}", field=option) from error
+        return
+    try:
+        descriptor, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+    except OSError as error:
+        raise InvalidRequest(f"cannot write {path}: {error.strerror}", field=option) from error
+    temporary = Path(name)
+    try:
+        with os.fdopen(descriptor, "wb") as file:
+            yield file
+        # mkstemp makes files that only their owner may read.
+        umask = os.umask(0)
+        os.umask(umask)
+        temporary.chmod(0o666 & ~umask)
+        temporary.replace(target)
+    except OSError as error:
+        raise InvalidRequest(f"cannot write {path}: {error.strerror}", field=option) from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_walk_logs(path: Path, logs: Mapping[str, WalkLogView | None]) -> None:
+    """One array per recorded quantity, 500 rows a second, float64, NaN where undefined.
+
+    Names are those of `gaitswarm.sim.kernel.observation.WalkLog`; with several scenarios,
+    `<scenario>/<name>`.
+    Raises InvalidRequest if the file cannot be written; an earlier file is replaced at once.
+    """
+    import numpy as np
+
+    arrays = {
+        f"{scenario}/{name}" if len(logs) > 1 else name: np.array(column.values, dtype=np.float64)
+        for scenario, log in logs.items()
+        if log is not None
+        for name, column in log.columns.items()
+    }
+    with replacing(path, "log") as file:
+        np.savez_compressed(file, allow_pickle=False, **arrays)

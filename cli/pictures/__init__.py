@@ -1,1 +1,0 @@
-"""Pictures of jobs, robots and comparisons, drawn without a screen."""

@@ -1,4 +1,4 @@
-"""Designs of the literature, simulated as a job's own were."""
+"""Published designs, simulated in a job's scenarios under its preference."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.views import SimulationView
 
 
-def published_beside(spec: Spec) -> dict[str, SimulationView]:
-    """The published optimum of the job's controller and preference, by the name to show.
+def published_results(spec: Spec) -> dict[str, SimulationView]:
+    """Return the published optimum for the job's controller and preference, by label.
 
-    Evaluated in the job's scenarios under its preference. Where none was published for that
-    preference, the controller's first; none for a job that tunes no drive.
+    If none was published for that preference, the controller's first; none for jobs that tune no
+    drive.
     """
     study = published_study(spec) if isinstance(spec, JobSpec) else None
     if study is None or not isinstance(spec, JobSpec):
@@ -23,10 +23,6 @@ def published_beside(spec: Spec) -> dict[str, SimulationView]:
 
 
 def published_walk(spec: JobSpec, study: str) -> SimulationView:
-    """A published design in the job's scenarios, under its preference.
-
-    study: name of the design, one that was published for the job's controller.
-    """
     published = CONTROLLERS[spec.controller].published[study]
     request = SimulationRequest(
         robot=spec.robot,

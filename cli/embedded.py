@@ -1,4 +1,4 @@
-"""A job run by this process: start or take up, show progress, report."""
+"""Jobs run in this process: start or resume, show progress, report."""
 
 from __future__ import annotations
 
@@ -41,34 +41,32 @@ if TYPE_CHECKING:
 
 
 def resumed_job(
-    service: JobService, job_id: str, asked: Spec | None, *, accept_changes: bool
+    service: JobService, job_id: str, spec: Spec | None, *, accept_changes: bool
 ) -> Job:
-    """An earlier job, ready to be run on.
+    """Return an earlier job, ready to run; raise Conflict if it cannot be resumed.
 
-    asked: the spec that the user gave once more, if any. Raises NotFound, and Conflict if the job
-    was cancelled, is another than asked, or would go on with something else than it was begun with
-    and that is not accepted.
+    spec: if given again, it must be that of the job.
     """
-    if asked is not None:
-        check_same(service.job(job_id).spec, asked, job_id)
+    if spec is not None:
+        check_same(service.job(job_id).spec, spec, job_id)
     return taken_up(service, job_id, accept_changes=accept_changes)
 
 
 class Embedded:
-    """Workers that a process runs its own jobs on; opened when a job needs them.
+    """Workers of this process, opened when a job needs them.
 
-    accepts_changes: whether a job goes on although what its numbers depend on has changed.
+    accepts_changes: whether jobs may resume after changes of code, robot or compiler.
     """
 
     def __init__(self, settings: Settings, *, accepts_changes: bool = False) -> None:
-        # Workers are opened for the first job, which would be left behind.
+        # Fail before a job is stored: workers are opened only for the first job.
         check_address(settings.ray_address)
         self._settings = settings
         self._accepts_changes = accepts_changes
         self._evaluator: Evaluator | None = None
 
     def run(self, jobs: DatabaseJobs, store: Store, job: Job, claim: Claim | None = None) -> bool:
-        """Run a job, or follow it where another process runs it, until it ends or a signal comes"""
+        """Run a job, or follow another process that runs it; return whether a signal came."""
         stop = threading.Event()
         with (
             stop_on_signals(stop),
@@ -85,8 +83,8 @@ class Embedded:
             def committed(done: CompletedIteration, _state: JobState) -> None:
                 nonlocal best
                 if done.best is not None:
-                    _, found = done.best
-                    best = found if best is None else min(best, found)
+                    _, fitness = done.best
+                    best = fitness if best is None else min(best, fitness)
                 progress.iteration(done.iteration, len(done.fitness), best, done.evaluate_seconds)
 
             def followed(iteration: Iteration) -> None:
@@ -103,7 +101,7 @@ class Embedded:
                     job.id if claim is None else claim,
                     on_commit=committed,
                     on_retry=lambda seconds, why: progress.remark(
-                        f"{why}; trying again in {seconds:.0f} s"
+                        f"{why}; retrying in {seconds:.0f} s"
                     ),
                     on_follow=followed,
                     on_news=progress.remark,
@@ -113,14 +111,13 @@ class Embedded:
                     followed_iterations=job.progress.iterations,
                 )
             except Exception as error:
-                error.add_note(_how_to_go_on(job.id, jobs.place))
+                error.add_note(_resume_hint(job.id, jobs.place))
                 raise
             if not stop.is_set():
                 note_reference(store, ended)
         return stop.is_set()
 
     def close(self) -> None:
-        """End the workers, if any were opened. Idempotent."""
         if self._evaluator is not None:
             self._evaluator.close()
             self._evaluator = None
@@ -144,12 +141,11 @@ def job_run(
     *,
     any_budget: bool = False,
 ) -> Job:
-    """The job that was submitted before to do the same, or a new one, run to its end.
+    """Run an earlier job of the same spec, or a new one, to its end.
 
-    spec: its name should be its alone. jobs: of the store. any_budget: whether a job of another
-    budget is the same; it is extended if that is less.
+    any_budget: accept a job of another budget, extended if it is smaller.
 
-    Raises JobEnded if it does not succeed, and KeyboardInterrupt if a signal comes.
+    Raises JobEnded if it does not succeed, and KeyboardInterrupt after a signal.
     """
     service, claim = JobService(store), None
     job = earlier_job(service, spec, any_budget=any_budget)
@@ -164,7 +160,7 @@ def job_run(
         return job
     note(f"job {job.id}: {spec.name}")
     if embedded.run(jobs, store, job, claim):
-        note("stopped; the same command goes on")
+        note("stopped; to resume, run the same command")
         raise KeyboardInterrupt
     job = store.job(job.id)
     if job.state is not JobState.SUCCEEDED:
@@ -177,11 +173,11 @@ def run_seeds(
     workers: WorkerOptions,
     report: Callable[[DatabaseJobs, list[str]], None],
     *,
-    again: str,
+    report_command: str,
 ) -> None:
-    """Run jobs of one problem, one after the other, and report on all of them.
+    """Run jobs that differ in their seed one after another, then report on all.
 
-    report: prints what they say together. again: the command that does, for who interrupts it.
+    report_command: the command that prints the report later, for users who interrupt.
     """
     settings = read_settings(**asdict(workers))
     url = database_to_write(settings)
@@ -194,12 +190,12 @@ def run_seeds(
             note(f"run {number} of {len(specs)}: job {job.id} in database {masked_url(url)}")
             if embedded.run(jobs, store, job):
                 rest = [f"  gaitswarm optimize --resume {i}{jobs.place}" for i in ids[number - 1 :]]
-                last = f"  gaitswarm {again} {' '.join(ids)}{jobs.place}"
-                note("\n".join(["stopped; go on with", *rest, last]))
+                last = f"  gaitswarm {report_command} {' '.join(ids)}{jobs.place}"
+                note("\n".join(["stopped; to resume, run", *rest, last]))
                 raise KeyboardInterrupt
             ended = store.job(job.id)
             if ended.state is not JobState.SUCCEEDED:
-                note(f"job {job.id} is {ended.state}: {ended.error or 'no reason was given'}")
+                note(f"job {job.id} is {ended.state}: {ended.error or 'no reason given'}")
         report(jobs, ids)
 
 
@@ -210,9 +206,9 @@ def finish(
     *,
     as_json: bool,
     compare: bool,
-    beside: Mapping[str, JobView],
+    others: Mapping[str, JobView],
 ) -> None:
-    """Print the result, and what other jobs found of the same problem, by the name to show.
+    """Print the result, next to those of other jobs of the same problem by label.
 
     Raises KeyboardInterrupt if interrupted, JobEnded unless it succeeded.
     """
@@ -223,19 +219,19 @@ def finish(
     if as_json:
         print_json(job)
     else:
-        _report(job, jobs.place, compare=compare, beside=beside)
+        _report(job, jobs.place, compare=compare, others=others)
     if job.state is not JobState.SUCCEEDED:
         raise ended(job, jobs.place)
 
 
 def ended(job: JobView, place: str) -> JobEnded:
-    """What to say of a job that did not succeed, and what can be done."""
-    because = f": {job.error}" if job.error else ""
-    error = JobEnded(f"job {job.id} is {job.state}{because}")
+    """Return the error for a job that did not succeed, with a remedy."""
+    reason = f": {job.error}" if job.error else ""
+    error = JobEnded(f"job {job.id} is {job.state}{reason}")
     if job.state is JobState.CANCELLED:
-        error.add_note(f"what it has committed stays: gaitswarm history {job.id}{place}")
+        error.add_note(f"committed iterations remain: gaitswarm history {job.id}{place}")
     else:
-        error.add_note(_how_to_go_on(job.id, place))
+        error.add_note(_resume_hint(job.id, place))
     return error
 
 
@@ -243,28 +239,28 @@ def _explain_interruption(job: JobView, place: str) -> None:
     done = f"after {job.spent}"
     if job.state is JobState.RUNNING:
         note(
-            f"job {job.id} goes on in another process, {done}; follow it with\n"
+            f"job {job.id} continues in another process, {done}; to follow it, run\n"
             f"  gaitswarm watch {job.id}{place}"
         )
     else:
-        note(f"stopped {done}; {_how_to_go_on(job.id, place)}")
+        note(f"stopped {done}; {_resume_hint(job.id, place)}")
 
 
-def _how_to_go_on(job_id: str, place: str) -> str:
-    return f"go on with\n  gaitswarm optimize --resume {job_id}{place}"
+def _resume_hint(job_id: str, place: str) -> str:
+    return f"to resume, run\n  gaitswarm optimize --resume {job_id}{place}"
 
 
-def _report(job: JobView, place: str, *, compare: bool, beside: Mapping[str, JobView]) -> None:
-    from gaitswarm.cli.comparison import published_beside
+def _report(job: JobView, place: str, *, compare: bool, others: Mapping[str, JobView]) -> None:
+    from gaitswarm.cli.comparison import published_results
     from gaitswarm.cli.tables import design_table, results_table, search_line, worth
 
     console = stdout_console()
     if job.best is None:
         console.print("no design walks in every scenario", markup=False)
     else:
-        others = {name: other.best for name, other in beside.items() if other.best is not None}
-        published = published_beside(job.spec) if compare else {}
-        evaluations = {"best": job.best} | others | published
+        best = {name: other.best for name, other in others.items() if other.best is not None}
+        published = published_results(job.spec) if compare else {}
+        evaluations = {"best": job.best} | best | published
         console.print(design_table(job.spec, {k: e.design for k, e in evaluations.items()}))
         results = {k: e.scenarios for k, e in evaluations.items()}
         console.print(results_table(results, job.objectives))
@@ -273,8 +269,9 @@ def _report(job: JobView, place: str, *, compare: bool, beside: Mapping[str, Job
         searched = search_line(job.best)
         if searched is not None:
             console.print(searched, markup=False)
-    speed = f" at {job.simulations_per_second:.0f} walks/s" if job.simulations_per_second else ""
-    saved = f"; {job.evaluations_saved} of them were known" if job.evaluations_saved else ""
-    note(f"{job.evaluations} designs in {len(job.spec.case_names)} walks each{speed}{saved}")
-    note(f"its history: gaitswarm history {job.id}{place}")
-    note(f"look at it: gaitswarm serve{place}, then http://127.0.0.1:8000/jobs/{job.id}")
+    rate = job.simulations_per_second
+    speed = f" at {rate:.0f} simulations/s" if rate else ""
+    saved = f"; {job.evaluations_saved} of them cached" if job.evaluations_saved else ""
+    note(f"{job.evaluations} designs in {len(job.spec.case_names)} simulations each{speed}{saved}")
+    note(f"history: gaitswarm history {job.id}{place}")
+    note(f"page: gaitswarm serve{place}, then http://127.0.0.1:8000/jobs/{job.id}")

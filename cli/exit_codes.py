@@ -1,13 +1,13 @@
-"""Exit codes of `gaitswarm`, and which error ends in which.
+"""Exit codes of `gaitswarm`, and the errors that cause them.
 
 0    done
-1    the job that was waited for failed, was cancelled or was paused; or what was checked differs
-2    usage, or input that makes no sense; the message names the option, file or field
+1    the job failed, was cancelled or was paused, or a check failed
+2    invalid usage or input; the message names the option, file or field
 3    no such job, iteration, database or result
-4    the job's present state does not allow it
-5    server, database, workers, compiler, files or standard output cannot be reached or used now
-6    the server does not let whoever asks do that; the message says which token it takes
-70   a bug; the traceback says where
+4    not possible in the job's current state
+5    server, database, workers, compiler, files or standard output unavailable
+6    permission denied; the message names the required token
+70   a bug; the traceback shows where
 130  interrupted
 """
 
@@ -19,7 +19,7 @@ from typing import Final
 
 
 class ExitCode(IntEnum):
-    """What the shell sees; a contract, documented in docs/reference/commands.md."""
+    """Exit codes, documented in docs/reference/commands.md."""
 
     OK = 0
     JOB_FAILED = 1
@@ -33,29 +33,29 @@ class ExitCode(IntEnum):
 
 
 class JobEnded(Exception):
-    """A command did its work, but the job that it waited for did not succeed."""
+    """The job that a command waited for did not succeed."""
 
 
 class CheckFailed(Exception):
-    """A command did its work, but what it checked is not as it should be."""
+    """A command ran, but its check failed."""
 
 
 class OutputFailed(Exception):
     """Standard output cannot be written."""
 
 
-_OF_THE_MACHINE: Final = frozenset(
+_SYSTEM_ERRORS: Final = frozenset(
     {
         *(errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR, errno.EISDIR, errno.ELOOP),
         *(errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.ENAMETOOLONG),
         *(errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.EAGAIN),
     }
 )
-"""What a file system or the operating system refuses, whatever a program does."""
+"""Refusals of the file system or operating system that no program can avoid."""
 
 
 def exit_code(error: BaseException) -> ExitCode | None:
-    """Code of an error that is no bug of gaitswarm; None for any other."""
+    """Return the exit code of an expected error; None for a bug."""
     from gaitswarm.services.optimizer import errors
     from gaitswarm.sim.errors import SimulationError, SimulationInputError
 
@@ -75,14 +75,14 @@ def exit_code(error: BaseException) -> ExitCode | None:
         (errors.TooManyRequests, ExitCode.UNAVAILABLE),
         (SimulationError, ExitCode.UNAVAILABLE),
     )
-    if isinstance(error, OSError) and error.errno in _OF_THE_MACHINE:
+    if isinstance(error, OSError) and error.errno in _SYSTEM_ERRORS:
         return ExitCode.UNAVAILABLE
     return next((code for kind, code in kinds if isinstance(error, kind)), None)
 
 
 def explanation(error: BaseException) -> str:
-    """An error for people: what went wrong, and below it what they can do, if that is known."""
-    said = str(error)
+    """Return an error's message, followed by its notes with remedies."""
+    message = str(error)
     if isinstance(error, OSError):
-        said = ": ".join(str(part) for part in (error.filename, error.strerror) if part)
-    return "\n".join([said, *getattr(error, "__notes__", ())])
+        message = ": ".join(str(part) for part in (error.filename, error.strerror) if part)
+    return "\n".join([message, *getattr(error, "__notes__", ())])

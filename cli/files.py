@@ -17,17 +17,17 @@ if TYPE_CHECKING:
 
 @contextmanager
 def replacing(path: Path, option: str) -> Iterator[IO[bytes]]:
-    """A binary file that takes the path's place when the block ends without an exception.
+    """Open a binary file that replaces the path when the block succeeds.
 
-    A link stays, and what it points to is replaced; a device or pipe stays, and is written to.
+    The target of a link is replaced; devices and pipes are written to.
 
-    option: which option named the path, for the message of InvalidRequest if it cannot be written.
+    option: the option that named the path, for InvalidRequest if it cannot be written.
     """
     try:
         special = path.exists() and not path.is_file()
         target = path.resolve()
-    except (OSError, RuntimeError) as error:  # RuntimeError: links in a circle, before Python 3.13
-        reason = getattr(error, "strerror", None) or "its links lead in a circle"
+    except (OSError, RuntimeError) as error:  # RuntimeError: circular links, before Python 3.13
+        reason = getattr(error, "strerror", None) or "its links are circular"
         raise InvalidRequest(f"cannot write {path}: {reason}", field=option) from error
     if special:
         try:
@@ -44,7 +44,7 @@ def replacing(path: Path, option: str) -> Iterator[IO[bytes]]:
     try:
         with os.fdopen(descriptor, "wb") as file:
             yield file
-        # mkstemp makes files that only their owner may read.
+        # mkstemp creates files that only their owner can read.
         umask = os.umask(0)
         os.umask(umask)
         temporary.chmod(0o666 & ~umask)
@@ -56,11 +56,10 @@ def replacing(path: Path, option: str) -> Iterator[IO[bytes]]:
 
 
 def write_walk_logs(path: Path, logs: Mapping[str, WalkLogView | None]) -> None:
-    """One array per recorded quantity, 500 rows a second, float64, NaN where undefined.
+    """Write a NumPy archive with one array per quantity: 500 Hz, float64, NaN where undefined.
 
     Names are those of `gaitswarm.sim.kernel.observation.WalkLog`; with several scenarios,
     `<scenario>/<name>`.
-    Raises InvalidRequest if the file cannot be written; an earlier file is replaced at once.
     """
     import numpy as np
 

@@ -1,4 +1,4 @@
-"""Logs of long-running processes on standard error: lines for people, or JSON for programs."""
+"""Logs of long-running processes on standard error, as text or JSON."""
 
 from __future__ import annotations
 
@@ -12,14 +12,12 @@ LogFormat = Literal["console", "json"]
 
 
 class JsonFormatter(logging.Formatter):
-    """A message as one line of JSON: time, level, logger, message, and what it belongs to.
+    """One line of JSON per message: time, level, logger, message.
 
-    `job`, `iteration` and `request` are there where the message belongs to one. A bug has its
-    `traceback`, as one string.
+    If they apply, also `job`, `iteration`, `request` and `traceback`.
     """
 
     def format(self, record: logging.LogRecord) -> str:
-        """Write a message down."""
         from gaitswarm.services.optimizer.log_context import log_fields
 
         document: dict[str, Any] = {
@@ -35,7 +33,6 @@ class JsonFormatter(logging.Formatter):
 
 
 def log_to_stderr(level: str, log_format: LogFormat = "console") -> None:
-    """Show what a long-running process logs."""
     handler = logging.StreamHandler(sys.stderr)
     if log_format == "json":
         handler.setFormatter(JsonFormatter())
@@ -43,7 +40,7 @@ def log_to_stderr(level: str, log_format: LogFormat = "console") -> None:
     else:
         handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
     logging.basicConfig(level=level, handlers=[handler])
-    # Every start would tell of migrations that are already done.
+    # It would report migrations at every start.
     logging.getLogger("alembic").setLevel(logging.WARNING)
-    # Its lines show URLs of webhooks in full, which may hold secrets.
+    # It logs complete URLs of webhooks, which may contain secrets.
     logging.getLogger("httpx2").setLevel(logging.WARNING)

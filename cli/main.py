@@ -1,6 +1,6 @@
-"""`gaitswarm`: the command line.
+"""The `gaitswarm` command line.
 
-Commands import what they need when they run, so that `gaitswarm --help` answers at once.
+Commands import their dependencies when they run, so that `gaitswarm --help` is fast.
 """
 
 from __future__ import annotations
@@ -67,13 +67,9 @@ PANELS: Final = {
 
 
 class _HelpAtOnce(TyperGroup):
-    """Shows a command's help before anything is parsed: Typer imports Pydantic to read options.
-
-    And no sentence of it is cut.
-    """
+    """Show a command's help, untruncated, before parsing options, which imports Pydantic."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse arguments, unless a command's help is among them."""
         words = args[: args.index("--")] if "--" in args else args
         if not set(words).isdisjoint(ctx.help_option_names):
             command, context = self._command_named(ctx, words)
@@ -83,7 +79,6 @@ class _HelpAtOnce(TyperGroup):
         return list(super().parse_args(ctx, args))
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """List commands by panel, each with the whole of its first sentence."""
         commands = {name: self.get_command(ctx, name) for name in self.list_commands(ctx)}
         for panel, names in (PANELS if "optimize" in commands else {"Commands": commands}).items():
             listed = [(name, commands[name]) for name in names if name in commands]
@@ -91,7 +86,7 @@ class _HelpAtOnce(TyperGroup):
                 formatter.write_dl([(name, c.get_short_help_str(1000)) for name, c in listed if c])
 
     def _command_named(self, context: Any, words: list[str]) -> tuple[Any, Any]:
-        """The innermost command that is named, with its context; None where one is unknown."""
+        """Return the innermost named command and its context; None for an unknown command."""
         command: Any = self
         for word in words:
             if word.startswith("-") or not isinstance(command, TyperGroup):
@@ -108,17 +103,17 @@ app = typer.Typer(
     cls=_HelpAtOnce,
     epilog="Exit codes: 0 done, 1 job failed or cancelled, or a check failed, 2 bad input, 3 not"
     " found, 4 not possible in the job's state, 5 server, database, workers or output unavailable,"
-    " 6 not allowed, 70 a bug, 130 interrupted.",
+    " 6 permission denied, 70 a bug, 130 interrupted.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
-    # Rich takes longer to import than all the rest of a help text takes.
+    # Importing Rich takes longer than the rest of a help text.
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
 
-def _print_version(asked: bool) -> None:
-    if asked:
+def _print_version(requested: bool) -> None:
+    if requested:
         import gaitswarm
 
         typer.echo(f"gaitswarm {gaitswarm.__version__}")
@@ -160,7 +155,6 @@ for _module in (
 
 
 def main() -> None:
-    """Entry point of the console script."""
     replace_closed_streams()
     warnings_as_notes()
     sys.exit(run(sys.argv[1:]))
@@ -168,12 +162,12 @@ def main() -> None:
 
 @cache
 def commands(only: str | None = None) -> Callable[..., object]:
-    """Make commands with their options, which takes longer than most of them do."""
-    chosen = copy(app)
-    chosen.registered_commands = [c for c in app.registered_commands if _name(c) == only]
-    chosen.registered_groups = [g for g in app.registered_groups if g.name == only]
-    found = chosen.registered_commands or chosen.registered_groups
-    return get_command(chosen if found else app)
+    """Build one command, or all: building all takes longer than most of them run."""
+    alone = copy(app)
+    alone.registered_commands = [c for c in app.registered_commands if _name(c) == only]
+    alone.registered_groups = [g for g in app.registered_groups if g.name == only]
+    exists = alone.registered_commands or alone.registered_groups
+    return get_command(alone if exists else app)
 
 
 def _name(command: CommandInfo) -> str:
@@ -181,12 +175,12 @@ def _name(command: CommandInfo) -> str:
 
 
 def run(arguments: Sequence[str]) -> int:
-    """One command; returns its exit code. Messages about what went wrong are on stderr."""
+    """Run one command and return its exit code; errors go to stderr."""
     stdout = Stdout(sys.stdout)
     with redirect_stdout(cast(TextIO, stdout)):
-        chosen = commands(*arguments[:1])
-        code = _exit_code_of(lambda: chosen(list(arguments), prog_name="gaitswarm"))
-        # Not left to the interpreter, which could only complain.
+        command = commands(*arguments[:1])
+        code = _exit_code_of(lambda: command(list(arguments), prog_name="gaitswarm"))
+        # The interpreter would flush at exit, but could not return an exit code.
         flushed = _exit_code_of(stdout.flush)
     return code or flushed
 
@@ -196,14 +190,14 @@ def _exit_code_of(step: Callable[[], object]) -> int:
         step()
     except SystemExit as ended:
         if isinstance(ended.__context__, BrokenPipeError):
-            # Typer has caught it, and ends in 1, which here is a job that failed.
+            # Typer turns it into 1, which here means a failed job.
             return ExitCode.OK
         return ended.code if isinstance(ended.code, int) else int(bool(ended.code))
     except KeyboardInterrupt:
         return ExitCode.INTERRUPTED
     except OutputClosed:
         return ExitCode.OK
-    except Exception as error:  # noqa: BLE001 - whatever it is, it has an exit code
+    except Exception as error:  # noqa: BLE001 - every error has an exit code
         code = exit_code(error)
         if code is None:
             note(

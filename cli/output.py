@@ -1,4 +1,4 @@
-"""Where output goes: results to stdout, everything else to stderr."""
+"""Output: results to stdout, everything else to stderr."""
 
 from __future__ import annotations
 
@@ -18,25 +18,23 @@ if TYPE_CHECKING:
 
 
 class OutputClosed(Exception):
-    """Whoever read standard output has seen enough, as `head` has."""
+    """The reader of standard output closed it, as `head` does."""
 
 
 def stdout_console() -> Console:
-    """For tables and sentences that are the command's result."""
     from rich.console import Console
 
     return Console(file=sys.stdout, highlight=False, soft_wrap=True)
 
 
 def stderr_console() -> Console:
-    """For progress and remarks."""
     from rich.console import Console
 
     return Console(file=sys.stderr, highlight=False)
 
 
 def note(message: str) -> None:
-    """One line for the user that is no part of the result; lost where stderr cannot be written."""
+    """Print a line to stderr; it is lost if stderr cannot be written."""
     try:
         sys.stderr.write(f"{message}\n")
         sys.stderr.flush()
@@ -45,23 +43,22 @@ def note(message: str) -> None:
 
 
 def print_text(text: str) -> None:
-    """The result, as it is."""
     sys.stdout.write(f"{text}\n")
 
 
 def print_json(view: BaseModel) -> None:
-    """One JSON document; floats exact to the bit, null for what is not finite."""
+    """Print a JSON document with bit-exact floats and null for values that are not finite."""
     print_text(view.model_dump_json(indent=2))
 
 
 def print_json_list(views: Iterable[BaseModel]) -> None:
-    """A JSON array, written as the views come."""
+    """Print a JSON array while the views are read."""
     write_json_items(sys.stdout, views)
     sys.stdout.write("\n")
 
 
 def write_json_items(out: TextIO, views: Iterable[BaseModel], *, indent: int = 0) -> None:
-    """`[...]`, one view a line."""
+    """Write a JSON array with one view per line."""
     separator = "\n"
     margin = " " * indent
     out.write("[")
@@ -72,7 +69,7 @@ def write_json_items(out: TextIO, views: Iterable[BaseModel], *, indent: int = 0
 
 
 def warnings_as_notes() -> None:
-    """Show Python's warnings as remarks, without the source line that raised them."""
+    """Print Python's warnings as notes, without source lines."""
 
     def show(message: Warning | str, *_where: object, **_more: object) -> None:
         note(f"warning: {message}")
@@ -81,29 +78,30 @@ def warnings_as_notes() -> None:
 
 
 class Stdout:
-    """Standard output whose failures are not mistaken for those of any other file."""
+    """Standard output whose failures are distinct from those of other files.
+
+    Methods raise OutputFailed or OutputClosed.
+    """
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
 
     def write(self, text: str) -> int:
-        """As of a text stream. Raises OutputFailed, OutputClosed."""
-        # Typer writes no text to find out what stream it is, and takes a failure for an answer.
+        # Typer probes the stream by an empty write, and interprets a failure.
         if text == "":
             return 0
-        with self._telling_failures():
+        with self._distinct_failures():
             return self._stream.write(text)
 
     def flush(self) -> None:
-        """As of a text stream. Raises OutputFailed, OutputClosed."""
-        with self._telling_failures():
+        with self._distinct_failures():
             self._stream.flush()
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)
 
     @contextmanager
-    def _telling_failures(self) -> Iterator[None]:
+    def _distinct_failures(self) -> Iterator[None]:
         try:
             yield
         except BrokenPipeError as error:
@@ -115,9 +113,9 @@ class Stdout:
 
 
 def replace_closed_streams() -> None:
-    """Give a process that was started without some standard streams, as by `>&-`, empty ones.
+    """Open the null device for standard streams closed at start, as by `>&-`.
 
-    Their numbers would go to the next files that are opened.
+    Otherwise, the next files opened would get their descriptors.
     """
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
@@ -125,7 +123,7 @@ def replace_closed_streams() -> None:
 
 
 def discard(stream: TextIO) -> None:
-    """Let a stream that cannot be written swallow all: the interpreter flushes it at its end."""
+    """Redirect a broken stream to the null device: the interpreter flushes it at exit."""
     with suppress(OSError, ValueError):
         null = os.open(os.devnull, os.O_WRONLY)
         os.dup2(null, stream.fileno())

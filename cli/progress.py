@@ -1,4 +1,4 @@
-"""Progress of a job while it runs: a live bar on a terminal, plain lines elsewhere."""
+"""Progress of a running job: a live bar on a terminal, lines elsewhere."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ if TYPE_CHECKING:
     from gaitswarm.views.job import Spent
 
 _LINE_SECONDS: Final = 2.0
-"""Plain lines come at most this often, and for the last iteration."""
+"""Minimum interval of lines; the last iteration is always printed."""
 
 
 _LABELS: Final = {"iterations": "iteration", "designs": "design"}
 
 
 class Progress(Protocol):
-    """Told about every committed iteration."""
+    """Display of committed iterations."""
 
     def iteration(
         self, index: int, designs: int, best_so_far: float | None, seconds: float
     ) -> None:
-        """index: from 0; designs: judged in it; seconds: spent on their evaluation."""
+        """Show an iteration of so many designs, evaluated in so many seconds."""
 
     def remark(self, text: str) -> None:
-        """One line of news."""
+        """Show a line of text."""
 
 
 @contextmanager
@@ -48,10 +48,9 @@ def show_progress(
     iterations: int = 0,
     evaluations: int = 0,
 ) -> Iterator[Progress]:
-    """Progress of one job on stderr.
+    """Show progress of one job on stderr.
 
-    particles: designs of one iteration, at most; iterations_planned: the budget, in iterations of
-    so many; evaluations_planned: the same in designs; iterations, evaluations: committed already.
+    particles: maximum of designs per iteration. iterations, evaluations: already committed.
     """
     pace = _Pace(particles, iterations_planned, evaluations_planned, iterations, evaluations)
     console = stderr_console()
@@ -85,7 +84,7 @@ def show_progress(
 
 
 def watch_with_progress(jobs: Jobs, job_id: str) -> None:
-    """Follow a job until it ends. Raises JobEnded unless it succeeds."""
+    """Follow a job until it ends; raise JobEnded unless it succeeds."""
     from gaitswarm.views import IterationView
 
     job = jobs.job(job_id)
@@ -102,13 +101,13 @@ def watch_with_progress(jobs: Jobs, job_id: str) -> None:
                 )
             else:
                 last = event
-                because = f", and waits: {event.waiting}" if event.waiting else ""
-                progress.remark(f"job {event.id} is {event.state.value}{because}")
+                reason = f", waiting: {event.waiting}" if event.waiting else ""
+                progress.remark(f"job {event.id} is {event.state.value}{reason}")
     _check_success(last)
 
 
 def watch_as_json(jobs: Jobs, job_id: str) -> None:
-    """The same as JSON lines: `{"event": "iteration"|"state", "data": {...}}`."""
+    """Follow a job as JSON lines: `{"event": "iteration"|"state", "data": {...}}`."""
     from gaitswarm.views import IterationView
 
     last: StateView | None = None
@@ -124,12 +123,12 @@ def watch_as_json(jobs: Jobs, job_id: str) -> None:
 def _check_success(last: StateView | None) -> None:
     if last is None or last.state.value == "succeeded":
         return
-    because = f": {last.error}" if last.error else ""
-    raise JobEnded(f"job {last.id} {last.state.value}{because}")
+    reason = f": {last.error}" if last.error else ""
+    raise JobEnded(f"job {last.id} {last.state.value}{reason}")
 
 
 class _Pace:
-    """Budget spent, rate and rest, from the iterations seen."""
+    """Budget spent, evaluation rate and remaining time."""
 
     def __init__(
         self,
@@ -163,8 +162,8 @@ class _Pace:
     def ended(self) -> bool:
         return self._evaluations >= self._evaluations_planned
 
-    def saw(self, index: int, designs: int, seconds: float) -> tuple[float, float]:
-        """(evaluations per second, seconds left) after this iteration."""
+    def add(self, index: int, designs: int, seconds: float) -> tuple[float, float]:
+        """Add an iteration; return evaluations per second and seconds left."""
         self._iterations = index + 1
         self._evaluations += designs
         self._seen += designs
@@ -182,7 +181,7 @@ class _Live:
     def iteration(
         self, index: int, designs: int, best_so_far: float | None, seconds: float
     ) -> None:
-        rate, left = self._pace.saw(index, designs, seconds)
+        rate, left = self._pace.add(index, designs, seconds)
         spent = self._pace.spent
         self._bar.update(
             self._task,
@@ -206,7 +205,7 @@ class _Lines:
     def iteration(
         self, index: int, designs: int, best_so_far: float | None, seconds: float
     ) -> None:
-        rate, left = self._pace.saw(index, designs, seconds)
+        rate, left = self._pace.add(index, designs, seconds)
         now = time.monotonic()
         if now < self._next and not self._pace.ended:
             return

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from gaitswarm.services.optimizer.access import Token, Tokens
 
-Force = Annotated[bool, typer.Option("--force", help="Replace what is there.")]
+Force = Annotated[bool, typer.Option("--force", help="Overwrite existing data.")]
 
 
 def register(app: typer.Typer) -> None:
@@ -24,7 +24,7 @@ def register(app: typer.Typer) -> None:
     for command in (upgrade, check, backup, restore, prune):
         group.command()(command)
     app.add_typer(group, name="db")
-    group = typer.Typer(help="Make, list and revoke tokens, by which a server knows who asks.")
+    group = typer.Typer(help="Create, list and revoke tokens for access to a server.")
     group.command()(create)
     group.command("list")(list_)
     group.command()(revoke)
@@ -33,9 +33,9 @@ def register(app: typer.Typer) -> None:
 
 
 def upgrade(db: Db = None) -> None:
-    """Bring the database to this version's schema. No other command does.
+    """Upgrade the database to this version's schema.
 
-    It must not be in use, and a backup of it is advisable.
+    No other command does. The database must not be in use; back it up first.
     """
     from gaitswarm.cli.output import note
     from gaitswarm.services.optimizer.store.schema import migrate
@@ -43,22 +43,22 @@ def upgrade(db: Db = None) -> None:
 
     before = migrate.upgrade(_database(db))
     if before == head():
-        note(f"the database has this version's schema already, revision {before}")
+        note(f"the schema is up to date, revision {before}")
     else:
-        note(f"the database has schema revision {head()} now, after {before or 'none'}")
+        note(f"schema upgraded to revision {head()} from {before or 'none'}")
 
 
 def check(
     skip_histories: Annotated[
         bool,
-        typer.Option("--skip-histories", help="Compute no chain of a history again."),
+        typer.Option("--skip-histories", help="Do not recompute the digests of histories."),
     ] = False,
     db: Db = None,
     as_json: Json = False,
 ) -> None:
-    """Read all of the database, and look for what contradicts itself. Jobs may run meanwhile.
+    """Check the database for inconsistencies; jobs may run meanwhile.
 
-    The history of every job is compared with its digests. Exit code 1 if there is anything.
+    The history of every job is compared with its digests. The exit code is 1 if there are findings.
     """
     import json
     from contextlib import closing
@@ -79,35 +79,35 @@ def check(
     else:
         print_text("".join(f"{finding}\n" for finding in findings))
     if findings:
-        raise CheckFailed(f"the database is not as it should be: {len(findings)} findings")
-    note("the database is as it should be")
+        raise CheckFailed(f"the database is inconsistent: {len(findings)} findings")
+    note("the database is consistent")
 
 
 def backup(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="To be made.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="File to write.")],
     force: Force = False,
     db: Db = None,
 ) -> None:
-    """Write all that the database holds at one moment to a file. Jobs may run meanwhile.
+    """Write a consistent copy of the database to a file; jobs may run meanwhile.
 
-    The file is an SQLite database, whatever the database is.
+    The file is an SQLite database, also for PostgreSQL.
     """
     from gaitswarm.cli.output import note
     from gaitswarm.services.optimizer.store.schema import backup
 
     backup.backup(_database(db), file, overwrite=force)
-    note(f"{file} holds all of the database")
+    note(f"database written to {file}")
 
 
 def restore(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="As `backup` made it.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="File of `backup`.")],
     force: Force = False,
     db: Db = None,
 ) -> None:
-    """Fill an empty database with a backup. It must not be in use.
+    """Restore a backup to an empty database that is not in use.
 
-    A backup by an older version comes in this version's schema, one of SQLite may be restored to
-    PostgreSQL, and the other way round.
+    Backups of older versions are upgraded; backups of SQLite can be restored to PostgreSQL, and
+    vice versa.
     """
     from gaitswarm.cli.output import note
     from gaitswarm.jobs.open import database_to_write
@@ -115,27 +115,27 @@ def restore(
     from gaitswarm.settings import read_settings
 
     backup.restore(database_to_write(read_settings(db=db or None)), file, overwrite=force)
-    note(f"the database holds what {file} does")
+    note(f"database restored from {file}")
 
 
 def prune(
     older_than: Annotated[
         float | None,
-        typer.Option(min=0.0, metavar="DAYS", help="Delete jobs that ended so long ago, too."),
+        typer.Option(min=0.0, metavar="DAYS", help="Also delete jobs that ended earlier."),
     ] = None,
     state: Annotated[
         Literal["succeeded", "failed", "cancelled"] | None,
-        typer.Option(help="With --older-than: only jobs that ended so [default: all]."),
+        typer.Option(help="With --older-than: only jobs in this state [default: all]."),
     ] = None,
     audit_older_than: Annotated[
         float | None,
-        typer.Option(min=0.0, metavar="DAYS", help="Remove older entries of the audit log, too."),
+        typer.Option(min=0.0, metavar="DAYS", help="Also remove older audit entries."),
     ] = None,
     db: Db = None,
 ) -> None:
-    """Remove recorded walks that no job refers to, a day after they came, and free their space.
+    """Remove recordings older than a day that no job uses, and free their space.
 
-    With --older-than also jobs, but for those that are kept and those with forks under way.
+    With --older-than, also jobs, except those that are kept or have active forks.
     """
     from datetime import timedelta
 
@@ -145,29 +145,29 @@ def prune(
     from gaitswarm.services.optimizer.store.schema import maintenance
 
     if state is not None and older_than is None:
-        raise InvalidRequest("deletes nothing without --older-than", field="state")
+        raise InvalidRequest("requires --older-than", field="state")
     removed = maintenance.prune(
         _database(db),
         older_than=None if older_than is None else timedelta(days=older_than),
         states=ENDED if state is None else {JobState(state)},
         audit_older_than=None if audit_older_than is None else timedelta(days=audit_older_than),
     )
-    audit = f", {removed.audit} entries of the audit log" if audit_older_than is not None else ""
+    audit = f", {removed.audit} audit entries" if audit_older_than is not None else ""
     note(
-        f"{len(removed.jobs)} jobs{audit} and {removed.recordings} recorded walks are removed, and"
-        " free space is given back"
+        f"removed {len(removed.jobs)} jobs{audit} and {removed.recordings} recordings, and freed"
+        " their space"
     )
 
 
 def _database(db: str | None) -> str:
-    """That of the option or the environment; NotFound for an SQLite file that is not there."""
+    """Return the URL of the option or environment; raise NotFound for a missing SQLite file."""
     from gaitswarm.jobs.open import database_to_read
     from gaitswarm.settings import read_settings
 
     return database_to_read(read_settings(db=db or None))
 
 
-Name = Annotated[str, typer.Argument(metavar="NAME", help="Of the token: whose jobs its jobs are.")]
+Name = Annotated[str, typer.Argument(metavar="NAME", help="Name of the token, owner of its jobs.")]
 
 
 def create(
@@ -175,14 +175,14 @@ def create(
     scope: Annotated[
         Literal["read", "submit", "admin"],
         typer.Option(
-            help="read: look at everything; submit: also submit jobs and command these; admin:"
-            " command all jobs."
+            help="read: read everything; submit: also submit jobs and control them; admin: control"
+            " all jobs."
         ),
     ] = "submit",
     db: Db = None,
     as_json: Json = False,
 ) -> None:
-    """Make a token. Its secret is printed once, and stored nowhere."""
+    """Create a token; its secret is printed once and never stored."""
     from gaitswarm.cli.output import note, print_text
     from gaitswarm.services.optimizer.access import Scope
 
@@ -191,32 +191,32 @@ def create(
     if as_json:
         _print_json({**_document(token), "secret": secret})
         return
-    note(f"token {name!r} of scope {scope}; its secret is shown only now:")
+    note(f"token {name!r} of scope {scope}; the secret is shown only once:")
     print_text(secret)
 
 
 def list_(db: Db = None, as_json: Json = False) -> None:
-    """List all tokens, the oldest first."""
+    """List tokens, oldest first."""
     from gaitswarm.cli.output import note, print_text
 
-    with _tokens(db, made=False) as tokens:
-        found = tokens.all()
+    with _tokens(db, create=False) as tokens:
+        listed = tokens.all()
     if as_json:
-        _print_json([_document(token) for token in found])
+        _print_json([_document(token) for token in listed])
         return
-    if not found:
-        note("there are no tokens; `gaitswarm token create NAME` makes one")
-    for token in found:
+    if not listed:
+        note("there are no tokens; create one by `gaitswarm token create NAME`")
+    for token in listed:
         state = "valid" if token.revoked_at is None else f"revoked {token.revoked_at:%Y-%m-%d}"
-        made = f"{token.created_at:%Y-%m-%d}"
-        print_text(f"{token.name:24} {token.scope:7} made {made}  {state}")
+        created = f"{token.created_at:%Y-%m-%d}"
+        print_text(f"{token.name:24} {token.scope:7} created {created}  {state}")
 
 
 def revoke(name: Name, db: Db = None, as_json: Json = False) -> None:
-    """Let a token allow nothing any more; servers know within five seconds."""
+    """Revoke a token; servers refuse it within five seconds."""
     from gaitswarm.cli.output import note
 
-    with _tokens(db, made=False) as tokens:
+    with _tokens(db, create=False) as tokens:
         token = tokens.revoke(name)
     if as_json:
         _print_json(_document(token))
@@ -225,19 +225,16 @@ def revoke(name: Name, db: Db = None, as_json: Json = False) -> None:
 
 
 @contextmanager
-def _tokens(db: str | None, *, made: bool = True) -> Iterator[Tokens]:
-    """Of the database that the option or the environment names.
-
-    made: whether it is made if it is not there; else that is an error.
-    """
+def _tokens(db: str | None, *, create: bool = True) -> Iterator[Tokens]:
+    """Open the tokens of the database; a missing one is created, or an error."""
     from contextlib import closing
 
     from gaitswarm.jobs.open import database_to_read, database_to_write
     from gaitswarm.services.runtime import open_store
     from gaitswarm.settings import read_settings
 
-    find = database_to_write if made else database_to_read
-    with closing(open_store(find(read_settings(db=db or None)))) as store:
+    url = (database_to_write if create else database_to_read)(read_settings(db=db or None))
+    with closing(open_store(url)) as store:
         yield store.tokens
 
 
@@ -264,16 +261,16 @@ def audit(
         typer.Option(
             metavar="ID",
             callback=completed,
-            help="Only changes of this job; in full, if it is deleted.",
+            help="Only entries of this job; give the full id of a deleted one.",
         ),
     ] = None,
-    limit: Annotated[int, typer.Option(min=1, max=10_000, help="Most changes to show.")] = 50,
+    limit: Annotated[int, typer.Option(min=1, max=10_000, help="Maximum number of entries.")] = 50,
     db: Db = None,
     as_json: Json = False,
 ) -> None:
-    """Show who submitted, commanded and deleted jobs and made tokens, the newest first.
+    """Show who submitted, controlled and deleted jobs and created tokens, newest first.
 
-    It reads the database; /v1/audit of a server tells the same to administrators.
+    Reads the database; administrators of a server can also read /v1/audit.
     """
     from contextlib import closing
 
@@ -290,7 +287,7 @@ def audit(
         print_json_list(map(AuditEntryView.from_entry, entries))
         return
     if not entries:
-        note("nothing is known of it" if job else "nothing was done yet")
+        note("no entries of this job" if job else "no entries yet")
     for entry in entries:
         details = ", ".join(f"{name}={value}" for name, value in entry.details.items())
         print_text(

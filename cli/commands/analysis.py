@@ -41,16 +41,16 @@ def rank(
         str,
         typer.Option(
             metavar="NAME|JSON",
-            help='A, B, C, chapter-3, or your own: {"bias": [five or six numbers], "exponent": [as'
+            help='A, B, C, chapter-3, or JSON: {"bias": [five or six numbers], "exponent": [as'
             " many]}.",
         ),
     ],
-    top: Annotated[int, typer.Option(help="How many of the best designs to show.")] = 20,
+    top: Annotated[int, typer.Option(help="Number of designs to show.")] = 20,
     server: Server = None,
     db: Db = None,
     as_json: Json = False,
 ) -> None:
-    """Rank all designs of a job by another preference, from what is stored: no walk is run."""
+    """Rank a job's stored designs by another preference, without simulation."""
     from gaitswarm.cli.output import print_json
     from gaitswarm.jobs.open import open_jobs
 
@@ -64,7 +64,6 @@ def rank(
 
 
 def _ranking_request(preference: str, top: int) -> RankingRequest:
-    """Raises InvalidRequest that names the field."""
     from pydantic import ValidationError
 
     from gaitswarm.cli.inputs.spec_file import preference_choice
@@ -86,7 +85,7 @@ def _print_ranking(ranking: RankingView) -> None:
     console.print(ranking_table(ranking))
     agreement = MISSING if ranking.correlation is None else f"{ranking.correlation:.3f}"
     console.print(
-        f"of {ranking.evaluations} designs; the job's own best:"
+        f"{ranking.evaluations} designs; fitness of the job's best:"
         f" {number(ranking.fitness_of_present_best)}; rank correlation: {agreement}",
         markup=False,
     )
@@ -96,22 +95,22 @@ def front(
     job_id: JobId,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", metavar="FILE.csv", help="Write the front's designs, too."),
+        typer.Option("--output", "-o", metavar="FILE.csv", help="Also write the front's designs."),
     ] = None,
     most: Annotated[
-        int, typer.Option(help="Designs to list, with --json and --output; of more, some.")
+        int, typer.Option(help="Maximum number of designs with --json and --output.")
     ] = 1000,
     published: Annotated[
         bool,
-        typer.Option(help="Let the published designs of the controller walk, too, to place them."),
+        typer.Option(help="Also simulate the controller's published designs and place them."),
     ] = False,
     server: Server = None,
     db: Db = None,
     as_json: Json = False,
 ) -> None:
-    """Show the Pareto front of a job's designs, from what is stored: no walk is run.
+    """Show the Pareto front of a job's stored designs, without simulation.
 
-    Its knees, the best design in each objective, the best under A, B and C and under the job's own
+    Lists knees, the best design in each objective, under A, B and C, and under the job's
     preference, and the hypervolume.
     """
     from gaitswarm.cli.files import replacing
@@ -123,7 +122,7 @@ def front(
     if output is not None and output.suffix != ".csv":
         raise InvalidRequest(f"{output} must end in .csv", field="output")
     if published and as_json:
-        raise InvalidRequest("is for the table, not for --json", field="published")
+        raise InvalidRequest("cannot be combined with --json", field="published")
     with open_jobs(server, db) as jobs:
         view = jobs.front(job_id, most=most)
         placed = _place_published(jobs, job_id) if published else {}
@@ -141,7 +140,7 @@ def front(
 
 
 def _place_published(jobs: Jobs, job_id: str) -> dict[str, Placed]:
-    """Where the published designs lie; raises InvalidRequest where they cannot be compared."""
+    """Place the published designs with respect to the front."""
     from gaitswarm.cli.comparison import published_walk
     from gaitswarm.cli.front import placed
     from gaitswarm.services.optimizer.errors import InvalidRequest
@@ -151,17 +150,17 @@ def _place_published(jobs: Jobs, job_id: str) -> dict[str, Placed]:
     spec, view = jobs.job(job_id).spec, jobs.front(job_id, most=10_000)
     if not isinstance(spec, JobSpec) or spec.worlds is not None:
         raise InvalidRequest(
-            "the job judges in worlds, in which no published design has walked", field="published"
+            "a job with worlds cannot be compared with published designs", field="published"
         )
     names = CONTROLLERS[spec.controller].published
     return {name: placed(published_walk(spec, name), view) for name in names}
 
 
 def importance(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = False) -> None:
-    """Say which variables of a job matter, from what is stored: no walk is run.
+    """Show which variables of a job matter, from stored designs, without simulation.
 
-    First-order Sobol' indices for the fitness, for each objective and for failing, with intervals;
-    and whether the winner lies at a bound of the search.
+    First-order Sobol' indices of the fitness, each objective and failures, with intervals; and
+    variables whose best value lies at a bound.
     """
     from gaitswarm.cli.output import print_json
     from gaitswarm.jobs.open import open_jobs
@@ -210,25 +209,26 @@ def _importance_lines(view: ImportanceView) -> Iterator[str]:
 
     if view.designs < LEAST_DESIGNS:
         yield (
-            f"{view.designs} designs walk in every case, and indices need {LEAST_DESIGNS}:"
-            " `gaitswarm extend` lets the job try more"
+            f"indices need {LEAST_DESIGNS} designs that walk in every case, and the job has"
+            f" {view.designs}: add some by `gaitswarm extend`"
         )
     yield (
-        f"share of the variance of ranks that goes with each variable alone, among {view.sampled}"
-        f" designs that were tried, {view.failed} of {view.designs + view.failed} in all failed;"
-        " variables that moved together share it"
+        "share of the variance of ranks explained by each variable alone, among"
+        f" {view.sampled} designs; {view.failed} of all {view.designs + view.failed} failed;"
+        " correlated variables share it"
     )
     for variable in view.variables:
         if variable.at is None:
             continue
         bound = variable.low if variable.at == "low" else variable.high
         wider = variable.widened
-        advice = "no wider bound is known that can be simulated"
+        advice = "no wider bound can be simulated"
         if wider is not None:
             advice = f"widen it to {wider.low:g} to {wider.high:g} and run again"
         unit = "" if variable.unit == "1" else f" {variable.unit}"
         yield (
-            f"{variable.name}: the winner lies at the {variable.at} bound {bound:g}{unit}; {advice}"
+            f"{variable.name}: the best design lies at the {variable.at} bound {bound:g}{unit};"
+            f" {advice}"
         )
 
 
@@ -243,16 +243,16 @@ def _index_interval(index: IndexIntervalView | None) -> str:
 def scenarios(
     job_id: JobId,
     tolerance: Annotated[
-        float, typer.Option(help="Largest regret of the smallest family of scenarios, as a share.")
+        float, typer.Option(help="Largest accepted regret of a subset of scenarios, as a share.")
     ] = 0.01,
     server: Server = None,
     db: Db = None,
     as_json: Json = False,
 ) -> None:
-    """Say which scenarios of a job matter, from what is stored: no walk is run.
+    """Show which scenarios of a job matter, from stored designs, without simulation.
 
-    What would the job have taken for its best without one of them, or with few? A search with fewer
-    scenarios goes elsewhere, so check the answer by a job.
+    Compares the job's best with those by subsets of its scenarios. A search with fewer scenarios
+    visits other designs, so confirm the result by a job.
     """
     from gaitswarm.cli.output import print_json
     from gaitswarm.jobs.open import open_jobs
@@ -293,14 +293,14 @@ def _print_families(view: ScenarioFamiliesView) -> None:
     console.print(without)
     console.print(sizes)
     smallest = view.smallest
-    told = (
+    subset = (
         "none"
         if smallest is None
         else f"{', '.join(smallest.scenarios)}; regret {_loss_percent(smallest.regret)} %"
     )
     console.print(
-        f"of {view.designs} designs that walk in all scenarios; smallest family within"
-        f" {100.0 * view.tolerance:g} %: {told}",
+        f"{view.designs} designs walk in all scenarios; smallest family within"
+        f" {100.0 * view.tolerance:g} %: {subset}",
         markup=False,
     )
 
@@ -315,9 +315,9 @@ def _loss_share(value: float | None) -> str:
 
 def preferences(
     job_id: JobId,
-    drawn: Annotated[int, typer.Option(help="Preferences to draw beside A, B and C.")] = 512,
+    drawn: Annotated[int, typer.Option(help="Preferences to sample besides A, B and C.")] = 512,
     candidates: Annotated[
-        int, typer.Option(help="Winners to let walk, beside those of A, B and C.")
+        int, typer.Option(help="Winners to simulate, besides those of A, B and C.")
     ] = 8,
     samples: Samples = 128,
     radius: Radius = 0.02,
@@ -328,18 +328,18 @@ def preferences(
         typer.Option(
             "--for",
             metavar="ITERATION.DESIGN",
-            help="Find the preference under which this design of the job wins instead; no walk is"
-            " run.",
+            help="Instead, find the preference under which this design of the job wins, without"
+            " simulation.",
         ),
     ] = None,
     server: Server = None,
     db: Db = None,
     as_json: Json = False,
 ) -> None:
-    """Choose a preference so that its winner is robust (thesis 4.5), among a job's designs.
+    """Find preferences whose winner among a job's designs is robust (thesis 4.5).
 
-    They are ranked anew under many preferences, from what is stored; of the winners the robustness
-    index is estimated, by walks. With --for: which preference makes a design of the job its best.
+    Ranks stored designs under many preferences, and estimates the robustness index of the winners
+    by simulation. With --for, finds the preference that makes a design the best.
     """
     if for_design is not None:
         _find_preference(job_id, for_design, server=server, db=db, as_json=as_json)
@@ -395,23 +395,23 @@ def _print_preferences(view: RobustPreferencesView) -> None:
     heads = ("design", "index", "95 %", "wins under", "fitness", "loss %", "bias", "exponent")
     for head in heads:
         table.add_column(head, no_wrap=head not in ("bias", "exponent"))
-    for found in view.candidates:
-        index = found.index
-        share = f"{100.0 * found.share:.0f} %"
+    for candidate in view.candidates:
+        index = candidate.index
+        share = f"{100.0 * candidate.share:.0f} %"
         table.add_row(
-            place_of(found.iteration, found.particle),
+            place_of(candidate.iteration, candidate.particle),
             number(None if index is None else index.value, 3),
             MISSING if index is None else f"{number(index.low, 3)}–{number(index.high, 3)}",
-            ", ".join([*found.named, share]),
-            number(found.fitness),
-            number(None if found.loss is None else 100.0 * found.loss, 2),
-            " ".join(number(value, 2) for value in found.preference.bias),
-            " ".join(number(value, 2) for value in found.preference.exponent),
+            ", ".join([*candidate.named, share]),
+            number(candidate.fitness),
+            number(None if candidate.loss is None else 100.0 * candidate.loss, 2),
+            " ".join(number(value, 2) for value in candidate.preference.bias),
+            " ".join(number(value, 2) for value in candidate.preference.exponent),
         )
     console = stdout_console()
     console.print(table)
     console.print(
-        f"{view.winners} designs of the job win under A, B, C or any of {view.drawn} drawn"
-        " preferences; smaller indices are more robust; fitness and loss are by the job's own",
+        f"{view.winners} designs of the job win under A, B, C or any of {view.drawn} sampled"
+        " preferences; smaller indices are more robust; fitness and loss use the job's preference",
         markup=False,
     )

@@ -1,4 +1,4 @@
-"""`gaitswarm bench`: how fast this machine simulates."""
+"""`gaitswarm bench`: simulation speed of this machine."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ if TYPE_CHECKING:
     from gaitswarm.services.profile import JobProfile
 
 _SHARES: Final = {
-    "physics": "in kernels, the steps",
-    "control": "in kernels, the control ticks",
-    "tables": "in tasks: fuzzy tables",
-    "preparation": "in tasks: desired angles, parameters, objectives",
-    "workers": "sending tasks and answers, and waiting for the last worker",
+    "physics": "kernel: physics steps",
+    "control": "kernel: control ticks",
+    "tables": "tasks: fuzzy tables",
+    "preparation": "tasks: desired angles, parameters, objectives",
+    "workers": "transfer of tasks and results, waiting for the last worker",
     "search": "judging designs and asking for the next",
-    "store": "in the store",
+    "store": "store",
 }
 
 
@@ -37,16 +37,14 @@ def bench(
     precision: Precision = None,
     profile: Annotated[
         bool,
-        typer.Option(
-            "--profile", help="Run a whole job of chapter 4 on all cores, and say what takes time."
-        ),
+        typer.Option("--profile", help="Profile a complete job of chapter 4 on all cores."),
     ] = False,
     evaluator: Annotated[
-        str, typer.Option(help="Where the profiled job's walks run: ray or in-process.")
+        str, typer.Option(help="Workers of the profiled job: ray or in-process.")
     ] = "ray",
     as_json: Json = False,
 ) -> None:
-    """Measure the simulator on one core, with the physics of the main Fuzzy-PI job."""
+    """Measure the simulator's speed on one core, for the main Fuzzy-PI job."""
     import json
     from dataclasses import asdict
     from typing import get_args
@@ -62,11 +60,11 @@ def bench(
         from gaitswarm.services.profile import profile_job
 
         kind: EvaluatorKind = _one_of("evaluator", evaluator, get_args(EvaluatorKind))
-        found = profile_job(evaluator=kind, precision=digits)
-        print_text(json.dumps(asdict(found), indent=2) if as_json else _profile_text(found))
+        measured = profile_job(evaluator=kind, precision=digits)
+        print_text(json.dumps(asdict(measured), indent=2) if as_json else _profile_text(measured))
         return
-    chosen: Backend = _one_of("backend", backend, get_args(Backend))
-    result = benchmark.measure(repeats=repeats, backend=chosen, precision=digits)
+    requested: Backend = _one_of("backend", backend, get_args(Backend))
+    result = benchmark.measure(repeats=repeats, backend=requested, precision=digits)
     if as_json:
         print_text(json.dumps(asdict(result), indent=2))
         return
@@ -81,19 +79,20 @@ def bench(
     )
 
 
-def _one_of(field: str, value: str, known: tuple[Any, ...]) -> Any:
+def _one_of(field: str, value: str, choices: tuple[Any, ...]) -> Any:
     from gaitswarm.services.optimizer.errors import InvalidRequest
 
-    if value not in known:
-        raise InvalidRequest(f"{value!r} is none of {', '.join(known)}", field=field)
+    if value not in choices:
+        raise InvalidRequest(f"{value!r} is none of {', '.join(choices)}", field=field)
     return value
 
 
-def _profile_text(found: JobProfile) -> str:
+def _profile_text(profile: JobProfile) -> str:
     heading = (
-        f"{found.walks} walks of a chapter-4 job, {found.slots} slots ({found.evaluator}),"
-        f" {found.precision} precision: {found.seconds:.2f} s, {found.walks_per_second:.0f} walks"
-        f" a second, {found.lane_use:.1%} of the kernel's lanes used"
+        f"{profile.walks} simulations of a chapter-4 job, {profile.slots} slots"
+        f" ({profile.evaluator}), {profile.precision} precision: {profile.seconds:.2f} s,"
+        f" {profile.walks_per_second:.0f} simulations/s, {profile.lane_use:.1%} of the kernel's"
+        " lanes used"
     )
-    lines = [f"  {name:12} {share:6.1%}  {_SHARES[name]}" for name, share in found.shares.items()]
+    lines = [f"  {name:12} {share:6.1%}  {_SHARES[name]}" for name, share in profile.shares.items()]
     return "\n".join([heading, "shares of the slots' time:", *lines])

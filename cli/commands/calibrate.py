@@ -1,4 +1,4 @@
-"""`gaitswarm calibrate`, `targets`: a robot and conventions from a table of results."""
+"""`gaitswarm calibrate` and `targets`: robots and conventions fitted to a table of results."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ LeaveOneOut = Annotated[
     str | None,
     typer.Option(
         metavar="target|walk",
-        help="Predict every target by the design that is best without it, or without all of its"
-        " walk; nothing is simulated.",
+        help="Predict every target by the best design without it, or without its walk; without"
+        " simulation.",
     ),
 ]
 
@@ -51,36 +51,36 @@ def calibrate(
         str | None,
         typer.Option(
             metavar="NAME,...|JSON|FOLDER",
-            help="Robot by name, or several for the variable `robot` to choose among; a variant as"
-            " JSON, or the folder of your own.",
+            help="Robot by name, or several names as choices of the variable `robot`; a variant as"
+            " JSON; or a robot's folder.",
         ),
     ] = None,
     variables: Annotated[
         str | None,
         typer.Option(
-            help="What to fit, separated by commas; NAME=LOW:HIGH for bounds of your own, and"
-            " NAME=ONE:OTHER for some of its choices. Default: all of the robot's parameters."
+            help="Variables to fit, separated by commas; NAME=LOW:HIGH sets bounds, and"
+            " NAME=A:B limits choices. Default: all parameters of the robot."
         ),
     ] = None,
     fixed: Annotated[
-        str | None, typer.Option(metavar="NAME=VALUE,...", help="What to hold at one value.")
+        str | None, typer.Option(metavar="NAME=VALUE,...", help="Variables to fix.")
     ] = None,
     seeds: Annotated[
         int,
         typer.Option(
-            min=1, max=32, help="Jobs that differ in their seed: one alone decides nothing."
+            min=1, max=32, help="Number of jobs with different seeds; one alone decides nothing."
         ),
     ] = 3,
     iterations: Annotated[int, typer.Option(help="Iterations of each job.")] = 60,
-    particles: Annotated[int, typer.Option(help="Designs of an iteration.")] = 48,
-    seed: Annotated[int, typer.Option(help="Seed of the first job; the others count up.")] = 1,
+    particles: Annotated[int, typer.Option(help="Designs per iteration.")] = 48,
+    seed: Annotated[int, typer.Option(help="Seed of the first job; others follow.")] = 1,
     precision: Precision = None,
     name: JobName = None,
     leave_one_out: LeaveOneOut = None,
     workers: WorkerOptions,
     as_json: Json = False,
 ) -> None:
-    """Fit a robot and open conventions to a table of results, here and now."""
+    """Fit a robot and unknown conventions to a table of results, in this process."""
     from gaitswarm.cli.calibration import read_targets
     from gaitswarm.cli.embedded import run_seeds
     from gaitswarm.cli.inputs.spec_file import parse_spec
@@ -93,7 +93,7 @@ def calibrate(
         **read_targets(table),
         **_robots(robot),
         "fixed": dict(_pair(entry, "fixed") for entry in _entries(fixed)),
-        # Wide at first and narrow at last, as for identification.
+        # Explore first, then converge, as for identification.
         "optimizer": {
             "name": "pso",
             "particles": particles,
@@ -110,7 +110,7 @@ def calibrate(
         specs,
         workers,
         lambda jobs, ids: _show(jobs, ids, leave_one_out, as_json=as_json),
-        again="targets",
+        report_command="targets",
     )
 
 
@@ -121,9 +121,9 @@ def targets(
     db: Db = None,
     as_json: Json = False,
 ) -> None:
-    """Say how near calibrations that differ in their seed come to their targets.
+    """Show how closely calibrations meet their targets, and what the evidence decides.
 
-    And what the evidence decides.
+    The jobs differ only in their seed.
     """
     from gaitswarm.jobs.open import open_jobs
 
@@ -149,7 +149,7 @@ def _show(jobs: Jobs, job_ids: list[str], leave_one_out: str | None, *, as_json:
 
 
 def _robots(text: str | None) -> dict[str, Any]:
-    """What a spec has of one robot, or of several shipped ones."""
+    """Return the spec's field of one robot, or of several shipped ones."""
     from gaitswarm.cli.inputs.robots import chosen_robot
 
     if text is None or text.lstrip().startswith("{") or "," not in text:
@@ -158,7 +158,6 @@ def _robots(text: str | None) -> dict[str, Any]:
 
 
 def _variables(document: dict[str, Any], text: str) -> list[Any]:
-    """Names, and variables with bounds or choices of the user's own."""
     from gaitswarm.cli.inputs.spec_file import parse_spec
     from gaitswarm.services.optimizer.errors import InvalidRequest
     from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
@@ -166,30 +165,29 @@ def _variables(document: dict[str, Any], text: str) -> list[Any]:
     entries = _entries(text)
     if not any("=" in entry for entry in entries):
         return entries
-    # Everything is known to the catalogue, whatever of it is searched.
-    whole = cast(
+    spec = cast(
         CalibrationSpec, parse_spec({**document, "fixed": {}, "variables": None, "seed": 1})
     )
-    known = {variable.name: variable for variable in whole.catalogue()}
-    found: list[Any] = []
+    catalogue = {variable.name: variable for variable in spec.catalogue()}
+    variables: list[Any] = []
     for entry in entries:
         if "=" not in entry:
-            found.append(entry)
+            variables.append(entry)
             continue
         name, value = _pair(entry, "variables")
-        if name not in known:
+        if name not in catalogue:
             raise InvalidRequest(
-                f"unknown variable {name!r}; {instead_of(name, known)}", field="variables"
+                f"unknown variable {name!r}; {instead_of(name, catalogue)}", field="variables"
             )
         parts = [part.strip() for part in value.split(":")]
-        if known[name].kind == "categorical":
-            own: dict[str, Any] = {"choices": parts}
+        if catalogue[name].kind == "categorical":
+            domain: dict[str, Any] = {"choices": parts}
         elif len(parts) == 2:
-            own = dict(zip(("low", "high"), parts, strict=True))
+            domain = dict(zip(("low", "high"), parts, strict=True))
         else:
             raise InvalidRequest(f"{entry!r} is not NAME=LOW:HIGH", field="variables")
-        found.append({"name": name, "kind": known[name].kind, **own})
-    return found
+        variables.append({"name": name, "kind": catalogue[name].kind, **domain})
+    return variables
 
 
 def _entries(text: str | None) -> list[str]:

@@ -1,4 +1,4 @@
-"""`gaitswarm certify`: one design in many worlds, and in scenarios that no job contained."""
+"""`gaitswarm certify`: one design in many worlds and in held-out scenarios."""
 
 from __future__ import annotations
 
@@ -30,21 +30,23 @@ def certify(
         typer.Argument(
             metavar="DESIGN|ID",
             help="A published design, as published:A; a file with a JSON object {variable: value},"
-            " or `-` for standard input; or the identifier of a job, whose best is taken with its"
-            " robot, controller and preference, or of a certificate, which goes on.",
+            " or `-` for standard input; the id of a job, for its best with its robot, controller"
+            " and preference; or the id of a certificate to continue.",
         ),
     ],
     *,
     worlds: Annotated[
-        int | None, typer.Option(min=1, max=100_000, help="Worlds to draw. [default: 1000]")
+        int | None, typer.Option(min=1, max=100_000, help="Number of worlds. [default: 1000]")
     ] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="Of the worlds. [default: 1]")] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Seed of the worlds. [default: 1]")
+    ] = None,
     scenarios: Annotated[
         str | None,
         typer.Option(
             help="Names, numbers or FILE.json, separated by commas. Default: those of the job, of"
-            " the robot's folder or of table 4.2, and so many held-out ones that there are eight,"
-            " two at least."
+            " the robot's folder or of table 4.2, and at least two held-out ones, for a total of"
+            " eight."
         ),
     ] = None,
     ranges: Annotated[
@@ -52,7 +54,7 @@ def certify(
         typer.Option(
             "--range",
             metavar="NAME=LOW:HIGH",
-            help="Draw this perturbation from a range of your own; may be repeated.",
+            help="Draw this perturbation from another range; repeatable.",
         ),
     ] = None,
     fixed: Annotated[
@@ -60,14 +62,14 @@ def certify(
         typer.Option(
             "--set",
             metavar="NAME=VALUE",
-            help="Hold this perturbation at one value in all worlds; may be repeated.",
+            help="Fix this perturbation in all worlds; repeatable.",
         ),
     ] = None,
     only: Annotated[
         str | None,
         typer.Option(
             metavar="NAME,...",
-            help="Draw these perturbations alone; the others stay nominal. Default: all.",
+            help="Draw only these perturbations; others stay nominal. Default: all.",
         ),
     ] = None,
     controller: ControllerOption = None,
@@ -75,8 +77,8 @@ def certify(
     preference: Annotated[
         str | None,
         typer.Option(
-            help="A, B, C or chapter-3: how objectives are weighed [default: the job's, else that"
-            " of the robot's folder, else A]."
+            help="Weighting of objectives: A, B, C or chapter-3 [default: the job's, else that of"
+            " the robot's folder, else A]."
         ),
     ] = None,
     precision: Precision = None,
@@ -85,37 +87,37 @@ def certify(
         typer.Option(
             "--engine",
             metavar="mujoco|mujoco-contacts",
-            help="Let the design walk in the nominal world in this engine, too, and tell the"
-            " differences: in MuJoCo under our laws of contact, or with its own contacts. May be"
-            " repeated; needs pip install 'gaitswarm[mujoco]'.",
+            help="Also simulate the nominal world in this engine and show the differences: MuJoCo"
+            " with our contact laws, or with its own contacts. Repeatable; needs pip install"
+            " 'gaitswarm[mujoco]'.",
         ),
     ] = None,
     name: JobName = None,
-    most: Annotated[int, typer.Option(min=0, max=1000, help="Worst worlds to name.")] = 5,
+    most: Annotated[int, typer.Option(min=0, max=1000, help="Worst worlds to list.")] = 5,
     replay: Annotated[
         int | None,
         typer.Option(
             metavar="K",
             min=0,
             max=99_999,
-            help="Run no certificate: let the design walk in world K again, and show its results.",
+            help="Run no certificate: simulate the design in world K again and show its results.",
         ),
     ] = None,
     log: Annotated[
         Path | None,
         typer.Option(
             metavar="FILE.npz",
-            help="With --replay: write the walks' 500 Hz logs as NumPy arrays.",
+            help="With --replay: write 500 Hz logs as NumPy arrays.",
         ),
     ] = None,
     workers: WorkerOptions,
     as_json: Json = False,
 ) -> None:
-    """Put a design to the test in many worlds: how often it fails, and how bad it gets.
+    """Test a design in many worlds: how often it fails, and how bad it gets.
 
-    A world is one draw of all that a model may get wrong: friction, masses, battery, sensors. World
-    K is the same for every design under one seed. The same command goes on where it was stopped;
-    more worlds walk only what is missing.
+    A world is one sample of the model's uncertainties: friction, masses, battery, sensors. With
+    one seed, world K is the same for every design. Run the same command to resume; with more
+    worlds, only the missing ones are simulated.
     """
     from contextlib import closing
     from dataclasses import asdict
@@ -130,7 +132,7 @@ def certify(
     from gaitswarm.services.runtime import open_store
     from gaitswarm.settings import read_settings
 
-    given = {
+    values = {
         "worlds": worlds,
         "seed": seed,
         "scenarios": scenarios,
@@ -144,12 +146,12 @@ def certify(
         "engines": engines,
         "name": name,
     }
-    spec = certificate_spec(design, workers.db, given)
+    spec = certificate_spec(design, workers.db, values)
     if replay is not None:
         show_world(spec, replay, log, as_json=as_json)
         return
     if log is not None:
-        raise InvalidRequest("goes with --replay, which says of which world", field="log")
+        raise InvalidRequest("requires --replay", field="log")
     settings = read_settings(**asdict(workers))
     url = database_to_write(settings)
     with closing(open_store(url)) as store, closing(Embedded(settings)) as embedded:

@@ -1,4 +1,4 @@
-"""`gaitswarm compare`: drives side by side on the same walks."""
+"""`gaitswarm compare`: drives in the same scenarios."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ def compare(
         typer.Argument(
             metavar="DRIVE",
             help="2011, 2016, pi, fuzzy-pi-3, job:ID for a job's best, or CONTROLLER:FILE for a"
-            " design file. Default: the four named ones.",
+            " design file. Default: the first four.",
         ),
     ] = None,
     scenario: Annotated[
-        str, typer.Option(help="Name or number, several separated by commas, or all.")
+        str, typer.Option(help="Names or numbers, separated by commas, or all.")
     ] = "all",
     plot: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Draw speed, power and effectivity.")
@@ -39,19 +39,20 @@ def compare(
     db: Db = None,
     as_json: Json = False,
 ) -> None:
-    """Let several drives walk the same scenarios: speed, power, effectivity, objectives."""
+    """Compare drives in the same scenarios: speed, power, effectivity, objectives."""
     from gaitswarm.cli.inputs.robots import chosen_robot, chosen_scenarios
     from gaitswarm.cli.output import note, print_text
     from gaitswarm.cli.pictures import draw_comparison, save
     from gaitswarm.sim.drives import DRIVES
     from gaitswarm.sim.drives import compare as compare_drives
 
-    chosen = [_drive(name, server, db) for name in drives or DRIVES]
-    figures = compare_drives(chosen, chosen_scenarios(scenario, robot), robot=chosen_robot(robot))
+    compared = [_drive(name, server, db) for name in drives or DRIVES]
+    walked = chosen_scenarios(scenario, robot)
+    figures = compare_drives(compared, walked, robot=chosen_robot(robot))
     if as_json:
         print_text(json.dumps([_row(f) for f in figures], indent=2))
     else:
-        _show(chosen, figures)
+        _show(compared, figures)
     if plot is not None:
         save(draw_comparison(figures), plot)
         note(f"picture written to {plot}")

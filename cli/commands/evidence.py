@@ -30,7 +30,7 @@ def export(
     server: Server = None,
     db: Db = None,
 ) -> None:
-    """Write one row per evaluated design: fitness, variables, and results by scenario."""
+    """Write a table with one row per evaluated design: fitness, variables, results by scenario."""
     from gaitswarm.cli.files import replacing
     from gaitswarm.cli.output import note
     from gaitswarm.jobs.open import open_jobs
@@ -45,7 +45,7 @@ def export(
 
 
 def _table_format(path: Path) -> TableFormat:
-    """As the file's suffix says. Raises InvalidRequest for another."""
+    """Return the format of the file's suffix."""
     from gaitswarm.services.optimizer.errors import InvalidRequest
 
     match path.suffix:
@@ -60,12 +60,12 @@ def _table_format(path: Path) -> TableFormat:
 def evidence(
     job_id: JobId,
     output: Annotated[
-        Path, typer.Option("--output", "-o", metavar="FILE", help="FILE.zip, to be written.")
+        Path, typer.Option("--output", "-o", metavar="FILE", help="FILE.zip to write.")
     ],
     server: Server = None,
     db: Db = None,
 ) -> None:
-    """Write one file with all that a job is and found, for `verify` and for people."""
+    """Write a job's spec, history and results to one file that `verify` checks."""
     import hashlib
 
     from gaitswarm.cli.files import replacing
@@ -77,44 +77,42 @@ def evidence(
     with replacing(output, "output") as file:
         file.write(content)
     note(f"{output}: SHA-256 {hashlib.sha256(content).hexdigest()}")
-    note(f"check it: gaitswarm verify {output} --replay 20")
+    note(f"to check it, run: gaitswarm verify {output} --replay 20")
 
 
 def verify(
     source: Annotated[
         str,
-        typer.Argument(
-            metavar="FILE|ID", help="File of `evidence`, or a job's id or its beginning."
-        ),
+        typer.Argument(metavar="FILE|ID", help="File of `evidence`, or a job's id or its prefix."),
     ],
     replay: Annotated[
         int,
         typer.Option(
             min=0,
             metavar="N",
-            help="Evaluations to draw and simulate anew, of the job and of each certificate,"
-            " besides the best one.",
+            help="Evaluations to sample and repeat, of the job and of each certificate, in"
+            " addition to the best.",
         ),
     ] = 20,
     seed: Annotated[
         int | None,
-        typer.Option(min=0, help="By which they are drawn. [default: one that is not foreseen]"),
+        typer.Option(min=0, help="Seed of the sample. [default: unpredictable]"),
     ] = None,
     head: Annotated[
         str | None,
         typer.Option(
             metavar="DIGEST",
-            help="Of an iteration, noted down earlier: the history has to be the one it was of.",
+            help="Digest of an iteration, noted earlier, that the history must contain.",
         ),
     ] = None,
     server: Server = None,
     db: Db = None,
     as_json: Json = False,
 ) -> None:
-    """Check evidence, or the stored history of a job, to the bit; 1 if anything differs.
+    """Check evidence, or a job's stored history, to the bit; exit code 1 if anything differs.
 
-    A file needs neither database nor network, and is never trusted. Of a job the digests of its
-    iterations are computed again from what is stored, and the first that differs is named.
+    Checking a file needs neither database nor network, and never trusts the file. For a job, the
+    digests of its iterations are recomputed, and the first that differs is named.
     """
     from gaitswarm.cli.exit_codes import CheckFailed
     from gaitswarm.cli.inputs.options import full_id
@@ -122,47 +120,47 @@ def verify(
     from gaitswarm.evidence.verify import verify as verified
     from gaitswarm.jobs.open import open_jobs
 
-    found: VerificationView | HistoryVerificationView
+    view: VerificationView | HistoryVerificationView
     if Path(source).exists() or Path(source).name != source or "." in source:
-        found = verified(source, replay=replay, seed=seed, head=head)
+        view = verified(source, replay=replay, seed=seed, head=head)
     else:
         with open_jobs(server, db) as jobs:
             source = full_id(jobs, source)
-            found = jobs.verify(source, head=head)
-            if found.verified:
-                found = _verify_evidence(jobs, source, found, replay=replay, seed=seed, head=head)
+            view = jobs.verify(source, head=head)
+            if view.verified:
+                view = _verify_evidence(jobs, source, view, replay=replay, seed=seed, head=head)
     if as_json:
-        print_json(found)
+        print_json(view)
     else:
-        _print_verification(found)
-    if not found.verified:
-        raise CheckFailed(f"{source} is not what it says to be")
+        _print_verification(view)
+    if not view.verified:
+        raise CheckFailed(f"verification of {source} failed")
 
 
 def _verify_evidence(
     jobs: Jobs,
     job_id: str,
-    found: HistoryVerificationView,
+    history: HistoryVerificationView,
     *,
     replay: int,
     seed: int | None,
     head: str | None,
 ) -> VerificationView | HistoryVerificationView:
-    """What is stored of a job as it was committed, checked here as evidence."""
+    """Verify a job as evidence in this process."""
     from gaitswarm.errors import Conflict
     from gaitswarm.evidence.verify import verify as verified
 
     try:
         content = jobs.evidence(job_id)
     except Conflict:
-        if not found.iterations:
+        if not history.iterations:
             raise
-        # A history that is too large for a file: only drawn evaluations of it are in memory.
+        # The history is too large for a file: check it in the database.
         return jobs.verify(job_id, replay=replay, seed=seed, head=head)
     return verified(content, replay=replay, seed=seed, head=head)
 
 
-def _print_verification(found: VerificationView | HistoryVerificationView) -> None:
+def _print_verification(view: VerificationView | HistoryVerificationView) -> None:
     from rich.text import Text
 
     from gaitswarm.cli.output import stdout_console
@@ -172,13 +170,13 @@ def _print_verification(found: VerificationView | HistoryVerificationView) -> No
 
     console = stdout_console()
     table = Table(box=None, show_header=False)
-    said = {True: ("passed", "green"), False: ("FAILED", "red"), None: ("not checked", "yellow")}
-    for check in found.checks:
-        word, style = said[check.passed]
+    states = {True: ("passed", "green"), False: ("FAILED", "red"), None: ("not checked", "yellow")}
+    for check in view.checks:
+        word, style = states[check.passed]
         whose = "" if check.certificate is None else f"certificate {check.certificate}: "
         table.add_row(Text(f"{whose}{check.name}"), Text(word, style=style), Text(check.detail))
     console.print(table)
-    for difference in found.differences[:10]:
+    for difference in view.differences[:10]:
         values = (number(difference.stored, 17), number(difference.simulated, 17))
         whose = "" if difference.certificate is None else f"certificate {difference.certificate}, "
         console.print(
@@ -186,15 +184,12 @@ def _print_verification(found: VerificationView | HistoryVerificationView) -> No
             f" {difference.case}, {difference.what}: stored {values[0]}, simulated {values[1]}",
             markup=False,
         )
-    if found.provenance:
-        console.print("what numbers depend on is not the same here:", markup=False)
-    for line in found.provenance:
+    if view.provenance:
+        console.print("provenance differs on this machine:", markup=False)
+    for line in view.provenance:
         console.print(f"  {line}", markup=False)
-    if found.replayed:
-        console.print(f"drawn by seed {found.seed}", markup=False)
-    result = "verified" if found.verified else "NOT verified"
-    if isinstance(found, VerificationView):
-        what = f"SHA-256 {found.sha256}"
-    else:
-        what = f"job {found.job}"
+    if view.replayed:
+        console.print(f"sampled by seed {view.seed}", markup=False)
+    result = "verified" if view.verified else "NOT verified"
+    what = f"SHA-256 {view.sha256}" if isinstance(view, VerificationView) else f"job {view.job}"
     console.print(f"{result}: {what}", markup=False)

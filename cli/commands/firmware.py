@@ -23,18 +23,18 @@ def firmware(
         str,
         typer.Argument(
             metavar="DESIGN|ID",
-            help="published:NAME, a file as for `simulate`, `-`, or the id of a job: its best.",
+            help="published:NAME, a file as for `simulate`, `-`, or a job's id for its best.",
         ),
     ],
     output: Annotated[
         Path,
-        typer.Option("--output", "-o", metavar="FOLDER", help="Where to write; made anew."),
+        typer.Option("--output", "-o", metavar="FOLDER", help="New folder."),
     ],
     scenarios: Annotated[
         str | None,
         typer.Option(
-            help="Names, numbers or FILE.json, separated by commas, or all [default: the job's, of"
-            " other designs all]."
+            help="Names, numbers or FILE.json, separated by commas, or all [default: the job's,"
+            " else all]."
         ),
     ] = None,
     controller: ControllerOption = None,
@@ -43,14 +43,14 @@ def firmware(
         str | None,
         typer.Option(
             metavar="ERRORxCURRENT",
-            help="Bits of a fuzzy table's indices [default: 10x6]; the walks are by this table.",
+            help="Bits of a fuzzy table's indices, also for the simulations [default: 10x6].",
         ),
     ] = None,
     server: Server = None,
     db: Db = None,
     as_json: Json = False,
 ) -> None:
-    """Write a design as C for the robot's microcontrollers, with a test that repeats its walks."""
+    """Write a design as C for the robot's microcontrollers, with a test against simulations."""
     from gaitswarm.cli.inputs.design_file import given_design
     from gaitswarm.cli.inputs.robots import chosen_scenarios
     from gaitswarm.cli.output import print_json
@@ -77,7 +77,6 @@ def firmware(
 
 
 def _bits(text: str) -> tuple[int, int]:
-    """Raises InvalidRequest."""
     from gaitswarm.errors import simulation_errors
     from gaitswarm.sim.firmware import parsed_table_bits
 
@@ -100,7 +99,7 @@ def _show(view: FirmwareView) -> None:
     console.print(table)
     console.print(
         f"tables: {memory.tables} B of the {memory.flash} B of flash of an {memory.processor};"
-        f" remembered from tick to tick: {memory.remembered} B of {memory.ram} B of RAM",
+        f" state between ticks: {memory.remembered} B of {memory.ram} B of RAM",
         markup=False,
     )
     if view.table_difference is not None:
@@ -108,8 +107,8 @@ def _show(view: FirmwareView) -> None:
             f"{name.replace('_', ' ')} {'unknown' if share is None else f'{share:.2%}'}"
             for name, share in view.table_difference.items()
         )
-        console.print(f"from walks by 10 x 6 bits at most: {differences}", markup=False)
+        console.print(f"largest differences from 10 x 6 bits: {differences}", markup=False)
     for remark in memory.remarks:
         console.print(f"does not fit: {remark}", markup=False)
-    note(f"{len(view.files)} files written, {view.samples} samples to compare:")
+    note(f"{len(view.files)} files written; to compare {view.samples} samples, run")
     note(f"  make -C {view.folder} test")

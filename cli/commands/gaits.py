@@ -21,24 +21,24 @@ def register(app: typer.Typer) -> None:
 
 def gaits(
     gait: Annotated[
-        str | None, typer.Argument(metavar="[GAIT]", help="Draw this one [default: list all].")
+        str | None, typer.Argument(metavar="[GAIT]", help="Gait to draw [default: list all].")
     ] = None,
     *,
     robot: RobotOption = None,
     scenario: Annotated[
         str | None,
         typer.Option(
-            help="Whose posture, stride and sway are planned: name, number or FILE.json [default:"
-            " the first of the robot's own folder, or normal-slow]."
+            help="Scenario that sets posture, stride and sway: name, number or FILE.json [default:"
+            " the first of the robot's folder, else normal-slow]."
         ),
     ] = None,
     duty_factor: Annotated[
         float | None,
-        typer.Option(help="Support's share of the cycle [default: the gait's usual one]."),
+        typer.Option(help="Share of the cycle in support [default: the gait's usual one]."),
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """List gaits: order of footfalls, feet that stand, and whether they are statically stable."""
+    """List gaits: order of footfalls, supporting feet, static stability."""
     from gaitswarm.cli.inputs.robots import chosen_robot, one_scenario
     from gaitswarm.cli.output import print_json, print_text
     from gaitswarm.gaits import planned_gaits
@@ -61,15 +61,15 @@ def _list(view: GaitsView) -> str:
     for item in view.items:
         order = sorted(item.lags, key=lambda leg: item.lags[leg])
         footfalls = ", ".join(f"{leg} {item.lags[leg]:.2f}" for leg in order)
-        said = footfalls or f"for {' or '.join(map(str, item.legs))} legs"
-        lines += [f"{item.name:12} {item.description}", f"{'':12} {said}"]
+        order_text = footfalls or f"for {' or '.join(map(str, item.legs))} legs"
+        lines += [f"{item.name:12} {item.description}", f"{'':12} {order_text}"]
         if item.suits:
             lines.append(f"{'':12} {_plan(item)}")
     return "\n".join(lines) + "\n"
 
 
 def diagram(item: GaitView) -> str:
-    """A gait's footfall diagram, as people read it."""
+    """Return a gait's footfall diagram."""
     if not item.suits:
         return f"{item.name}: for {' or '.join(map(str, item.legs))} legs\n"
     lines = [f"{leg:14} {columns}" for leg, columns in item.support.items()]
@@ -88,23 +88,22 @@ def mjcf(
     scenario: Annotated[
         str | None,
         typer.Option(
-            help="Whose load, slope and first pose the model has: name, number or FILE [default:"
+            help="Scenario that sets load, slope and first pose: name, number or FILE [default:"
             " the first of the robot's folder, else normal-fast]."
         ),
     ] = None,
     contacts: Annotated[
         bool,
-        typer.Option(help="Let soles meet the ground, by MuJoCo's own contacts fitted to ours."),
+        typer.Option(help="Include MuJoCo's contacts of the soles, fitted to ours."),
     ] = True,
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", metavar="FILE.xml", help="Default: standard output."),
     ] = None,
 ) -> None:
-    """Write a robot as MJCF, which MuJoCo's viewer opens: with voltages or torques as controls.
+    """Write a robot as an MJCF model for MuJoCo, with voltages or torques as controls.
 
-    Needs pip install 'gaitswarm[mujoco]'. The viewer comes with pip install mujoco:
-    python -m mujoco.viewer --mjcf=FILE.xml.
+    Needs pip install 'gaitswarm[mujoco]'. To view it: python -m mujoco.viewer --mjcf=FILE.xml.
     """
     from gaitswarm.cli.inputs.robots import chosen_robot, one_scenario
     from gaitswarm.cli.output import note, print_text
@@ -113,11 +112,11 @@ def mjcf(
     from gaitswarm.sim.robot import load_robot
 
     machine = load_robot(chosen_robot(robot))
-    chosen = one_scenario(scenario, robot, preset="normal-fast")
+    walk = one_scenario(scenario, robot, preset="normal-fast")
     check_installed()
     from gaitswarm.sim.mujoco.model import exported
 
-    text = exported(machine, chosen, contacts=contacts)
+    text = exported(machine, walk, contacts=contacts)
     if output is None:
         print_text(text)
         return

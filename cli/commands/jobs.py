@@ -57,7 +57,7 @@ def register(app: typer.Typer) -> None:
 def submit(
     options: SpecOptions,
     idempotency_key: Annotated[
-        str | None, typer.Option(help="The same key and spec again make no second job.")
+        str | None, typer.Option(help="Repeating a key with the same spec creates no second job.")
     ] = None,
     priority: Priority = 0,
     notify: Notify = None,
@@ -65,21 +65,21 @@ def submit(
     db: Db = None,
     as_json: Json = False,
 ) -> None:
-    """Queue a job for a running server; see `optimize` to run one here and now."""
+    """Queue a job for a running server; `optimize` runs one in this process."""
     from gaitswarm.cli.inputs.spec_file import build_spec
     from gaitswarm.cli.output import note, print_json, stdout_console
     from gaitswarm.jobs.open import open_jobs
 
-    asked = build_spec(options)
+    spec = build_spec(options)
     with open_jobs(server, db, create=True) as jobs:
         job = jobs.submit(
-            asked, idempotency_key=idempotency_key, priority=priority, notify_url=notify
+            spec, idempotency_key=idempotency_key, priority=priority, notify_url=notify
         )
         if as_json:
             print_json(job)
             return
         stdout_console().print(job.id, markup=False)
-        note(f"{job.state}; follow it: gaitswarm watch {job.id}{jobs.place}")
+        note(f"{job.state}; to follow it, run: gaitswarm watch {job.id}{jobs.place}")
 
 
 def list_jobs(
@@ -92,34 +92,32 @@ def list_jobs(
     ] = None,
     forks_of: Annotated[
         str | None,
-        typer.Option(
-            metavar="ID", callback=completed, help="Only jobs that were forked from this one."
-        ),
+        typer.Option(metavar="ID", callback=completed, help="Only forks of this job."),
     ] = None,
     search: Annotated[
         str,
         typer.Option(metavar="TEXT", help="Only jobs whose name, id, note or tags contain this."),
     ] = "",
     robot: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Only jobs of this robot, or of `own` ones.")
+        str | None,
+        typer.Option(metavar="NAME", help="Only jobs of this robot; `own`: custom robots."),
     ] = None,
     controller: Annotated[
         str | None, typer.Option(metavar="NAME", help="Only jobs that tune this controller.")
     ] = None,
     preference: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Only jobs of this preference, or of `own`.")
+        str | None,
+        typer.Option(metavar="NAME", help="Only jobs of this preference; `own`: custom ones."),
     ] = None,
-    tag: Annotated[str | None, typer.Option(help="Only jobs that have this tag.")] = None,
+    tag: Annotated[str | None, typer.Option(help="Only jobs with this tag.")] = None,
     archived: Annotated[
         bool | None,
         typer.Option(
             "--archived/--not-archived",
-            help="Only jobs that are archived, or are not, which is the default.",
+            help="Only archived jobs, or only others (the default).",
         ),
     ] = None,
-    everything: Annotated[
-        bool, typer.Option("--all", help="Jobs that are archived as well as those that are not.")
-    ] = False,
+    everything: Annotated[bool, typer.Option("--all", help="Include archived jobs.")] = False,
     order: Annotated[
         str,
         typer.Option(
@@ -127,13 +125,13 @@ def list_jobs(
             " state, iterations, evaluations, priority, rate (most first) or time_left."
         ),
     ] = "created",
-    reverse: Annotated[bool, typer.Option("--reverse", help="The other way round.")] = False,
-    limit: Annotated[int, typer.Option(min=1, help="Most jobs to list.")] = 50,
+    reverse: Annotated[bool, typer.Option("--reverse", help="Reverse the order.")] = False,
+    limit: Annotated[int, typer.Option(min=1, help="Maximum number of jobs.")] = 50,
     server: Server = None,
     db: Db = None,
     as_json: Json = False,
 ) -> None:
-    """List jobs, newest first unless another order is chosen."""
+    """List jobs, newest first by default."""
     from gaitswarm.cli.output import note, print_json_list, stdout_console
     from gaitswarm.cli.tables import jobs_table
     from gaitswarm.jobs.open import open_jobs
@@ -142,35 +140,35 @@ def list_jobs(
     from gaitswarm.services.optimizer.jobs.labels import JobFilter
 
     if everything and archived is not None:
-        raise InvalidRequest("leaves out none; choose one of both", field="all")
-    in_state = None if state is None else _one_of(JobState, state, "state")
-    sorted_by = _one_of(JobOrder, order, "order")
+        raise InvalidRequest("--all and --archived are mutually exclusive", field="all")
+    job_state = None if state is None else _one_of(JobState, state, "state")
+    job_order = _one_of(JobOrder, order, "order")
     with open_jobs(server, db) as jobs:
-        found = jobs.jobs(
-            state=in_state,
+        matches = jobs.jobs(
+            state=job_state,
             parent=forks_of,
             search=search,
             where=JobFilter(
                 None if everything else bool(archived), robot, controller, preference, tag
             ),
-            order=sorted_by,
+            order=job_order,
             reverse=reverse,
             limit=limit if as_json else limit + 1,
         )
         if as_json:
-            print_json_list(found)
+            print_json_list(matches)
             return
-        rows = list(found)
+        rows = list(matches)
     if rows:
         stdout_console().print(jobs_table(rows[:limit]))
     else:
-        note("no job fits" if everything else "no job fits; --all lists archived ones, too")
+        note("no job matches" if everything else "no job matches; --all includes archived jobs")
     if len(rows) > limit:
-        note(f"there are more than {limit}: see them by --limit, or fewer by --search or --tag")
+        note(f"more than {limit} jobs match: raise --limit, or narrow by --search or --tag")
 
 
 def status(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = False) -> None:
-    """Show a job: state, progress, best design, and why it failed if it did."""
+    """Show a job's state, progress and best design, and the reason if it failed."""
     from gaitswarm.cli.output import print_json
     from gaitswarm.cli.tables import print_job
     from gaitswarm.jobs.open import open_jobs
@@ -184,9 +182,9 @@ def status(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = 
 
 
 def watch(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = False) -> None:
-    """Follow a job until it ends; the exit code tells whether it succeeded.
+    """Follow a job until it ends; the exit code is 0 if it succeeded.
 
-    With --json every committed iteration is one line, as is every change of the job's state.
+    With --json, every committed iteration and every change of state is one line.
     """
     from gaitswarm.cli.progress import watch_as_json, watch_with_progress
     from gaitswarm.jobs.open import open_jobs
@@ -197,7 +195,7 @@ def watch(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = F
 
 
 def pause(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = False) -> None:
-    """Pause a job when its present iteration is committed."""
+    """Pause a job after its current iteration."""
     _command("pause", job_id, server, db, as_json=as_json)
 
 
@@ -208,7 +206,7 @@ def resume(
     db: Db = None,
     as_json: Json = False,
 ) -> None:
-    """Queue a paused or failed job again; a running server goes on with it."""
+    """Resume a paused or failed job."""
     _command("resume", job_id, server, db, as_json=as_json, accept_changes=accept_changes)
 
 
@@ -216,13 +214,13 @@ def extend(
     job_id: JobId,
     iterations: Annotated[
         int,
-        typer.Option(help="Budget in all, not further iterations."),
+        typer.Option(help="Total budget, including iterations done."),
     ],
     server: Server = None,
     db: Db = None,
     as_json: Json = False,
 ) -> None:
-    """Give a job another budget; one that has succeeded is queued and goes on from its end."""
+    """Extend a job's budget; a job that has succeeded continues."""
     from gaitswarm.cli.output import print_json, stdout_console
     from gaitswarm.jobs.open import open_jobs
 
@@ -244,7 +242,7 @@ def prioritize(
     db: Db = None,
     as_json: Json = False,
 ) -> None:
-    """Give a job that waits or runs another priority."""
+    """Change the priority of a queued or running job."""
     from gaitswarm.cli.output import print_json, stdout_console
     from gaitswarm.jobs.open import open_jobs
 
@@ -259,19 +257,17 @@ def prioritize(
 
 
 def cancel(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = False) -> None:
-    """End a job for good; what it has committed stays."""
+    """Cancel a job for good; committed iterations remain."""
     _command("cancel", job_id, server, db, as_json=as_json)
 
 
 def _one_of(kind: type[S], text: str, option: str) -> S:
-    """Raises InvalidRequest that says which there are."""
     from gaitswarm.services.optimizer.errors import InvalidRequest
 
     try:
         return kind(text)
     except ValueError:
-        known = ", ".join(kind)
-        raise InvalidRequest(f"{text!r} is none of {known}", field=option) from None
+        raise InvalidRequest(f"{text!r} is none of {', '.join(kind)}", field=option) from None
 
 
 def _command(
@@ -298,7 +294,7 @@ def _command(
 def history(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = False) -> None:
     """Show every committed iteration.
 
-    With --json also every design: its values, fitness, statuses and raw objectives.
+    With --json, also every design: values, fitness, statuses and raw objectives.
     """
     from gaitswarm.cli.output import stdout_console
     from gaitswarm.cli.tables import iterations_table
@@ -313,28 +309,28 @@ def history(job_id: JobId, server: Server = None, db: Db = None, as_json: Json =
 
 
 def best(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = False) -> None:
-    """Show the best design that a job has found so far, scenario by scenario."""
+    """Show a job's best design so far, by scenario."""
     from gaitswarm.cli.output import print_json, stdout_console
     from gaitswarm.cli.tables import print_best, worth
     from gaitswarm.jobs.open import open_jobs
     from gaitswarm.settings import place_of
 
     with open_jobs(server, db) as jobs:
-        found = jobs.best(job_id)
+        view = jobs.best(job_id)
         if as_json:
-            print_json(found)
+            print_json(view)
             return
         job = jobs.job(job_id)
         stdout_console().print(
-            f"job {job_id}: fitness {worth(found, digits=6)}, design"
-            f" {place_of(found.iteration, found.particle)}",
+            f"job {job_id}: fitness {worth(view, digits=6)}, design"
+            f" {place_of(view.iteration, view.particle)}",
             markup=False,
         )
-        print_best(found, job)
+        print_best(view, job)
 
 
 def _print_history(job: JobView, iterations: Iterator[HistoryIterationView]) -> None:
-    """One JSON document, written as it is read: a history may be larger than memory."""
+    """Stream one JSON document: a history may be larger than memory."""
     import json
     import sys
 
@@ -358,9 +354,9 @@ def diff(
     db: Db = None,
     as_json: Json = False,
 ) -> None:
-    """Set up to 12 jobs beside each other: what they came to, and how their specs differ.
+    """Compare up to 12 jobs: results, and differences of their specs.
 
-    With --json how they converged and how the fitness of their designs is distributed, too.
+    With --json, also convergence and the distribution of fitness.
     """
     from gaitswarm.cli.output import print_json
     from gaitswarm.jobs.open import open_jobs
@@ -392,7 +388,7 @@ def _print_comparison(view: JobComparisonView) -> None:
     console.print(table, markup=False)
     if not view.comparable:
         console.print(
-            "they judge by different measures, so their fitness cannot be compared", markup=False
+            "the jobs use different measures, so their fitness is not comparable", markup=False
         )
 
 
@@ -403,12 +399,12 @@ def fork(
         typer.Option(
             "--from",
             metavar="K",
-            help="First iteration that is the fork's own, counted from 0 as `history` does: it"
-            " begins with those before it, 0 to K-1.",
+            help="First iteration of the fork itself, counted from 0 as in `history`; iterations 0"
+            " to K-1 are copied.",
         ),
     ],
     preference: Annotated[
-        str | None, typer.Option(help="How objectives are weighed: A, B, C, chapter-3, or JSON.")
+        str | None, typer.Option(help="Weighting of objectives: A, B, C, chapter-3, or JSON.")
     ] = None,
     optimizer: Annotated[
         str | None,
@@ -419,7 +415,7 @@ def fork(
         typer.Option(metavar="JSON|FILE", help="Settings of the method."),
     ] = None,
     particles: Annotated[
-        int | None, typer.Option(help="Designs of one iteration, at most.")
+        int | None, typer.Option(help="Maximum number of designs per iteration.")
     ] = None,
     scenarios: Annotated[
         str | None, typer.Option(help="Names, numbers or FILE.json, separated by commas.")
@@ -427,19 +423,19 @@ def fork(
     robot: RobotOption = None,
     iterations: Annotated[
         int | None,
-        typer.Option(help="Budget in all, with the iterations that it begins with."),
+        typer.Option(help="Total budget, including copied iterations."),
     ] = None,
     start_count: Annotated[
         int | None,
         typer.Option(
             min=1,
-            help="Designs to start from where the search cannot be taken over. [default: 5]",
+            help="Start designs if the search cannot be continued. [default: 5]",
         ),
     ] = None,
     name: JobName = None,
     accept_changes: AcceptChanges = False,
     idempotency_key: Annotated[
-        str | None, typer.Option(help="The same key and fork again make no second job.")
+        str | None, typer.Option(help="Repeating a key with the same fork creates no second job.")
     ] = None,
     priority: Priority = 0,
     notify: Notify = None,
@@ -447,14 +443,14 @@ def fork(
     db: Db = None,
     as_json: Json = False,
 ) -> None:
-    """Queue a job that begins with iterations of another one; what is not said is as in that."""
+    """Queue a job that starts with iterations of another; omitted options keep its values."""
     from gaitswarm.cli.inputs.robots import chosen_robot, scenario_data
     from gaitswarm.cli.inputs.spec_file import optimizer_choice, preference_choice
     from gaitswarm.cli.output import note, print_json, stdout_console
     from gaitswarm.cli.tables import lineage_line
     from gaitswarm.jobs.open import open_jobs
 
-    given = {
+    values = {
         "preference": None if preference is None else preference_choice(preference),
         "optimizer": optimizer_choice(optimizer, optimizer_settings),
         "particles": particles,
@@ -465,7 +461,7 @@ def fork(
         "name": name,
         "accept_changes": accept_changes or None,
     }
-    options: ForkOptions = {k: v for k, v in given.items() if v is not None}  # type: ignore[assignment]
+    options: ForkOptions = {k: v for k, v in values.items() if v is not None}  # type: ignore[assignment]
     with open_jobs(server, db) as jobs:
         job = jobs.fork(
             job_id,
@@ -481,28 +477,28 @@ def fork(
         stdout_console().print(job.id, markup=False)
         if job.lineage is not None:
             note(f"{job.state}: {lineage_line(job.lineage)}")
-        note(f"follow it: gaitswarm watch {job.id}{jobs.place}")
+        note(f"to follow it, run: gaitswarm watch {job.id}{jobs.place}")
 
 
 def label(
     job_id: JobId,
     name: Annotated[
-        str | None, typer.Option(help="Show this in place of the spec's name; empty to end that.")
+        str | None, typer.Option(help="Name to show instead of the spec's; empty restores that.")
     ] = None,
-    note: Annotated[str | None, typer.Option(help="Write this note.")] = None,
+    note: Annotated[str | None, typer.Option(help="Note; empty removes it.")] = None,
     tag: Annotated[
-        list[str] | None, typer.Option(help="Tag it, in place of its tags; may be repeated.")
+        list[str] | None, typer.Option(help="Tag, replacing all tags; repeatable.")
     ] = None,
-    no_tags: Annotated[bool, typer.Option("--no-tags", help="Remove its tags.")] = False,
+    no_tags: Annotated[bool, typer.Option("--no-tags", help="Remove all tags.")] = False,
     archive: Annotated[
         bool | None,
-        typer.Option("--archive/--unarchive", help="Put it out of the way in lists, or back."),
+        typer.Option("--archive/--unarchive", help="Hide the job from lists, or show it again."),
     ] = None,
     server: Server = None,
     db: Db = None,
     as_json: Json = False,
 ) -> None:
-    """Name, note, tag or archive a job; its spec and its results stay as they are."""
+    """Name, annotate, tag or archive a job; its spec and results do not change."""
     from gaitswarm.cli.output import print_json, stdout_console
     from gaitswarm.jobs.open import open_jobs
 
@@ -512,21 +508,21 @@ def label(
     if as_json:
         print_json(job)
         return
-    written = [f"name {job.name!r}", *(f"tag {word}" for word in job.tags)]
+    labels = [f"name {job.name!r}", *(f"tag {word}" for word in job.tags)]
     if job.note:
-        written.append("a note")
+        labels.append("a note")
     if job.archived:
-        written.append("archived")
-    stdout_console().print(f"job {job.id}: {', '.join(written)}", markup=False)
+        labels.append("archived")
+    stdout_console().print(f"job {job.id}: {', '.join(labels)}", markup=False)
 
 
 def delete(
     job_id: JobId,
-    yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask for confirmation.")] = False,
     server: Server = None,
     db: Db = None,
 ) -> None:
-    """Delete a job that has ended or is paused, with all that it has found."""
+    """Delete an ended or paused job with all its results."""
     import sys
 
     from gaitswarm.cli.output import note, stdout_console
@@ -537,7 +533,7 @@ def delete(
         if not yes:
             note(_loss(jobs, jobs.job(job_id)))
             if not sys.stdin.isatty():
-                raise InvalidRequest("nobody can be asked here; --yes deletes the job", field="yes")
+                raise InvalidRequest("not a terminal: pass --yes to confirm", field="yes")
             if not typer.confirm("Delete it?", err=True):
                 note("nothing was deleted")
                 return
@@ -547,12 +543,12 @@ def delete(
 
 def keep(
     job_id: JobId,
-    release: Annotated[bool, typer.Option("--release", help="Let it be deleted again.")] = False,
+    release: Annotated[bool, typer.Option("--release", help="Allow deletion again.")] = False,
     server: Server = None,
     db: Db = None,
     as_json: Json = False,
 ) -> None:
-    """Protect a job from deletion, however long ago it ended."""
+    """Protect a job from deletion."""
     from gaitswarm.cli.output import print_json, stdout_console
     from gaitswarm.jobs.open import open_jobs
 
@@ -561,18 +557,18 @@ def keep(
     if as_json:
         print_json(job)
     else:
-        how = "is kept" if job.kept else "is not kept any more"
-        stdout_console().print(f"job {job.id} {how}", markup=False)
+        state = "is kept" if job.kept else "is no longer kept"
+        stdout_console().print(f"job {job.id} {state}", markup=False)
 
 
 def _loss(jobs: Jobs, job: JobView) -> str:
-    """What goes with a job, and what stays."""
+    """Describe what deletion removes, and what remains."""
     forks = sum(1 for _ in jobs.jobs(parent=job.id))
     name = f" ({job.name})" if job.name else ""
     loss = (
-        f"job {job.id}{name} is {job.state}; deleting it loses {job.iterations} iterations with"
-        f" {job.evaluations} evaluated designs for good"
+        f"job {job.id}{name} is {job.state}; deletion removes {job.iterations} iterations with"
+        f" {job.evaluations} evaluated designs permanently"
     )
     if forks:
-        loss += f"\nforks of it, {forks}, keep their copies, but their parent is gone"
-    return f"{loss}\ncertificates of its designs stay as jobs of their own"
+        loss += f"\nforks that keep their copies of its iterations: {forks}"
+    return f"{loss}\ncertificates of its designs remain"

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from gaitswarm.sim.robot import Robot
 
 LARGEST_FILE: Final = 1 << 28
-"""Largest log that is read [B]; a second takes about a megabyte."""
+"""Largest accepted log [B]; one second takes about 1 MB."""
 
 _HUGE: Final = 1e300
 
@@ -46,7 +46,7 @@ ScenarioOption = Annotated[
 TrajectoryOption = Annotated[
     Path | None,
     typer.Option(
-        "--trajectory", metavar="FILE", help="JSON object of gait parameters, beside the design."
+        "--trajectory", metavar="FILE", help="JSON object of gait parameters, added to the design."
     ),
 ]
 CyclesOption = Annotated[
@@ -75,25 +75,21 @@ def read_walk(
     server: str | None,
     db: str | None,
 ) -> MeasuredWalk:
-    """The walk of a design; of a job's best on the job's robot, unless another is named.
-
-    server, db: Where the job is, if the design is of one.
-    Raises InvalidRequest or SimulationInputError that names what is wrong, NotFound.
-    """
+    """Return the walk of a design; a job's best uses the job's robot by default."""
     from gaitswarm.cli.inputs.design_file import given_design
     from gaitswarm.cli.inputs.robots import chosen_scenarios
     from gaitswarm.sim.measurement.measured_log import MeasuredWalk
     from gaitswarm.sim.robot import load_robot
 
     given = given_design(design, controller, trajectory, robot=robot, server=server, db=db)
-    unchecked: Mapping[str, Any] = given.values
-    for name, value in unchecked.items():
+    values: Mapping[str, Any] = given.values
+    for name, value in values.items():
         number = isinstance(value, int | float) and not isinstance(value, bool)
         if not (number and -_HUGE < value < _HUGE):
             raise InvalidRequest("must be a finite number", field=f"design.{name}")
     scenarios = chosen_scenarios(scenario, robot)
     if len(scenarios) != 1:
-        raise InvalidRequest("name one scenario: a log is of one walk", field="scenario")
+        raise InvalidRequest("must name one scenario", field="scenario")
     (chosen,) = scenarios
     if cycles is not None:
         chosen = chosen.model_copy(update={"cycles": float(cycles)})
@@ -103,7 +99,7 @@ def read_walk(
 def synchronised(
     path: Path, log: MeasuredLog, simulated: MeasuredLog, walk: MeasuredWalk
 ) -> Synchronised:
-    """A log beside the simulated walk. Raises InvalidRequest that names the file."""
+    """Align a log with the simulated walk; errors name the file."""
     from gaitswarm.sim.errors import MeasuredLogError
     from gaitswarm.sim.measurement.synchronise import synchronise
 
@@ -114,7 +110,7 @@ def synchronised(
 
 
 def read_measured(path: Path, robot: Robot) -> MeasuredLog:
-    """A log from a file. Raises InvalidRequest that names file, line, column and unit."""
+    """Read a log; errors name file, line, column and unit."""
     from gaitswarm.sim.errors import MeasuredLogError
     from gaitswarm.sim.measurement.measured_csv import parse_measured_log
 
@@ -138,7 +134,7 @@ Truth = Annotated[
     Path | None,
     typer.Option(
         metavar="FILE.json",
-        help="True values by name, as `synthesize --parameters` takes them: shown beside.",
+        help="True values by name, as for `synthesize --parameters`, shown for comparison.",
     ),
 ]
 
@@ -158,7 +154,7 @@ def record(
     db: Db = None,
     as_json: Json = False,
 ) -> None:
-    """Keep a measured walk where jobs can fit a robot to it; prints the recording's id."""
+    """Store a measured walk for identification, and print the recording's id."""
     from gaitswarm.cli.output import note, print_json, stdout_console
     from gaitswarm.jobs.open import open_jobs
     from gaitswarm.sim.identification.recorded_walk import record as recorded
@@ -166,23 +162,23 @@ def record(
     walk = read_walk(scenario, controller, design, trajectory, cycles, robot, server=server, db=db)
     log = read_measured(measured, walk.robot)
     pair = synchronised(measured, log, walk.simulated(), walk)
-    taken = recorded(pair, walk.scenario, walk.controller, walk.design)
+    recording = recorded(pair, walk.scenario, walk.controller, walk.design)
     with open_jobs(server, db, create=True) as jobs:
-        kept = jobs.record(taken)
+        view = jobs.record(recording)
     if as_json:
-        print_json(kept)
+        print_json(view)
         return
-    stdout_console().print(kept.id, markup=False)
+    stdout_console().print(view.id, markup=False)
     note(
-        f"{'SYNTHETIC ' if kept.synthetic else ''}recording of {kept.joints} currents over"
-        f" {kept.seconds:g} s, {pair.cycles} cycles of {kept.scenario}"
+        f"{'SYNTHETIC ' if view.synthetic else ''}recording of {view.joints} currents over"
+        f" {view.seconds:g} s, {pair.cycles} cycles of {view.scenario}"
     )
 
 
 @with_groups
 def identify(
     recordings: Annotated[
-        list[str], typer.Argument(metavar="RECORDING...", help="Ids that `record` printed.")
+        list[str], typer.Argument(metavar="RECORDING...", help="Ids printed by `record`.")
     ],
     *,
     variables: Annotated[
@@ -190,31 +186,31 @@ def identify(
         typer.Option(help="Parameters to fit, separated by commas. Default: all of table 2.7."),
     ] = None,
     links: Annotated[
-        str, typer.Option(help="Links whose currents are compared, separated by commas.")
+        str, typer.Option(help="Links whose currents to compare, separated by commas.")
     ] = "1,2,3",
     robot: RobotOption = None,
     runs: Annotated[
         int,
         typer.Option(
-            min=1, max=32, help="Jobs that differ in their seed: one alone shows no trust."
+            min=1, max=32, help="Number of jobs with different seeds; one alone shows no trust."
         ),
     ] = 3,
     iterations: Annotated[int, typer.Option(help="Iterations of each job.")] = 120,
-    particles: Annotated[int, typer.Option(help="Designs of an iteration.")] = 48,
-    seed: Annotated[int, typer.Option(help="Seed of the first job; the others count up.")] = 1,
+    particles: Annotated[int, typer.Option(help="Designs per iteration.")] = 48,
+    seed: Annotated[int, typer.Option(help="Seed of the first job; others follow.")] = 1,
     precision: Precision = None,
     name: JobName = None,
     truth: Truth = None,
     workers: WorkerOptions,
     as_json: Json = False,
 ) -> None:
-    """Fit parameters of a robot to recorded walks, here and now, and say which can be trusted."""
+    """Fit a robot's parameters to recorded walks in this process, and show which are reliable."""
     from gaitswarm.cli.calibration import read_truth, show_parameters
     from gaitswarm.cli.embedded import run_seeds
     from gaitswarm.cli.inputs.robots import chosen_robot
     from gaitswarm.cli.inputs.spec_file import parse_spec
 
-    known = read_truth(truth)
+    true_values = read_truth(truth)
     document = {
         "kind": "identification",
         "name": name or "identification",
@@ -222,7 +218,7 @@ def identify(
         "recordings": recordings,
         "variables": None if variables is None else variables.split(","),
         "links": [int(link) if link.isdecimal() else link for link in links.split(",")],
-        # Wide at first and narrow at last: there are many parameters, and one valley.
+        # Explore first, then converge: there are many parameters, and one valley.
         "optimizer": {
             "name": "pso",
             "particles": particles,
@@ -236,8 +232,8 @@ def identify(
     run_seeds(
         specs,
         workers,
-        lambda jobs, ids: show_parameters(jobs.parameters(ids), known, as_json=as_json),
-        again="parameters",
+        lambda jobs, ids: show_parameters(jobs.parameters(ids), true_values, as_json=as_json),
+        report_command="parameters",
     )
 
 
@@ -252,21 +248,21 @@ def parameters(
     db: Db = None,
     as_json: Json = False,
 ) -> None:
-    """Say which fitted parameters can be trusted: intervals at twelve fitness thresholds.
+    """Show which fitted parameters are reliable: intervals at twelve fitness thresholds.
 
-    Of one job, or of jobs of one problem that differ in their seed.
+    Takes one job, or jobs that differ only in their seed.
     """
     from gaitswarm.cli.calibration import draw_parameters, read_truth, show_parameters
     from gaitswarm.cli.output import note
     from gaitswarm.cli.pictures import save
     from gaitswarm.jobs.open import open_jobs
 
-    known = read_truth(truth)
+    true_values = read_truth(truth)
     with open_jobs(server, db) as jobs:
-        found = jobs.parameters(job_ids)
-    show_parameters(found, known, as_json=as_json)
+        view = jobs.parameters(job_ids)
+    show_parameters(view, true_values, as_json=as_json)
     if output is not None:
-        save(draw_parameters(found, known), output)
+        save(draw_parameters(view, true_values), output)
         note(f"picture written to {output}")
 
 
@@ -275,27 +271,27 @@ def recordings(
         str,
         typer.Option(
             metavar="TEXT",
-            help="Only those whose id, scenario or controller contain this, whatever its case.",
+            help="Only recordings whose id, scenario or controller contain this, in any case.",
         ),
     ] = "",
-    limit: Annotated[int, typer.Option(min=1, help="Most recordings to list.")] = 50,
+    limit: Annotated[int, typer.Option(min=1, help="Maximum number of recordings.")] = 50,
     server: Server = None,
     db: Db = None,
     as_json: Json = False,
 ) -> None:
-    """List recorded walks, newest first: their ids are what `identify` takes."""
+    """List recorded walks and their ids for `identify`, newest first."""
     from gaitswarm.cli.output import note, print_json_list, stdout_console
     from gaitswarm.cli.tables import recordings_table
     from gaitswarm.jobs.open import open_jobs
 
     with open_jobs(server, db) as jobs:
-        found = jobs.recordings(search=search, limit=limit)
+        matches = jobs.recordings(search=search, limit=limit)
         if as_json:
-            print_json_list(found)
+            print_json_list(matches)
             return
-        rows = list(found)
+        rows = list(matches)
     if not rows:
-        note("no recording fits" if search else "nothing is recorded yet; see `gaitswarm record`")
+        note("no recording matches" if search else "no recordings yet; see `gaitswarm record`")
         return
     stdout_console().print(recordings_table(rows))
 
@@ -325,7 +321,7 @@ def validate(
     db: Db = None,
     as_json: Json = False,
 ) -> None:
-    """Simulate the walk that was measured, and judge the differences by tolerance classes."""
+    """Simulate a measured walk, and classify the differences by tolerance."""
     from gaitswarm.cli.output import note, print_json, stdout_console
     from gaitswarm.cli.validation import (
         alignment,
@@ -373,19 +369,19 @@ def synthesize(
     cycles: CyclesOption = None,
     robot: RobotOption = None,
     seed: Annotated[
-        int, typer.Option(min=0, max=(1 << 64) - 1, help="Source of the instruments' noise.")
+        int, typer.Option(min=0, max=(1 << 64) - 1, help="Seed of the sensor noise.")
     ] = 1,
     parameters: Annotated[
         Path | None,
         typer.Option(
             metavar="FILE.json",
-            help="Values of single parameters by name: the twin then differs in these alone.",
+            help="Parameter values by name; the twin differs only in these.",
         ),
     ] = None,
     server: Server = None,
     db: Db = None,
 ) -> None:
-    """Write a SYNTHETIC log: a perturbed twin of the robot, with sensor noise. No measurement."""
+    """Write a SYNTHETIC log of a perturbed twin of the robot with sensor noise, for tests."""
     from gaitswarm.cli.calibration import read_truth
     from gaitswarm.cli.files import replacing
     from gaitswarm.cli.output import note
@@ -399,10 +395,10 @@ def synthesize(
     walk = read_walk(scenario, controller, design, trajectory, cycles, robot, server=server, db=db)
     twin = None
     if parameters is not None:
-        known = {variable.name for variable in identifiable_variables(walk.robot)}
+        names = {variable.name for variable in identifiable_variables(walk.robot)}
         values = read_truth(parameters)
         for name in values:
-            if name not in known:
+            if name not in names:
                 raise InvalidRequest("no such parameter of the robot", field=f"parameters.{name}")
         twin = Perturbation.of(values)
     log = synthetic_log(

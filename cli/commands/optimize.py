@@ -33,27 +33,25 @@ def optimize(
         typer.Option(
             metavar="ID",
             callback=completed,
-            help="Go on with this job, to the same bits as if it had never stopped.",
+            help="Resume this job; results equal those of an uninterrupted run to the bit.",
         ),
     ] = None,
     accept_changes: AcceptChanges = False,
     compare_published: Annotated[
         bool,
-        typer.Option(
-            "--compare-published", help="Show the best design beside the one of the literature."
-        ),
+        typer.Option("--compare-published", help="Compare the best design with the published one."),
     ] = False,
     compare_optimizer: Annotated[
         str | None,
         typer.Option(
             metavar="NAME",
-            help="Run the same job with another search method, too, and show what that found.",
+            help="Also run the job with another search method, and compare the results.",
         ),
     ] = None,
     workers: WorkerOptions,
     as_json: Json = False,
 ) -> None:
-    """Run a job here and now, without a server. Ctrl-C stops it; --resume goes on with it."""
+    """Run a job in this process. Ctrl-C stops it; --resume continues it."""
     from contextlib import closing
     from dataclasses import asdict
 
@@ -68,16 +66,16 @@ def optimize(
     from gaitswarm.services.runtime import open_store
     from gaitswarm.settings import read_settings
 
-    for option, given in {
+    for option, value in {
         "compare-published": compare_published,
         "compare-optimizer": compare_optimizer,
     }.items():
-        if as_json and given:
-            raise InvalidRequest("is for people; leave it out with --json", field=option)
+        if as_json and value:
+            raise InvalidRequest("cannot be combined with --json", field=option)
     if accept_changes and resume is None:
-        raise InvalidRequest("a new job has nothing to go on from", field="accept-changes")
+        raise InvalidRequest("requires --resume", field="accept-changes")
     settings = read_settings(**asdict(workers))
-    asked = build_spec(options) if resume is None or options.given else None
+    spec = build_spec(options) if resume is None or options.given else None
     if compare_optimizer is not None:
         check_optimizer_name(compare_optimizer, "compare-optimizer")
     url = database_to_write(settings)
@@ -88,22 +86,22 @@ def optimize(
         service = JobService(store)
         jobs = DatabaseJobs(service, url)
         claim = None
-        if asked is not None and resume is None:
-            claim = service.submit_embedded(asked)
+        if spec is not None and resume is None:
+            claim = service.submit_embedded(spec)
             job = claim.job
         else:
-            job = resumed_job(service, resume or "", asked, accept_changes=accept_changes)
+            job = resumed_job(service, resume or "", spec, accept_changes=accept_changes)
         note(f"job {job.id} in database {masked_url(url)}")
         interrupted = embedded.run(jobs, store, job, claim)
-        beside = {}
+        others = {}
         if compare_optimizer is not None and not interrupted:
             other = job_run(by_other_optimizer(job.spec, compare_optimizer), store, jobs, embedded)
-            beside[compare_optimizer] = jobs.job(other.id)
-        finish(jobs, job.id, interrupted, as_json=as_json, compare=compare_published, beside=beside)
+            others[compare_optimizer] = jobs.job(other.id)
+        finish(jobs, job.id, interrupted, as_json=as_json, compare=compare_published, others=others)
 
 
 def optimizers(as_json: Json = False) -> None:
-    """List search methods with what can be set of them."""
+    """List search methods and their settings."""
     from gaitswarm.cli.output import print_json_list, stdout_console
     from gaitswarm.cli.tables import optimizers_table
     from gaitswarm.views import optimizer_views
@@ -115,7 +113,7 @@ def optimizers(as_json: Json = False) -> None:
 
 
 def plugins(as_json: Json = False) -> None:
-    """List plug-ins: controllers, cases and search methods of other packages that are installed."""
+    """List installed plug-ins: controllers, cases and search methods of other packages."""
     from rich.text import Text
 
     from gaitswarm.cli.output import print_json_list, stdout_console
@@ -133,7 +131,7 @@ def plugins(as_json: Json = False) -> None:
 
 
 def cases(as_json: Json = False) -> None:
-    """List cases of plug-ins, which evaluate designs in place of walks, with their settings."""
+    """List cases: plug-ins that evaluate designs instead of the simulator, and their settings."""
     from rich.text import Text
 
     from gaitswarm.cli.output import print_json_list, stdout_console

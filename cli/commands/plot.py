@@ -28,7 +28,7 @@ Output = Annotated[
 def register(app: typer.Typer) -> None:
     """Add the commands."""
     plots = typer.Typer(
-        help="Draw a job's convergence or front, a controller's surface, or how robust designs are."
+        help="Draw a job's convergence or front, a controller's surface, or designs' robustness."
     )
     plots.command()(convergence)
     plots.command()(front)
@@ -38,7 +38,7 @@ def register(app: typer.Typer) -> None:
 
 
 def convergence(job_id: JobId, output: Output, server: Server = None, db: Db = None) -> None:
-    """Draw a job's fitness over its iterations: best so far, and its designs."""
+    """Draw a job's fitness over its iterations."""
     from gaitswarm.cli.output import note
     from gaitswarm.cli.pictures import draw_convergence, save
     from gaitswarm.jobs.open import open_jobs
@@ -76,7 +76,7 @@ def surface(
     server: Server = None,
     db: Db = None,
 ) -> None:
-    """Draw the output of a Fuzzy-PI design over angle error and motor current, as quantised."""
+    """Draw the quantised output of a Fuzzy-PI design over angle error and motor current."""
     from gaitswarm.cli.inputs.design_file import given_design
     from gaitswarm.cli.output import note
     from gaitswarm.cli.pictures import draw_surface, save
@@ -92,7 +92,7 @@ def surface(
 
 def robustness(
     designs: Annotated[
-        list[str], typer.Argument(metavar="DESIGN|ID", help="One or several, as for `robustness`.")
+        list[str], typer.Argument(metavar="DESIGN|ID", help="Designs as for `robustness`.")
     ],
     output: Output,
     samples: Samples = 256,
@@ -102,11 +102,11 @@ def robustness(
     controller: ControllerOption = None,
     robot: RobotOption = None,
     precision: Precision = None,
-    title: Annotated[str, typer.Option(help="Of the picture.")] = "Robustness",
+    title: Annotated[str, typer.Option(help="Title of the picture.")] = "Robustness",
     server: Server = None,
     db: Db = None,
 ) -> None:
-    """Draw designs' robustness indices by scenario side by side, with their intervals."""
+    """Draw robustness indices of designs by scenario, with their intervals."""
     from gaitswarm.cli.inputs.design_file import given_design
     from gaitswarm.cli.output import note
     from gaitswarm.cli.pictures import save
@@ -128,7 +128,7 @@ def robustness(
         )
     if len({request.resolved_scenarios() for request in requests.values()}) > 1:
         raise InvalidRequest(
-            "the designs' jobs have different ones; choose some", field="scenarios"
+            "the designs' jobs have different scenarios; pass --scenarios", field="scenarios"
         )
     views = {label: estimate(request) for label, request in requests.items()}
     save(draw_robustness(views, title=title), output)

@@ -1,4 +1,4 @@
-"""`gaitswarm robot`: a robot of one's own from a URDF, and a look at it."""
+"""`gaitswarm robot`: custom robots from URDF files, and checks of them."""
 
 from __future__ import annotations
 
@@ -19,68 +19,69 @@ if TYPE_CHECKING:
 
 _Choice = TypeVar("_Choice", bound=str)
 
-_NAMED: Final = 5
-"""Missing meshes that are named."""
+_LISTED: Final = 5
+"""Missing meshes that are listed."""
 
 Folder = Annotated[
-    Path, typer.Argument(metavar="FOLDER", help="With robot.toml and robot.urdf.", exists=False)
+    Path,
+    typer.Argument(metavar="FOLDER", help="Folder of robot.toml and robot.urdf.", exists=False),
 ]
 
 PackagePath = Annotated[
     list[Path] | None,
     typer.Option(
         metavar="FOLDER",
-        help="Where package:// of meshes is looked for, before ROS_PACKAGE_PATH; repeatable.",
+        help="Search path of package:// meshes, before ROS_PACKAGE_PATH; repeatable.",
     ),
 ]
 
 
 def register(app: typer.Typer) -> None:
     """Add the commands."""
-    group = typer.Typer(help="Make a robot of your own from its URDF, and check it.")
+    group = typer.Typer(help="Create a robot from a URDF file, and check it.")
     group.command()(init)
     group.command()(check)
     app.add_typer(group, name="robot")
 
 
 def init(
-    urdf: Annotated[Path, typer.Argument(metavar="FILE.urdf", help="Of a robot with legs.")],
+    urdf: Annotated[Path, typer.Argument(metavar="FILE.urdf", help="URDF of a legged robot.")],
     *,
     output: Annotated[
-        Path, typer.Option("--output", "-o", metavar="FOLDER", help="New, or empty.")
+        Path, typer.Option("--output", "-o", metavar="FOLDER", help="New or empty folder.")
     ],
     name: Annotated[
-        str | None, typer.Option(help="Of the robot [default: the URDF's, else the file's].")
+        str | None, typer.Option(help="Name of the robot [default: the URDF's, else the file's].")
     ] = None,
     actuator: Annotated[
         str,
         typer.Option(
             metavar="auto|dc|torque",
-            help="Kind of its actuators: DC motors with gearheads, or torque-controlled ones; auto"
-            " decides by the torques and rates of the URDF.",
+            help="Actuators: DC motors with gearheads, or torque-controlled; auto decides by the"
+            " URDF's torques and rates.",
         ),
     ] = "auto",
     up: Annotated[
         str | None,
         typer.Option(
             metavar="AXIS",
-            help="Of its first link, that points up: x, y, z, -x, -y, -z [default: z; refused if"
-            " the legs speak against it].",
+            help="Axis of the first link that points up: x, y, z, -x, -y, -z [default: z; refused"
+            " if inconsistent with the legs].",
         ),
     ] = None,
     forward: Annotated[
         str | None,
         typer.Option(
             metavar="AXIS",
-            help="Of its first link, that points ahead [default: x; a warning if the legs speak"
-            " against it].",
+            help="Axis of the first link that points forward [default: x; a warning if inconsistent"
+            " with the legs].",
         ),
     ] = None,
     meshes: Annotated[
         bool,
         typer.Option(
             "--meshes/--no-meshes",
-            help="Copy the meshes that the URDF names: the page shows them, no walk needs them.",
+            help="Copy the URDF's meshes, which the page shows; simulations do not need them.",
         ),
     ] = True,
     package_path: PackagePath = None,
@@ -88,14 +89,13 @@ def init(
 ) -> None:
     """Find legs, choose a stance, propose actuators, and write a robot's folder.
 
-    It holds robot.toml, with a comment on every guess; robot.urdf and its meshes; and job.json,
-    what jobs of this robot have unless they say otherwise. Then --robot FOLDER works in every
-    command.
+    It contains robot.toml, with a comment on every guess; robot.urdf and its meshes; and job.json,
+    the defaults of this robot's jobs. Then pass --robot FOLDER to any command.
     """
     from gaitswarm.cli.output import note, print_text
     from gaitswarm.robots import init_robot
 
-    made = init_robot(
+    created = init_robot(
         urdf,
         output,
         name=name,
@@ -106,23 +106,23 @@ def init(
         packages=package_path or [],
     )
     if as_json:
-        left_out = [{"name": name, "problem": problem} for name, problem in made.meshes.left_out]
+        left_out = [{"name": name, "problem": problem} for name, problem in created.meshes.left_out]
         _print(
             {
                 "folder": str(output),
-                "name": made.name,
-                "guesses": list(made.guesses),
-                "meshes": {"copied": list(made.meshes.copied), "left_out": left_out},
+                "name": created.name,
+                "guesses": list(created.guesses),
+                "meshes": {"copied": list(created.meshes.copied), "left_out": left_out},
             }
         )
         return
-    for guess in made.guesses:
+    for guess in created.guesses:
         print_text(f"{guess}\n")
-    print_text(_copied(made.meshes))
+    print_text(_mesh_summary(created.meshes))
     note(
-        f"robot {made.name!r} written to {output}; look at it with `gaitswarm robot check {output}`"
+        f"robot {created.name!r} written to {output}; check it by `gaitswarm robot check {output}`"
     )
-    if made.meshes.copied:
+    if created.meshes.copied:
         note(f"`gaitswarm serve --robots {output}` shows its meshes on the page")
 
 
@@ -131,12 +131,12 @@ def check(
     *,
     draw: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Draw how it stands into FILE.png, .svg or .pdf."),
+        typer.Option(metavar="FILE", help="Draw its stance to FILE.png, .svg or .pdf."),
     ] = None,
     package_path: PackagePath = None,
     as_json: Json = False,
 ) -> None:
-    """Load a robot, let it stand for a second, and say what there is to it."""
+    """Load a robot, simulate it standing for a second, and show its properties."""
     from gaitswarm.cli.output import note, print_json, print_text
     from gaitswarm.robots import check_robot
 
@@ -149,7 +149,7 @@ def check(
     if as_json:
         print_json(view)
         return
-    print_text(_told(view))
+    print_text(_summary(view))
     for warning in view.warnings:
         note(f"warning: {warning}")
 
@@ -175,14 +175,14 @@ def _one_of(text: str, choices: Sequence[_Choice], field: str) -> _Choice:
     raise InvalidRequest(f"{text!r} is none of {', '.join(choices)}", field=field)
 
 
-def _copied(meshes: MeshCopies) -> str:
-    found, lost = len(meshes.copied), meshes.left_out
-    if not found and not lost:
+def _mesh_summary(meshes: MeshCopies) -> str:
+    copied, missing = len(meshes.copied), meshes.left_out
+    if not copied and not missing:
         return ""
-    lines = [f"meshes: {found} of {found + len(lost)} copied, {meshes.size / 1e6:.1f} MB"]
-    lines += [f"  left out: {name[:200]}: {problem}" for name, problem in lost[:_NAMED]]
-    if len(lost) > _NAMED:
-        lines.append(f"  and {len(lost) - _NAMED} more; --package-path names folders of packages")
+    lines = [f"meshes: {copied} of {copied + len(missing)} copied, {meshes.size / 1e6:.1f} MB"]
+    lines += [f"  left out: {name[:200]}: {problem}" for name, problem in missing[:_LISTED]]
+    if len(missing) > _LISTED:
+        lines.append(f"  and {len(missing) - _LISTED} more; pass --package-path")
     return "\n".join(lines) + "\n"
 
 
@@ -192,14 +192,14 @@ def _files(folder: Path) -> RobotFiles:
     from gaitswarm.sim.robot import RobotFiles
 
     if not folder.is_dir():
-        raise InvalidRequest(f"{folder} is no folder", field="folder")
+        raise InvalidRequest(f"{folder} is not a folder", field="folder")
     files = chosen_robot(str(folder))
     if not isinstance(files, RobotFiles):
-        raise InvalidRequest(f"{folder} is no robot's folder", field="folder")
+        raise InvalidRequest(f"{folder} is not a robot's folder", field="folder")
     return files
 
 
-def _told(view: RobotCheckView) -> str:
+def _summary(view: RobotCheckView) -> str:
     standing = view.standing
     stood = (
         f"standing for {standing.seconds:g} s: soles carry {standing.normal_forces:.1f} N of"
@@ -210,7 +210,7 @@ def _told(view: RobotCheckView) -> str:
         f"{view.name}: {len(view.legs)} legs, {view.joints} joints, {view.mass:.3f} kg",
         "",
         f"{'leg':20} {'joints':{width}} {'mass':>9} {'length':>8} {'reach':>8}",
-        f"{'body, and what is held':{21 + width}} {view.body_mass:6.3f} kg",
+        f"{'body and held joints':{21 + width}} {view.body_mass:6.3f} kg",
         *(
             f"{leg.name:20} {', '.join(leg.joints):{width}} {leg.mass:6.3f} kg {leg.length:6.3f} m"
             f" {leg.reach:6.3f} m"
@@ -221,13 +221,15 @@ def _told(view: RobotCheckView) -> str:
     ]
     lines += [f"held: {name} at {angle:g} rad" for name, angle in view.held.items()]
     if view.guesses:
-        lines += ["guessed, as robot.toml has it:", *(f"  {guess}" for guess in view.guesses)]
+        lines += ["guesses in robot.toml:", *(f"  {guess}" for guess in view.guesses)]
     if view.meshes:
         missing = [mesh.name for mesh in view.meshes if mesh.path is None]
         lines.append(f"meshes: {len(view.meshes) - len(missing)} of {len(view.meshes)} found")
-        lines += [f"  missing: {name}" for name in missing[:_NAMED]]
-        if len(missing) > _NAMED:
-            lines.append(f"  and {len(missing) - _NAMED} more; name their folder by --package-path")
+        lines += [f"  missing: {name}" for name in missing[:_LISTED]]
+        if len(missing) > _LISTED:
+            lines.append(
+                f"  and {len(missing) - _LISTED} more; pass their folders by --package-path"
+            )
     return "\n".join(lines) + "\n"
 
 

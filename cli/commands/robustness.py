@@ -1,4 +1,4 @@
-"""`gaitswarm robustness`: what small changes of a design's variables do to its objectives."""
+"""`gaitswarm robustness`: sensitivity of objectives to small changes of a design."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     from gaitswarm.requests.robustness import Progress, RobustnessRequest
     from gaitswarm.views.robustness import RobustnessView
 
-Samples = Annotated[int, typer.Option(help="Designs that walk beside each given one.")]
+Samples = Annotated[int, typer.Option(help="Designs to sample around each given one.")]
 Radius = Annotated[
-    float, typer.Option(help="How far they are from it, as a share of each variable's bounds.")
+    float, typer.Option(help="Radius of the sample, as a share of each variable's bounds.")
 ]
-Seed = Annotated[int, typer.Option(help="Of the sample.")]
+Seed = Annotated[int, typer.Option(help="Seed of the sample.")]
 Scenarios = Annotated[
     str | None,
     typer.Option(
@@ -39,8 +39,8 @@ def robustness(
         str,
         typer.Argument(
             metavar="DESIGN|ID",
-            help="Design file, `-`, or published:NAME, as for `simulate`; or the id of a job, for"
-            " its best.",
+            help="Design file, `-`, or published:NAME, as for `simulate`; or a job's id for its"
+            " best.",
         ),
     ],
     samples: Samples = 256,
@@ -54,10 +54,10 @@ def robustness(
     db: Db = None,
     as_json: Json = False,
 ) -> None:
-    """Estimate the robustness index of a design (thesis 4.4.3): the smaller, the more robust.
+    """Estimate the robustness index of a design (thesis 4.4.3); smaller is more robust.
 
-    It is the norm of the Jacobian of the objectives' logarithms, by the variables as shares of
-    their bounds, from a regression over designs that are drawn around the given one.
+    It is the norm of the Jacobian of the objectives' logarithms with respect to the variables as
+    shares of their bounds, from a regression over designs sampled around the given one.
     """
     from gaitswarm.cli.inputs.design_file import given_design
     from gaitswarm.cli.output import print_json
@@ -89,10 +89,7 @@ def robustness_request(
     robot: str | None,
     precision: str | None,
 ) -> RobustnessRequest:
-    """What to ask of a design; a job's best walks in the job's scenarios on the job's robot.
-
-    Raises InvalidRequest that names the field.
-    """
+    """Build the request for a design; a job's best uses the job's scenarios and robot."""
     from pydantic import ValidationError
 
     from gaitswarm.cli.inputs.robots import robot_defaults, scenario_data
@@ -122,7 +119,7 @@ def robustness_request(
 
 
 def estimate(request: RobustnessRequest) -> RobustnessView:
-    """The estimate; what takes longer than two seconds shows how far it is."""
+    """Estimate the index, with progress on stderr."""
     from gaitswarm.requests.robustness import run_robustness
 
     with shown_progress() as progress:
@@ -131,18 +128,18 @@ def estimate(request: RobustnessRequest) -> RobustnessView:
 
 @contextmanager
 def shown_progress() -> Iterator[Progress]:
-    """A line on stderr every two seconds."""
+    """Print progress to stderr every two seconds."""
     import time
 
     from gaitswarm.cli.output import note
 
-    told = time.monotonic()
+    last = time.monotonic()
 
     def progress(done: int, planned: int) -> None:
-        nonlocal told
-        if done < planned and time.monotonic() - told >= 2.0:
-            told = time.monotonic()
-            note(f"{done} of {planned} walks")
+        nonlocal last
+        if done < planned and time.monotonic() - last >= 2.0:
+            last = time.monotonic()
+            note(f"{done} of {planned} simulations")
 
     yield progress
 

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from gaitswarm.services.runtime import Runtime
     from gaitswarm.settings import Settings
 
-_GLANCE: Final = 0.2
-"""Seconds after which a signal is seen at the latest."""
+_SIGNAL_POLL: Final = 0.2
+"""Maximum delay before a signal is handled [s]."""
 
 
 def register(app: typer.Typer) -> None:
@@ -46,11 +46,11 @@ def serve(
         typer.Option(
             min=0,
             max=65535,
-            help="Port; 0 takes a free one. [env: GAITSWARM_API_PORT; default: 8000]",
+            help="Port; 0 chooses a free one. [env: GAITSWARM_API_PORT; default: 8000]",
         ),
     ] = None,
     no_runner: Annotated[
-        bool, typer.Option("--no-runner", help="Run no jobs; other processes do.")
+        bool, typer.Option("--no-runner", help="Run no jobs in this process.")
     ] = False,
     robots: Annotated[
         list[Path] | None,
@@ -58,8 +58,8 @@ def serve(
             metavar="FOLDER",
             exists=True,
             file_okay=False,
-            help="Show this robot's meshes on the page, or those of the robots in this folder, to"
-            " whoever may read the jobs; may be repeated. [env: GAITSWARM_ROBOTS; default: none]",
+            help="Folder of a robot, or of several, whose meshes the page shows to users who can"
+            " read the jobs; repeatable. [env: GAITSWARM_ROBOTS; default: none]",
         ),
     ] = None,
     options: RunnerOptions,
@@ -80,36 +80,34 @@ def serve(
 
     settings = read_settings(**asdict(options), api_host=host, api_port=port, robots=robots or None)
     log_to_stderr(settings.log_level, settings.log_format)
-    tell = note if settings.log_format == "console" else logging.getLogger("gaitswarm").info
+    report = note if settings.log_format == "console" else logging.getLogger("gaitswarm").info
     metrics = Metrics()
     activity = None if no_runner else Activity()
     runs_jobs = not no_runner
     with _runtime(
         settings, metrics, runs_jobs=runs_jobs, housekeeping=True, activity=activity
     ) as opened:
-        beside = opened.runner
-        components = _components(opened, beside)
         app = create_app(
             opened.service,
             settings=settings,
-            components=components,
+            components=_components(opened),
             metrics=metrics,
             activity=activity,
         )
         try:
             server = ApiServer(
-                app, settings, drain=lambda at_once: _drain(beside, settings, at_once)
+                app, settings, drain=lambda at_once: _drain(opened.runner, settings, at_once)
             )
         except OSError as error:
             raise EvaluatorUnavailable(
                 f"cannot listen: {error.strerror}; choose another --port, or --port 0"
             ) from error
-        doing = "runs no jobs" if beside is None else "runs queued jobs"
+        role = "runs no jobs" if opened.runner is None else "runs queued jobs"
         if not is_built():
-            tell("there is no page, only the API: in a checkout, `make page` builds the page")
-        tell(f"gaitswarm serves {server.url} and {doing}; {server.url}/docs; Ctrl-C ends it")
+            report("the page is not built, only the API is served: run `make page` in a checkout")
+        report(f"gaitswarm serves {server.url} and {role}; {server.url}/docs; Ctrl-C ends it")
         if settings.tokens_required:
-            _tell_of_tokens(tell, opened.service.store.tokens.create_first(), server.url)
+            _report_tokens(report, opened.service.store.tokens.create_first(), server.url)
         # Full collections would otherwise block the event loop for 0.1 s to visit all modules.
         gc.freeze()
         server.run()
@@ -119,8 +117,8 @@ def serve(
 def runner(options: RunnerOptions) -> None:
     """Run queued jobs, without page and API, until Ctrl-C or SIGTERM.
 
-    The jobs that are then under way commit their iterations and go back to the queue; a second
-    signal drops the iterations.
+    Running jobs then commit their current iterations and return to the queue; a second signal
+    discards these iterations.
     """
     import logging
     import threading
@@ -141,7 +139,7 @@ def runner(options: RunnerOptions) -> None:
         from gaitswarm.services.monitoring.metrics import Metrics
 
         metrics = Metrics()
-    # A stop while a cluster is connected ends the command before it is ready.
+    # A signal while connecting to a cluster ends the command.
     with (
         suppress(EvaluationStopped),
         stop_on_signals(stop, at_once),
@@ -151,8 +149,8 @@ def runner(options: RunnerOptions) -> None:
         log.info("ready: %d slots, %d jobs at once", opened.slots, settings.concurrent_jobs)
         if url is not None:
             log.info("metrics: %s", url)
-        # Handlers run in this thread, but the system may hand a signal to another one.
-        while not stop.wait(_GLANCE):
+        # Handlers run in this thread, but the system may deliver a signal to another.
+        while not stop.wait(_SIGNAL_POLL):
             pass
         _drain(opened.runner, settings, at_once)
 
@@ -164,18 +162,18 @@ def _drain(runner: Runner | None, settings: Settings, at_once: threading.Event) 
         return
     seconds = settings.drain_seconds
     logging.getLogger(__name__).info(
-        "ending: jobs commit their iterations under way, for %g s at most, and go back to the"
-        " queue; a second signal drops the iterations",
+        "stopping: jobs commit their current iterations within %g s and return to the queue; a"
+        " second signal discards these iterations",
         seconds,
     )
     runner.drain(seconds, at_once)
 
 
-def _components(opened: Runtime, runner: Runner | None) -> tuple[Component, ...]:
-    """Parts of the process that it tells of. Jobs wait for workers that are away."""
+def _components(opened: Runtime) -> tuple[Component, ...]:
+    """Return the components of health reports; jobs wait for missing workers."""
     from gaitswarm.api.dependencies import Component
 
-    events = Component("events", opened.service.store.changes.trouble)
+    events, runner = Component("events", opened.service.store.changes.trouble), opened.runner
     if runner is None:
         return (events,)
     return (
@@ -185,15 +183,15 @@ def _components(opened: Runtime, runner: Runner | None) -> tuple[Component, ...]
     )
 
 
-def _tell_of_tokens(tell: Callable[[str], None], secret: str | None, url: str) -> None:
+def _report_tokens(report: Callable[[str], None], secret: str | None, url: str) -> None:
     if secret is None:
-        tell("requests need a token: `gaitswarm token create NAME` makes one")
+        report("requests need a token: create one by `gaitswarm token create NAME`")
         return
-    tell(
-        "requests need a token; this one, `first`, may do everything, and is shown only now:\n"
+    report(
+        "requests need a token; this one, `first`, has all permissions and is shown only once:\n"
         f"  {secret}\n"
-        f"  the page with it: {url}/#token={secret}\n"
-        "`gaitswarm token create NAME` makes more, and `gaitswarm token revoke first` ends this one"
+        f"  page: {url}/#token={secret}\n"
+        "create more by `gaitswarm token create NAME`; revoke it by `gaitswarm token revoke first`"
     )
 
 
@@ -233,7 +231,7 @@ def _runtime(
 
 
 def _tracing() -> Tracing | None:
-    """Where OpenTelemetry's variables name a collector, spans are sent there."""
+    """Export spans if OpenTelemetry's variables name a collector."""
     import logging
     import os
 
@@ -243,9 +241,9 @@ def _tracing() -> Tracing | None:
     try:
         from gaitswarm.services.monitoring.tracing import exporting_tracing
     except ModuleNotFoundError as error:
-        # Other programs on the machine may have asked for it.
+        # The variables may be meant for other programs.
         logging.getLogger(__name__).warning(
-            "no spans are sent, %s is missing: install gaitswarm[telemetry]", error.name
+            "spans are not exported, %s is missing: install gaitswarm[telemetry]", error.name
         )
         return None
     return exporting_tracing()
@@ -253,7 +251,7 @@ def _tracing() -> Tracing | None:
 
 @contextmanager
 def _served(metrics: Metrics | None, settings: Settings, opened: Runtime) -> Iterator[str | None]:
-    """A runner's metrics and health on the port of the settings; URL of the metrics, if any."""
+    """Serve a runner's metrics and health if a port is set; yield the URL of the metrics."""
     if metrics is None or settings.metrics_port is None:
         yield None
         return

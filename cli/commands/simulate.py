@@ -1,4 +1,4 @@
-"""`gaitswarm simulate`: one design in chosen scenarios."""
+"""`gaitswarm simulate`: one design in some scenarios."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def simulate(
         str,
         typer.Option(
             metavar="JSON|FILE|published:NAME|job:ID",
-            help="JSON object {variable: value} of the controller's variables and any gait"
+            help="JSON object {variable: value} of controller variables and optional gait"
             " parameters, or with one under `design`; a published design, as published:A; or the"
             " best of a job.",
         ),
@@ -32,33 +32,33 @@ def simulate(
     scenario: Annotated[
         str | None,
         typer.Option(
-            help="Name, number or FILE.json, several separated by commas, or all; of the robot's"
-            " folder, if it has some, else of the six of table 4.2 [default: the job's, else all]."
+            help="Names, numbers or FILE.json, separated by commas, or all; of the robot's folder"
+            " if it has scenarios, else of table 4.2 [default: the job's, else all]."
         ),
     ] = None,
     trajectory: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="JSON object of gait parameters, beside the design."),
+        typer.Option(metavar="FILE", help="JSON object of gait parameters, added to the design."),
     ] = None,
     preference: Annotated[
         str | None,
         typer.Option(
-            help="A, B, C or chapter-3: how objectives are weighed [default: the job's, else that"
-            " of the robot's folder, else A]."
+            help="Weighting of objectives: A, B, C or chapter-3 [default: the job's, else that of"
+            " the robot's folder, else A]."
         ),
     ] = None,
     world: Annotated[
         str | None,
         typer.Option(
             metavar="JSON|FILE",
-            help="Walk where the model is wrong: an object of perturbations, such as"
-            ' \'{"friction_factor": 0.7, "slope_added": 2}\', or one with it under `values`, as'
-            " `certify --json` prints worlds.",
+            help="Perturbations of the model, such as"
+            ' \'{"friction_factor": 0.7, "slope_added": 2}\', or an object with them under'
+            " `values`, as printed by `certify --json`.",
         ),
     ] = None,
     log: Annotated[
         Path | None,
-        typer.Option(metavar="FILE.npz", help="Write the walks' 500 Hz logs as NumPy arrays."),
+        typer.Option(metavar="FILE.npz", help="Write 500 Hz logs as NumPy arrays."),
     ] = None,
     robot: RobotOption = None,
     precision: Precision = None,
@@ -66,7 +66,7 @@ def simulate(
     db: Db = None,
     as_json: Json = False,
 ) -> None:
-    """Let one design walk and say what it is worth; a fall is a result, not an error."""
+    """Simulate one design and show its objectives and fitness; a fall is a result, not an error."""
     from pydantic import ValidationError
 
     from gaitswarm.cli.inputs.design_file import given_design
@@ -91,8 +91,8 @@ def simulate(
     if given.spec is not None and preference is None:
         data["preference"] = given.spec.preference
     if world is not None:
-        found = json_object(world, "world")
-        data["world"] = found.get("values", found)
+        document = json_object(world, "world")
+        data["world"] = document.get("values", document)
     try:
         request = SimulationRequest.model_validate(data)
     except ValidationError as error:

@@ -1,1 +1,1 @@
-"""What commands are given: options, specs, designs, robots, files."""
+"""Inputs of commands: options, specs, designs, robots."""

@@ -1,4 +1,4 @@
-"""Designs as commands are given them: JSON, files, published names, ids of jobs."""
+"""Designs from arguments: JSON, files, published names, ids of jobs."""
 
 from __future__ import annotations
 
@@ -29,11 +29,8 @@ class GivenDesign:
     """A design from a file, from the literature, or a job's best.
 
     Attributes:
-        label: what people call it.
-        controller: that it is a design of.
-        values: by name, in the variables' units; of a categorical variable the index of a choice.
-        spec: of the job whose best it is, with its robot, scenarios and variables; None for a
-            design from elsewhere.
+        values: in the variables' units, by name; indices of choices for categorical variables.
+        spec: of the job whose best design it is; None for other designs.
     """
 
     label: str
@@ -42,7 +39,7 @@ class GivenDesign:
     spec: JobSpec | None = None
 
     def robot(self, option: str | None) -> str | RobotVariant | RobotFiles:
-        """The robot to walk on: that of the option, else the job's, else the default."""
+        """Return the robot of the option, else the job's, else the default."""
         if option is None and self.spec is not None:
             return self.spec.robot
         return chosen_robot(option)
@@ -57,7 +54,7 @@ def given_design(
     server: str | None,
     db: str | None,
 ) -> GivenDesign:
-    """The design that an argument DESIGN|ID names."""
+    """Return the design of an argument DESIGN|ID."""
     if not may_be_file(given):
         best = _best_of_job(given.removeprefix(_JOB), controller, server, db)
         return replace(best, values=_in_gait(best.values, trajectory))
@@ -65,15 +62,12 @@ def given_design(
         label = f"published {given.removeprefix(_PUBLISHED)}"
     else:
         label = "design" if _is_json(given) else Path(given).stem
-    chosen = _controller_name(controller or robot_defaults(robot).controller)
-    return GivenDesign(label, chosen, read_design(given, chosen, trajectory))
+    name = _controller_name(controller or robot_defaults(robot).controller)
+    return GivenDesign(label, name, read_design(given, name, trajectory))
 
 
 def may_be_file(given: str) -> bool:
-    """Whether an argument DESIGN|ID names something else than a job.
-
-    given: as for `given_design`.
-    """
+    """Return whether an argument DESIGN|ID names anything but a job."""
     if given.startswith(_JOB):
         return False
     named = given == "-" or given.startswith(_PUBLISHED) or given.endswith(".json")
@@ -96,7 +90,7 @@ def _best_of_job(
         try:
             spec = jobs.job(job_id).spec
         except NotFound as error:
-            hint = "a design is the id of a job, a file, or published:NAME"
+            hint = "pass the id of a job, a file, or published:NAME"
             raise NotFound(f"{error}; {hint}") from error
         if not isinstance(spec, JobSpec):
             raise InvalidRequest(
@@ -112,32 +106,30 @@ def _best_of_job(
 
 
 def read_design(design: str, controller: str, trajectory: Path | None = None) -> dict[str, Any]:
-    """Values by name, choices as their indices; numbers are not checked yet.
+    """Read values by name, with indices of choices; numbers are not checked yet.
 
-    design: a flat JSON object {name: value}, or one with that under `design`, as `best --json`
-        prints; or a file that holds it; or `published:NAME` for a design of the literature; or
-        `job:ID` for the best of a job in the database that the environment names.
-    trajectory: a file with gait parameters only, none of which a design file may set as well; a
-        published design walks in this gait in place of its own.
-    Raises InvalidRequest that names the field.
+    design: a JSON object {name: value}, or one with it under `design`, as printed by
+        `best --json`; a file of it; `published:NAME`; or `job:ID` for the best of a job in the
+        environment's database.
+    trajectory: a file of gait parameters; they replace those of a published design, but must not
+        repeat those of a design file.
     """
     values = _read_values(design, controller)
-    own = _controller(controller)
-    known = (*own.variables, *own.conventions, *GAIT_VARIABLES)
-    values = _checked(values, known, "design")
+    law = _controller(controller)
+    values = _checked(values, (*law.variables, *law.conventions, *GAIT_VARIABLES), "design")
     return _in_gait(values, trajectory, replacing=design.startswith(_PUBLISHED))
 
 
 def _in_gait(
     values: dict[str, Any], trajectory: Path | None, *, replacing: bool = False
 ) -> dict[str, Any]:
-    """A design with the gait parameters of a file; replacing: also those that it sets itself."""
+    """Add the gait parameters of a file to a design; replacing: also replace its own."""
     if trajectory is None:
         return values
     gait = _checked(read_json_object(trajectory, "trajectory"), GAIT_VARIABLES, "trajectory")
     for name in gait:
         if name in values and not replacing:
-            raise InvalidRequest("set in the design too; choose one", field=f"trajectory.{name}")
+            raise InvalidRequest("also set in the design; choose one", field=f"trajectory.{name}")
     return {**values, **gait}
 
 
@@ -146,10 +138,10 @@ def _read_values(design: str, controller: str) -> dict[str, Any]:
         published = _controller(controller).published
         name = design.removeprefix(_PUBLISHED)
         if not published:
-            own = ", ".join(variable.name for variable in _controller(controller).variables)
+            names = ", ".join(variable.name for variable in _controller(controller).variables)
             raise InvalidRequest(
-                f"no design of {controller} was published, for any robot; give a JSON object or a"
-                f" file with values of {own}, or job:ID for the best of a job",
+                f"no design of {controller} was published; pass a JSON object or a file with"
+                f" values of {names}, or job:ID for the best of a job",
                 field="design",
             )
         if name not in published:
@@ -180,9 +172,9 @@ def _controller_name(name: str) -> ControllerName:
     return name
 
 
-def _checked(values: dict[str, Any], known: Sequence[Variable], field: str) -> dict[str, Any]:
-    """Values of known variables, with the index of a choice in place of its name."""
-    variables = VariableCatalogue(known)
+def _checked(values: dict[str, Any], allowed: Sequence[Variable], field: str) -> dict[str, Any]:
+    """Check names, and replace names of choices by their indices."""
+    variables = VariableCatalogue(allowed)
     checked = dict(values)
     for name, value in values.items():
         if name not in variables:

@@ -15,75 +15,75 @@ if TYPE_CHECKING:
     from gaitswarm.jobs.port import Jobs
 
 _LENGTH: Final = 12
-"""Characters of an id."""
+"""Characters of a complete id."""
 
 
-def full_id(jobs: Jobs, given: str) -> str:
-    """The id of the only job whose id begins so."""
+def full_id(jobs: Jobs, prefix: str) -> str:
+    """Return the only id with a prefix, or the text itself if there is none."""
     from gaitswarm.services.optimizer.errors import InvalidRequest
 
-    if not 0 < len(given) < _LENGTH:
-        return given
-    found = [job.id for job in jobs.jobs(search=given) if job.id.startswith(given)]
-    if len(found) > 1:
-        few = ", ".join(sorted(found)[:4]) + (", ..." if len(found) > 4 else "")
-        raise InvalidRequest(f"{given!r} fits {few}; give more of it", field="id")
-    return found[0] if found else given
+    if not 0 < len(prefix) < _LENGTH:
+        return prefix
+    matches = [job.id for job in jobs.jobs(search=prefix) if job.id.startswith(prefix)]
+    if len(matches) > 1:
+        few = ", ".join(sorted(matches)[:4]) + (", ..." if len(matches) > 4 else "")
+        raise InvalidRequest(f"{prefix!r} matches {few}; type more characters", field="id")
+    return matches[0] if matches else prefix
 
 
-def completed_all(context: typer.Context, given: list[str]) -> list[str]:
-    """Ids of the command line, in full."""
-    if context.resilient_parsing or all(len(one) >= _LENGTH for one in given):
-        return given
+def completed_all(context: typer.Context, ids: list[str]) -> list[str]:
+    """Complete prefixes of ids."""
+    if context.resilient_parsing or all(len(text) >= _LENGTH for text in ids):
+        return ids
     from gaitswarm.jobs.open import open_jobs
 
     options = context.params
     with open_jobs(options.get("server"), options.get("db")) as jobs:
-        return [full_id(jobs, one) for one in given]
+        return [full_id(jobs, text) for text in ids]
 
 
-def completed(context: typer.Context, given: str | None) -> str | None:
-    """An id of the command line, in full."""
-    return None if given is None else completed_all(context, [given])[0]
+def completed(context: typer.Context, text: str | None) -> str | None:
+    """Complete the prefix of an id."""
+    return None if text is None else completed_all(context, [text])[0]
 
 
-def completed_start(context: typer.Context, given: str | None) -> str | None:
-    """What a job begins with: ids of jobs in full, or the name of a file as it is."""
-    if given is None or given.lower().endswith(".csv"):
-        return given
+def completed_start(context: typer.Context, text: str | None) -> str | None:
+    """Complete prefixes of ids separated by commas; names of CSV files do not change."""
+    if text is None or text.lower().endswith(".csv"):
+        return text
     from gaitswarm.services.optimizer.errors import NotFound
 
-    ids = [one.strip() for one in given.split(",") if one.strip()]
+    ids = [entry.strip() for entry in text.split(",") if entry.strip()]
     try:
         return ",".join(completed_all(context, ids))
     except NotFound:
-        # A database that is made with the job has none of them: the spec is refused by its place.
-        return given
+        # The database does not exist yet: validation of the spec reports the unknown job.
+        return text
 
 
 JobId = Annotated[
     str,
     typer.Argument(
-        metavar="ID", callback=completed, help="Identifier of the job, or its beginning."
+        metavar="ID", callback=completed, help="Identifier of the job, or a prefix of it."
     ),
 ]
 
 JobIds = Annotated[
     list[str],
     typer.Argument(
-        metavar="ID...", callback=completed_all, help="Identifiers of jobs, or their beginnings."
+        metavar="ID...", callback=completed_all, help="Identifiers of jobs, or prefixes of them."
     ),
 ]
 
-JobName = Annotated[str | None, typer.Option(help="Name of the job, for people.")]
+JobName = Annotated[str | None, typer.Option(help="Display name of the job.")]
 
 Priority = Annotated[
     int,
     typer.Option(
         min=-10,
         max=10,
-        help="How urgent it is: of waiting jobs the highest is run first, and of running jobs one"
-        " that is a step higher has twice the share of the workers. No result depends on it.",
+        help="Priority: queued jobs with the highest run first, and running jobs get twice the"
+        " share of the workers per step. Results do not depend on it.",
     ),
 ]
 
@@ -91,15 +91,15 @@ Notify = Annotated[
     str | None,
     typer.Option(
         metavar="URL",
-        help="Where a JSON document is sent when the job has ended, by a server or runner that"
-        " allows the URL's host.",
+        help="Webhook for a JSON document when the job ends; the server or runner must allow the"
+        " URL's host.",
     ),
 ]
 
 Server = Annotated[
     str | None,
-    # Read before the id of a job, which may have to be looked up there.
-    typer.Option(metavar="URL", is_eager=True, help="Ask this server. [env: GAITSWARM_SERVER]"),
+    # Parsed before job ids, whose prefixes are completed there.
+    typer.Option(metavar="URL", is_eager=True, help="Use this server. [env: GAITSWARM_SERVER]"),
 ]
 
 Db = Annotated[
@@ -118,7 +118,7 @@ AcceptChanges = Annotated[
     bool,
     typer.Option(
         "--accept-changes",
-        help="Go on although code, robot or compiler have changed; the job records it.",
+        help="Resume although code, robot or compiler have changed; the job records it.",
     ),
 ]
 
@@ -127,9 +127,9 @@ RobotOption = Annotated[
     typer.Option(
         "--robot",
         metavar="NAME|JSON|FOLDER",
-        help="Robot by name, szabadka2-reconstructed (the default), szabadka2-identified (of table"
-        " 2.7) or szabadka2 (of the datasheet), a variant as JSON, such as"
-        ' {"contact_law": "stick", "backlash": [2.5, 1, 1]}, or the folder of your own.',
+        help="Robot by name: szabadka2-reconstructed (the default), szabadka2-identified (table"
+        " 2.7) or szabadka2 (datasheet); a variant as JSON, such as"
+        ' {"contact_law": "stick", "backlash": [2.5, 1, 1]}; or a robot\'s folder.',
     ),
 ]
 
@@ -137,7 +137,7 @@ ControllerOption = Annotated[
     str | None,
     typer.Option(
         "--controller",
-        help="Motor controller: fuzzy-pi, fuzzy-pi-3, p, pi, pid or, of torque-controlled"
+        help="Motor controller: fuzzy-pi, fuzzy-pi-3, p, pi, pid or, for torque-controlled"
         " actuators, joint-pd [default: that of the job or spec, else of the robot's folder, else"
         " fuzzy-pi].",
     ),
@@ -147,30 +147,27 @@ Precision = Annotated[
     str | None,
     typer.Option(
         metavar="single|double",
-        help="Of the physics' numbers: double (the default), or single, which is about twice as"
-        " fast. What a job reports as best is judged in double.",
+        help="Precision of the physics: double (the default), or single, which is about twice as"
+        " fast. A job's best design is always evaluated in double.",
     ),
 ]
 
 
 @dataclass(frozen=True, slots=True)
 class SpecOptions:
-    """Options of a command that submits a job; None leaves the value of the spec in the file.
-
-    scenarios: names, numbers or files, separated by commas.
-    """
+    """Options of commands that submit a job; None keeps the value of the spec file."""
 
     spec: Annotated[
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Job spec as JSON; `-` reads standard input. Without one: the chapter-4 job.",
+            help="Job spec as JSON; `-` reads standard input. Default: the chapter-4 job.",
         ),
     ] = None
     iterations: Annotated[
-        int | None, typer.Option(help="Budget, in iterations of so many designs as --particles.")
+        int | None, typer.Option(help="Budget, in iterations of --particles designs.")
     ] = None
-    particles: Annotated[int | None, typer.Option(help="Designs of one iteration, at most.")] = None
+    particles: Annotated[int | None, typer.Option(help="Maximum designs per iteration.")] = None
     optimizer: Annotated[
         str | None,
         typer.Option(
@@ -182,26 +179,24 @@ class SpecOptions:
         str | None,
         typer.Option(
             metavar="JSON|FILE",
-            help="Settings of the method that are not its defaults, such as '{\"sigma\": 0.4}'.",
+            help="Settings of the method, such as '{\"sigma\": 0.4}'.",
         ),
     ] = None
-    seed: Annotated[int | None, typer.Option(help="Source of all randomness.")] = None
+    seed: Annotated[int | None, typer.Option(help="Seed of all random numbers.")] = None
     start_from: Annotated[
         str | None,
         typer.Option(
             metavar="ID[,ID]|FILE.csv",
             callback=completed_start,
-            help="Begin with the best designs of earlier jobs, or with those of a file.",
+            help="Start from the best designs of earlier jobs, or from those of a file.",
         ),
     ] = None
     start_count: Annotated[
         int | None,
-        typer.Option(
-            min=1, help="Designs to begin with [default: of jobs the 5 best, of a file all]."
-        ),
+        typer.Option(min=1, help="Number of start designs [default: 5 of jobs, all of a file]."),
     ] = None
     preference: Annotated[
-        str | None, typer.Option(help="How objectives are weighed: A, B, C or chapter-3 (eq. 3.1).")
+        str | None, typer.Option(help="Weighting of objectives: A, B, C or chapter-3 (eq. 3.1).")
     ] = None
     scenarios: Annotated[
         str | None, typer.Option(help="Names, numbers or FILE.json, separated by commas.")
@@ -211,15 +206,15 @@ class SpecOptions:
         str | None,
         typer.Option(
             metavar="NAME|JSON|FILE",
-            help="Evaluate designs by a plug-in's case in place of walks in gaitswarm's simulator,"
-            " by its name or its settings; `gaitswarm cases` lists all.",
+            help="Evaluate designs by a plug-in's case, instead of the simulator, by its name or"
+            " settings; `gaitswarm cases` lists all.",
         ),
     ] = None
     with_gait: Annotated[
         bool | None,
         typer.Option(
             "--with-gait",
-            help="Search the gait, too: cycle time, stride, height, duty factor and FIR filter.",
+            help="Also search the gait: cycle time, stride, height, duty factor and FIR filter.",
         ),
     ] = None
     worlds: Annotated[
@@ -227,23 +222,22 @@ class SpecOptions:
         typer.Option(
             min=1,
             max=100,
-            help="Judge every design in so many worlds that differ from the model, not in the model"
-            " alone.",
+            help="Evaluate every design in this many worlds that differ from the model.",
         ),
     ] = None
     aggregate: Annotated[
         str | None,
         typer.Option(
             metavar="mean|quantile|worst|cvar",
-            help="With --worlds: what utilities in all worlds come to [default: cvar].",
+            help="With --worlds: aggregation of utilities over worlds [default: cvar].",
         ),
     ] = None
     level: Annotated[
         float | None,
-        typer.Option(help="With --worlds: of a quantile or of the cvar [default: 0.75]."),
+        typer.Option(help="With --worlds: level of the quantile or cvar [default: 0.75]."),
     ] = None
     worlds_seed: Annotated[
-        int | None, typer.Option(min=0, help="With --worlds: of the worlds [default: 1].")
+        int | None, typer.Option(min=0, help="With --worlds: seed of the worlds [default: 1].")
     ] = None
     robot: RobotOption = None
     precision: Precision = None
@@ -251,19 +245,19 @@ class SpecOptions:
 
     @property
     def given(self) -> dict[str, Any]:
-        """Those that the user gave, by name."""
+        """Options that the user passed, by name."""
         return {name: value for name, value in asdict(self).items() if value is not None}
 
 
 @dataclass(frozen=True, slots=True)
 class WorkerOptions:
-    """Options of a command that runs jobs, named as the settings that they go before."""
+    """Options of commands that run jobs, named as the settings that they override."""
 
     db: Db = None
     evaluator: Annotated[
         str | None,
         typer.Option(
-            help="in-process: threads of this process; ray: the same, and Ray in long jobs or at an"
+            help="in-process: threads of this process; ray: also Ray, for long jobs or with an"
             " address. [env: GAITSWARM_EVALUATOR; default: ray]",
         ),
     ] = None
@@ -271,31 +265,30 @@ class WorkerOptions:
         int | None,
         typer.Option(
             min=1,
-            help="Walks to compute at once on this machine. [env: GAITSWARM_CPUS; default: all"
-            " cores]",
+            help="Parallel simulations on this machine. [env: GAITSWARM_CPUS; default: all cores]",
         ),
     ] = None
     ray_address: Annotated[
         str | None,
         typer.Option(
             metavar="ADDRESS",
-            help="Use this Ray cluster for all walks: HOST:PORT of its head, or auto on a node of"
-            " it. [env: GAITSWARM_RAY_ADDRESS]",
+            help="Ray cluster for all simulations: HOST:PORT of its head, or auto on one of its"
+            " nodes. [env: GAITSWARM_RAY_ADDRESS]",
         ),
     ] = None
     cache: Annotated[
         bool | None,
         typer.Option(
             "--cache/--no-cache",
-            help="Walk a design only if no job in the database has walked it before; it changes no"
-            " result. [env: GAITSWARM_CACHE; default: cache]",
+            help="Reuse earlier simulations of the same designs in the database; results do not"
+            " change. [env: GAITSWARM_CACHE; default: cache]",
         ),
     ] = None
 
 
 @dataclass(frozen=True, slots=True)
 class RunnerOptions(WorkerOptions):
-    """Options of a command that runs queued jobs."""
+    """Options of commands that run queued jobs."""
 
     concurrent_jobs: Annotated[
         int | None,
@@ -303,13 +296,13 @@ class RunnerOptions(WorkerOptions):
             "--jobs",
             min=1,
             max=256,
-            help="Jobs to run at once. [env: GAITSWARM_CONCURRENT_JOBS; default: 2]",
+            help="Jobs to run in parallel. [env: GAITSWARM_CONCURRENT_JOBS; default: 2]",
         ),
     ] = None
 
 
 def with_groups(command: Callable[..., None]) -> Callable[..., None]:
-    """A command as Typer, which knows no groups of options, takes it."""
+    """Expand dataclasses among a command's parameters to single options for Typer."""
     annotations = get_type_hints(command, include_extras=True)
     groups: dict[str, type[Any]] = {
         name: kind
@@ -324,10 +317,10 @@ def with_groups(command: Callable[..., None]) -> Callable[..., None]:
             parameters.append(parameter.replace(annotation=annotations[name]))
 
     @wraps(command)
-    def called(**given: Any) -> None:
+    def called(**values: Any) -> None:
         for name, kind in groups.items():
-            given[name] = kind(**{field.name: given.pop(field.name) for field in fields(kind)})
-        command(**given)
+            values[name] = kind(**{field.name: values.pop(field.name) for field in fields(kind)})
+        command(**values)
 
     by_name = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in parameters]
     called.__signature__ = inspect.Signature(by_name)  # type: ignore[attr-defined]
@@ -336,7 +329,7 @@ def with_groups(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def _parameters(group: type) -> list[inspect.Parameter]:
-    """Those with which a dataclass is made, their annotations resolved."""
+    """Return the parameters of a dataclass with resolved annotations."""
     annotations = get_type_hints(group, include_extras=True)
     parameters = inspect.signature(group).parameters
-    return [own.replace(annotation=annotations[name]) for name, own in parameters.items()]
+    return [p.replace(annotation=annotations[name]) for name, p in parameters.items()]

@@ -1,4 +1,4 @@
-"""Robots and scenarios as the command line names them."""
+"""Robots and scenarios from options."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def chosen_robot(text: str | None) -> str | RobotVariant | RobotFiles:
-    """A robot's name, a variant as JSON, or a folder. Raises InvalidRequest."""
+    """Return the robot of a name, a variant as JSON, or a folder."""
     from pydantic import TypeAdapter, ValidationError
 
     from gaitswarm.sim.robot import RobotSource
@@ -27,7 +27,7 @@ def chosen_robot(text: str | None) -> str | RobotVariant | RobotFiles:
     data = robot_data(text)
     if isinstance(data, str) and data not in SHIPPED:
         raise InvalidRequest(
-            f"unknown robot {data!r}; known are {', '.join(SHIPPED)}, or name a folder that holds"
+            f"unknown robot {data!r}; choose from {', '.join(SHIPPED)}, or pass a folder with"
             " robot.toml and robot.urdf",
             field="robot",
         )
@@ -39,7 +39,7 @@ def chosen_robot(text: str | None) -> str | RobotVariant | RobotFiles:
 
 
 def robot_data(text: str | None) -> str | dict[str, Any]:
-    """What a spec would hold under `robot`, unchecked. Raises InvalidRequest."""
+    """Return the unchecked field `robot` of a spec."""
     if text is None:
         return DEFAULT_ROBOT
     if text.lstrip().startswith("{"):
@@ -67,10 +67,7 @@ def _text(path: Path) -> str:
 
 
 def robot_defaults(text: str | None) -> RobotDefaults:
-    """What jobs and walks of a robot have unless an option says otherwise. Raises InvalidRequest.
-
-    text: as the option names it.
-    """
+    """Return the defaults of a robot's folder; the general ones for any other robot."""
     from gaitswarm.robots import RobotDefaults
     from gaitswarm.robots import robot_defaults as defaults_of
 
@@ -80,54 +77,45 @@ def robot_defaults(text: str | None) -> RobotDefaults:
 
 
 def scenario_data(text: str, robot: str | None = None) -> list[str | dict[str, Any]]:
-    """What a spec would hold under `scenarios`: names and numbers, and the contents of files.
+    """Return the unchecked field `scenarios` of a spec: names, numbers and contents of files.
 
-    Where a robot's folder has scenarios of its own, `all` and numbers are of these, and their names
-    come before those of presets.
+    If the robot's folder has scenarios, `all` and numbers refer to these, and their names take
+    precedence over presets.
 
-    text: `all`, or entries separated by commas, FILE.json for a scenario of one's own. robot: as
-    the option names it. Raises InvalidRequest for a file that is not JSON.
+    text: `all`, or names, numbers and FILE.json, separated by commas.
     """
     defaults = robot_defaults(robot)
     if text == "all":
         return defaults.scenarios
-    own = defaults.own_scenarios
-    numbers = {str(number): entry for number, entry in enumerate(own.values(), start=1)}
+    named = defaults.own_scenarios
+    numbered = {str(number): entry for number, entry in enumerate(named.values(), start=1)}
     entries = [entry.strip() for entry in text.split(",")]
-    return [own.get(e) or numbers.get(e) or _scenario_entry(e) for e in entries]
+    return [named.get(e) or numbered.get(e) or _scenario_entry(e) for e in entries]
 
 
 def chosen_scenarios(text: str, robot: str | None = None) -> tuple[Scenario, ...]:
-    """The scenarios of `scenario_data`. Raises SimulationInputError, InvalidRequest."""
-    return tuple(map(_found_scenario, scenario_data(text, robot)))
+    """Return the scenarios of `scenario_data`."""
+    return tuple(map(_scenario, scenario_data(text, robot)))
 
 
 def one_scenario(text: str | None, robot: str | None, *, preset: str) -> Scenario:
-    """The walk of a command that is about one.
-
-    text: as the option names it; None for the first of the robot's folder, or else the preset.
-    Raises SimulationInputError, InvalidRequest.
-    """
+    """Return one scenario; by default the first of the robot's folder, else the preset."""
     first = "1" if robot_defaults(robot).own_scenarios else preset
-    chosen = chosen_scenarios(text or first, robot)
-    if len(chosen) != 1:
-        raise InvalidRequest("one scenario, not several", field="scenario")
-    return chosen[0]
+    scenarios = chosen_scenarios(text or first, robot)
+    if len(scenarios) != 1:
+        raise InvalidRequest("must name one scenario", field="scenario")
+    return scenarios[0]
 
 
-def _found_scenario(entry: str | dict[str, Any]) -> Scenario:
-    from gaitswarm.sim.scenario import find_scenario
-
-    return find_scenario(entry) if isinstance(entry, str) else _own_scenario(entry)
-
-
-def _own_scenario(data: dict[str, Any]) -> Scenario:
+def _scenario(entry: str | dict[str, Any]) -> Scenario:
     from pydantic import ValidationError
 
-    from gaitswarm.sim.scenario import Scenario
+    from gaitswarm.sim.scenario import Scenario, find_scenario
 
+    if isinstance(entry, str):
+        return find_scenario(entry)
     try:
-        return Scenario.model_validate(data)
+        return Scenario.model_validate(entry)
     except ValidationError as error:
         raise _refusal(error, "scenario") from error
 

@@ -177,7 +177,7 @@ def test_users_choose_ranges_and_fixed_values(files: Path) -> None:
             "fixed: angle_delay: 1.4 in world 0 is no",
         ),
         (("published:A", "--scenarios", "moon"), 2, "scenarios.0: unknown scenario 'moon'"),
-        (("published:A", "--log", "walk.npz"), 2, "log: goes with --replay"),
+        (("published:A", "--log", "walk.npz"), 2, "log: requires --replay"),
         (("published:A", "--replay", 100_000), 2, "99999"),
         (("published:A", "--preference", "D"), 2, "preference: "),
     ],

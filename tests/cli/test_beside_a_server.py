@@ -75,7 +75,7 @@ def test_ctrl_c_ends_the_following_of_a_job_and_says_where_it_goes_on(
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=60)
     assert (process.returncode, out) == (130, "")
-    assert "goes on in another process" in err
+    assert "continues in another process" in err
     assert f"gaitswarm watch {job_id} --db {db}" in err
     assert _job(gaitswarm, job_id, db)["state"] == "running"
     assert gaitswarm("cancel", job_id, "--server", server).code == 0

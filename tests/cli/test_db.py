@@ -20,7 +20,7 @@ def test_an_upgrade_leaves_a_database_of_the_newest_schema_alone(
     open_store(str(db)).close()
     upgraded = gaitswarm("db", "upgrade", "--db", db)
     assert upgraded.code == ExitCode.OK
-    assert f"already, revision {head()}" in upgraded.err
+    assert f"up to date, revision {head()}" in upgraded.err
 
 
 def test_commands_refuse_a_database_of_another_schema(gaitswarm: Gaitswarm, db: Path) -> None:

@@ -37,7 +37,7 @@ def test_it_says_what_is_lost_and_asks(
     deleted = gaitswarm("delete", finished.id, "--db", db)
     assert deleted.code == 0
     assert "loses 2 iterations with 6 evaluated designs" in deleted.err
-    assert "forks of it, 1, keep their copies" in deleted.err
+    assert "forks that keep their copies of its iterations: 1" in deleted.err
     assert gaitswarm("status", finished.id, "--db", db).code == (3 if yes else 0)
 
 

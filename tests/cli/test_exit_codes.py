@@ -178,7 +178,7 @@ def test_an_optimization_without_workers_says_how_to_go_on_with_its_job(
         stopped = gaitswarm("optimize", "--spec", small_spec, "--db", db)
     assert stopped.code == ExitCode.UNAVAILABLE
     said = re.search(
-        r"^gaitswarm: no Ray.*\n.*go on with\n  gaitswarm (.*)$", stopped.err, re.MULTILINE
+        r"^gaitswarm: no Ray.*\n.*to resume, run\n  gaitswarm (.*)$", stopped.err, re.MULTILINE
     )
     assert said, stopped.err
     resumed = gaitswarm(*said[1].split(), *IN_PROCESS, "--json")

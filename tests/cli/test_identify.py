@@ -47,7 +47,7 @@ def test_a_log_is_recorded_once_fitted_and_judged(
     (entry,) = gaitswarm("recordings", "--db", db, "--json").json
     assert (entry["id"], entry["joints"], entry["seconds"]) == (recording, 18, 1.6)
     none = gaitswarm("recordings", "--search", "other", "--db", db)
-    assert (none.code, none.out) == (0, "") and "no recording fits" in none.err
+    assert (none.code, none.out) == (0, "") and "no recording matches" in none.err
 
     fitted = gaitswarm(
         "identify", recording, "--variables", "body_mass,battery_voltage", "--runs", "2",

@@ -358,7 +358,7 @@ def test_a_start_that_makes_no_sense_is_refused_with_its_place(
     for options, message in (
         (("--start-from", designs), "line 2, column FI1R: 1e+09 is outside the bounds"),
         (("--start-from", "nothing"), "start.jobs.0: there is no job 'nothing'"),
-        (("--start-count", "3"), "start-count: goes with --start-from"),
+        (("--start-count", "3"), "start-count: requires --start-from"),
     ):
         result = gaitswarm(*run, *options)
         assert result.code == 2

@@ -114,7 +114,7 @@ def test_a_stop_is_heard_while_a_cluster_is_connected_that_never_answers(
     assert process.returncode == code
     assert "Traceback" not in err
     if command == "optimize":
-        assert "go on with" in err
+        assert "to resume, run" in err
         (job,) = gaitswarm("list", "--db", db, "--json").json
         assert (job["state"], job["iterations"]) == ("queued", 0)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from gaitswarm.cli.comparison import published_beside
+from gaitswarm.cli.comparison import published_results
 from gaitswarm.cli.inputs.design_file import read_design
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
@@ -107,13 +107,13 @@ def test_a_job_is_compared_with_the_optimum_of_its_preference() -> None:
     brief = {"name": "brief", "cycle_time": 0.5, "cycles": 1.0, "radius": 0.16, "hip_height": 0.15}
     for preference in CHAPTER_4:
         spec = job("fuzzy-pi", preference=preference, scenarios=[brief])
-        assert list(published_beside(spec)) == [f"published {preference}"]
-    assert list(published_beside(job("pi", scenarios=[brief]))) == ["published pi-pso-ps"]
+        assert list(published_results(spec)) == [f"published {preference}"]
+    assert list(published_results(job("pi", scenarios=[brief]))) == ["published pi-pso-ps"]
 
 
 def test_a_job_whose_controller_was_never_published_is_compared_with_nothing() -> None:
     assert not CONTROLLERS["pid"].published
-    assert published_beside(job("pid")) == {}
+    assert published_results(job("pid")) == {}
 
 
 def test_no_published_design_names_anything_but_variables_and_gait() -> None:

@@ -16,7 +16,7 @@ from tests.examples.processes import line_with
 def test_a_token_is_made_listed_and_revoked(gaitswarm: Gaitswarm, db: Path) -> None:
     made = gaitswarm("token", "create", "ci", "--scope", "read", "--db", db)
     assert made.code == ExitCode.OK
-    assert made.out.startswith("gaitswarm_") and "shown only now" in made.err
+    assert made.out.startswith("gaitswarm_") and "shown only once" in made.err
 
     (listed,) = gaitswarm("token", "list", "--db", db, "--json").json
     assert (listed["name"], listed["scope"], listed["revoked_at"]) == ("ci", "read", None)

@@ -97,7 +97,7 @@ def test_the_preference_that_is_told_makes_the_design_the_best_of_the_job(
     power = 1.0 / sum(view["fits"][0]["preference"]["exponent"])
     margin = (second["fitness"] / first["fitness"]) ** power - 1.0
     assert view["fits"][0]["margin"] == pytest.approx(margin)
-    told = gaitswarm(*asked, f"{iteration}/{particle}")
+    told = gaitswarm(*asked, f"{iteration}.{particle}")
     assert f"design {iteration}.{particle} wins by {100.0 * margin:.3g} %" in told.out
 
 
@@ -172,4 +172,4 @@ def test_a_job_without_a_design_is_a_conflict(
     job = gaitswarm("submit", "--spec", small_spec, "--db", db, "--json").json
     refused = gaitswarm("front", job["id"], "--db", db)
     assert refused.code == 4
-    assert "no design yet that walks in all scenarios" in refused.err
+    assert "no design yet that succeeds in all scenarios" in refused.err

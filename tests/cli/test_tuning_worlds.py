@@ -57,8 +57,8 @@ def test_a_job_in_worlds_is_run_reported_and_ranked(
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--aggregate", "worst"], "aggregate: goes with --worlds"),
-        (["--worlds-seed", "3"], "worlds-seed: goes with --worlds"),
+        (["--aggregate", "worst"], "aggregate: requires --worlds"),
+        (["--worlds-seed", "3"], "worlds-seed: requires --worlds"),
         (["--worlds", "4", "--aggregate", "median"], "worlds.aggregate: "),
         (["--worlds", "4", "--level", "1.5"], "worlds.level: "),
     ],

@@ -45,7 +45,10 @@ def test_the_terminal_writes_and_finds_them(finished: Finished) -> None:
     listed = run_command("list", "--db", finished.db, "--tag", "a", "--archived", "--json").json
     assert [job["name"] for job in listed] == ["renamed"]
     assert run_command("list", "--db", finished.db, "--json").json == []
-    assert "no job fits; --all lists archived ones" in run_command("list", "--db", finished.db).err
+    assert (
+        "no job matches; --all includes archived jobs"
+        in run_command("list", "--db", finished.db).err
+    )
     nothing = run_command("list", "--db", finished.db, "--all", "--search", "nowhere")
     assert (nothing.out, nothing.err) == ("", "no job fits\n")
     everything = run_command("list", "--db", finished.db, "--all")

@@ -88,7 +88,7 @@ def test_a_second_signal_drops_the_iteration_under_way(store: SqlStore, database
     with runner(DB=str(database), CPUS="1") as started:
         before = begun(store, job.id)
         started.send_signal(signal.SIGTERM)
-        line_with(started.stderr, "ending: jobs commit")
+        line_with(started.stderr, "stopping: jobs commit")
         started.send_signal(signal.SIGTERM)
         assert started.wait(timeout=60) == 0
     ended = store.job(job.id)

@@ -10,13 +10,15 @@ from typing import TYPE_CHECKING, Any, Final
 
 from gaitswarm.cli.inputs.design_file import read_design
 from gaitswarm.cli.inputs.spec_file import read_json_object
+from gaitswarm.cli.output import note, print_json, stdout_console
+from gaitswarm.cli.tables import MISSING, Table, number
 from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.settings import place_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from pydantic import BaseModel
 
-    from gaitswarm.cli.tables import Table
     from gaitswarm.views.calibration import ReachedView, TargetsView
     from gaitswarm.views.identification import IdentifiabilityView, ParameterView
 
@@ -25,17 +27,15 @@ _OPTIONAL: Final = ("relative_to", "use")
 _OF_WALK: Final = ("controller", "design", "scenario")
 
 _LARGEST: Final = 1 << 20
-"""Largest table that is read [B]."""
+"""Largest accepted table [B]."""
 
 
 def read_targets(path: Path) -> dict[str, list[dict[str, Any]]]:
-    """Walks and targets, as a spec of kind `calibration` has them.
+    """Read walks and targets of a spec of kind `calibration`; errors name line and column.
 
-    path: a CSV file with a head; empty lines and those that begin with # are left out. A walk's
-        controller, design and scenario may be left empty in its further rows. Files of
-        designs and scenarios are looked up from the table's folder.
-
-    Raises InvalidRequest that names line and column.
+    path: a CSV file with a header; empty lines and lines that start with # are ignored. A walk's
+        controller, design and scenario may be empty in its later rows. Files of designs and
+        scenarios are relative to the table's folder.
     """
     walks: dict[str, dict[str, Any]] = {}
     cells_of: dict[str, dict[str, str]] = {}
@@ -47,7 +47,7 @@ def read_targets(path: Path) -> dict[str, list[dict[str, Any]]]:
             for column, cell in cells.items():
                 if cell not in ("", cells_of[name][column]):
                     raise _refusal(
-                        path, line, column, f"the walk {name!r} has another above; rename one"
+                        path, line, column, f"differs from an earlier row of walk {name!r}"
                     )
         else:
             walks[name] = _walk(path, line, name, cells)
@@ -59,7 +59,7 @@ def read_targets(path: Path) -> dict[str, list[dict[str, Any]]]:
 
 
 def _rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
-    """Line numbers and cells by column, stripped."""
+    """Yield line numbers and stripped cells by column."""
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             text = file.read(_LARGEST + 1)
@@ -68,35 +68,36 @@ def _rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
     if len(text) > _LARGEST:
         raise InvalidRequest(f"{path} is larger than {_LARGEST >> 20} MiB", field="targets")
     reader = csv.reader(text.splitlines(), strict=True, skipinitialspace=True)
-    head: list[str] | None = None
+    header: list[str] | None = None
     try:
         for row in reader:
             cells = [cell.strip() for cell in row]
             if not any(cells) or cells[0].startswith("#"):
                 continue
-            if head is None:
-                head = _head(path, reader.line_num, cells)
-            elif len(cells) > len(head):
+            if header is None:
+                header = _header(path, reader.line_num, cells)
+            elif len(cells) > len(header):
                 raise _refusal(
-                    path, reader.line_num, head[-1], "the line has more cells than the head"
+                    path, reader.line_num, header[-1], "the line has more cells than the header"
                 )
             else:
-                named = dict(zip(head, cells, strict=False))
+                named = dict(zip(header, cells, strict=False))
                 yield reader.line_num, dict.fromkeys((*_NEEDED, *_OPTIONAL), "") | named
     except csv.Error as error:
         raise InvalidRequest(f"{path}, line {reader.line_num}: {error}", field="targets") from error
 
 
-def _head(path: Path, line: int, columns: list[str]) -> list[str]:
+def _header(path: Path, line: int, columns: list[str]) -> list[str]:
+    allowed = (*_NEEDED, *_OPTIONAL)
     for column in columns:
-        if column not in (*_NEEDED, *_OPTIONAL):
-            known = ", ".join((*_NEEDED, *_OPTIONAL))
-            raise _refusal(path, line, column, f"unknown column; known are {known}")
+        if column not in allowed:
+            names = ", ".join(allowed)
+            raise _refusal(path, line, column, f"unknown column; known are {names}")
         if columns.count(column) > 1:
-            raise _refusal(path, line, column, "there are two columns of this name")
+            raise _refusal(path, line, column, "duplicate column")
     for column in _NEEDED:
         if column not in columns:
-            raise _refusal(path, line, column, "the head lacks this column")
+            raise _refusal(path, line, column, "missing column")
     return columns
 
 
@@ -105,7 +106,9 @@ def _walk(path: Path, line: int, name: str, cells: Mapping[str, str]) -> dict[st
 
     for column, cell in cells.items():
         if not cell:
-            raise _refusal(path, line, column, f"empty in the first row of the walk {name!r}")
+            raise _refusal(
+                path, line, column, f"must not be empty in the first row of walk {name!r}"
+            )
     document = {
         "name": name,
         "controller": cells["controller"],
@@ -163,7 +166,7 @@ def _target(
     scenarios = len(walks[row["walk"]]["scenarios"])
     if scenarios > 1 and not QUANTITIES[document["quantity"]].scenarios:
         raise _refusal(
-            path, line, "quantity", f"of one scenario, and the walk has {scenarios}; name another"
+            path, line, "quantity", f"applies to one scenario, but the walk has {scenarios}"
         )
     return target.model_dump(mode="json")
 
@@ -175,7 +178,7 @@ def _checked(
     document: dict[str, Any],
     columns: Mapping[str, str],
 ) -> BaseModel:
-    """columns: of the fields that are called otherwise in the table."""
+    """Validate a document; columns: those of fields with another name in the table."""
     from pydantic import ValidationError
 
     from gaitswarm.sim.input import message_of, without_tags
@@ -191,7 +194,7 @@ def _checked(
             if len(location) > 1 and field == "design":
                 message = f"{location[1]}: {message}"
         else:
-            # A validator of the whole names the field first.
+            # Validators of the whole document put the field first.
             field, _, message = message.partition(": ")
         raise _refusal(path, line, columns.get(field, field), message) from error
 
@@ -201,14 +204,11 @@ def _refusal(path: Path, line: int, column: str, message: str) -> InvalidRequest
 
 
 def show_targets(reached: TargetsView, parameters: IdentifiabilityView) -> None:
-    """The result of the commands `calibrate` and `targets`."""
-    from gaitswarm.cli.output import note, stdout_console
-    from gaitswarm.settings import place_of
-
+    """Print the result of `calibrate` and `targets`."""
     console = stdout_console()
     console.print(targets_table(reached))
     console.print(
-        f"misfit {reached.fitness:.3f} tolerances, root mean square over what is fitted: job"
+        f"misfit {reached.fitness:.3f} tolerances (root mean square over fitted targets): job"
         f" {reached.job}, design {place_of(reached.iteration, reached.particle)}",
         markup=False,
     )
@@ -218,15 +218,13 @@ def show_targets(reached: TargetsView, parameters: IdentifiabilityView) -> None:
     if any(parameter.choices for parameter in parameters.parameters):
         console.print(choices_table(parameters))
     if len(parameters.jobs) == 1:
-        note("note: one run always narrows down; run others with other seeds to see what to trust")
+        note("note: a single run always converges; runs with other seeds show what is reliable")
 
 
 def targets_table(reached: TargetsView) -> Table:
-    """Targets as rows: what was printed or measured, what is simulated, and how far off it is."""
-    from gaitswarm.cli.tables import Table, number
-
+    """Return a table of targets, simulated values and differences."""
     left_out = any(target.left_out is not None for target in reached.targets)
-    title = "Targets; off: in tolerances"
+    title = "Targets; off: difference in tolerances"
     table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0))
     for column in ("walk", "quantity", "unit"):
         table.add_column(column, overflow="fold")
@@ -250,9 +248,7 @@ def targets_table(reached: TargetsView) -> Table:
 
 
 def choices_table(parameters: IdentifiabilityView) -> Table:
-    """Choices as rows: the least misfit with each, over all runs and of each run."""
-    from gaitswarm.cli.tables import Table, number
-
+    """Return a table of the least misfit with each choice, over all runs and by run."""
     title = "Least misfit by choice"
     table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0))
     for column in ("variable", "choice"):
@@ -273,29 +269,23 @@ def choices_table(parameters: IdentifiabilityView) -> Table:
 
 
 def _left_out(reached: ReachedView | None) -> tuple[str, str]:
-    from gaitswarm.cli.tables import MISSING, number
-
     return (MISSING if reached is None else number(reached.simulated)), _off(reached)
 
 
 def _off(reached: ReachedView | None) -> str:
-    from gaitswarm.cli.tables import MISSING
-
     if reached is None or reached.difference is None:
         return MISSING
     return f"{reached.difference:+.2f}"
 
 
 _SHOWN: Final = (0.2, 0.1, 0.05, 0.02)
-"""Of the twelve thresholds, those that a table has room for; JSON and the picture have all."""
+"""Thresholds shown in tables; JSON and the picture contain all twelve."""
 
 _STYLES: Final = {"trusted": "green", "rough": "yellow", "unknown": "red"}
 
 
 def read_truth(path: Path | None) -> dict[str, float]:
-    """True values by name; none without a file. Raises InvalidRequest."""
-    from gaitswarm.cli.inputs.spec_file import read_json_object
-
+    """Read true values by name; none without a file."""
     values = {} if path is None else read_json_object(path, "truth")
     for name, value in values.items():
         if isinstance(value, bool) or not isinstance(value, int | float):
@@ -304,27 +294,23 @@ def read_truth(path: Path | None) -> dict[str, float]:
 
 
 def show_parameters(
-    found: IdentifiabilityView, truth: Mapping[str, float], *, as_json: bool
+    view: IdentifiabilityView, truth: Mapping[str, float], *, as_json: bool
 ) -> None:
-    """The command's result."""
-    from gaitswarm.cli.output import note, print_json, stdout_console
-
+    """Print the result of `identify` and `parameters`."""
     if as_json:
-        print_json(found)
+        print_json(view)
         return
     console = stdout_console()
-    console.print(parameters_table(found, truth))
-    for job, fitness in zip(found.jobs, found.fitness, strict=True):
+    console.print(parameters_table(view, truth))
+    for job, fitness in zip(view.jobs, view.fitness, strict=True):
         console.print(f"job {job}: mean error of currents {1000 * fitness:.2f} mA", markup=False)
-    if len(found.jobs) == 1:
-        note("note: one run always narrows down; run others with other seeds to see what to trust")
+    if len(view.jobs) == 1:
+        note("note: a single run always converges; runs with other seeds show what is reliable")
 
 
-def parameters_table(found: IdentifiabilityView, truth: Mapping[str, float]) -> Table:
-    """Parameters as rows: best value, true one, and widths of the intervals in percent."""
+def parameters_table(view: IdentifiabilityView, truth: Mapping[str, float]) -> Table:
+    """Return a table of best and true values, and of intervals' widths in percent."""
     from rich.text import Text
-
-    from gaitswarm.cli.tables import Table, number
 
     title = "Fitted parameters; widths of their intervals in % of the range searched"
     table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0))
@@ -336,28 +322,28 @@ def parameters_table(found: IdentifiabilityView, truth: Mapping[str, float]) -> 
     for threshold in _SHOWN:
         table.add_column(f"{threshold:.0%}", justify="right")
     table.add_column("trust")
-    for p in found.parameters:
+    for p in view.parameters:
         table.add_row(
             p.name,
             p.unit,
             number(p.best),
             *([number(truth.get(p.name))] if truth else []),
-            *(f"{100 * _width(found, p, threshold):.0f}" for threshold in _SHOWN),
+            *(f"{100 * _width(view, p, threshold):.0f}" for threshold in _SHOWN),
             Text(p.trust or "one run", style=_STYLES.get(p.trust or "", "")),
         )
     return table
 
 
-def draw_parameters(found: IdentifiabilityView, truth: Mapping[str, float]) -> Figure:
-    """A small panel a parameter: its interval against the threshold (fig. 2.14)."""
+def draw_parameters(view: IdentifiabilityView, truth: Mapping[str, float]) -> Figure:
+    """Draw one panel per parameter: its interval against the threshold (fig. 2.14)."""
     from matplotlib.figure import Figure
 
-    columns = min(len(found.parameters), 6)
-    rows = -(-len(found.parameters) // columns)
+    columns = min(len(view.parameters), 6)
+    rows = -(-len(view.parameters) // columns)
     figure = Figure(figsize=(2.2 * columns, 1.6 * rows + 0.6), layout="constrained")
     panels = figure.subplots(rows, columns, squeeze=False, sharex=True).ravel()
-    across = [100.0 * threshold for threshold in found.thresholds]
-    for axes, p in zip(panels, found.parameters, strict=False):
+    across = [100.0 * threshold for threshold in view.thresholds]
+    for axes, p in zip(panels, view.parameters, strict=False):
         axes.fill_between(
             across,
             [interval.low for interval in p.intervals],
@@ -375,21 +361,21 @@ def draw_parameters(found: IdentifiabilityView, truth: Mapping[str, float]) -> F
         axes.set_title(f"{p.name} [{p.unit}]", fontsize=6, loc="left")
         axes.tick_params(labelsize=6)
         axes.spines[["top", "right"]].set_visible(False)
-    for axes in panels[len(found.parameters) :]:
+    for axes in panels[len(view.parameters) :]:
         axes.set_visible(False)
-    figure.supxlabel("fitness within so many percent of its run's best", fontsize=8)
+    figure.supxlabel("fitness above its run's best  [%]", fontsize=8)
     return figure
 
 
 def _height(p: ParameterView, value: float | str) -> float:
-    """Where a value lies in its panel: a choice at its index, one that is none below the panel."""
+    """Return a value's height in its panel: a choice's index; below the panel if unknown."""
     if not isinstance(value, str):
         return value
     names = [choice.name for choice in p.choices]
     return float(names.index(value)) if value in names else -1.0
 
 
-def _width(found: IdentifiabilityView, p: ParameterView, threshold: float) -> float:
-    """Share of the range that was searched."""
-    interval = p.intervals[found.thresholds.index(threshold)]
+def _width(view: IdentifiabilityView, p: ParameterView, threshold: float) -> float:
+    """Return the interval's width as a share of the search range."""
+    interval = p.intervals[view.thresholds.index(threshold)]
     return (interval.high - interval.low) / (p.high - p.low)

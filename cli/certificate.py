@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final, cast
 
+from gaitswarm.cli.files import write_walk_logs
 from gaitswarm.cli.inputs.design_file import given_design, may_be_file
 from gaitswarm.cli.inputs.options import full_id
 from gaitswarm.cli.inputs.robots import (
@@ -16,7 +17,8 @@ from gaitswarm.cli.inputs.robots import (
 )
 from gaitswarm.cli.inputs.spec_file import parse_spec
 from gaitswarm.cli.output import note, print_text, stdout_console
-from gaitswarm.cli.tables import MISSING, SHORT, Table, number
+from gaitswarm.cli.tables import MISSING, SHORT, Table, number, results_table, worth
+from gaitswarm.requests.simulations import SimulationRequest, run_simulation
 from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 from gaitswarm.services.optimizer.jobs.kinds.held_out import certificate_walks
@@ -40,16 +42,16 @@ _PLAIN: Final = ("worlds", "seed", "preference", "precision", "engines", "name")
 
 
 def certificate_spec(design: str, db: str | None, given: Mapping[str, Any]) -> CertificateSpec:
-    """The job that a command asks for."""
+    """Return the spec of a design and options, or of an earlier certificate with options."""
     options = {name: value for name, value in given.items() if value is not None}
     document = _earlier(design, db, options) or _new(design, db, options)
     document |= {name: options[name] for name in _PLAIN if name in options}
     if "scenarios" in options:
-        # A job's scenarios have names there, whether they are presets or its own.
-        known = {scenario.name: scenario for scenario in document.get("scenarios", ())}
-        chosen = scenario_data(options["scenarios"], options.get("robot"))
+        # Names may refer to the earlier certificate's scenarios.
+        earlier = {scenario.name: scenario for scenario in document.get("scenarios", ())}
         document["scenarios"] = [
-            known.get(entry, entry) if isinstance(entry, str) else entry for entry in chosen
+            earlier.get(entry, entry) if isinstance(entry, str) else entry
+            for entry in scenario_data(options["scenarios"], options.get("robot"))
         ]
         document |= _still_held_out(document)
     if "robot" in options:
@@ -59,7 +61,7 @@ def certificate_spec(design: str, db: str | None, given: Mapping[str, Any]) -> C
 
 
 def _earlier(design: str, db: str | None, options: Mapping[str, Any]) -> dict[str, Any] | None:
-    """Of a certificate that is named by its id; None for any other design."""
+    """Return the document of a certificate named by its id; None for any other design."""
     from gaitswarm.jobs.open import open_jobs
 
     if may_be_file(design):
@@ -72,34 +74,34 @@ def _earlier(design: str, db: str | None, options: Mapping[str, Any]) -> dict[st
     if not isinstance(spec, CertificateSpec):
         return None
     if "controller" in options:
-        raise InvalidRequest("is that of the certificate; leave it out", field="controller")
+        raise InvalidRequest("is set by the certificate; omit it", field="controller")
     document = spec.model_dump() | {"scenarios": spec.resolved_scenarios()}
-    # They follow from the number of worlds.
+    # Derived from the number of worlds.
     del document["iterations"]
     return document
 
 
 def _new(design: str, db: str | None, options: Mapping[str, Any]) -> dict[str, Any]:
     robot = options.get("robot")
-    found = given_design(design, options.get("controller"), robot=robot, server=None, db=db)
+    given = given_design(design, options.get("controller"), robot=robot, server=None, db=db)
     document: dict[str, Any] = {
         "kind": "certificate",
-        "name": f"certificate of {found.label}",
-        "controller": found.controller,
-        "design": found.values,
+        "name": f"certificate of {given.label}",
+        "controller": given.controller,
+        "design": given.values,
     }
-    if found.spec is None:
+    if given.spec is None:
         walker, tuned = chosen_robot(robot), chosen_scenarios("all", robot)
         document |= {"robot": walker, "preference": robot_defaults(robot).preference}
     else:
-        walker = found.spec.robot if robot is None else chosen_robot(robot)
-        tuned = found.spec.resolved_scenarios()
-        document |= {"robot": walker, "preference": found.spec.resolved_preference()}
-    return document | certificate_walks(tuned, walker, found.values)
+        walker = given.spec.robot if robot is None else chosen_robot(robot)
+        tuned = given.spec.resolved_scenarios()
+        document |= {"robot": walker, "preference": given.spec.resolved_preference()}
+    return document | certificate_walks(tuned, walker, given.values)
 
 
 def _still_held_out(document: Mapping[str, Any]) -> dict[str, Any]:
-    """`held_out` without what is not walked, if the spec says which are."""
+    """Return `held_out`, if set, without scenarios that are not used."""
     if document.get("held_out") is None:
         return {}
     walked = {
@@ -110,10 +112,10 @@ def _still_held_out(document: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _perturbations(document: Mapping[str, Any], options: Mapping[str, Any]) -> dict[str, Any]:
-    """`variables` and `fixed` of the spec, as far as options say something of them."""
+    """Return `variables` and `fixed` of the spec if options change them."""
     ranges = dict(map(_range, options.get("ranges", ())))
-    held = dict(_pair(entry, "set", "NAME=VALUE") for entry in options.get("fixed", ()))
-    if not ranges and not held and "only" not in options:
+    fixed_values = dict(_pair(entry, "set", "NAME=VALUE") for entry in options.get("fixed", ()))
+    if not ranges and not fixed_values and "only" not in options:
         return {}
     drawn = document.get("variables") or [variable.name for variable in PERTURBATIONS]
     variables = {entry if isinstance(entry, str) else entry["name"]: entry for entry in drawn}
@@ -122,7 +124,7 @@ def _perturbations(document: Mapping[str, Any], options: Mapping[str, Any]) -> d
         variables = {name: variables.get(name, name) for name in names}
     variables |= ranges
     fixed = {name: v for name, v in document.get("fixed", {}).items() if name not in variables}
-    fixed |= held
+    fixed |= fixed_values
     return {
         "variables": [entry for name, entry in variables.items() if name not in fixed],
         "fixed": fixed,
@@ -130,7 +132,7 @@ def _perturbations(document: Mapping[str, Any], options: Mapping[str, Any]) -> d
 
 
 def _range(entry: str) -> tuple[str, dict[str, str]]:
-    """Name and variable of NAME=LOW:HIGH, of the perturbation's kind. Raises InvalidRequest."""
+    """Return name and variable of NAME=LOW:HIGH."""
     name, value = _pair(entry, "range", "NAME=LOW:HIGH")
     low, colon, high = value.partition(":")
     if not colon:
@@ -148,34 +150,30 @@ def _pair(entry: str, option: str, form: str) -> tuple[str, str]:
 
 
 _STRONGEST = 5
-"""Perturbations that are named."""
+"""Number of perturbations shown."""
 
 
 def show_certificate(view: CertificateView, place: str) -> None:
-    """Print what a design came to in many worlds."""
+    """Print the results of a certificate."""
     console = stdout_console()
     console.print(_by_scenario(view))
     console.print(
-        f"{view.worlds} worlds of seed {view.seed}; a walk failed in {_chance(view.failed)}, the"
-        f" robot fell in {_chance(view.fell)}",
+        f"{view.worlds} worlds of seed {view.seed}; failures in {_chance(view.failed)}, falls in"
+        f" {_chance(view.fell)}",
         markup=False,
     )
     if view.worst:
         console.print(_worst(view))
-        console.print(f"see the worst again: {view.worst[0].replay}{place}", markup=False)
+        console.print(f"to replay the worst: {view.worst[0].replay}{place}", markup=False)
     if view.influences:
         console.print(_influences(view))
     for name, engine in view.engines.items():
         console.print(engine_table(name, engine))
-    note(f"job {view.job}; its walks: gaitswarm history {view.job}{place}")
+    note(f"job {view.job}; all results: gaitswarm history {view.job}{place}")
 
 
 def show_world(spec: CertificateSpec, world: int, log: Path | None, *, as_json: bool) -> None:
-    """Let a certificate's design walk in one world, and print its results."""
-    from gaitswarm.cli.files import write_walk_logs
-    from gaitswarm.cli.tables import results_table, worth
-    from gaitswarm.requests.simulations import SimulationRequest, run_simulation
-
+    """Simulate a certificate's design in one world, and print the results."""
     request = SimulationRequest(
         robot=spec.robot,
         controller=spec.controller,
@@ -220,29 +218,27 @@ def _by_scenario(view: CertificateView) -> Table:
     table.add_column("scenario", no_wrap=True)
     for heading in ("failed", "at most", "nominal", "median", "95 %", "CVaR 95 %", "worst"):
         table.add_column(heading, justify="right")
-    for name, found in view.scenarios.items():
-        marked = f"{name} *" if found.held_out else name
-        table.add_row(marked, *_failed(found.failed), *_spread(found.utility))
+    for name, scenario in view.scenarios.items():
+        label = f"{name} *" if scenario.held_out else name
+        table.add_row(label, *_failed(scenario.failed), *_spread(scenario.utility))
     table.add_row("all", *_failed(view.failed), *_spread(view.fitness), style="bold")
-    if any(found.held_out for found in view.scenarios.values()):
+    if any(scenario.held_out for scenario in view.scenarios.values()):
         table.caption, table.caption_justify = "* held out: the design was not tuned in it", "left"
     return table
 
 
-def _failed(found: ProportionView) -> tuple[str, str]:
-    return f"{found.count}", f"{100.0 * found.high:.2g} %"
+def _failed(share: ProportionView) -> tuple[str, str]:
+    return f"{share.count}", f"{100.0 * share.high:.2g} %"
 
 
 def _spread(spread: SpreadView) -> tuple[str, ...]:
-    # A walk that failed is worse than any other.
-    worst = number(spread.worst)
     cvar = number(spread.cvar)
     return (
         number(spread.nominal),
         _quantile(spread.quantiles[2]),
         _quantile(spread.quantiles[4]),
         f"> {cvar}" if spread.tail_failed else cvar,
-        worst,
+        number(spread.worst),
     )
 
 
@@ -250,10 +246,10 @@ def _quantile(value: float | None) -> str:
     return "failed" if value is None else number(value)
 
 
-def _chance(found: ProportionView) -> str:
+def _chance(share: ProportionView) -> str:
     return (
-        f"{found.count} ({100.0 * found.share:.3g} %; 95 % interval {100.0 * found.low:.2g} to"
-        f" {100.0 * found.high:.2g} %)"
+        f"{share.count} ({100.0 * share.share:.3g} %; 95 % interval {100.0 * share.low:.2g} to"
+        f" {100.0 * share.high:.2g} %)"
     )
 
 
@@ -270,7 +266,7 @@ def _worst(view: CertificateView) -> Table:
 
 def _influences(view: CertificateView) -> Table:
     table = Table(
-        title="What goes with bad worlds (rank correlation with the fitness)",
+        title="Perturbations in bad worlds (rank correlation with the fitness)",
         title_justify="left",
         box=None,
         padding=(0, 1, 0, 0),
@@ -278,19 +274,18 @@ def _influences(view: CertificateView) -> Table:
     table.add_column("perturbation")
     for heading in ("correlation", "from", "to"):
         table.add_column(heading, justify="right")
-    for found in view.influences[:_STRONGEST]:
-        table.add_row(
-            found.name, *(f"{v:+.2f}" for v in (found.correlation, found.low, found.high))
-        )
+    for influence in view.influences[:_STRONGEST]:
+        values = (influence.correlation, influence.low, influence.high)
+        table.add_row(influence.name, *(f"{value:+.2f}" for value in values))
     return table
 
 
 _COMPARED = ("torque", "acceleration", "angular_acceleration", "energy", "reciprocal_speed")
-"""The loss of height, a difference near zero, is in the JSON."""
+"""Objectives shown; the loss of height, a difference near zero, is only in the JSON."""
 
 
 def engine_table(name: str, engine: ComparedEngineView) -> Table:
-    """Three rows a scenario: by our engine, by the other one, and by how much the latter is more"""
+    """Return a table of three rows per scenario: our engine, the other, the relative difference."""
     table = Table(
         title=f"The nominal world in {name}: {engine.description}",
         title_justify="left",
@@ -301,10 +296,10 @@ def engine_table(name: str, engine: ComparedEngineView) -> Table:
         table.add_column(heading, no_wrap=True)
     for heading in (*(SHORT[name] for name in _COMPARED), "utility"):
         table.add_column(heading, justify="right", no_wrap=True)
-    for scenario, found in engine.scenarios.items():
-        quantities = [*(found.objectives[key] for key in _COMPARED), found.utility]
-        table.add_row(scenario, OWN, found.ours, *_ours(quantities))
-        table.add_row("", name, found.theirs, *_theirs(quantities))
+    for scenario, compared in engine.scenarios.items():
+        quantities = [*(compared.objectives[key] for key in _COMPARED), compared.utility]
+        table.add_row(scenario, OWN, compared.ours, *_ours(quantities))
+        table.add_row("", name, compared.theirs, *_theirs(quantities))
         table.add_row("", "difference", "", *_differences(quantities), style="bold")
     blank = [""] * len(_COMPARED)
     fitness = [engine.fitness]

@@ -8,14 +8,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
-from gaitswarm.cli.tables import SHORT, number
+from gaitswarm.cli.tables import SHORT, Table, number
 from gaitswarm.settings import place_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from gaitswarm.cli.tables import Table
     from gaitswarm.views import SimulationView
     from gaitswarm.views.trade_offs import (
         FrontView,
@@ -30,9 +29,7 @@ _ACCENT: Final = "#d1495b"
 
 
 def marked_table(view: FrontView) -> Table:
-    """Knees, the best in each objective, and the winners of preferences."""
-    from gaitswarm.cli.tables import Table
-
+    """Return a table of knees, the best in each objective, and winners of preferences."""
     table = Table(box=None, padding=(0, 1, 0, 0))
     table.add_column("", no_wrap=True)
     for head in ("design", *(f"{SHORT[o.name]}\n{o.unit}" for o in view.objectives), "fitness"):
@@ -48,7 +45,7 @@ def marked_table(view: FrontView) -> Table:
 
 
 def _marked(view: FrontView) -> Mapping[str, NormalisedDesignView]:
-    """Designs with a mark, by what there is to say of them."""
+    """Return notable designs by label."""
     marked: dict[str, NormalisedDesignView] = {}
     for place, knee in enumerate(view.knees, start=1):
         marked[f"knee {place} ({knee.distance:.2f})"] = knee
@@ -61,18 +58,18 @@ def _marked(view: FrontView) -> Mapping[str, NormalisedDesignView]:
 
 
 def summary(view: FrontView) -> Iterator[str]:
-    """What the table leaves open."""
+    """Yield sentences about the front."""
     error = f" ± {view.hypervolume_error:.4f}" if view.hypervolume_error else ""
     yield (
-        f"{view.size} of {view.designs_judged} designs are dominated by no other; hypervolume"
-        f" {view.hypervolume:.4f}{error}; fitness is by the job's own preference, and all is"
+        f"{view.size} of {view.designs_judged} designs are not dominated; hypervolume"
+        f" {view.hypervolume:.4f}{error}; fitness uses the job's preference; all values are"
         " minimized"
     )
     for winner in view.winners:
         if not winner.on_front:
             yield (
-                f"the best under {_whose(winner)} is dominated by {winner.dominated_by} designs, by"
-                f" one in every objective by {100.0 * winner.behind:.2g} %"
+                f"the best under {_whose(winner)} is dominated by {winner.dominated_by} designs,"
+                f" and behind one in every objective by {100.0 * winner.behind:.2g} %"
             )
 
 
@@ -82,14 +79,14 @@ def _whose(winner: FrontWinnerView) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Placed:
-    """A design from elsewhere beside a front.
+    """Position of another design relative to a front.
 
     Attributes:
         objectives: over all scenarios, by name; None if it fails in one.
-        fitness: by the job's own preference.
-        dominated_by: designs of the front that dominate it.
-        dominates: designs of the front that it dominates.
-        of: designs that it was compared with.
+        fitness: by the job's preference.
+        dominated_by: number of designs of the front that dominate it.
+        dominates: number of designs of the front that it dominates.
+        of: number of designs of the front.
     """
 
     objectives: dict[str, float] | None
@@ -100,7 +97,7 @@ class Placed:
 
 
 def placed(walk: SimulationView, view: FrontView) -> Placed:
-    """Where a design that walked in the job's scenarios lies with respect to the front."""
+    """Place a design, simulated in the job's scenarios, relative to the front."""
     import numpy as np
 
     names = [objective.name for objective in view.objectives]
@@ -110,32 +107,33 @@ def placed(walk: SimulationView, view: FrontView) -> Placed:
     ]  # fmt: skip
     if len(walks) < len(walk.scenarios):
         return Placed(None, None, 0, 0, len(view.designs))
-    own = np.exp(np.log(np.array(walks, dtype=np.float64)).mean(axis=0))
+    means = np.exp(np.log(np.array(walks, dtype=np.float64)).mean(axis=0))
     front = np.array([list(design.objectives.values()) for design in view.designs])
     return Placed(
-        dict(zip(names, own.tolist(), strict=True)),
+        dict(zip(names, means.tolist(), strict=True)),
         walk.fitness,
-        int(((front <= own).all(axis=1) & (front < own).any(axis=1)).sum()),
-        int(((own <= front).all(axis=1) & (own < front).any(axis=1)).sum()),
+        int(((front <= means).all(axis=1) & (front < means).any(axis=1)).sum()),
+        int(((means <= front).all(axis=1) & (means < front).any(axis=1)).sum()),
         len(front),
     )
 
 
 def placed_lines(published: Mapping[str, Placed]) -> Iterator[str]:
-    """One sentence for each design."""
-    for name, own in published.items():
-        if own.objectives is None:
+    """Yield one sentence per published design."""
+    for name, design in published.items():
+        if design.objectives is None:
             yield f"published {name} fails in a scenario"
             continue
-        told = [f"{SHORT[key]} {number(value)}" for key, value in own.objectives.items()]
+        values = [f"{SHORT[key]} {number(value)}" for key, value in design.objectives.items()]
         yield (
-            f"published {name} is dominated by {own.dominated_by} of {own.of} designs of the front,"
-            f" and dominates {own.dominates}: {', '.join(told)}, fitness {number(own.fitness)}"
+            f"published {name} is dominated by {design.dominated_by} of {design.of} designs of the"
+            f" front, and dominates {design.dominates}: {', '.join(values)}, fitness"
+            f" {number(design.fitness)}"
         )
 
 
 def front_csv(view: FrontView) -> bytes:
-    """One row for each design of the front: where it is, marks, fitness, objectives, variables."""
+    """Return a CSV with one row per design: position, marks, fitness, objectives, variables."""
     text = io.StringIO()
     names = [objective.name for objective in view.objectives]
     variables = list(view.designs[0].design) if view.designs else []
@@ -156,9 +154,7 @@ def front_csv(view: FrontView) -> bytes:
 
 
 def fits_table(view: PreferenceForView) -> Table:
-    """Preferences that suit a design, one for each set of biases, the best first."""
-    from gaitswarm.cli.tables import Table
-
+    """Return a table of preferences that suit a design, one per set of biases, best first."""
     table = Table(box=None, padding=(0, 2, 0, 0))
     for head in ("biases of", "rank", "margin %", "rival", "bias", "exponent"):
         table.add_column(head, no_wrap=head not in ("bias", "exponent"))
@@ -176,15 +172,15 @@ def fits_table(view: PreferenceForView) -> Table:
 
 
 def verdict(view: PreferenceForView) -> str:
-    """Whether a design wins under any preference, in a sentence."""
-    own, best = place_of(view.chosen.iteration, view.chosen.particle), view.fits[0]
+    """State in a sentence whether a design wins under any preference."""
+    place, best = place_of(view.chosen.iteration, view.chosen.particle), view.fits[0]
     if view.wins:
-        return f"design {own} wins{_by(best)} under {best.preference.model_dump_json()}"
+        return f"design {place} wins{_by(best)} under {best.preference.model_dump_json()}"
     tried = "" if view.certain else " that were tried"
     dominated = "" if view.on_front else ", which is dominated"
     rival = "another" if best.rival is None else place_of(best.rival.iteration, best.rival.particle)
     return (
-        f"no exponents{tried} with these biases make design {own} win{dominated}; under"
+        f"no exponents{tried} with these biases make design {place} win{dominated}; under"
         f" {best.preference.model_dump_json()} it has rank {best.rank}, and {rival} is better"
         f"{_by(best)}"
     )
@@ -195,7 +191,7 @@ def _by(fit: PreferenceFitView) -> str:
 
 
 def draw_front(view: FrontView, *, title: str) -> Figure:
-    """The front in every pair of objectives, with the winners under A, B and C and the knees."""
+    """Draw the front in every pair of objectives, with knees and winners under A, B and C."""
     from matplotlib.figure import Figure
 
     names = [objective.name for objective in view.objectives]
@@ -247,5 +243,5 @@ def _draw_pair(axes: Axes, view: FrontView, horizontal: str, vertical: str) -> N
 
 
 def _once(axes: Axes, label: str) -> str:
-    """A label that the legend has not yet."""
+    """Return the label unless the legend has it."""
     return "" if label in axes.get_legend_handles_labels()[1] else label

@@ -28,12 +28,12 @@ _ACCENT: Final = "#d1495b"
 
 
 def draw_convergence(iterations: Sequence[IterationView], *, title: str) -> Figure:
-    """Fitness (minimized) over iterations: best so far, median, and the band best to worst."""
+    """Draw fitness (minimized) over iterations: best so far, median, and the best-worst band."""
     from matplotlib.figure import Figure
     from matplotlib.ticker import MaxNLocator
 
     if not iterations:
-        raise InvalidRequest("the job has committed no iteration yet, so there is nothing to draw")
+        raise InvalidRequest("the job has no committed iteration to draw yet")
     figure = Figure(figsize=(8.0, 4.5), layout="constrained")
     axes = figure.add_subplot()
     index = [i.index for i in iterations]
@@ -43,7 +43,7 @@ def draw_convergence(iterations: Sequence[IterationView], *, title: str) -> Figu
     axes.fill_between(index, best, worst, color=_INK, alpha=0.12, lw=0, label="designs")
     axes.plot(index, median, color=_INK, alpha=0.6, lw=1.2, label="median of the iteration")
     so_far = _floats([i.best_so_far for i in iterations])
-    label = f"best so far, {so_far[-1]:.4g} at last"
+    label = f"best so far, finally {so_far[-1]:.4g}"
     axes.step(index, so_far, where="post", color=_ACCENT, lw=2.2, label=label)
     axes.set_yscale("log")
     _plain_log_labels(axes)
@@ -59,7 +59,7 @@ def draw_convergence(iterations: Sequence[IterationView], *, title: str) -> Figu
 
 
 def draw_surface(surface: Surface, *, title: str) -> Figure:
-    """Output over angle error and motor current, from the table that the robot looks up."""
+    """Draw the output over angle error and motor current, from the robot's lookup table."""
     from matplotlib.figure import Figure
     from matplotlib.ticker import MaxNLocator
 
@@ -93,7 +93,7 @@ def draw_surface(surface: Surface, *, title: str) -> Figure:
 
 
 def draw_comparison(figures: Sequence[WalkFigures]) -> Figure:
-    """Speed, power and effectivity of every drive, in groups by scenario."""
+    """Draw speed, power and effectivity of every drive, grouped by scenario."""
     from matplotlib.figure import Figure
 
     scenarios = list(dict.fromkeys(f.scenario for f in figures))
@@ -123,14 +123,11 @@ def draw_comparison(figures: Sequence[WalkFigures]) -> Figure:
 
 
 def save(figure: Figure, path: Path, option: str = "output") -> None:
-    """Write in the format of the file's suffix. Raises InvalidRequest.
-
-    option: which option named the path.
-    """
+    """Write a figure in the format of the file's suffix; option: the one that named the path."""
     kind = path.suffix.removeprefix(".").lower()
     if kind not in _FORMATS:
         raise InvalidRequest(f"{path} must end in .{', .'.join(_FORMATS)}", field=option)
-    # Without a date the same picture is the same file.
+    # Without a date, equal pictures are equal files.
     metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
     with replacing(path, option) as file:
         figure.savefig(file, format=kind, dpi=150, metadata=metadata)
@@ -141,7 +138,7 @@ def _floats(values: Sequence[float | None]) -> list[float]:
 
 
 def _plain_log_labels(axes: Axes) -> None:
-    """25, not 2.5 x 10^1: a fitness varies by less than a decade."""
+    """Label 25 instead of 2.5 x 10^1: a fitness varies by less than a decade."""
     from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
     axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=12))
@@ -152,14 +149,11 @@ def _plain_log_labels(axes: Axes) -> None:
 _GROUND: Final = "#9db8d9"
 
 _ACROSS: Final = {"from the side": (0, 2), "from above": (0, 1)}
-"""Coordinates of the body's frame that a panel shows: x forward, y left, z up."""
+"""Coordinates of the body's frame by panel: x forward, y left, z up."""
 
 
 def draw_robot(view: RobotCheckView) -> Figure:
-    """Legs, feet, centre of mass, ground, and the polygon of the feet that supports the robot.
-
-    view: what `robot check` found.
-    """
+    """Draw legs, feet, centre of mass, ground, and the support polygon."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9.0, 4.5), layout="constrained")
@@ -197,16 +191,16 @@ def draw_robot(view: RobotCheckView) -> Figure:
 
 
 def _name(axes: Axes, name: str, x: float, y: float) -> None:
-    # A leg's name is anybody's, and `$` would begin a formula.
+    # Names come from URDFs, and `$` would start a formula.
     axes.annotate(name, (x, y), (4, -10), textcoords="offset points", fontsize=8, parse_math=False)
 
 
 def _around(points: np.ndarray) -> list[int]:
-    """Indices of the points' convex hull, one after the other around it."""
+    """Return indices of the points' convex hull in order."""
     from scipy.spatial import ConvexHull, QhullError
 
     try:
         return [int(index) for index in ConvexHull(points).vertices]
     except QhullError:
-        # All on one line, as those of two legs.
+        # All points are collinear, as those of two legs.
         return [int(points[:, 0].argmin()), int(points[:, 0].argmax())]

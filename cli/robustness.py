@@ -5,19 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
-from gaitswarm.cli.tables import MISSING, SHORT, number
+from gaitswarm.cli.tables import MISSING, SHORT, Table, number
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from gaitswarm.cli.tables import Table
     from gaitswarm.views.robustness import IndexView, RobustnessView
 
 
 def scenarios_table(view: RobustnessView) -> Table:
-    """One row a scenario: index, interval, and what each objective adds to it."""
-    from gaitswarm.cli.tables import Table
-
+    """Return a table with one row per scenario: index, interval, and shares of objectives."""
     table = Table(title="Robustness index", title_justify="left", box=None, padding=(0, 1, 0, 0))
     table.add_column("scenario", no_wrap=True)
     for head in ("index", "95 %", *(SHORT[o.name] for o in view.objectives), "failed"):
@@ -40,9 +37,7 @@ def scenarios_table(view: RobustnessView) -> Table:
 
 
 def variables_table(view: RobustnessView) -> Table:
-    """One row a variable: to which the objectives answer most, over all scenarios and in each."""
-    from gaitswarm.cli.tables import Table
-
+    """Return a table with one row per variable: index over all scenarios and in each."""
     table = Table(title="By variable", title_justify="left", box=None, padding=(0, 1, 0, 0))
     table.add_column("variable", no_wrap=True)
     for head in ("sampled", "all", *view.scenarios):
@@ -59,23 +54,23 @@ def variables_table(view: RobustnessView) -> Table:
 
 
 def summary(view: RobustnessView) -> Iterator[str]:
-    """What the tables leave open."""
+    """Yield sentences about the estimate."""
     yield (
-        f"of {view.samples} designs within {100.0 * view.radius:g} % of each variable's bounds;"
-        " numbers are relative changes of objectives over the whole bounds; smaller is more robust"
+        f"{view.samples} designs within {100.0 * view.radius:g} % of each variable's bounds;"
+        " values are relative changes of objectives over the whole bounds; smaller is more robust"
     )
     unexplained = ", ".join(
         f"{SHORT[name]} {number(100.0 * value, 2)} %" for name, value in _unexplained(view).items()
     )
-    yield f"left unexplained by a linear model, largest of all scenarios: {unexplained}"
+    yield f"unexplained by the linear model, largest of all scenarios: {unexplained}"
     if view.held:
-        yield f"held: {', '.join(view.held)}"
+        yield f"fixed: {', '.join(view.held)}"
 
 
 def draw_robustness(views: Mapping[str, RobustnessView], *, title: str) -> Figure:
-    """The index with its interval by scenario, designs side by side (after fig. 4.8).
+    """Draw the index with its interval by scenario, designs side by side (after fig. 4.8).
 
-    views: of the same scenarios, by the name to show.
+    views: of the same scenarios, by label.
     """
     from matplotlib.figure import Figure
 
@@ -84,17 +79,17 @@ def draw_robustness(views: Mapping[str, RobustnessView], *, title: str) -> Figur
     axes = figure.add_subplot()
     width = 0.8 / len(views)
     for k, (name, view) in enumerate(views.items()):
-        places, found = [], []
+        places, indices = [], []
         for n, scenario in enumerate(scenarios):
             index = view.index if scenario == "all" else view.scenarios[scenario].index
-            # One that was not found has no bar.
+            # A missing index has no bar.
             if index is not None:
                 places.append(n + (k - (len(views) - 1) / 2) * width)
-                found.append(index)
-        errors = [[i.value - i.low for i in found], [i.high - i.value for i in found]]
+                indices.append(index)
+        errors = [[i.value - i.low for i in indices], [i.high - i.value for i in indices]]
         axes.bar(
             places,
-            [index.value for index in found],
+            [index.value for index in indices],
             width,
             yerr=errors,
             error_kw={"elinewidth": 1.0, "capsize": 2.0},
@@ -111,7 +106,7 @@ def draw_robustness(views: Mapping[str, RobustnessView], *, title: str) -> Figur
 
 
 def _unexplained(view: RobustnessView) -> dict[str, float]:
-    """Largest of all scenarios, by objective."""
+    """Return the largest value of all scenarios by objective."""
     return {
         objective.name: max(
             part.unexplained[objective.name] or 0.0 for part in view.scenarios.values()

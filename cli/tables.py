@@ -12,6 +12,9 @@ from rich.table import Column
 from rich.table import Table as RichTable
 from rich.text import Text
 
+from gaitswarm.cli.output import stdout_console
+from gaitswarm.settings import place_of
+
 if TYPE_CHECKING:
     from gaitswarm.services.optimizer.jobs.fork import Lineage
     from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
@@ -36,16 +39,16 @@ if TYPE_CHECKING:
 
 
 class Table(RichTable):
-    """As Rich's, but ids and numbers stay whole on a console of any width.
+    """Rich table that never cuts ids and numbers, at any console width.
 
-    Cells break between words only. Where even so a row does not fit on a line, every row becomes a
-    block of lines, each with a heading and a cell; empty cells have none. A first cell without a
-    heading, or with nothing beside it, is the heading of its block or of those below. Of a table
-    without headings every row is a line that the terminal breaks. Brackets in a cell are no markup.
+    Cells break only between words. If rows still do not fit, every row becomes a block of lines
+    with a heading and a cell each, without empty cells. A first cell without a heading, or alone
+    in its row, is the heading of its block or of the following ones. Rows of tables without
+    headings become lines that the terminal wraps. Brackets in cells are not markup.
     """
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        """The table, or its rows as blocks. Called by Rich."""
+        """Render the table, or its rows as blocks; called by Rich."""
         options = options.update(markup=False)
         for column in self.columns:
             column.min_width = _longest_word(console, options, column)
@@ -57,31 +60,31 @@ class Table(RichTable):
             yield from self._lines()
 
     def _narrowest(self) -> int:
-        """Characters that the table takes when all columns are as narrow as their words."""
+        """Return the width with all columns as narrow as their longest words."""
         _, right, _, left = self.padding
         edges = 0 if self.pad_edge else left + right
         return sum((c.min_width or 0) + left + right for c in self.columns) - edges
 
     def _blocks(self) -> Iterator[Text | RichTable]:
-        """One block a row, with an empty line between two."""
+        """Yield one block per row, separated by empty lines."""
         if self.title:
             yield Text(str(self.title), style="italic")
         for number, row in enumerate(self._rows()):
             if number:
                 yield Text()
-            said = [pair for pair in zip(self.columns, row, strict=True) if str(pair[1])]
-            if said and (len(said) == 1 or not str(said[0][0].header)):
-                yield Text(str(said.pop(0)[1]), style="bold")
+            cells = [pair for pair in zip(self.columns, row, strict=True) if str(pair[1])]
+            if cells and (len(cells) == 1 or not str(cells[0][0].header)):
+                yield Text(str(cells.pop(0)[1]), style="bold")
             block = RichTable(box=None, show_header=False, padding=(0, 2, 0, 0))
             block.add_column(overflow="fold", no_wrap=True)
             block.add_column(overflow="fold")
-            for column, cell in said:
+            for column, cell in cells:
                 block.add_row(_on_one_line(column.header), _text(cell))
-            if said:
+            if cells:
                 yield block
 
     def _lines(self) -> Iterator[Text]:
-        """One line a row, cells below each other but for the last."""
+        """Yield one line per row, with aligned cells except the last."""
         rows = [[_text(cell) for cell in row] for row in self._rows()]
         widths = [max(cell.cell_len for cell in column) for column in zip(*rows, strict=True)]
         for row in rows:
@@ -98,7 +101,7 @@ def _text(cell: RenderableType) -> Text:
 
 
 def _longest_word(console: Console, options: ConsoleOptions, column: Column) -> int:
-    """Of a column's heading and cells; a cell that must not be wrapped is one word."""
+    """Return the longest word of a column; cells that must not wrap are one word."""
     head = Measurement.get(console, options, column.header).minimum
     cells = [Measurement.get(console, options, cell) for cell in column.cells]
     return max([head, *(cell.maximum if column.no_wrap else cell.minimum for cell in cells)])
@@ -127,16 +130,16 @@ SHORT: Final = {
     "reciprocal_speed": "1/speed",
     "height_loss": "h. loss",
 }
-"""Headings that leave room for six objectives on a line of 80 characters."""
+"""Headings short enough for six objectives on 80 characters."""
 
 
 def jobs_table(jobs: Iterable[JobSummaryView]) -> Table:
-    """One row a job; priorities and gains only where there is one."""
+    """Return a table of jobs, with columns of priorities and gains only if there are any."""
     rows = list(jobs)
-    urgent = any(job.priority for job in rows)
-    compared = any(job.gain is not None for job in rows)
-    table = Table("id", "name", "state", *(["priority"] if urgent else []), box=None)
-    gains = ["gain"] if compared else []
+    has_priority = any(job.priority for job in rows)
+    has_gain = any(job.gain is not None for job in rows)
+    table = Table("id", "name", "state", *(["priority"] if has_priority else []), box=None)
+    gains = ["gain"] if has_gain else []
     for heading in ("iterations", "best fitness", *gains, "submitted (UTC)"):
         table.add_column(heading)
     for job in rows:
@@ -144,10 +147,10 @@ def jobs_table(jobs: Iterable[JobSummaryView]) -> Table:
             job.id,
             _name(job),
             Text(job.state.value, style=_STYLES.get(job.state.value, "")),
-            *([str(job.priority)] if urgent else []),
+            *([str(job.priority)] if has_priority else []),
             _spent(job),
             number(job.best_fitness),
-            *([_gain(job)] if compared else []),
+            *([_gain(job)] if has_gain else []),
             f"{job.created_at:%Y-%m-%d %H:%M}",
         )
     return table
@@ -161,14 +164,14 @@ def _gain(job: JobSummaryView) -> str:
 
 
 def _name(job: JobSummaryView) -> Text:
-    """With tags, what is archived, and of a fork where it comes from."""
+    """Return the name, with tags, the archived mark and a fork's parent."""
     fork = [] if job.lineage is None else ["fork of", job.lineage.parent]
     marks = [*(f"#{tag}" for tag in job.tags), *(["archived"] if job.archived else [])]
     return Text("\n".join(filter(None, [job.name, *fork, " ".join(marks)])) or MISSING)
 
 
 def optimizers_table(optimizers: Iterable[OptimizerView]) -> Table:
-    """One row a name; settings as they are by default."""
+    """Return a table of search methods with default settings."""
     table = Table("name", "description", "settings", box=None)
     for optimizer in optimizers:
         settings = optimizer.settings.model_dump(exclude={"name"})
@@ -182,7 +185,7 @@ def optimizers_table(optimizers: Iterable[OptimizerView]) -> Table:
 
 
 def iterations_table(iterations: Iterable[IterationView]) -> Table:
-    """One row an iteration; fitness is minimized."""
+    """Return a table of iterations; fitness is minimized."""
     table = Table(box=None)
     columns = ("iteration", "best so far", "best", "mean", "median", "worst", "failed", "seconds")
     for column in columns:
@@ -196,7 +199,7 @@ def iterations_table(iterations: Iterable[IterationView]) -> Table:
 
 
 def design_table(spec: Spec, designs: Mapping[str, Mapping[str, float | str]]) -> Table:
-    """Variables as rows, designs as columns, with unit and bounds."""
+    """Return a table of variables with the values of designs, bounds and units."""
     table = Table(title="Design", title_justify="left", box=None, padding=(0, 2, 0, 0))
     table.add_column("variable")
     for name in designs:
@@ -217,7 +220,7 @@ def design_table(spec: Spec, designs: Mapping[str, Mapping[str, float | str]]) -
 
 
 def _range(variable: Variable | None) -> str:
-    """Bounds of the search, or the choices; None for what is fixed."""
+    """Format bounds or choices of a variable; None for a fixed one."""
     if variable is None:
         return "fixed"
     if variable.kind == "categorical":
@@ -229,9 +232,9 @@ def results_table(
     designs: Mapping[str, Mapping[str, ScenarioResultView]],
     objectives: Sequence[Objective | ObjectiveView],
 ) -> Table:
-    """Scenarios as rows; with several designs, one row for each under the scenario's name.
+    """Return a table of results by scenario, with one row per design.
 
-    objectives: columns of the results. Utility and objectives are minimized.
+    Utility and objectives are minimized.
     """
     table = Table(title="By scenario", title_justify="left", box=None, padding=(0, 1, 0, 0))
     table.add_column("scenario", no_wrap=True)
@@ -255,7 +258,7 @@ def results_table(
 
 
 def measurements_table(results: Mapping[str, SimulatedScenarioView]) -> Table:
-    """Scenarios as rows, what their walks tell beside the objectives as columns."""
+    """Return a table of measurements by scenario."""
     from gaitswarm.sim.outcome import MEASUREMENTS
 
     table = Table(title="Measured", title_justify="left", box=None, padding=(0, 1, 0, 0))
@@ -270,27 +273,24 @@ def measurements_table(results: Mapping[str, SimulatedScenarioView]) -> Table:
 
 
 def gait_in_words(gait: PlannedGaitView) -> str:
-    """What a gait plans: duty factor, feet that stand, static stability."""
+    """Describe a planned gait: duty factor, supporting feet, static stability."""
     if gait.margin is None:
-        return f"duty {gait.duty_factor:.2f}, at moments no foot stands: not statically stable"
-    # Zero has a sign that nobody wants to see.
+        return f"duty {gait.duty_factor:.2f}, at times without support: not statically stable"
+    # Adding zero removes the sign of -0.0.
     margin = round(1000.0 * gait.margin, 1) + 0.0
     return (
-        f"duty {gait.duty_factor:.2f}, {gait.fewest_feet} feet or more stand, stability margin"
-        f" {margin:.1f} mm: {'' if gait.stable else 'not '}statically stable"
+        f"duty {gait.duty_factor:.2f}, at least {gait.fewest_feet} supporting feet, stability"
+        f" margin {margin:.1f} mm: {'' if gait.stable else 'not '}statically stable"
     )
 
 
 def _objective(name: str, value: float | None) -> str:
-    # A height is lost by millimetres: four decimals say more than four digits.
+    # Losses of height are millimetres: show four decimals instead of four digits.
     return f"{value:.4f}" if name == "height_loss" and value is not None else number(value)
 
 
 def worth(view: EvaluationView | SimulationView, *, digits: int = 4) -> str:
-    """Fitness, which is minimized, and beside it the figure that is maximized, if there is one.
-
-    digits: significant ones of the fitness.
-    """
+    """Format the minimized fitness, and the maximized figure of merit if there is one."""
     fitness = number(view.fitness, digits)
     if view.figure_of_merit is None:
         return fitness
@@ -298,20 +298,18 @@ def worth(view: EvaluationView | SimulationView, *, digits: int = 4) -> str:
 
 
 def search_line(best: BestView) -> str | None:
-    """What a search in single precision made of its best; None if it is in double, too."""
+    """Describe the best's fitness in the search's precision; None if that is double, too."""
     if best.search is None:
         return None
-    found = number(best.search.fitness, 6)
+    fitness = number(best.search.fitness, 6)
     return (
-        f"judged in double precision; in {best.search.precision}, in which it was found, its"
-        f" fitness is {found} ({100.0 * best.search.difference:+.2g} %)"
+        f"evaluated in double precision; in {best.search.precision} precision of the search, its"
+        f" fitness is {fitness} ({100.0 * best.search.difference:+.2g} %)"
     )
 
 
 def ranking_table(ranking: RankingView) -> Table:
-    """The best designs by another preference, best first, beside their ranks before."""
-    from gaitswarm.settings import place_of
-
+    """Return a table of the best designs by another preference, with their ranks before."""
     table = Table(box=None)
     columns = ["rank", "before", "design", "fitness", "before"]
     maximized = any(design.figure_of_merit is not None for design in ranking.top)
@@ -330,9 +328,7 @@ def ranking_table(ranking: RankingView) -> Table:
 
 
 def print_job(job: JobView) -> None:
-    """What `status` shows."""
-    from gaitswarm.cli.output import stdout_console
-
+    """Print the result of `status`."""
     console = stdout_console()
     rows = {
         "job": job.id,
@@ -366,14 +362,13 @@ def print_job(job: JobView) -> None:
 
 
 def lineage_line(lineage: Lineage) -> str:
-    """What a fork took over of which job, and why no more."""
-    first = f"fork of {lineage.parent}, "
+    """Describe a fork's parent and how it continues."""
+    parent = f"fork of {lineage.parent}, "
     changed = f" with another {', '.join(lineage.changed)}" if lineage.changed else ""
     if lineage.carried == "search":
-        begins = lineage.from_iteration
-        return f"{first}goes on from its iteration {begins}{changed}"
+        return f"{parent}continues from its iteration {lineage.from_iteration}{changed}"
     return (
-        f"{first}a new search{changed} from the best designs of its iterations before"
+        f"{parent}a new search{changed} from the best designs before iteration"
         f" {lineage.from_iteration}: {lineage.reason}"
     )
 
@@ -393,13 +388,11 @@ def _spent(job: JobSummaryView) -> str:
 def _iterations(job: JobView) -> str:
     if job.spent.unit == "iterations":
         return f"{job.iterations} of {job.iterations_planned}"
-    return f"{job.iterations}, of {job.particles} designs at most"
+    return f"{job.iterations}, of up to {job.particles} designs"
 
 
 def print_best(best: BestView, job: JobView) -> None:
-    """The best design of a job, its results by case, and what a search in single made of it."""
-    from gaitswarm.cli.output import stdout_console
-
+    """Print a job's best design and its results."""
     console = stdout_console()
     console.print(design_table(job.spec, {"best": best.design}))
     console.print(results_table({"best": best.scenarios}, job.objectives))
@@ -409,7 +402,7 @@ def print_best(best: BestView, job: JobView) -> None:
 
 
 def provenance_line(provenance: JobProvenance) -> str:
-    """What numbers depend on, digests shortened to what tells them apart."""
+    """Describe provenance, with shortened digests."""
     simulation = provenance.simulation
     return (
         f"gaitswarm {provenance.gaitswarm}, {simulation.backend} backend in"
@@ -420,7 +413,7 @@ def provenance_line(provenance: JobProvenance) -> str:
 
 
 def number(value: float | str | None, digits: int = 4) -> str:
-    """As many significant digits, or all before the decimal point; a choice's name as it is."""
+    """Format a number with significant digits, at least all integer ones; names do not change."""
     if isinstance(value, str):
         return value
     if value is None:
@@ -429,7 +422,7 @@ def number(value: float | str | None, digits: int = 4) -> str:
 
 
 def duration(seconds: float) -> str:
-    """`42 s`, `3 min 05 s`, `2 h 07 min`."""
+    """Format seconds, as `42 s`, `3 min 05 s` or `2 h 07 min`."""
     whole = round(seconds)
     if whole < 60:
         return f"{whole} s"
@@ -439,9 +432,8 @@ def duration(seconds: float) -> str:
 
 
 def recordings_table(recordings: Iterable[RecordingEntryView]) -> Table:
-    """One row a recording; one that cannot be read has an id and a time."""
+    """Return a table of recordings; unreadable ones have only an id and a time."""
     table = Table(box=None)
-    # Ids are what other commands take: they are never cut.
     table.add_column("id", no_wrap=True)
     for heading in ("walk", "currents", "recorded (UTC)"):
         table.add_column(heading)
@@ -449,11 +441,11 @@ def recordings_table(recordings: Iterable[RecordingEntryView]) -> Table:
         walk = Text(" ".join(filter(None, (entry.scenario, entry.controller))) or MISSING)
         if entry.synthetic:
             walk.append(" SYNTHETIC")
-        known = entry.joints is not None and entry.seconds is not None
+        readable = entry.joints is not None and entry.seconds is not None
         table.add_row(
             entry.id,
             walk,
-            f"{entry.joints} over {number(entry.seconds)} s" if known else MISSING,
+            f"{entry.joints} over {number(entry.seconds)} s" if readable else MISSING,
             f"{entry.created_at:%Y-%m-%d %H:%M}",
         )
     return table

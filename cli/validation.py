@@ -11,6 +11,7 @@ import numpy as np
 from rich.text import Text
 
 from gaitswarm.cli.files import replacing
+from gaitswarm.cli.pictures import save
 from gaitswarm.cli.tables import Table
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
@@ -32,16 +33,14 @@ REPORT: Final = "report.md"
 def write_report(
     folder: Path, comparison: Comparison, pair: Synchronised, facts: Mapping[str, str]
 ) -> Path:
-    """Write `report.md` and its pictures; returns the path of the report.
+    """Write `report.md` and its pictures, and return the report's path.
 
-    facts: what was compared, by heading. Raises InvalidRequest if the folder cannot be written.
+    facts: rows of its first table, by heading.
     """
-    from gaitswarm.cli.pictures import save
-
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InvalidRequest(f"cannot make {folder}: {error.strerror}", field="report") from error
+        raise InvalidRequest(f"cannot create {folder}: {error.strerror}", field="report") from error
     save(draw_errors(comparison), folder / "rmae.png")
     save(draw_leg(pair, Quantity.JOINT_ANGLE), folder / "angles.png")
     save(draw_leg(pair, Quantity.CURRENT), folder / "currents.png")
@@ -71,7 +70,7 @@ def _lines(comparison: Comparison, facts: Mapping[str, str], *, leg: str) -> Ite
     yield ""
     yield "## Tolerance classes of RMAE"
     yield ""
-    classes = [[known.value, _range(known), known.phrase] for known in Tolerance]
+    classes = [[tolerance.value, _range(tolerance), tolerance.phrase] for tolerance in Tolerance]
     yield from _table(["class", "RMAE", "meaning"], classes)
     yield ""
     yield "## By quantity and link"
@@ -128,9 +127,9 @@ def _agreements(rows: Iterable[tuple[QuantityComparison, Agreement]]) -> Iterabl
 
 
 def _range(tolerance: Tolerance) -> str:
-    known = list(Tolerance)
-    low = 0.0 if tolerance is known[0] else known[known.index(tolerance) - 1].limit
-    if tolerance is known[-1]:
+    classes = list(Tolerance)
+    low = 0.0 if tolerance is classes[0] else classes[classes.index(tolerance) - 1].limit
+    if tolerance is classes[-1]:
         return f"above {low * 100:.0f} %"
     return f"{low * 100:.0f} to {tolerance.limit * 100:.0f} %"
 
@@ -154,7 +153,7 @@ _WITHIN: Final = {True: "inside", False: "outside"}
 
 
 def comparison_table(comparison: Comparison) -> Table:
-    """One row by quantity and link; supply and acceleration have one row each."""
+    """Return a table with one row per quantity and link; one for supply and acceleration."""
     table = Table(box=None, padding=(0, 1, 0, 0))
     table.add_column("quantity", no_wrap=True)
     for column in ("of", "mean |X|", "mean |Y|", "MSE", "MAE", "RMAE", "class", "RAM"):
@@ -178,7 +177,7 @@ def comparison_table(comparison: Comparison) -> Table:
 
 
 def confidence_table(comparison: Comparison) -> Table:
-    """Whether the simulated mean lies between those of repeated measurements (eq. 2.20)."""
+    """Return a table of simulated means within repeated measurements (eq. 2.20)."""
     table = Table(box=None, padding=(0, 1, 0, 0))
     for column in ("quantity", "of", "CONF of mean |X|", "mean |Y|", ""):
         table.add_column(column, no_wrap=True)
@@ -195,7 +194,7 @@ def confidence_table(comparison: Comparison) -> Table:
 
 
 def confidence(agreement: Agreement) -> str:
-    """CONF, from the least to the largest mean of the measurements."""
+    """Format CONF, the smallest and largest mean of the measurements."""
     if agreement.confidence is None:
         return ""
     low, high = agreement.confidence
@@ -203,17 +202,17 @@ def confidence(agreement: Agreement) -> str:
 
 
 def _heading(judged: QuantityComparison) -> Text:
-    # Not a plain string: rich takes [rad] for a style.
+    # As a plain string, [rad] would be a style of Rich.
     return Text(f"{judged.quantity} [{judged.unit}]")
 
 
 def percent(share: float) -> str:
-    """`27.6 %`; `∞` for the error of a signal that was measured as zero."""
+    """Format a share; `∞` for the error of a signal measured as zero."""
     return f"{share * 100:.1f} %" if math.isfinite(share) else "∞"
 
 
 def alignment(comparison: Comparison) -> str:
-    """What was compared, and how the logs were aligned."""
+    """Describe the compared cycles and the alignment of the logs."""
     order = "later" if comparison.lag >= 0.0 else "earlier"
     return (
         f"{comparison.cycles} cycle{'s' if comparison.cycles > 1 else ''} of"
@@ -223,19 +222,17 @@ def alignment(comparison: Comparison) -> str:
 
 
 def remarks(comparison: Comparison) -> list[str]:
-    """What to know before one believes the table."""
-    from gaitswarm.sim.measurement.measured_log import Quantity
-
-    said = []
+    """Return caveats of a comparison."""
+    notes = []
     if comparison.synthetic:
-        said.append("the measured log is SYNTHETIC: this tests the toolkit, not the model")
+        notes.append("the measured log is SYNTHETIC: this tests the toolkit, not the model")
     desired = comparison.quantity(Quantity.DESIRED_ANGLE).whole
     if desired.tolerance is not Tolerance.GREEN:
-        said.append(
+        notes.append(
             f"the desired angles differ by {percent(desired.rmae)}: scenario, design or cycle time"
             " are probably not those of the measured walk"
         )
-    return said
+    return notes
 
 
 _MEASURED: Final = "#1f3a5f"
@@ -248,14 +245,14 @@ _COLOURS: Final = {
     Tolerance.PURPLE: "#7b2d8b",
 }
 _HIGHEST: Final = 20.0
-"""Frequency up to which spectra are drawn [Hz]; walking is below."""
+"""Highest frequency of drawn spectra [Hz]; walking is below."""
 
 _LARGEST: Final = 1.0
-"""RMAE at which bars are cut off."""
+"""RMAE at which bars are truncated."""
 
 
 def draw_leg(pair: Synchronised, quantity: Quantity) -> Figure:
-    """Time series of the first leg's three joints, measured and simulated."""
+    """Draw time series of the first leg's joints, measured and simulated."""
     from matplotlib.figure import Figure
 
     joints = pair.measured.joints[:JOINTS_PER_LEG]
@@ -275,7 +272,7 @@ def draw_leg(pair: Synchronised, quantity: Quantity) -> Figure:
 
 
 def draw_spectra(pair: Synchronised, quantity: Quantity) -> Figure:
-    """Amplitudes over frequency by link, averaged over its joints; without the mean value."""
+    """Draw amplitude spectra by link, averaged over its joints, without the mean value."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9.0, 6.5), layout="constrained")
@@ -299,7 +296,7 @@ def draw_spectra(pair: Synchronised, quantity: Quantity) -> Figure:
 
 
 def draw_errors(comparison: Comparison) -> Figure:
-    """RMAE of every quantity and link as bars in the colours of the tolerance classes."""
+    """Draw the RMAE of every quantity and link in the colours of the tolerance classes."""
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch
 
@@ -317,9 +314,9 @@ def draw_errors(comparison: Comparison) -> Figure:
         over = "> " if agreement.rmae > _LARGEST else ""
         text = f" {over}{min(agreement.rmae, _LARGEST) * 100:.1f} %"
         axes.text(lengths[row], row, text, va="center", size="small")
-    for known in Tolerance:
-        if known.limit <= _LARGEST:
-            axes.axvline(known.limit, color="0.6", lw=0.8, ls=":")
+    for tolerance in Tolerance:
+        if tolerance.limit <= _LARGEST:
+            axes.axvline(tolerance.limit, color="0.6", lw=0.8, ls=":")
     axes.set_yticks(range(len(rows)), [name for name, _ in rows])
     axes.invert_yaxis()
     axes.set_xlim(0.0, min(_LARGEST * 1.1, max(0.55, *(x + 0.08 for x in lengths))))
@@ -328,7 +325,7 @@ def draw_errors(comparison: Comparison) -> Figure:
     axes.set_title("RMAE by link", loc="left", weight="bold")
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(
-        handles=[Patch(color=_COLOURS[known], label=known.value) for known in Tolerance],
+        handles=[Patch(color=_COLOURS[t], label=t.value) for t in Tolerance],
         frameon=False,
         ncols=len(Tolerance),
         loc="lower right",

@@ -27,7 +27,7 @@ def chosen_robot(text: str | None) -> str | RobotVariant | RobotFiles:
     data = robot_data(text)
     if isinstance(data, str) and data not in SHIPPED:
         raise InvalidRequest(
-            f"unknown robot {data!r}; choose from {', '.join(SHIPPED)}, or pass a folder with"
+            f"unknown robot {data!r}; known are {', '.join(SHIPPED)}, or pass a folder with"
             " robot.toml and robot.urdf",
             field="robot",
         )

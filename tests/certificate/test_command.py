@@ -166,7 +166,7 @@ def test_users_choose_ranges_and_fixed_values(files: Path) -> None:
     [
         (("published:Z",), 2, "design: no published design 'Z' of fuzzy-pi"),
         (("nowhere.json",), 2, "design: cannot read nowhere.json"),
-        (("bcdfghjkmnpq",), 3, "there is no job 'bcdfghjkmnpq'; a design is the id of a job"),
+        (("bcdfghjkmnpq",), 3, "there is no job 'bcdfghjkmnpq'; pass the id of a job"),
         (("published:A", "--range", "friction_factor"), 2, "range: 'friction_factor' is not NAME="),
         (("published:A", "--range", "friction_factor=1"), 2, "range: 'friction_factor=1' is not"),
         (("published:A", "--range", "hat=0:1"), 2, "variables: unknown variable 'hat'"),

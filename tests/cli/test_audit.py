@@ -9,7 +9,7 @@ from tests.cli.conftest import Gaitswarm
 
 
 def test_what_was_done_on_this_machine_is_told_by_job(gaitswarm: Gaitswarm, db: Path) -> None:
-    assert "nothing was done yet" in gaitswarm("audit", "--db", db).err
+    assert "no entries yet" in gaitswarm("audit", "--db", db).err
     first = gaitswarm("submit", "--iterations", "2", "--db", db).out.strip()
     gaitswarm("submit", "--iterations", "2", "--db", db)
     gaitswarm("extend", first, "--iterations", "7", "--db", db)

@@ -49,7 +49,7 @@ def test_rows_of_a_walk_share_what_its_first_row_says(table: Path, tmp_path: Pat
         ("", "has no rows"),
         ("walk,colour\n", "line 1, column colour: unknown column; known are walk, controller"),
         ("walk,walk\n", "line 1, column walk: there are two columns"),
-        ("walk,controller\n", "line 1, column design: the head lacks this column"),
+        ("walk,controller\n", "line 1, column design: missing column"),
         (HEAD + "pi,pi,,normal-fast,speed,1,1\n", "line 2, column design: empty in the first row"),
         (HEAD + f"\n{PI}speed,fast,0.1\n", "line 3, column value: 'fast' is not a number"),
         (HEAD + f"{PI}speed,1,0\n", "line 2, column tolerance: must be greater than 0"),

@@ -85,14 +85,14 @@ def test_pruning_removes_entries_of_the_audit_log_only_by_their_age(
         store.create_job(spec())
     assert "audit" not in gaitswarm("db", "prune", "--db", db).err
     day = gaitswarm("db", "prune", "--audit-older-than", "1", "--db", db)
-    assert "0 entries of the audit log" in day.err
+    assert "0 audit entries" in day.err
     assert len(gaitswarm("audit", "--db", db, "--json").json) == 1
     all_of_it = gaitswarm("db", "prune", "--audit-older-than", "0", "--db", db)
-    assert "1 entries of the audit log" in all_of_it.err
+    assert "1 audit entries" in all_of_it.err
     assert gaitswarm("audit", "--db", db, "--json").json == []
 
 
 def test_pruning_says_what_it_removed(gaitswarm: Gaitswarm, finished: Finished) -> None:
     pruned = gaitswarm("db", "prune", "--db", finished.db)
-    assert pruned.code == ExitCode.OK and "0 recorded walks" in pruned.err
+    assert pruned.code == ExitCode.OK and "0 recordings" in pruned.err
     assert gaitswarm("best", finished.id, "--db", finished.db, "--json").json

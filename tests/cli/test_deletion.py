@@ -19,7 +19,7 @@ def db(finished: Finished, tmp_path: Path) -> Path:
 
 @pytest.fixture
 def answering(monkeypatch: pytest.MonkeyPatch) -> Callable[[bool], None]:
-    """Let somebody sit at the terminal, who says yes or no."""
+    """Simulate a terminal whose user answers yes or no."""
 
     def answer(yes: bool) -> None:
         monkeypatch.setattr("sys.stdin.isatty", lambda: True)
@@ -36,12 +36,12 @@ def test_it_says_what_is_lost_and_asks(
     answering(yes)
     deleted = gaitswarm("delete", finished.id, "--db", db)
     assert deleted.code == 0
-    assert "loses 2 iterations with 6 evaluated designs" in deleted.err
+    assert "removes 2 iterations with 6 evaluated designs" in deleted.err
     assert "forks that keep their copies of its iterations: 1" in deleted.err
     assert gaitswarm("status", finished.id, "--db", db).code == (3 if yes else 0)
 
 
-def test_without_anybody_to_ask_it_needs_yes(
+def test_without_a_terminal_deletion_requires_yes(
     gaitswarm: Gaitswarm, finished: Finished, db: Path
 ) -> None:
     refused = gaitswarm("delete", finished.id, "--db", db)

@@ -27,7 +27,7 @@ def test_a_fork_is_shown_with_its_parent(
     made = gaitswarm("fork", finished.id, "--from", "1", *where)
     assert made.code == 0, made.err
     fork = made.out.strip()
-    assert "goes on from its iteration 1" in made.err
+    assert "continues from its iteration 1" in made.err
     assert f"fork of {finished.id}" in gaitswarm("status", fork, *where).out
     assert gaitswarm("list", *where).out.count(finished.id) == 2
     (only,) = gaitswarm("list", "--forks-of", finished.id, *where, "--json").json

@@ -87,7 +87,7 @@ def test_simulate_says_whether_the_gait_is_statically_stable(
     scenario = write_json(SCENARIO, "scenario.json")
     options = ("--controller", "pi", "--design", "published:validation")
     text = gaitswarm("simulate", *options, "--scenario", str(scenario)).out
-    assert "short: duty 0.56, 3 feet or more stand, stability margin" in text
+    assert "short: duty 0.56, at least 3 supporting feet, stability margin" in text
 
 
 def test_a_job_searches_groups_of_legs_and_begins_with_their_values_from_a_file(

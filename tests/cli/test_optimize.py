@@ -65,7 +65,7 @@ def test_a_search_in_single_precision_reports_its_best_in_double_with_the_differ
     walk = ("simulate", "--design", design, "--scenario", scenario, "--json")
     assert gaitswarm(*walk).json["fitness"] == best["fitness"]
     assert gaitswarm(*walk, "--precision", "single").json["fitness"] == best["search"]["fitness"]
-    line = "judged in double precision; in single, in which it was found, its fitness is"
+    line = "evaluated in double precision; in single precision of the search, its fitness is"
     status, text = (
         gaitswarm("status", job["id"], "--db", db),
         gaitswarm("best", job["id"], "--db", db),

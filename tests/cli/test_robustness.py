@@ -39,7 +39,7 @@ def test_a_published_design_has_an_index_by_scenario_objective_and_variable(
     assert other["index"]["value"] != view["index"]["value"]
     text = gaitswarm(*asked).out
     assert f"{view['index']['value']:.3g}" in text
-    assert "held: FOMF" in text
+    assert "fixed: FOMF" in text
 
 
 def test_a_jobs_best_is_walked_as_its_job_walked_it(

@@ -106,9 +106,7 @@ def _walk(path: Path, line: int, name: str, cells: Mapping[str, str]) -> dict[st
 
     for column, cell in cells.items():
         if not cell:
-            raise _refusal(
-                path, line, column, f"must not be empty in the first row of walk {name!r}"
-            )
+            raise _refusal(path, line, column, f"required in the first row of walk {name!r}")
     document = {
         "name": name,
         "controller": cells["controller"],

@@ -48,9 +48,12 @@ def test_rows_of_a_walk_share_what_its_first_row_says(table: Path, tmp_path: Pat
     [
         ("", "has no rows"),
         ("walk,colour\n", "line 1, column colour: unknown column; known are walk, controller"),
-        ("walk,walk\n", "line 1, column walk: there are two columns"),
+        ("walk,walk\n", "line 1, column walk: duplicate column"),
         ("walk,controller\n", "line 1, column design: missing column"),
-        (HEAD + "pi,pi,,normal-fast,speed,1,1\n", "line 2, column design: empty in the first row"),
+        (
+            HEAD + "pi,pi,,normal-fast,speed,1,1\n",
+            "line 2, column design: required in the first row",
+        ),
         (HEAD + f"\n{PI}speed,fast,0.1\n", "line 3, column value: 'fast' is not a number"),
         (HEAD + f"{PI}speed,1,0\n", "line 2, column tolerance: must be greater than 0"),
         (HEAD + f"{PI}speed,-1,0.1\n", "line 2, column value: -1, but speed is greater than 0"),
@@ -60,7 +63,7 @@ def test_rows_of_a_walk_share_what_its_first_row_says(table: Path, tmp_path: Pat
         (HEAD + f"{PI}speed,1,0.1,,,6\n", "line 2, column use: the line has more cells"),
         (
             HEAD + f"{PI}speed,1,0.1\npi,p,,,speed,1,0.1\n",
-            "line 3, column controller: the walk 'pi' has another above",
+            "line 3, column controller: differs from an earlier row of walk 'pi'",
         ),
         (HEAD + "a,pie,published:A,1,speed,1,0.1\n", "line 2, column controller: .*'pie'"),
         (HEAD + "a,pi,published:Z,1,speed,1,0.1\n", "line 2, column design: no published design"),
@@ -70,7 +73,7 @@ def test_rows_of_a_walk_share_what_its_first_row_says(table: Path, tmp_path: Pat
         (HEAD + f"{PI.replace('normal-fast', 'moon')}speed,1,1\n", "line 2, column scenario: "),
         (
             HEAD + f"{PI.replace('normal-fast', '1 2')}speed,1,1\n",
-            "line 2, column quantity: of one scenario, and the walk has 2",
+            "line 2, column quantity: applies to one scenario, but the walk has 2",
         ),
         (HEAD + 'a,"pi', "line 2: "),
     ],

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, cast
 
 from gaitswarm.cli.files import write_walk_logs
 from gaitswarm.cli.inputs.design_file import given_design, may_be_file
-from gaitswarm.cli.inputs.options import full_id
+from gaitswarm.cli.inputs.options import full_id, name_and_value
 from gaitswarm.cli.inputs.robots import (
     chosen_robot,
     chosen_scenarios,
@@ -114,7 +114,7 @@ def _still_held_out(document: Mapping[str, Any]) -> dict[str, Any]:
 def _perturbations(document: Mapping[str, Any], options: Mapping[str, Any]) -> dict[str, Any]:
     """Return `variables` and `fixed` of the spec if options change them."""
     ranges = dict(map(_range, options.get("ranges", ())))
-    fixed_values = dict(_pair(entry, "set", "NAME=VALUE") for entry in options.get("fixed", ()))
+    fixed_values = dict(name_and_value(entry, "set") for entry in options.get("fixed", ()))
     if not ranges and not fixed_values and "only" not in options:
         return {}
     drawn = document.get("variables") or [variable.name for variable in PERTURBATIONS]
@@ -133,20 +133,13 @@ def _perturbations(document: Mapping[str, Any], options: Mapping[str, Any]) -> d
 
 def _range(entry: str) -> tuple[str, dict[str, str]]:
     """Return name and variable of NAME=LOW:HIGH."""
-    name, value = _pair(entry, "range", "NAME=LOW:HIGH")
+    name, value = name_and_value(entry, "range", "NAME=LOW:HIGH")
     low, colon, high = value.partition(":")
     if not colon:
         raise InvalidRequest(f"{entry!r} is not NAME=LOW:HIGH", field="range")
     kinds = {variable.name: variable.kind for variable in PERTURBATIONS}
     kind = kinds.get(name, "continuous")
     return name, {"name": name, "low": low, "high": high, "kind": kind}
-
-
-def _pair(entry: str, option: str, form: str) -> tuple[str, str]:
-    name, equals, value = entry.partition("=")
-    if not (name and equals and value):
-        raise InvalidRequest(f"{entry!r} is not {form}", field=option)
-    return name.strip(), value.strip()
 
 
 _STRONGEST = 5
@@ -235,15 +228,10 @@ def _spread(spread: SpreadView) -> tuple[str, ...]:
     cvar = number(spread.cvar)
     return (
         number(spread.nominal),
-        _quantile(spread.quantiles[2]),
-        _quantile(spread.quantiles[4]),
+        *("failed" if q is None else number(q) for q in (spread.quantiles[2], spread.quantiles[4])),
         f"> {cvar}" if spread.tail_failed else cvar,
         number(spread.worst),
     )
-
-
-def _quantile(value: float | None) -> str:
-    return "failed" if value is None else number(value)
 
 
 def _chance(share: ProportionView) -> str:
@@ -298,23 +286,14 @@ def engine_table(name: str, engine: ComparedEngineView) -> Table:
         table.add_column(heading, justify="right", no_wrap=True)
     for scenario, compared in engine.scenarios.items():
         quantities = [*(compared.objectives[key] for key in _COMPARED), compared.utility]
-        table.add_row(scenario, OWN, compared.ours, *_ours(quantities))
-        table.add_row("", name, compared.theirs, *_theirs(quantities))
+        table.add_row(scenario, OWN, compared.ours, *(number(q.ours) for q in quantities))
+        table.add_row("", name, compared.theirs, *(number(q.theirs) for q in quantities))
         table.add_row("", "difference", "", *_differences(quantities), style="bold")
     blank = [""] * len(_COMPARED)
-    fitness = [engine.fitness]
-    table.add_row("all", OWN, "", *blank, *_ours(fitness))
-    table.add_row("", name, "", *blank, *_theirs(fitness))
-    table.add_row("", "difference", "", *blank, *_differences(fitness), style="bold")
+    table.add_row("all", OWN, "", *blank, number(engine.fitness.ours))
+    table.add_row("", name, "", *blank, number(engine.fitness.theirs))
+    table.add_row("", "difference", "", *blank, *_differences([engine.fitness]), style="bold")
     return table
-
-
-def _ours(quantities: Sequence[ComparedView]) -> list[str]:
-    return [number(quantity.ours) for quantity in quantities]
-
-
-def _theirs(quantities: Sequence[ComparedView]) -> list[str]:
-    return [number(quantity.theirs) for quantity in quantities]
 
 
 def _differences(quantities: Sequence[ComparedView]) -> list[str]:

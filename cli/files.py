@@ -29,30 +29,25 @@ def replacing(path: Path, option: str) -> Iterator[IO[bytes]]:
     except (OSError, RuntimeError) as error:  # RuntimeError: circular links, before Python 3.13
         reason = getattr(error, "strerror", None) or "its links are circular"
         raise InvalidRequest(f"cannot write {path}: {reason}", field=option) from error
-    if special:
-        try:
+    try:
+        if special:
             with path.open("wb") as file:
                 yield file
-        except OSError as error:
-            raise InvalidRequest(f"cannot write {path}: {error.strerror}", field=option) from error
-        return
-    try:
+            return
         descriptor, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+        temporary = Path(name)
+        try:
+            with os.fdopen(descriptor, "wb") as file:
+                yield file
+            # mkstemp creates files that only their owner can read.
+            umask = os.umask(0)
+            os.umask(umask)
+            temporary.chmod(0o666 & ~umask)
+            temporary.replace(target)
+        finally:
+            temporary.unlink(missing_ok=True)
     except OSError as error:
         raise InvalidRequest(f"cannot write {path}: {error.strerror}", field=option) from error
-    temporary = Path(name)
-    try:
-        with os.fdopen(descriptor, "wb") as file:
-            yield file
-        # mkstemp creates files that only their owner can read.
-        umask = os.umask(0)
-        os.umask(umask)
-        temporary.chmod(0o666 & ~umask)
-        temporary.replace(target)
-    except OSError as error:
-        raise InvalidRequest(f"cannot write {path}: {error.strerror}", field=option) from error
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def write_walk_logs(path: Path, logs: Mapping[str, WalkLogView | None]) -> None:

@@ -6,6 +6,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Protocol
 
 from gaitswarm.cli.exit_codes import JobEnded
@@ -127,49 +128,42 @@ def _check_success(last: StateView | None) -> None:
     raise JobEnded(f"job {last.id} {last.state.value}{reason}")
 
 
+@dataclass(slots=True)
 class _Pace:
     """Budget spent, evaluation rate and remaining time."""
 
-    def __init__(
-        self,
-        particles: int,
-        iterations_planned: int,
-        evaluations_planned: int,
-        iterations: int,
-        evaluations: int,
-    ) -> None:
-        self._particles = particles
-        self._iterations_planned = iterations_planned
-        self._evaluations_planned = evaluations_planned
-        self._iterations = iterations
-        self._evaluations = evaluations
-        self._seen = 0
-        self._seconds = 0.0
+    particles: int
+    iterations_planned: int
+    evaluations_planned: int
+    iterations: int
+    evaluations: int
+    seen: int = 0
+    seconds: float = 0.0
 
     @property
     def spent(self) -> Spent:
         from gaitswarm.views.job import budget_spent
 
         return budget_spent(
-            self._iterations,
-            self._evaluations,
-            particles=self._particles,
-            iterations_planned=self._iterations_planned,
-            evaluations_planned=self._evaluations_planned,
+            self.iterations,
+            self.evaluations,
+            particles=self.particles,
+            iterations_planned=self.iterations_planned,
+            evaluations_planned=self.evaluations_planned,
         )
 
     @property
     def ended(self) -> bool:
-        return self._evaluations >= self._evaluations_planned
+        return self.evaluations >= self.evaluations_planned
 
     def add(self, index: int, designs: int, seconds: float) -> tuple[float, float]:
         """Add an iteration; return evaluations per second and seconds left."""
-        self._iterations = index + 1
-        self._evaluations += designs
-        self._seen += designs
-        self._seconds += seconds
-        rate = self._seen / max(self._seconds, 1e-9)
-        return rate, max(0, self._evaluations_planned - self._evaluations) / rate
+        self.iterations = index + 1
+        self.evaluations += designs
+        self.seen += designs
+        self.seconds += seconds
+        rate = self.seen / max(self.seconds, 1e-9)
+        return rate, max(0, self.evaluations_planned - self.evaluations) / rate
 
 
 class _Live:
@@ -210,16 +204,11 @@ class _Lines:
         if now < self._next and not self._pace.ended:
             return
         self._next = now + _LINE_SECONDS
-        note(
-            f"{self._spent(index)}: best {number(best_so_far)},"
-            f" {rate:.1f} evaluations/s, {duration(left)} left"
-        )
+        spent = self._pace.spent
+        done = f"{spent.done}/{spent.planned} {spent.unit}"
+        if spent.unit != "iterations":
+            done = f"{index + 1} iterations, {done}"
+        note(f"{done}: best {number(best_so_far)}, {rate:.1f} evaluations/s, {duration(left)} left")
 
     def remark(self, text: str) -> None:
         note(text)
-
-    def _spent(self, index: int) -> str:
-        spent = self._pace.spent
-        if spent.unit == "iterations":
-            return f"{spent.done}/{spent.planned} iterations"
-        return f"{index + 1} iterations, {spent.done}/{spent.planned} {spent.unit}"

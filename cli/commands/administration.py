@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -60,7 +61,6 @@ def check(
 
     The history of every job is compared with its digests. The exit code is 1 if there are findings.
     """
-    import json
     from contextlib import closing
 
     from gaitswarm.cli.exit_codes import CheckFailed
@@ -189,7 +189,7 @@ def create(
     with _tokens(db) as tokens:
         token, secret = tokens.create(name, Scope(scope))
     if as_json:
-        _print_json({**_document(token), "secret": secret})
+        print_text(json.dumps({**_document(token), "secret": secret}, indent=2))
         return
     note(f"token {name!r} of scope {scope}; the secret is shown only once:")
     print_text(secret)
@@ -202,7 +202,7 @@ def list_(db: Db = None, as_json: Json = False) -> None:
     with _tokens(db, create=False) as tokens:
         listed = tokens.all()
     if as_json:
-        _print_json([_document(token) for token in listed])
+        print_text(json.dumps([_document(token) for token in listed], indent=2))
         return
     if not listed:
         note("there are no tokens; create one by `gaitswarm token create NAME`")
@@ -214,12 +214,12 @@ def list_(db: Db = None, as_json: Json = False) -> None:
 
 def revoke(name: Name, db: Db = None, as_json: Json = False) -> None:
     """Revoke a token; servers refuse it within five seconds."""
-    from gaitswarm.cli.output import note
+    from gaitswarm.cli.output import note, print_text
 
     with _tokens(db, create=False) as tokens:
         token = tokens.revoke(name)
     if as_json:
-        _print_json(_document(token))
+        print_text(json.dumps(_document(token), indent=2))
     else:
         note(f"token {name!r} is revoked")
 
@@ -245,14 +245,6 @@ def _document(token: Token) -> dict[str, Any]:
         "created_at": token.created_at.isoformat(),
         "revoked_at": None if token.revoked_at is None else token.revoked_at.isoformat(),
     }
-
-
-def _print_json(document: Any) -> None:
-    import json
-
-    from gaitswarm.cli.output import print_text
-
-    print_text(json.dumps(document, indent=2))
 
 
 def audit(

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from gaitswarm.cli.inputs.options import Json, Precision
+from gaitswarm.cli.inputs.options import Json, Precision, one_of
 
 if TYPE_CHECKING:
     from gaitswarm.services.profile import JobProfile
@@ -55,15 +55,15 @@ def bench(
     from gaitswarm.sim.assembly import Backend
     from gaitswarm.sim.kernel import walk
 
-    digits: walk.Precision = _one_of("precision", precision or "double", get_args(walk.Precision))
+    digits: walk.Precision = one_of(get_args(walk.Precision), precision or "double", "precision")
     if profile:
         from gaitswarm.services.profile import profile_job
 
-        kind: EvaluatorKind = _one_of("evaluator", evaluator, get_args(EvaluatorKind))
+        kind: EvaluatorKind = one_of(get_args(EvaluatorKind), evaluator, "evaluator")
         measured = profile_job(evaluator=kind, precision=digits)
         print_text(json.dumps(asdict(measured), indent=2) if as_json else _profile_text(measured))
         return
-    requested: Backend = _one_of("backend", backend, get_args(Backend))
+    requested: Backend = one_of(get_args(Backend), backend, "backend")
     result = benchmark.measure(repeats=repeats, backend=requested, precision=digits)
     if as_json:
         print_text(json.dumps(asdict(result), indent=2))
@@ -77,14 +77,6 @@ def bench(
         f" {result.real_time_factor_per_core:.0f} x real time on one core,"
         f" {result.lane_use:.1%} of its lanes used"
     )
-
-
-def _one_of(field: str, value: str, choices: tuple[Any, ...]) -> Any:
-    from gaitswarm.services.optimizer.errors import InvalidRequest
-
-    if value not in choices:
-        raise InvalidRequest(f"{value!r} is none of {', '.join(choices)}", field=field)
-    return value
 
 
 def _profile_text(profile: JobProfile) -> str:

@@ -15,6 +15,7 @@ from gaitswarm.cli.inputs.options import (
     Precision,
     Server,
     WorkerOptions,
+    name_and_value,
     with_groups,
 )
 from gaitswarm.sim.near_names import instead_of
@@ -92,7 +93,7 @@ def calibrate(
         "name": name or f"calibration to {table.name}",
         **read_targets(table),
         **_robots(robot),
-        "fixed": dict(_pair(entry, "fixed") for entry in _entries(fixed)),
+        "fixed": dict(name_and_value(entry, "fixed") for entry in _entries(fixed)),
         # Explore first, then converge, as for identification.
         "optimizer": {
             "name": "pso",
@@ -174,7 +175,7 @@ def _variables(document: dict[str, Any], text: str) -> list[Any]:
         if "=" not in entry:
             variables.append(entry)
             continue
-        name, value = _pair(entry, "variables")
+        name, value = name_and_value(entry, "variables")
         if name not in catalogue:
             raise InvalidRequest(
                 f"unknown variable {name!r}; {instead_of(name, catalogue)}", field="variables"
@@ -192,12 +193,3 @@ def _variables(document: dict[str, Any], text: str) -> list[Any]:
 
 def _entries(text: str | None) -> list[str]:
     return [] if text is None else [entry.strip() for entry in text.split(",")]
-
-
-def _pair(entry: str, option: str) -> tuple[str, str]:
-    from gaitswarm.services.optimizer.errors import InvalidRequest
-
-    name, equals, value = entry.partition("=")
-    if not (name and equals and value):
-        raise InvalidRequest(f"{entry!r} is not NAME=VALUE", field=option)
-    return name.strip(), value.strip()

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from enum import StrEnum
-from typing import TYPE_CHECKING, Annotated, TypeVar
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -21,6 +20,7 @@ from gaitswarm.cli.inputs.options import (
     Server,
     SpecOptions,
     completed,
+    one_of,
     with_groups,
 )
 
@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from gaitswarm.specs import ForkOptions
     from gaitswarm.views import HistoryIterationView, JobView
     from gaitswarm.views.comparison import JobComparisonView
-
-S = TypeVar("S", bound=StrEnum)
 
 
 def register(app: typer.Typer) -> None:
@@ -141,8 +139,8 @@ def list_jobs(
 
     if everything and archived is not None:
         raise InvalidRequest("--all and --archived are mutually exclusive", field="all")
-    job_state = None if state is None else _one_of(JobState, state, "state")
-    job_order = _one_of(JobOrder, order, "order")
+    job_state = None if state is None else one_of(JobState, state, "state")
+    job_order = one_of(JobOrder, order, "order")
     with open_jobs(server, db) as jobs:
         matches = jobs.jobs(
             state=job_state,
@@ -259,15 +257,6 @@ def prioritize(
 def cancel(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = False) -> None:
     """Cancel a job for good; committed iterations remain."""
     _command("cancel", job_id, server, db, as_json=as_json)
-
-
-def _one_of(kind: type[S], text: str, option: str) -> S:
-    from gaitswarm.services.optimizer.errors import InvalidRequest
-
-    try:
-        return kind(text)
-    except ValueError:
-        raise InvalidRequest(f"{text!r} is none of {', '.join(kind)}", field=option) from None
 
 
 def _command(

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from gaitswarm.cli.inputs.options import Json
+from gaitswarm.cli.inputs.options import Json, one_of
 
 if TYPE_CHECKING:
     from gaitswarm.meshes import MeshCopies
-    from gaitswarm.sim.proposal.drive import ActuatorChoice
-    from gaitswarm.sim.proposal.frame import Axis
     from gaitswarm.sim.robot import RobotFiles
     from gaitswarm.views.robots import RobotCheckView
-
-_Choice = TypeVar("_Choice", bound=str)
 
 _LISTED: Final = 5
 """Missing meshes that are listed."""
@@ -94,27 +90,28 @@ def init(
     """
     from gaitswarm.cli.output import note, print_text
     from gaitswarm.robots import init_robot
+    from gaitswarm.sim.proposal.drive import ACTUATOR_CHOICES
+    from gaitswarm.sim.proposal.frame import AXES
 
     created = init_robot(
         urdf,
         output,
         name=name,
-        actuator=_kind(actuator),
-        up=_axis(up, "up"),
-        forward=_axis(forward, "forward"),
+        actuator=one_of(ACTUATOR_CHOICES, actuator, "actuator"),
+        up=None if up is None else one_of(AXES, up, "up"),
+        forward=None if forward is None else one_of(AXES, forward, "forward"),
         meshes=meshes,
         packages=package_path or [],
     )
     if as_json:
         left_out = [{"name": name, "problem": problem} for name, problem in created.meshes.left_out]
-        _print(
-            {
-                "folder": str(output),
-                "name": created.name,
-                "guesses": list(created.guesses),
-                "meshes": {"copied": list(created.meshes.copied), "left_out": left_out},
-            }
-        )
+        document = {
+            "folder": str(output),
+            "name": created.name,
+            "guesses": list(created.guesses),
+            "meshes": {"copied": list(created.meshes.copied), "left_out": left_out},
+        }
+        print_text(json.dumps(document, indent=2, ensure_ascii=False) + "\n")
         return
     for guess in created.guesses:
         print_text(f"{guess}\n")
@@ -152,27 +149,6 @@ def check(
     print_text(_summary(view))
     for warning in view.warnings:
         note(f"warning: {warning}")
-
-
-def _kind(text: str) -> ActuatorChoice:
-    from gaitswarm.sim.proposal.drive import ACTUATOR_CHOICES
-
-    return _one_of(text, ACTUATOR_CHOICES, "actuator")
-
-
-def _axis(text: str | None, field: str) -> Axis | None:
-    from gaitswarm.sim.proposal.frame import AXES
-
-    return None if text is None else _one_of(text, AXES, field)
-
-
-def _one_of(text: str, choices: Sequence[_Choice], field: str) -> _Choice:
-    from gaitswarm.services.optimizer.errors import InvalidRequest
-
-    for choice in choices:
-        if choice == text:
-            return choice
-    raise InvalidRequest(f"{text!r} is none of {', '.join(choices)}", field=field)
 
 
 def _mesh_summary(meshes: MeshCopies) -> str:
@@ -231,11 +207,3 @@ def _summary(view: RobotCheckView) -> str:
                 f"  and {len(missing) - _LISTED} more; pass their folders by --package-path"
             )
     return "\n".join(lines) + "\n"
-
-
-def _print(document: dict[str, Any]) -> None:
-    import json
-
-    from gaitswarm.cli.output import print_text
-
-    print_text(json.dumps(document, indent=2, ensure_ascii=False) + "\n")

@@ -3,19 +3,42 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, fields, is_dataclass
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar, get_type_hints
 
 import typer
 
 if TYPE_CHECKING:
     from gaitswarm.jobs.port import Jobs
 
+C = TypeVar("C", bound=str)
+
 _LENGTH: Final = 12
 """Characters of a complete id."""
+
+
+def one_of(choices: Iterable[C], text: str, option: str) -> C:
+    """Return the choice that equals the text of an option."""
+    from gaitswarm.services.optimizer.errors import InvalidRequest
+
+    choices = tuple(choices)
+    for choice in choices:
+        if choice == text:
+            return choice
+    raise InvalidRequest(f"{text!r} is none of {', '.join(choices)}", field=option)
+
+
+def name_and_value(entry: str, option: str, form: str = "NAME=VALUE") -> tuple[str, str]:
+    """Split NAME=VALUE at the equals sign."""
+    from gaitswarm.services.optimizer.errors import InvalidRequest
+
+    name, equals, value = entry.partition("=")
+    if not (name and equals and value):
+        raise InvalidRequest(f"{entry!r} is not {form}", field=option)
+    return name.strip(), value.strip()
 
 
 def full_id(jobs: Jobs, prefix: str) -> str:

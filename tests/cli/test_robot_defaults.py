@@ -80,8 +80,8 @@ def test_a_design_that_was_not_published_says_what_can_be_given(dog: Path) -> No
     result = run_command("simulate", "--robot", dog, "--design", "published:A")
     assert result.code == 2
     assert (
-        "design: no design of pid was published; pass a JSON object or a file with values of P, I, D, or job:ID"
-        in " ".join(result.err.split())
+        "design: no design of pid was published; pass a JSON object or a file with values of P, I,"
+        " D, or job:ID" in " ".join(result.err.split())
     )
 
 

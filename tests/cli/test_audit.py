@@ -8,7 +8,7 @@ from gaitswarm.cli.exit_codes import ExitCode
 from tests.cli.conftest import Gaitswarm
 
 
-def test_what_was_done_on_this_machine_is_told_by_job(gaitswarm: Gaitswarm, db: Path) -> None:
+def test_audit_lists_actions_by_job(gaitswarm: Gaitswarm, db: Path) -> None:
     assert "no entries yet" in gaitswarm("audit", "--db", db).err
     first = gaitswarm("submit", "--iterations", "2", "--db", db).out.strip()
     gaitswarm("submit", "--iterations", "2", "--db", db)

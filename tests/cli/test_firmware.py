@@ -121,7 +121,7 @@ def test_a_folder_of_something_else_is_refused(gaitswarm: Gaitswarm, tmp_path: P
         (("published:Z",), "known are A, B, C"),
         (("published:A", "--scenarios", "moonwalk"), "unknown scenario"),
         (("published:A", "--controller", "pi"), "pi-pso-ps"),
-        (("published:A", "--robot", "nobody"), "unknown robot"),
+        (("published:A", "--robot", "unknown"), "unknown robot"),
         (("published:A", "--table-bits", "8"), "table_bits: '8' is not a resolution such as 8x6"),
         (
             ("published:A", "--table-bits", "18x6"),

@@ -34,7 +34,7 @@ def test_a_fork_is_shown_with_its_parent(
     assert only["id"] == fork
 
 
-def test_a_fork_says_why_it_begins_anew(
+def test_a_fork_states_why_it_starts_a_new_search(
     gaitswarm: Gaitswarm, finished: Finished, own_db: Path, place: Place
 ) -> None:
     asked = ("fork", finished.id, "--from", "2", "--optimizer", "random", "--start-count", "1")

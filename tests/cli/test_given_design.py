@@ -85,7 +85,7 @@ def test_a_jobs_best_walks_on_the_jobs_robot_unless_another_is_named() -> None:
     assert replace(best, spec=None).robot(None) == DEFAULT_ROBOT
 
 
-def test_every_command_that_takes_a_design_can_be_told_where_its_job_is() -> None:
+def test_every_command_that_takes_a_design_has_options_of_its_job() -> None:
     options = command_line.commands()
     taking = command_line.taking(r"job:ID|DESIGN")
     assert len(taking) >= 10

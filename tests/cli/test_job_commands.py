@@ -123,10 +123,10 @@ def test_watch_replays_what_is_committed_and_ends_with_the_job(
     assert result.code == 0
     lines = result.out.splitlines()
     assert [line[:20] for line in lines] == ['{"event":"iteration"'] * 2 + ['{"event":"state","da']
-    told = gaitswarm("watch", finished.id, *where)
-    assert told.code == 0
-    assert "2/2 iterations: best" in told.err
-    assert told.out == ""
+    result = gaitswarm("watch", finished.id, *where)
+    assert result.code == 0
+    assert "2/2 iterations: best" in result.err
+    assert result.out == ""
 
 
 def test_watching_a_cancelled_job_is_exit_code_1(
@@ -221,7 +221,7 @@ def test_a_job_has_a_priority_that_can_be_changed(
     assert gaitswarm("prioritize", queued, "--priority", "0", *where).code == 4
 
 
-def test_who_is_told_of_a_jobs_end_is_said_at_submission(
+def test_submit_sets_the_webhook(
     gaitswarm: Gaitswarm, db: Path, small_spec: Path, place: Place
 ) -> None:
     where = place(db)
@@ -263,7 +263,7 @@ def test_designs_are_ranked_by_another_preference(
     assert len(table.splitlines()) == 4
 
 
-def test_a_ranking_by_chapter_3_shows_what_it_maximizes_beside_the_fitness(
+def test_a_ranking_by_chapter_3_shows_fitness_and_figure_of_merit(
     gaitswarm: Gaitswarm, finished: Finished, place: Place
 ) -> None:
     asked = ("rank", finished.id, "--preference", "chapter-3", *place(finished.db))

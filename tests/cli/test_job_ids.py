@@ -23,15 +23,15 @@ def test_the_beginning_of_an_id_is_enough(
 ) -> None:
     where = place(finished.db)
     for command in ("status", "best", "history"):
-        told = gaitswarm(command, finished.id[:5], *where, "--json")
-        assert told.json == gaitswarm(command, finished.id, *where, "--json").json
+        result = gaitswarm(command, finished.id[:5], *where, "--json")
+        assert result.json == gaitswarm(command, finished.id, *where, "--json").json
 
 
 def test_the_beginning_may_stand_before_the_options_that_say_where(
     gaitswarm: Gaitswarm, finished: Finished
 ) -> None:
-    told = gaitswarm("status", "--json", finished.id[:5], "--db", finished.db)
-    assert told.json["id"] == finished.id
+    result = gaitswarm("status", "--json", finished.id[:5], "--db", finished.db)
+    assert result.json["id"] == finished.id
 
 
 COMMANDS = {
@@ -108,7 +108,7 @@ def measured(finished: Finished, tmp_path_factory: pytest.TempPathFactory) -> Pa
 def test_it_is_enough_wherever_a_command_takes_an_id(
     gaitswarm: Gaitswarm, finished: Finished, measured: Path, tmp_path: Path, name: str
 ) -> None:
-    def told(job_id: str) -> tuple[int, str]:
+    def code_and_error(job_id: str) -> tuple[int, str]:
         folder = tmp_path / job_id
         folder.mkdir()
         shutil.copy(finished.db, folder / "jobs.db")
@@ -118,7 +118,7 @@ def test_it_is_enough_wherever_a_command_takes_an_id(
         assert result.code == OTHERWISE.get(name, 0), result.err
         return result.code, result.out.replace(finished.id, "ID").replace(job_id, "ID")
 
-    whole, beginning = told(finished.id), told(finished.id[:5])
+    whole, beginning = code_and_error(finished.id), code_and_error(finished.id[:5])
     if name not in ITS_OWN:
         assert beginning == whole
 
@@ -126,8 +126,8 @@ def test_it_is_enough_wherever_a_command_takes_an_id(
 def test_a_beginning_of_no_id_is_refused_as_any_unknown_one(
     gaitswarm: Gaitswarm, finished: Finished
 ) -> None:
-    told = gaitswarm("status", "zzzz", "--db", finished.db)
-    assert (told.code, told.err.strip()) == (3, "gaitswarm: there is no job 'zzzz'")
+    result = gaitswarm("status", "zzzz", "--db", finished.db)
+    assert (result.code, result.err.strip()) == (3, "gaitswarm: there is no job 'zzzz'")
 
 
 def test_a_beginning_of_several_ids_is_refused_with_these(

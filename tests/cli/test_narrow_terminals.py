@@ -60,9 +60,9 @@ def test_every_word_that_is_printed_where_there_is_room_is_printed_where_there_i
 
     def said(columns: int) -> str:
         monkeypatch.setenv("COLUMNS", str(columns))
-        told = gaitswarm(*words, *where)
-        assert told.code == 0, told.err
-        return told.out
+        result = gaitswarm(*words, *where)
+        assert result.code == 0, result.err
+        return result.out
 
     whole = set(said(400).split())
     for columns in (60, 80):
@@ -75,8 +75,8 @@ def test_drives_are_compared_below_the_names_of_their_scenarios(
     gaitswarm: Gaitswarm, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", "60")
-    told = gaitswarm("compare", "2016", "pi", "--scenario", "1,3")
-    blocks = [block.split() for block in told.out.split("\n\n")]
+    result = gaitswarm("compare", "2016", "pi", "--scenario", "1,3")
+    blocks = [block.split() for block in result.out.split("\n\n")]
     assert [block[:3] for block in blocks] == [
         ["normal-fast"],
         ["scenario", "drive", "2016"],

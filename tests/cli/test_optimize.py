@@ -138,7 +138,7 @@ def test_an_optimizer_is_named_and_its_settings_are_written_out(
     }
 
 
-def test_the_report_for_people_has_the_published_optimum_beside_the_best(
+def test_the_report_compares_the_best_with_the_published_optimum(
     gaitswarm: Gaitswarm, small_spec: Path, db: Path
 ) -> None:
     result = gaitswarm(
@@ -310,28 +310,28 @@ def test_a_directory_that_is_not_there_is_exit_code_5_and_named(
 
 
 def test_json_has_every_bit_of_what_is_stored(finished: Finished, gaitswarm: Gaitswarm) -> None:
-    told = gaitswarm("history", finished.id, "--db", finished.db, "--json").json
+    result = gaitswarm("history", finished.id, "--db", finished.db, "--json").json
     with closing(open_store(str(finished.db))) as store:
         stored = store.evaluations_between(finished.id, 0, 2)
-    shown = [evaluation for i in told["iterations"] for evaluation in i["evaluations"]]
+    shown = [evaluation for i in result["iterations"] for evaluation in i["evaluations"]]
     assert [e["fitness"] for e in shown] == [e.fitness for e in stored]
     assert [list(e["design"].values()) for e in shown] == [e.design.tolist() for e in stored]
     walks = [list(e["scenarios"]["short"]["objectives"].values()) for e in shown]
     assert walks == [e.objectives[0].tolist() for e in stored]
 
 
-def test_a_job_that_is_run_again_walks_only_if_it_is_told_to(
+def test_a_repeated_job_simulates_only_without_the_cache(
     gaitswarm: Gaitswarm, small_spec: Path, db: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("GAITSWARM_CACHE")
     run = ("optimize", "--spec", small_spec, "--db", db, "--evaluator", "in-process", "--json")
-    first, again, anew = (
+    first, again, uncached = (
         gaitswarm(*run).json,
         gaitswarm(*run).json,
         gaitswarm(*run, "--no-cache").json,
     )
-    assert [job["evaluations_saved"] for job in (first, again, anew)] == [0, 6, 0]
-    assert first["best"] == again["best"] == anew["best"]
+    assert [job["evaluations_saved"] for job in (first, again, uncached)] == [0, 6, 0]
+    assert first["best"] == again["best"] == uncached["best"]
 
 
 def test_a_job_starts_from_the_best_of_another_or_from_a_file(
@@ -368,8 +368,8 @@ def test_a_start_that_makes_no_sense_is_refused_with_its_place(
 def test_an_address_that_is_none_of_a_cluster_leaves_no_job_behind(
     gaitswarm: Gaitswarm, db: Path, small_spec: Path
 ) -> None:
-    told = gaitswarm("optimize", "--spec", small_spec, "--db", db, "--ray-address", "ray://x:1")
-    assert told.code == ExitCode.BAD_INPUT and "is not the address of a cluster's head" in told.err
+    result = gaitswarm("optimize", "--spec", small_spec, "--db", db, "--ray-address", "ray://x:1")
+    assert result.code == ExitCode.BAD_INPUT and "is not the address of a cluster's head" in result.err
     assert gaitswarm("list", "--db", db, "--json").json == []
 
 
@@ -380,10 +380,10 @@ def test_an_address_that_is_none_of_a_cluster_leaves_no_job_behind(
         (("--optimizer-settings", "[1]"), r"must be an object, \{\.\.\.\}, not a list"),
     ],
 )
-def test_what_an_option_cannot_be_is_told_with_what_it_can_be(
+def test_errors_of_options_name_the_allowed_values(
     gaitswarm: Gaitswarm, db: Path, small_spec: Path, options: tuple[str, ...], said: str
 ) -> None:
     words = [str(small_spec) if word == "FILE" else word for word in options]
-    told = gaitswarm("optimize", "--db", db, *words)
-    assert told.code == ExitCode.BAD_INPUT
-    assert re.search(said, " ".join(told.err.split())), told.err
+    result = gaitswarm("optimize", "--db", db, *words)
+    assert result.code == ExitCode.BAD_INPUT
+    assert re.search(said, " ".join(result.err.split())), result.err

@@ -1,4 +1,4 @@
-"""Robots beside the default one walk through the same commands, those that do not ship as well."""
+"""Commands with other robots than the default, including custom ones."""
 
 from __future__ import annotations
 
@@ -71,9 +71,9 @@ def test_a_scenario_out_of_its_reach_is_refused_by_leg_and_millimetres(
     far = tmp_path / "far.json"
     far.write_text('{"name": "far", "cycle_time": 2, "radius": 0.5, "hip_height": 0.16}')
     assert run([*SIMULATE, "--robot", str(QUADRUPED), "--scenario", str(far)]) == 2
-    told = capsys.readouterr().err
-    assert "far" in told
-    assert "mm" in told
+    result = capsys.readouterr().err
+    assert "far" in result
+    assert "mm" in result
 
 
 @pytest.mark.parametrize(
@@ -96,9 +96,9 @@ def test_an_error_in_a_robot_file_names_field_line_and_unit(
 ) -> None:
     folder = edited(tmp_path, "robot.toml", line, broken)
     assert run([*SIMULATE, "--robot", str(folder), "--scenario", CRAWL]) == 2
-    told = capsys.readouterr().err
+    result = capsys.readouterr().err
     for part in said:
-        assert part in told
+        assert part in result
 
 
 @pytest.mark.parametrize(

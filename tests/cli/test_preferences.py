@@ -28,7 +28,7 @@ def test_winners_are_listed_by_how_robust_they_are(
     indices = [found["index"]["value"] for found in candidates]
     assert indices == sorted(indices)
 
-    # By the preference that is told, the design is the best of the job; its index is that of
+    # By the reported preference, the design is the best of the job; its index is that of
     # `robustness`.
     first = candidates[0]
     by_a = next(found for found in candidates if "A" in found["named"])

@@ -78,7 +78,7 @@ def test_a_published_design_walks_in_its_own_gait_and_in_anothers_on_request(
     assert own.json["fitness"] != other.json["fitness"]
 
 
-def test_beside_a_job_a_published_design_walks_in_the_gait_of_the_jobs_designs() -> None:
+def test_a_published_design_is_compared_in_the_gait_of_the_jobs_designs() -> None:
     published = CONTROLLERS["pi"].published["pi-pso-ps"]
     assert adapted_to_job(published, job("pi")) == {"P": 0.454, "I": 0.147}
     held = job("pi", fixed={"stride": 0.1, "integrator_unit": 1.0})

@@ -56,7 +56,7 @@ def test_each_scenario_is_left_out_in_its_turn(
         assert uphill["regret"]["value"] == pytest.approx(winner["fitness"] / best - 1.0)
 
 
-def test_it_is_told_as_tables(gaitswarm: Gaitswarm, two_scenarios: Finished) -> None:
+def test_scenarios_are_printed_as_tables(gaitswarm: Gaitswarm, two_scenarios: Finished) -> None:
     result = gaitswarm("scenarios", two_scenarios.id, "--db", two_scenarios.db, "--tolerance", "10")
     assert result.code == 0, result.err
     assert "smallest family within 1000 %" in result.out

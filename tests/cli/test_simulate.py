@@ -40,8 +40,8 @@ def test_measurements_are_printed_in_their_units(
 ) -> None:
     design = write_json(PUBLISHED_A)
     result = gaitswarm("simulate", "--design", design, *FAST)
-    told = gaitswarm("simulate", "--design", design, *FAST, "--json").json
-    measurements = told["scenarios"]["normal-fast"]["measurements"]
+    result = gaitswarm("simulate", "--design", design, *FAST, "--json").json
+    measurements = result["scenarios"]["normal-fast"]["measurements"]
     assert "peak current" in result.out
     assert f"{measurements['motor_heat']:.4g}" in result.out
 
@@ -120,9 +120,7 @@ def test_the_log_is_a_numpy_archive_of_the_walk_at_500_hz(
 
 
 @pytest.mark.slow
-def test_logs_of_several_scenarios_are_told_apart_by_name(
-    gaitswarm: Gaitswarm, tmp_path: Path
-) -> None:
+def test_logs_of_several_scenarios_have_their_names(gaitswarm: Gaitswarm, tmp_path: Path) -> None:
     path = tmp_path / "walks.npz"
     gaitswarm("simulate", "--design", "published:A", "--scenario", "1,6", "--log", path)
     with np.load(path) as log:

@@ -103,7 +103,7 @@ def test_a_reader_that_goes_away_is_no_error(finished: Finished, command: str) -
     arguments = command.format(id=finished.id).split()
     where = {"GAITSWARM_DB": str(finished.db)}
     with start_python(*COMMAND_LINE, *arguments, environment=where) as process:
-        # Before the first word: whatever is written, nobody reads it.
+        # Before the first output, so that no write has a reader.
         output(process.stdout).close()
         assert output(process.stderr).read() == ""
         assert process.wait(timeout=60) == ExitCode.OK

@@ -60,10 +60,10 @@ def test_a_cell_that_must_not_be_wrapped_is_not_cut_either(width: int) -> None:
     for head in ("variable", "moved with", "interval"):
         table.add_column(head, no_wrap=True)
     table.add_row("duty_factor", "cycle_time, -0.63", "51 (40 to 65)")
-    told = " ".join(printed(table, width).split())
+    text = " ".join(printed(table, width).split())
     if width > 40:
-        assert "duty_factor cycle_time, -0.63 51 (40 to 65)" in told
-    assert "…" not in told and "40 to 65" in told
+        assert "duty_factor cycle_time, -0.63 51 (40 to 65)" in text
+    assert "…" not in text and "40 to 65" in text
 
 
 def test_a_first_cell_without_a_heading_is_that_of_its_block() -> None:

@@ -28,8 +28,8 @@ def test_a_token_is_made_listed_and_revoked(gaitswarm: Gaitswarm, db: Path) -> N
 
 def test_looking_for_tokens_makes_no_database(gaitswarm: Gaitswarm, db: Path) -> None:
     for arguments in (("list",), ("revoke", "ci")):
-        told = gaitswarm("token", *arguments, "--db", db)
-        assert told.code == ExitCode.NOT_FOUND and "there is no database" in told.err
+        result = gaitswarm("token", *arguments, "--db", db)
+        assert result.code == ExitCode.NOT_FOUND and "there is no database" in result.err
     assert not db.exists()
 
 
@@ -45,8 +45,8 @@ def test_what_cannot_be_made_or_revoked_is_named(gaitswarm: Gaitswarm, db: Path)
     gaitswarm("token", "create", "ci", "--db", db)
     again = gaitswarm("token", "create", "ci", "--db", db)
     assert again.code == ExitCode.BAD_INPUT and "'ci' already" in again.err
-    unknown = gaitswarm("token", "revoke", "nobody", "--db", db)
-    assert unknown.code == ExitCode.NOT_FOUND and "'nobody'" in unknown.err
+    unknown = gaitswarm("token", "revoke", "unknown", "--db", db)
+    assert unknown.code == ExitCode.NOT_FOUND and "'unknown'" in unknown.err
 
 
 def test_beyond_this_machine_the_first_start_prints_a_token(

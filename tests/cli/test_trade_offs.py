@@ -41,7 +41,7 @@ def test_a_front_is_shown_with_its_marks_and_written_as_a_table(
     assert f"hypervolume {view['hypervolume']:.4f}" in shown.out
 
 
-def test_published_designs_walk_and_are_placed_beside_the_front(
+def test_published_designs_are_placed_relative_to_the_front(
     gaitswarm: Gaitswarm, finished: Finished, write_json: WriteJson
 ) -> None:
     where = (finished.id, "--db", finished.db)
@@ -81,7 +81,7 @@ def test_a_front_is_drawn(gaitswarm: Gaitswarm, finished: Finished, tmp_path: Pa
     assert "<svg" in picture.read_text(encoding="utf-8")
 
 
-def test_the_preference_that_is_told_makes_the_design_the_best_of_the_job(
+def test_the_reported_preference_makes_the_design_the_best_of_the_job(
     gaitswarm: Gaitswarm, finished: Finished
 ) -> None:
     front = gaitswarm("front", finished.id, "--db", finished.db, "--json").json
@@ -97,11 +97,11 @@ def test_the_preference_that_is_told_makes_the_design_the_best_of_the_job(
     power = 1.0 / sum(view["fits"][0]["preference"]["exponent"])
     margin = (second["fitness"] / first["fitness"]) ** power - 1.0
     assert view["fits"][0]["margin"] == pytest.approx(margin)
-    told = gaitswarm(*asked, f"{iteration}.{particle}")
-    assert f"design {iteration}.{particle} wins by {100.0 * margin:.3g} %" in told.out
+    result = gaitswarm(*asked, f"{iteration}.{particle}")
+    assert f"design {iteration}.{particle} wins by {100.0 * margin:.3g} %" in result.out
 
 
-def test_a_design_that_cannot_win_is_told_what_beats_it(
+def test_a_design_that_cannot_win_names_a_better_one(
     gaitswarm: Gaitswarm, finished: Finished
 ) -> None:
     ranking = gaitswarm(
@@ -112,11 +112,11 @@ def test_a_design_that_cannot_win_is_told_what_beats_it(
     worst = ranking["top"][-1]
     place = worst["iteration"], worst["particle"]
     assert place not in on_front
-    told = gaitswarm(
+    result = gaitswarm(
         "preferences", finished.id, "--db", finished.db, "--for", f"{place[0]}.{place[1]}"
     )
-    assert told.code == 0, told.err
-    assert f"make design {place[0]}.{place[1]} win, which is dominated; under" in told.out
+    assert result.code == 0, result.err
+    assert f"make design {place[0]}.{place[1]} win, which is dominated; under" in result.out
 
 
 def test_a_job_in_worlds_trades_what_it_makes_of_all_of_them(

@@ -1,4 +1,4 @@
-"""`optimize` and `identify` beside a server that runs jobs of the same database."""
+"""`optimize` and `identify` on the database of a running server."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ IN_PROCESS = ("--evaluator", "in-process")
 @pytest.fixture(scope="module")
 def db(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """One for all tests: each looks at jobs of its own, and leaves none that runs."""
-    return tmp_path_factory.mktemp("beside-a-server") / "jobs.db"
+    return tmp_path_factory.mktemp("shared-database") / "jobs.db"
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +39,7 @@ def server(db: Path) -> Iterator[str]:
     assert process.returncode == 0
 
 
-def test_an_optimization_beside_a_server_of_its_database_keeps_its_job(
+def test_optimize_keeps_its_job_while_a_server_runs(
     small_spec: Path, db: Path, server: str
 ) -> None:
     process = start_python(
@@ -112,7 +112,7 @@ def test_an_optimization_that_is_cancelled_elsewhere_says_so(
     assert f"gaitswarm history {job_id} --db {db}" in err
 
 
-def test_an_identification_beside_a_server_of_its_database_follows_the_runs_that_that_takes(
+def test_identify_follows_runs_that_a_server_claims(
     gaitswarm: Gaitswarm, write_json: WriteJson, db: Path, tmp_path: Path, server: str
 ) -> None:
     walk = write_json(SHORT_WALK | {"cycle_time": 0.8, "cycles": 2}, "walk.json")

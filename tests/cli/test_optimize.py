@@ -369,7 +369,9 @@ def test_an_address_that_is_none_of_a_cluster_leaves_no_job_behind(
     gaitswarm: Gaitswarm, db: Path, small_spec: Path
 ) -> None:
     result = gaitswarm("optimize", "--spec", small_spec, "--db", db, "--ray-address", "ray://x:1")
-    assert result.code == ExitCode.BAD_INPUT and "is not the address of a cluster's head" in result.err
+    assert (
+        result.code == ExitCode.BAD_INPUT and "is not the address of a cluster's head" in result.err
+    )
     assert gaitswarm("list", "--db", db, "--json").json == []
 
 

@@ -71,7 +71,7 @@ def test_help_after_two_dashes_is_an_argument(gaitswarm: Gaitswarm) -> None:
 def test_help_cuts_no_commands_sentence(gaitswarm: Gaitswarm) -> None:
     listed = gaitswarm("--help").out.split("Start here:")[1]
     assert "..." not in listed
-    assert "cases and search methods of" in listed
+    assert "search methods of other packages" in " ".join(listed.split())
 
 
 def test_help_lists_every_command_once_and_the_eight_main_ones_first(gaitswarm: Gaitswarm) -> None:

@@ -30,9 +30,6 @@ class JobProfile:
     """Distribution of a job's time from its first committed iteration to its last.
 
     Attributes:
-        evaluator: kind.
-        slots: number of tasks that run concurrently.
-        precision: of the physics.
         walks: designs times scenarios.
         seconds: wall time [s].
         walks_per_second: of all slots together.

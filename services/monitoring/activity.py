@@ -36,7 +36,6 @@ class IterationSpan:
     Attributes:
         begun: Unix time [s].
         seconds: duration [s]; None while in progress.
-        designs: number simulated.
         error: cause of failure; None for a result or while in progress.
     """
 
@@ -91,9 +90,7 @@ class WorkerHealth:
 
     Attributes:
         name: of the machine; "" for tasks without an answer.
-        tasks: number of finished tasks.
         walks: simulations in these tasks.
-        failures: tasks without a result.
         compute_seconds: total computing time [s].
         last_seen: Unix time of the last answer [s].
         error: of the last failed task; None if there is none.
@@ -123,14 +120,7 @@ class WorkerHealth:
 
 @dataclass(frozen=True, slots=True)
 class JobActivity:
-    """Recent activity of a job in this process.
-
-    Attributes:
-        iterations: in order of start.
-        tasks: in order of completion.
-        messages: oldest first.
-        workers: by name, over the whole run here.
-    """
+    """Recent activity of a job in this process."""
 
     iterations: tuple[IterationSpan, ...] = ()
     tasks: tuple[TaskSpan, ...] = ()

@@ -39,7 +39,6 @@ class ComparedCase:
     """One scenario by two engines.
 
     Attributes:
-        utility: by the preference.
         objectives: f1 to f6 of table 4.1; f6 by its absolute value.
     """
 
@@ -113,7 +112,6 @@ class Proportion:
     Attributes:
         count: worlds in which the event occurred.
         low: lower end of the exact 95 % interval (Clopper and Pearson 1934).
-        high: upper end.
     """
 
     count: int
@@ -151,7 +149,6 @@ class CaseResult:
     """One scenario over all worlds.
 
     Attributes:
-        utility: by the preference.
         objectives: f1 to f6 of table 4.1; f6 by its absolute value.
     """
 
@@ -169,8 +166,6 @@ class WorldOutcome:
 
     Attributes:
         index: of the world, from 0.
-        iteration: of the job.
-        particle: index in the iteration.
         fitness: geometric mean over the scenarios, +inf if one failed.
         failures: failed scenarios with their statuses.
         scenario: worst scenario: a failed one, else the one whose utility is the greatest multiple
@@ -195,7 +190,6 @@ class Influence:
         correlation: Spearman's; worlds with a failed scenario share the last rank. Positive:
             greater values go with worse results.
         low: lower end of the 95 % interval (Bonett and Wright 2000).
-        high: upper end.
     """
 
     name: str
@@ -209,14 +203,10 @@ class Certificate:
     """Results of a design in many worlds.
 
     Attributes:
-        worlds: number of drawn worlds.
-        cases: in the job's order.
         fitness: over all scenarios.
         fell: worlds in which the robot fell in at least one scenario.
         failed: worlds in which at least one scenario failed.
         worst: those with the most failed scenarios first.
-        influences: strongest first.
-        engines: other engines in the nominal world.
     """
 
     worlds: int

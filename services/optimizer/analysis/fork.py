@@ -330,7 +330,6 @@ def _check_unchanged(parent: Parent, taken: TakenHistory, now: JobProvenance) ->
 def _from_best_designs(
     parent: Parent, spec: AnySpec, fitness: Floats, request: ForkRequest, reason: str
 ) -> AnySpec:
-    """Return the spec that starts from the parent's best designs."""
     if not spec.searches:
         raise InvalidRequest(
             f"{reason}, and a job of kind {spec.kind} samples its designs, so it cannot start from"

@@ -42,7 +42,6 @@ def non_dominated(points: Floats) -> NDArray[np.bool_]:
 
 
 def _front(points: Floats, rows: Rows) -> Rows:
-    """Return the non-dominated rows, ascending."""
     if len(rows) ** 2 <= _LEAF:
         return rows[~_any_below(points[rows], points[rows], itself=True)]
     half = len(rows) // 2
@@ -182,7 +181,6 @@ class _Undominated:
         )
 
     def insert(self, row: int) -> None:
-        """Remove what a point dominates."""
         point, size = self.points[row], self.points.shape[1]
         above = self.bounds[0, : self.count] > point[0]
         for j in range(1, size):
@@ -233,7 +231,6 @@ class _Undominated:
 
 
 def _estimated(points: Floats) -> HypervolumeCurve:
-    """Share of sampled points that are dominated, after each point."""
     size = points.shape[1]
     samples = min(_MOST_SAMPLES, _COMPARISONS // len(points))
     drawn = uniform(0, _DRAW, iteration=0, particle=0, count=samples * size)
@@ -276,7 +273,6 @@ class Knee:
     """A design of the front that is closer to the ideal than its neighborhood.
 
     Attributes:
-        row: of the job's evaluations.
         distance: from the plane through the mean of the extremes, in normalised objectives.
     """
 
@@ -289,7 +285,6 @@ class FrontWinner:
     """The job's best design by a preference, relative to the front.
 
     Attributes:
-        row: of the job's evaluations.
         on_front: whether it belongs to the front, or equals a design of it.
         dominated_by: number of designs of the front that dominate it.
         behind: share by which one of them is better in every objective; 0 on the front.

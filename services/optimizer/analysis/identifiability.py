@@ -182,7 +182,6 @@ def check_comparable(jobs: Sequence[Job]) -> None:
 
 
 def _problem(spec: Spec) -> Spec:
-    """The spec without the fields that may differ between runs of one problem."""
     return spec.model_copy(
         update={"name": "", "seed": 0, "iterations": 1, "optimizer": PsoSettings()}
     )

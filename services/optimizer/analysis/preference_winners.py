@@ -32,7 +32,6 @@ class Winner:
     """A design that is the best of its job under some preferences.
 
     Attributes:
-        row: of the job's evaluations.
         preference: one under which it wins: of table 4.5 if possible, else that with the greatest
             lead.
         named: names of the preferences of table 4.5 under which it wins.

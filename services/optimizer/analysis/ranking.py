@@ -25,10 +25,8 @@ class RankedDesign:
     """One of the best designs.
 
     Attributes:
-        row: of the ranked columns.
         rank: by the new preference, from 1; ties by age.
         rank_before: by the job's own preference; None if the design failed.
-        fitness: by the new preference.
     """
 
     row: int
@@ -42,7 +40,6 @@ class Ranking:
     """All evaluations under one preference; fitness is minimized.
 
     Attributes:
-        top: best first.
         present_best: new fitness of the job's own best design, None without one.
         best_so_far: (iterations,), +inf until a design succeeds.
         correlation: Spearman's, between old and new finite fitness; None if undefined.

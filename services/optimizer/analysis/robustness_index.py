@@ -88,7 +88,6 @@ class Robustness:
 
     Attributes:
         index: root mean square of the scenarios' indices; None if one has none.
-        scenarios: in the scenarios' order.
     """
 
     index: Interval | None

@@ -63,7 +63,6 @@ class LeftOut:
 
     Attributes:
         scenario: index of the omitted one.
-        family: the others.
         loss: relative excess of the family's winner above the job's best in the omitted scenario;
             negative if it is better.
         similar: index of the scenario with the most similar ranking; None if undefined.
@@ -82,11 +81,8 @@ class ScenarioFamilies:
     """Results of judging by fewer scenarios.
 
     Attributes:
-        designs: number of designs that succeed in all scenarios.
-        failed: number of the others.
         left_out: one entry for each scenario; empty for a single scenario.
         families: of every smaller size, all of them or a sample, smaller ones first.
-        tolerance: largest acceptable loss.
         smallest: smallest family whose interval of regret ends within the tolerance, of these the
             one of least regret; None if there is none.
     """

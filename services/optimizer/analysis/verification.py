@@ -214,7 +214,6 @@ def _check_ask(stored: StoredLink) -> None:
 
 
 def _check_next(store: Store, job: Job) -> None:
-    """Check the iteration in progress."""
     index = job.progress.iterations
     try:
         links = store.links(job.id, index, index + 1)

@@ -56,7 +56,6 @@ class PreferenceFit:
     Attributes:
         preference: exponents sum to about 1.
         biases_of: origin of the biases: `job`, `A`, `B`, `C`.
-        rank: from 1.
         rival: row of the best design that is not equal to it; None if there is none.
         margin: share by which the rival's fitness is worse; negative if it is better. For exponents
             that sum to 1.
@@ -113,7 +112,6 @@ def preference_fits(
 
 
 def _biases(own: Preference) -> Mapping[tuple[float, ...], tuple[str, ...]]:
-    """Biases with the names of their preferences."""
     names_by_bias: dict[tuple[float, ...], tuple[str, ...]] = {}
     for name, preference in {"job": own, **NAMED}.items():
         names_by_bias[preference.bias] = (*names_by_bias.get(preference.bias, ()), name)

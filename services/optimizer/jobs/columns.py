@@ -54,14 +54,7 @@ class EvaluationColumns:
         return np.asarray(self.statuses != Status.OK)
 
     def rows(self, chosen: slice | NDArray[np.intp]) -> EvaluationColumns:
-        return EvaluationColumns(
-            self.iteration[chosen],
-            self.particle[chosen],
-            self.designs[chosen],
-            self.objectives[chosen],
-            self.statuses[chosen],
-            self.fitness[chosen],
-        )
+        return EvaluationColumns(*(array[chosen] for array in self.arrays))  # type: ignore[arg-type]
 
     def of_iteration(self, iteration: int) -> EvaluationColumns:
         return self.rows(slice(*np.searchsorted(self.iteration, [iteration, iteration + 1])))

@@ -124,7 +124,6 @@ class DesignSpace:
 
     @property
     def _fixed_variables(self) -> tuple[Variable, ...]:
-        """The fixed variables, with all of their choices."""
         return self.catalogue[len(self.variables) :]
 
     def _check_fixed_value(self, where: str, name: str, value: float | str, fixed: float) -> None:
@@ -176,7 +175,6 @@ class DesignSpace:
 def _fixed_values(
     fixed: Mapping[str, float | str], catalogue: Mapping[str, Variable]
 ) -> tuple[tuple[str, float], ...]:
-    """Names and numbers of fixed values."""
     held = []
     for name, value in fixed.items():
         if name not in catalogue:
@@ -211,7 +209,6 @@ def _number(where: str, variable: Variable, value: float | str) -> float:
 
 
 def _checked(entry: str | Variable, catalogued: Variable) -> Variable:
-    """Return a variable with custom bounds or choices and the catalogue's unit."""
     if isinstance(entry, str):
         return catalogued
     # A continuous variable may be restricted to integers.

@@ -127,7 +127,6 @@ class Estimate:
     """Predicted cost of a job.
 
     Attributes:
-        walks: simulations: designs times cases.
         simulated_seconds: of all simulations together [s].
         seconds: wall time [s], None if unknown.
         basis: what the wall time is derived from, for people.

@@ -131,7 +131,6 @@ class TakenHistory:
     Attributes:
         state: the optimizer's dump after the last ask taken over.
         fitness: (n,) of each iteration if rejudged; None: unchanged.
-        provenance: the parent's records.
         accepts_changes: whether the fork continues under another provenance.
     """
 

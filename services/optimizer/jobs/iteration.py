@@ -20,7 +20,6 @@ class Reevaluation:
     """A design of a single-precision search, reevaluated in double precision.
 
     Attributes:
-        particle: index in the swarm, from 0.
         objectives: (K, m) raw objectives by case, as in `Evaluation`.
         statuses: (K,) values of `gaitswarm.sim.outcome.Status`.
         fitness: minimized, +inf if any case failed.
@@ -37,8 +36,6 @@ class Evaluation:
     """A design's results in all cases of its job.
 
     Attributes:
-        iteration: from 0.
-        particle: from 0.
         design: (v,) values of `Job.spec.design_space().names`.
         objectives: (K, m) raw objectives by case, columns as in `Job.spec.objectives`, NaN if
             missing.
@@ -67,7 +64,6 @@ class Iteration:
         failed: number of designs that failed in at least one case.
         evaluate_seconds: duration of the evaluation [s].
         committed_at: UTC.
-        digest: see `jobs.chain`.
     """
 
     index: int
@@ -125,7 +121,6 @@ class CompletedIteration:
     """All that one transaction commits of an iteration.
 
     Attributes:
-        iteration: from 0.
         designs: (n, v) values of `Job.spec.design_space().names`.
         outcomes: K, one per case, of n designs each.
         fitness: (n,), +inf for a failed design.

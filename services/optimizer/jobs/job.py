@@ -182,13 +182,9 @@ class Job:
         stored_spec: resolved; its `iterations` are the current budget. An `UnreadableSpec` if this
             version cannot read it.
         updated_at: time of the last change of state or progress.
-        started_at: time of the first claim.
         provenance: provenance of the results, by first iteration.
         accepts_changes: whether the user has accepted a changed provenance; cleared by the claim.
         lineage: origin of a fork.
-        owner: name of the token that submitted it.
-        kept: whether it is protected from deletion.
-        submitted_iterations: budget at submission.
         waiting: reason for waiting while running, such as unreachable workers; None if it does not
             wait.
         priority: see `priority.py`.
@@ -270,12 +266,9 @@ class Claim:
     """A lease on a job.
 
     Attributes:
-        job: as of the claim.
-        runner: the holder's name.
         token: fencing token: the store rejects writes under an older one.
         ask: the stored ask to continue with; None for a new job or one extended after its budget
             was spent.
-        recordings: those named by the spec, by id.
         answered: the last committed ask, if there is no open one.
         taken_from: previous runner, whose lease had expired; None for a queued job.
     """

@@ -26,8 +26,6 @@ class Notification:
     Attributes:
         id: the same for every attempt, so that receivers can detect repetitions.
         document: sent as JSON.
-        created_at: time of the job's end.
-        attempts: number so far.
         next_attempt_at: None once delivered or given up.
         delivered_at: None unless delivered.
         error: cause of the last failed attempt; None after a success.

@@ -89,7 +89,6 @@ def _check_known(settings: Mapping[Any, Any], model: type[SearchSettings]) -> No
 
 
 def _tag(settings: Any) -> str | None:
-    """Return the tag of the requested method."""
     if isinstance(settings, BaseModel):
         return f"<{getattr(settings, 'name', '')}>"
     return f"<{settings.get('name')}>" if isinstance(settings, Mapping) else None

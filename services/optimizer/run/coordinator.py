@@ -67,7 +67,6 @@ class Claimed:
     """The job was claimed by this process.
 
     Attributes:
-        claim: with the job as of the claim.
         provenance: of results computed by this process.
         accepts_changes: whether to continue under a changed provenance.
     """
@@ -273,11 +272,8 @@ class Coordination:
     and resuming follow the same path.
 
     Attributes:
-        backoff: pauses while workers are unreachable.
-        job: as last read.
         answered: the last answered ask, if the claim had no open one.
         best_fitness: of the best committed design, in double precision; +inf if there is none.
-        evaluations: designs in committed iterations.
         done: the evaluated iteration until it is committed.
         following: the ask after the commit in progress.
         failures: consecutive failures of the workers.
@@ -369,7 +365,6 @@ def _start(state: Coordination, event: Claimed) -> tuple[Coordination, tuple[Act
 
 
 def _begin(state: Coordination, job: Job) -> tuple[Coordination, tuple[Action, ...]]:
-    """Start from the last answered ask, if any, under the job's present budget."""
     if state.answered is not None:
         columns = state.answered.columns
         feedback = job.spec.search_feedback(columns.objectives, columns.failed, columns.fitness)
@@ -446,7 +441,6 @@ def _continue(state: Coordination, stored: JobState) -> tuple[Coordination, tupl
 
 
 def _evaluate_next(state: Coordination) -> tuple[Coordination, tuple[Action, ...]]:
-    """Evaluate the ask, or reevaluate the best design of the evaluated one."""
     if state.done is None:
         return replace(state, phase=Phase.EVALUATING), (_evaluate(state),)
     return replace(state, phase=Phase.REEVALUATING), (_reevaluate(state, state.done),)
@@ -470,7 +464,6 @@ def _evaluate(state: Coordination) -> Evaluate:
 
 
 def _reevaluate(state: Coordination, done: CompletedIteration) -> Evaluate:
-    """Reevaluate the best design of the iteration in double precision."""
     job, _ = _current(state)
     best = int(np.argmin(done.fitness))
     return _evaluation_of(state, job.spec.in_double(), done.designs[best : best + 1])

@@ -180,7 +180,6 @@ class _EmbeddedRun:
                 time.sleep(_GLANCE)
 
     def _catch_up(self) -> None:
-        """Report the iterations that another process has stored meanwhile."""
         more = True
         while more:
             page = self.store.iterations(self.job.id, after=self.seen)

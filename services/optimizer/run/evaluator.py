@@ -19,7 +19,6 @@ class TaskReport:
     """A task of a request, as run by a worker.
 
     Attributes:
-        walks: number of simulations.
         seconds: from the dispatch to the answer [s].
         compute_seconds: computing time of the worker [s].
         host: name of the worker's machine; "" without an answer.
@@ -42,7 +41,6 @@ class EvaluationRequest:
 
     Attributes:
         job_id: jobs share the workers by their weights.
-        cases: evaluated for every design.
         designs: (n, v) float64.
         provenance: of this process; the workers must match it.
         iterations_left: estimated number of later iterations.

@@ -116,7 +116,6 @@ def evaluate_uncached(
 def _cached(
     store: Store, request: EvaluationRequest, keys: tuple[bytes, ...]
 ) -> dict[bytes, CachedOutcome]:
-    """Return the usable cached outcomes of keys."""
     try:
         stored = store.known(keys)
     except StoreUnavailable as error:
@@ -159,10 +158,7 @@ class RunContext:
     Attributes:
         lease_seconds: time without renewal after which another runner may take the job over [s].
         backoff: pauses while workers are unreachable.
-        on_commit: called after a commit.
-        on_retry: called before waiting for the workers.
         provenance: provenance of what this process computes for a spec.
-        accepts_changes: whether to continue under a changed provenance.
         cache: whether to reuse outcomes of other jobs.
         clock: monotonic time [s], injectable in tests.
         sleep: injectable in tests.

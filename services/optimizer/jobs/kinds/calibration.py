@@ -340,7 +340,6 @@ class CalibrationSpec(Spec):
         )
 
     def _walks(self, cases: tuple[CalibrationWalk, ...]) -> list[tuple[int, CalibrationWalk]]:
-        """Every walk's index with each of its cases."""
         of_walk = self.layout().of_walk
         return [(i, cases[k]) for i, walk in enumerate(self.walks) for k in of_walk[walk.name]]
 

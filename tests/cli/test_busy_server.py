@@ -1,4 +1,4 @@
-"""Commands ask a server again that is busy, where that does no harm."""
+"""Retries of commands on a busy server."""
 
 from __future__ import annotations
 

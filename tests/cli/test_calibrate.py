@@ -22,7 +22,7 @@ def table(tmp_path: Path) -> Path:
     return tmp_path / "targets.csv"
 
 
-def test_rows_of_a_walk_share_what_its_first_row_says(table: Path, tmp_path: Path) -> None:
+def test_rows_of_a_walk_share_the_values_of_its_first_row(table: Path, tmp_path: Path) -> None:
     (tmp_path / "own.json").write_text(json.dumps({"P": 0.3, "I": 0.2, "fir_window": "hamming"}))
     table.write_text(
         HEAD

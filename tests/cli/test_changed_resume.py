@@ -1,4 +1,4 @@
-"""A job that is resumed after what its numbers depend on has changed: refused, or on purpose."""
+"""Resuming a job after changes of its provenance: refused, or accepted on request."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def test_a_job_does_not_mix_numbers_that_depend_on_something_else(
     assert (job["state"], job["iterations"]) == ("queued", 2)
 
 
-def test_a_change_that_is_accepted_is_recorded_from_that_iteration_on(
+def test_an_accepted_change_is_recorded_from_its_iteration(
     extended: Finished, tmp_path: Path, gaitswarm: Gaitswarm
 ) -> None:
     before = history(extended, gaitswarm)
@@ -111,9 +111,7 @@ def test_a_change_that_is_accepted_is_recorded_from_that_iteration_on(
     assert "computed by from iteration 2" in said and now["robot_digest"][:8] in said
 
 
-def test_changes_are_accepted_of_a_job_that_is_resumed_and_of_no_new_one(
-    gaitswarm: Gaitswarm, small_spec: Path, db: Path
-) -> None:
+def test_accept_changes_requires_resume(gaitswarm: Gaitswarm, small_spec: Path, db: Path) -> None:
     refused = gaitswarm("optimize", "--spec", small_spec, "--db", db, "--accept-changes")
     assert refused.code == 2 and "accept-changes" in refused.err
     assert not db.exists()

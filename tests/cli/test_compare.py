@@ -56,7 +56,7 @@ def test_a_design_file_is_compared_on_a_variant_of_the_robot(
         (["compare", "--robot", "{"], "robot"),
     ],
 )
-def test_what_makes_no_sense_is_exit_code_2(
+def test_invalid_input_is_exit_code_2(
     arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run(arguments) == 2

@@ -32,7 +32,7 @@ def test_commands_refuse_a_database_of_another_schema(gaitswarm: Gaitswarm, db: 
         assert "revision 0019 of a version before 0.1.0" in refused.err
 
 
-def test_a_database_that_is_not_there_is_not_made(gaitswarm: Gaitswarm, db: Path) -> None:
+def test_a_missing_database_is_not_created(gaitswarm: Gaitswarm, db: Path) -> None:
     assert gaitswarm("db", "upgrade", "--db", db).code == ExitCode.NOT_FOUND
     assert not db.exists()
 
@@ -53,7 +53,7 @@ def test_a_backup_is_made_and_restored_and_overwrites_only_by_force(
     assert gaitswarm("db", "restore", file, "--force", "--db", db).code == ExitCode.OK
 
 
-def test_a_check_says_what_is_wrong_and_ends_so(gaitswarm: Gaitswarm, db: Path) -> None:
+def test_a_check_reports_findings_and_fails(gaitswarm: Gaitswarm, db: Path) -> None:
     open_store(str(db)).close()
     sound = gaitswarm("db", "check", "--db", db, "--json")
     assert (sound.code, sound.json) == (ExitCode.OK, [])
@@ -92,7 +92,7 @@ def test_pruning_removes_entries_of_the_audit_log_only_by_their_age(
     assert gaitswarm("audit", "--db", db, "--json").json == []
 
 
-def test_pruning_says_what_it_removed(gaitswarm: Gaitswarm, finished: Finished) -> None:
+def test_pruning_reports_removed_entries(gaitswarm: Gaitswarm, finished: Finished) -> None:
     pruned = gaitswarm("db", "prune", "--db", finished.db)
     assert pruned.code == ExitCode.OK and "0 recordings" in pruned.err
     assert gaitswarm("best", finished.id, "--db", finished.db, "--json").json

@@ -1,4 +1,4 @@
-"""`gaitswarm delete`: asks first, says what is lost; `gaitswarm keep` protects."""
+"""`gaitswarm delete` and `keep`."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def answering(monkeypatch: pytest.MonkeyPatch) -> Callable[[bool], None]:
 
 
 @pytest.mark.parametrize("yes", [True, False])
-def test_it_says_what_is_lost_and_asks(
+def test_deletion_describes_the_loss_and_asks_for_confirmation(
     gaitswarm: Gaitswarm, finished: Finished, db: Path, answering: Callable[[bool], None], yes: bool
 ) -> None:
     assert gaitswarm("fork", finished.id, "--from", "1", "--db", db).code == 0
@@ -52,9 +52,7 @@ def test_without_a_terminal_deletion_requires_yes(
     assert gaitswarm("delete", finished.id, "--yes", "--db", db).code == 3
 
 
-def test_a_job_that_is_kept_is_not_deleted(
-    gaitswarm: Gaitswarm, finished: Finished, db: Path
-) -> None:
+def test_a_kept_job_is_not_deleted(gaitswarm: Gaitswarm, finished: Finished, db: Path) -> None:
     assert gaitswarm("keep", finished.id, "--db", db).out == f"job {finished.id} is kept\n"
     refused = gaitswarm("delete", finished.id, "--yes", "--db", db)
     assert refused.code == 4 and "gaitswarm keep --release" in refused.err

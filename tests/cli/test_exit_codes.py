@@ -1,4 +1,4 @@
-"""What a shell sees when something is wrong that is no bug, and when one is."""
+"""Exit codes of errors and bugs."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ WRITING = ["help", "help of a command", "version", "JSON, written as it is read"
 @pytest.mark.slow
 @pytest.mark.parametrize("buffered", [BUFFERED, {"PYTHONUNBUFFERED": "1"}], ids=["", "unbuffered"])
 @pytest.mark.parametrize("kind", WRITING)
-def test_a_full_device_is_said_and_exit_code_5(
+def test_a_full_device_is_exit_code_5(
     finished: Finished, kind: str, buffered: dict[str, str]
 ) -> None:
     with Path("/dev/full").open("w") as full:
@@ -75,7 +75,7 @@ def test_a_reader_that_has_seen_enough_is_no_error(finished: Finished, kind: str
 @pytest.mark.variants
 @pytest.mark.slow
 @pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
-def test_streams_that_are_closed_are_no_error(finished: Finished, closed: str) -> None:
+def test_closed_streams_are_no_error(finished: Finished, closed: str) -> None:
     program = f'"$0" "$@" {closed}'
     command = (sys.executable, *COMMAND_LINE, "status", finished.id, "--db", str(finished.db))
     done = subprocess.run(
@@ -89,9 +89,7 @@ def test_streams_that_are_closed_are_no_error(finished: Finished, closed: str) -
     assert (done.returncode, done.stderr) == (ExitCode.OK, "")
 
 
-@pytest.mark.thorough(
-    "test_a_full_device_is_said_and_exit_code_5", "test_streams_that_are_closed_are_no_error"
-)
+@pytest.mark.thorough("test_a_full_device_is_exit_code_5", "test_closed_streams_are_no_error")
 @pytest.mark.slow
 def test_messages_that_cannot_be_written_change_no_exit_code(finished: Finished) -> None:
     with Path("/dev/full").open("w") as full:
@@ -101,7 +99,7 @@ def test_messages_that_cannot_be_written_change_no_exit_code(finished: Finished)
 
 
 @pytest.mark.slow
-def test_a_data_directory_that_cannot_be_made_is_exit_code_5_and_what_else_will_do(
+def test_a_data_directory_that_cannot_be_created_is_exit_code_5_with_a_remedy(
     small_spec: Path,
 ) -> None:
     # A file, so that it cannot be written by root either.
@@ -116,7 +114,7 @@ def test_a_data_directory_that_cannot_be_made_is_exit_code_5_and_what_else_will_
 
 
 @pytest.mark.slow
-def test_a_cache_directory_and_a_home_that_cannot_be_written_stop_nothing(
+def test_unwritable_cache_and_home_directories_are_no_error(
     small_spec: Path, tmp_path: Path
 ) -> None:
     no_folder = str(small_spec)
@@ -153,7 +151,7 @@ def test_a_bug_is_exit_code_70_with_its_traceback(
         (StoreUnavailable("the database is away"), "the database is away"),
     ],
 )
-def test_what_the_machine_refuses_is_no_bug(
+def test_refusals_of_the_operating_system_are_no_bugs(
     gaitswarm: Gaitswarm, monkeypatch: pytest.MonkeyPatch, error: Exception, said: str
 ) -> None:
     def refused(*_: object, **__: object) -> None:
@@ -167,7 +165,7 @@ def test_what_the_machine_refuses_is_no_bug(
 
 
 @pytest.mark.slow
-def test_an_optimization_without_workers_says_how_to_go_on_with_its_job(
+def test_an_optimization_without_workers_names_the_command_to_resume(
     gaitswarm: Gaitswarm, small_spec: Path, db: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def no_cluster(*_: object, **__: object) -> None:

@@ -97,7 +97,7 @@ def test_the_surface_of_a_fuzzy_design_is_drawn_with_units(
 
 
 @pytest.mark.slow
-def test_pictures_are_png_too_and_nothing_else(
+def test_pictures_are_png_svg_or_pdf(
     gaitswarm: Gaitswarm, finished: Finished, tmp_path: Path
 ) -> None:
     png, gif = tmp_path / "c.png", tmp_path / "c.gif"

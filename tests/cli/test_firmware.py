@@ -1,4 +1,4 @@
-"""`gaitswarm firmware`: of a published design, a file and a job; and back from the robot."""
+"""`gaitswarm firmware` of published designs, files and jobs, and the way back from the robot."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tests.firmware.conftest import make
 pytestmark = pytest.mark.slow
 
 
-def test_json_tells_files_sizes_and_samples(gaitswarm: Gaitswarm, tmp_path: Path) -> None:
+def test_json_lists_files_sizes_and_samples(gaitswarm: Gaitswarm, tmp_path: Path) -> None:
     folder = tmp_path / "firmware"
     done = gaitswarm("firmware", "published:A", "--output", folder, "--scenarios", "1,6", "--json")
     assert done.code == 0, done.err
@@ -48,7 +48,7 @@ def test_all_six_scenarios_are_written_unless_some_are_named(
     assert "make -C" in done.err
 
 
-def test_what_does_not_fit_is_said(gaitswarm: Gaitswarm, tmp_path: Path) -> None:
+def test_tables_that_do_not_fit_are_reported(gaitswarm: Gaitswarm, tmp_path: Path) -> None:
     walk = ("--controller", "fuzzy-pi-3", "--scenarios", "1", "-o", tmp_path / "firmware")
     done = gaitswarm("firmware", "published:fuzzy-pso-ps", *walk)
     assert done.code == 0, done.err
@@ -133,7 +133,7 @@ def test_a_folder_of_something_else_is_refused(gaitswarm: Gaitswarm, tmp_path: P
         ),
     ],
 )
-def test_bad_input_says_what_there_is(
+def test_bad_input_lists_the_choices(
     arguments: tuple[str, ...], said: str, gaitswarm: Gaitswarm, tmp_path: Path
 ) -> None:
     done = gaitswarm("firmware", *arguments, "-o", tmp_path / "firmware")
@@ -142,7 +142,7 @@ def test_bad_input_says_what_there_is(
     assert not (tmp_path / "firmware").exists()
 
 
-def test_a_job_that_is_not_there_is_not_found(gaitswarm: Gaitswarm, db: Path) -> None:
+def test_a_missing_job_is_not_found(gaitswarm: Gaitswarm, db: Path) -> None:
     done = gaitswarm("firmware", "nothing", "--db", db, "-o", db.with_name("firmware"))
     assert done.code == 3, done.err
 

@@ -1,4 +1,4 @@
-"""`fork`, and what `status` and `list` show of a fork."""
+"""`fork`, and forks in `status` and `list`."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_a_fork_states_why_it_starts_a_new_search(
     assert len(made.json["spec"]["start"]) == 1
 
 
-def test_a_fork_from_an_iteration_that_is_not_there_is_bad_input(
+def test_a_fork_from_a_missing_iteration_is_bad_input(
     gaitswarm: Gaitswarm, finished: Finished, own_db: Path, place: Place
 ) -> None:
     refused = gaitswarm("fork", finished.id, "--from", "3", *place(own_db))

@@ -41,7 +41,7 @@ def test_all_gaits_are_listed_with_those_that_suit_the_robot(gaitswarm: Gaitswar
     assert all(name in text for name in items) and "for 6 legs" in text
 
 
-def test_a_duty_factor_of_ones_own_is_planned(gaitswarm: Gaitswarm) -> None:
+def test_a_custom_duty_factor_is_planned(gaitswarm: Gaitswarm) -> None:
     crawl = gaitswarm("gaits", "crawl", *CRAWL, "--duty-factor", "0.9", "--json").json
     assert [item["planned"]["duty_factor"] for item in crawl["items"]] == pytest.approx([0.9])
     refused = gaitswarm("gaits", "crawl", *CRAWL, "--duty-factor", "1.5")
@@ -49,7 +49,7 @@ def test_a_duty_factor_of_ones_own_is_planned(gaitswarm: Gaitswarm) -> None:
     assert "trot, pace" in gaitswarm("gaits", "gallop").err
 
 
-def test_diagrams_in_the_documentation_are_what_the_command_prints(gaitswarm: Gaitswarm) -> None:
+def test_diagrams_in_the_documentation_equal_the_output(gaitswarm: Gaitswarm) -> None:
     text = (ROOT / "docs" / "gaits.md").read_text(encoding="utf-8")
     shown = [body.split("\n", 1) for body in text.split("```console\n$ gaitswarm gaits ")[1:]]
     assert len(shown) == 2
@@ -81,9 +81,7 @@ def test_a_design_gives_groups_of_legs_values_of_their_own(
     assert "no such group of legs; it has all, left, right, front" in refused.err
 
 
-def test_simulate_says_whether_the_gait_is_statically_stable(
-    gaitswarm: Gaitswarm, write_json: WriteJson
-) -> None:
+def test_simulate_reports_static_stability(gaitswarm: Gaitswarm, write_json: WriteJson) -> None:
     scenario = write_json(SCENARIO, "scenario.json")
     options = ("--controller", "pi", "--design", "published:validation")
     text = gaitswarm("simulate", *options, "--scenario", str(scenario)).out

@@ -1,4 +1,4 @@
-"""A design is given as a published name, a file, standard input, or a job's id."""
+"""Designs as published names, files, standard input, or ids of jobs."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_a_job_gives_its_best_with_the_spec_that_found_it(finished: Finished) ->
 
 
 @pytest.mark.slow
-def test_a_file_goes_before_a_job_of_its_name_unless_the_job_is_said(
+def test_a_file_takes_precedence_over_a_job_without_prefix(
     finished: Finished, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -58,13 +58,13 @@ def test_a_file_goes_before_a_job_of_its_name_unless_the_job_is_said(
 
 
 @pytest.mark.slow
-def test_a_controller_that_is_not_the_jobs_is_refused(finished: Finished) -> None:
+def test_another_controller_than_the_jobs_is_refused(finished: Finished) -> None:
     with pytest.raises(InvalidRequest, match="tunes fuzzy-pi") as refused:
         given(finished.id, finished.db, controller="pi")
     assert refused.value.field == "controller"
 
 
-def test_what_is_neither_job_nor_file_says_what_there_could_be(database: Path) -> None:
+def test_an_unknown_design_lists_the_choices(database: Path) -> None:
     with pytest.raises(NotFound, match="the id of a job, a file, or published:NAME"):
         given("nowhere", database)
     with pytest.raises(InvalidRequest, match="known are A, B, C"):

@@ -1,4 +1,4 @@
-"""From a synthetic log to trusted parameters, on the command line and over a server."""
+"""Identification from a synthetic log, on the command line and over a server."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def test_a_log_is_recorded_once_fitted_and_judged(
         ((), "there is no recording"),
     ],
 )
-def test_what_cannot_be_fitted_is_refused_by_name(
+def test_unknown_parameters_are_refused_by_name(
     gaitswarm: Gaitswarm, db: Path, arguments: tuple[str, ...], message: str
 ) -> None:
     refused = gaitswarm("identify", "0" * 32, "--db", db, *FIT, *arguments)

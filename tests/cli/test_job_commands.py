@@ -37,7 +37,7 @@ def test_submit_queues_a_job_that_status_and_list_then_show(
     assert gaitswarm("list", "--state", "paused", *where, "--json").json == []
 
 
-def test_the_same_idempotency_key_makes_one_job_and_another_spec_is_a_conflict(
+def test_an_idempotency_key_creates_one_job_and_conflicts_with_another_spec(
     gaitswarm: Gaitswarm, small_spec: Path, db: Path, queued: str, place: Place
 ) -> None:
     where = place(db)
@@ -84,7 +84,7 @@ def test_best_of_a_job_without_any_is_exit_code_3(
     assert "no design yet" in result.err
 
 
-def test_best_is_the_one_that_optimize_reported(
+def test_best_equals_the_report_of_optimize(
     gaitswarm: Gaitswarm, finished: Finished, place: Place
 ) -> None:
     where = place(finished.db)
@@ -156,9 +156,7 @@ def test_a_server_that_does_not_answer_is_exit_code_5(gaitswarm: Gaitswarm) -> N
     assert "gaitswarm serve" in result.err
 
 
-def test_a_database_that_is_not_there_is_not_made_by_reading(
-    gaitswarm: Gaitswarm, db: Path
-) -> None:
+def test_reading_a_missing_database_does_not_create_it(gaitswarm: Gaitswarm, db: Path) -> None:
     result = gaitswarm("list", "--db", db)
     assert result.code == 3
     assert str(db) in result.err

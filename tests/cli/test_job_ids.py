@@ -1,4 +1,4 @@
-"""Ids of jobs may be shortened as long as one job is meant."""
+"""Unique prefixes of job ids."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What commands print is whole on narrow terminals: no name, id or number is cut."""
+"""Output on narrow terminals: no name, id or number is cut."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def jobs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str]]:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_every_word_that_is_printed_where_there_is_room_is_printed_where_there_is_little(
+def test_narrow_terminals_show_the_same_words_as_wide_ones(
     gaitswarm: Gaitswarm,
     jobs: tuple[Path, list[str]],
     command: str,

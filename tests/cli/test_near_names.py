@@ -1,4 +1,4 @@
-"""A name that is none is answered with the one that may have been meant."""
+"""Suggestions for misspelled names."""
 
 from __future__ import annotations
 

@@ -108,9 +108,7 @@ def test_controller_and_gait_are_searched_together(
     assert gaitswarm(*asked, *where).json["best"] == job["best"]
 
 
-def test_a_gait_that_is_held_fixed_stays_so(
-    gaitswarm: Gaitswarm, write_json: WriteJson, db: Path
-) -> None:
+def test_a_fixed_gait_stays_fixed(gaitswarm: Gaitswarm, write_json: WriteJson, db: Path) -> None:
     spec = write_json({"controller": "pi", "fixed": {"stride": 0.12}, "scenarios": ["straight"]})
     asked = gaitswarm("submit", "--spec", spec, "--with-gait", "--db", db, "--json").json["spec"]
     assert [v["name"] for v in asked["variables"]] == [
@@ -154,7 +152,7 @@ def test_the_report_compares_the_best_with_the_published_optimum(
     assert f"gaitswarm serve --db {db}" in result.err
 
 
-def test_the_report_has_what_another_method_finds_with_the_same_budget(
+def test_the_report_compares_another_method_with_the_same_budget(
     gaitswarm: Gaitswarm, small_spec: Path, db: Path
 ) -> None:
     """A job of the same database, which is found again when it is asked for again."""
@@ -200,7 +198,7 @@ def test_resuming_takes_the_same_spec_but_no_other(
     assert "another seed" in other.err
 
 
-def test_resuming_goes_on_with_a_paused_job_and_refuses_a_cancelled_one(
+def test_resuming_continues_a_paused_job_and_refuses_a_cancelled_one(
     gaitswarm: Gaitswarm, small_spec: Path, db: Path, finished: Finished
 ) -> None:
     where = ("--db", db)
@@ -269,7 +267,7 @@ BAD_FILES = {
 
 
 @pytest.mark.parametrize(("content", "why"), BAD_FILES.values(), ids=BAD_FILES)
-def test_a_file_that_is_no_spec_is_exit_code_2(
+def test_an_invalid_spec_file_is_exit_code_2(
     gaitswarm: Gaitswarm, tmp_path: Path, db: Path, content: bytes, why: str
 ) -> None:
     path = tmp_path / "spec.json"
@@ -281,7 +279,7 @@ def test_a_file_that_is_no_spec_is_exit_code_2(
     assert not db.exists()
 
 
-def test_a_spec_file_that_is_not_there_is_exit_code_2(gaitswarm: Gaitswarm, db: Path) -> None:
+def test_a_missing_spec_file_is_exit_code_2(gaitswarm: Gaitswarm, db: Path) -> None:
     result = gaitswarm("optimize", "--spec", "no-such-file.json", "--db", db)
     assert result.code == 2
     assert "no-such-file.json" in result.err
@@ -300,7 +298,7 @@ def test_an_option_that_makes_no_sense_is_exit_code_2(
     assert not db.exists()
 
 
-def test_a_directory_that_is_not_there_is_exit_code_5_and_named(
+def test_a_missing_directory_is_exit_code_5_and_named(
     gaitswarm: Gaitswarm, small_spec: Path, tmp_path: Path
 ) -> None:
     missing = tmp_path / "missing" / "jobs.db"
@@ -309,7 +307,7 @@ def test_a_directory_that_is_not_there_is_exit_code_5_and_named(
     assert str(missing) in result.err
 
 
-def test_json_has_every_bit_of_what_is_stored(finished: Finished, gaitswarm: Gaitswarm) -> None:
+def test_json_has_every_bit_of_stored_values(finished: Finished, gaitswarm: Gaitswarm) -> None:
     result = gaitswarm("history", finished.id, "--db", finished.db, "--json").json
     with closing(open_store(str(finished.db))) as store:
         stored = store.evaluations_between(finished.id, 0, 2)
@@ -365,7 +363,7 @@ def test_a_start_that_makes_no_sense_is_refused_with_its_place(
         assert message in result.err
 
 
-def test_an_address_that_is_none_of_a_cluster_leaves_no_job_behind(
+def test_an_invalid_cluster_address_leaves_no_job_behind(
     gaitswarm: Gaitswarm, db: Path, small_spec: Path
 ) -> None:
     result = gaitswarm("optimize", "--spec", small_spec, "--db", db, "--ray-address", "ray://x:1")

@@ -114,7 +114,7 @@ def test_an_error_in_a_robot_file_names_field_line_and_unit(
     ],
 )
 @pytest.mark.parametrize("command", [SIMULATE, ["optimize", "--iterations", "1", "--json"]])
-def test_a_robot_that_is_none_is_named(
+def test_an_unknown_robot_is_named(
     robot: str, said: str, command: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run([*command, "--robot", robot]) == 2

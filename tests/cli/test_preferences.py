@@ -1,4 +1,4 @@
-"""`gaitswarm preferences`: which preference's winner is the most robust."""
+"""`gaitswarm preferences`: preferences with robust winners."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_winners_are_listed_by_how_robust_they_are(
         (("--precision", "half"), "precision"),
     ],
 )
-def test_what_makes_no_sense_is_named(
+def test_invalid_input_is_named(
     gaitswarm: Gaitswarm, finished: Finished, options: tuple[str, str], said: str
 ) -> None:
     result = gaitswarm("preferences", finished.id, "--db", finished.db, *options)

@@ -1,4 +1,4 @@
-"""The command line as its users run it: processes, signals, a server."""
+"""The command line as processes: signals and a server."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_the_jobs_of_a_server_that_is_killed_are_free_after_the_lease_of_its_set
         assert time.monotonic() - killed < 15.0
 
 
-def test_an_optimization_stopped_by_ctrl_c_says_how_to_go_on_and_ends_as_if_never_stopped(
+def test_an_optimization_stopped_by_ctrl_c_resumes_to_the_same_result(
     gaitswarm: Gaitswarm, write_json: WriteJson, db: Path, tmp_path: Path
 ) -> None:
     spec = write_json(SMALL_SPEC | {"iterations": 40})
@@ -119,7 +119,7 @@ def test_a_stop_is_heard_while_a_cluster_is_connected_that_never_answers(
         assert (job["state"], job["iterations"]) == ("queued", 0)
 
 
-def test_an_optimization_whose_database_is_overwritten_with_garbage_does_not_end_well(
+def test_an_optimization_fails_if_its_database_is_overwritten(
     gaitswarm: Gaitswarm, write_json: WriteJson, db: Path
 ) -> None:
     spec = write_json(SMALL_SPEC | {"iterations": 100})

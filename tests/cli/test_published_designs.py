@@ -1,4 +1,4 @@
-"""Designs of the literature by name, each with its own gait where it was published with one."""
+"""Published designs by name, with their gaits."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_every_published_design_walks(
 
 
 @pytest.mark.slow
-def test_a_published_design_walks_in_its_own_gait_and_in_anothers_on_request(
+def test_a_published_design_walks_in_its_gait_or_a_requested_one(
     gaitswarm: Gaitswarm, write_json: WriteJson
 ) -> None:
     walk = ("simulate", "--controller", "pi", "--scenario", "normal-fast", "--json")
@@ -111,7 +111,7 @@ def test_a_job_is_compared_with_the_optimum_of_its_preference() -> None:
     assert list(published_results(job("pi", scenarios=[brief]))) == ["published pi-pso-ps"]
 
 
-def test_a_job_whose_controller_was_never_published_is_compared_with_nothing() -> None:
+def test_a_job_without_published_designs_is_compared_with_nothing() -> None:
     assert not CONTROLLERS["pid"].published
     assert published_results(job("pid")) == {}
 

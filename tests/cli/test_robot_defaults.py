@@ -1,4 +1,4 @@
-"""What the folder of a robot says of its jobs holds in every command, if no option differs."""
+"""Defaults of a robot's folder in every command."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_robustness_is_by_the_bounds_of_the_folders_variables(tmp_path: Path) ->
     assert (known["P"]["low"], known["P"]["high"]) == (0.1, 1.0)
 
 
-def test_a_design_that_was_not_published_says_what_can_be_given(dog: Path) -> None:
+def test_an_unpublished_design_lists_the_choices(dog: Path) -> None:
     result = run_command("simulate", "--robot", dog, "--design", "published:A")
     assert result.code == 2
     assert (

@@ -65,9 +65,7 @@ def test_a_jobs_best_is_walked_as_its_job_walked_it(
         (("--robot", "spot"), "unknown robot 'spot'"),
     ],
 )
-def test_what_makes_no_sense_is_named(
-    gaitswarm: Gaitswarm, options: tuple[str, str], said: str
-) -> None:
+def test_invalid_input_is_named(gaitswarm: Gaitswarm, options: tuple[str, str], said: str) -> None:
     result = gaitswarm("robustness", "published:A", *options)
     assert result.code == 2
     assert said in result.err

@@ -1,4 +1,4 @@
-"""`gaitswarm scenarios`: which scenarios of a job matter."""
+"""`gaitswarm scenarios`: importance of a job's scenarios."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Search methods on the command line: which there are, their settings, and uneven iterations."""
+"""Search methods on the command line: lists, settings, and uneven iterations."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def test_wrong_settings_name_the_field_and_the_way_out(
     assert not db.exists()
 
 
-def test_auto_is_stored_as_the_method_that_it_stands_for(gaitswarm: Gaitswarm, db: Path) -> None:
+def test_auto_is_stored_as_the_selected_method(gaitswarm: Gaitswarm, db: Path) -> None:
     found = submitted(gaitswarm, db, "--optimizer", "auto", "--particles", 9)
     assert found == submitted(gaitswarm, db, "--particles", 9)
 

@@ -64,7 +64,7 @@ def test_resuming_a_job_that_a_server_runs_follows_it_to_its_end(
     assert "120/120 iterations: best" in resumed.err
 
 
-def test_ctrl_c_ends_the_following_of_a_job_and_says_where_it_goes_on(
+def test_ctrl_c_stops_following_and_names_the_command_to_continue(
     gaitswarm: Gaitswarm, write_json: WriteJson, db: Path, server: str
 ) -> None:
     spec = write_json(SMALL_SPEC | {"iterations": 1_000_000})
@@ -81,7 +81,7 @@ def test_ctrl_c_ends_the_following_of_a_job_and_says_where_it_goes_on(
     assert gaitswarm("cancel", job_id, "--server", server).code == 0
 
 
-def test_an_optimization_that_was_away_too_long_says_so_and_follows_its_job(
+def test_an_optimization_that_lost_its_lease_follows_its_job(
     gaitswarm: Gaitswarm, write_json: WriteJson, db: Path, server: str
 ) -> None:
     spec = write_json(SMALL_SPEC | {"iterations": 250})
@@ -98,7 +98,7 @@ def test_an_optimization_that_was_away_too_long_says_so_and_follows_its_job(
     assert "this process lost its lease" in err and "another process has taken the job over" in err
 
 
-def test_an_optimization_that_is_cancelled_elsewhere_says_so(
+def test_an_optimization_cancelled_elsewhere_reports_it(
     gaitswarm: Gaitswarm, write_json: WriteJson, db: Path, server: str
 ) -> None:
     spec = write_json(SMALL_SPEC | {"iterations": 1_000_000})

@@ -1,4 +1,4 @@
-"""`gaitswarm simulate` lets one design walk and says what it is worth."""
+"""`gaitswarm simulate`."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_measurements_are_printed_in_their_units(
     assert f"{measurements['motor_heat']:.4g}" in result.out
 
 
-def test_a_design_is_json_a_file_what_best_prints_or_of_the_literature(
+def test_a_design_is_json_a_file_the_output_of_best_or_published(
     gaitswarm: Gaitswarm, write_json: WriteJson
 ) -> None:
     flat = write_json(PUBLISHED_A, "flat.json")

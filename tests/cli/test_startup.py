@@ -1,4 +1,4 @@
-"""The command line answers at once, and cleanly."""
+"""Fast start-up, help and clean ends of the command line."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ def test_help_imports_none_of_the_heavy_packages(of: list[str]) -> None:
 
 
 @pytest.mark.slow
-def test_commands_on_a_database_import_nothing_that_few_of_them_need() -> None:
+def test_commands_on_a_database_import_no_rarely_needed_packages() -> None:
     rare = ("scipy", "casadi", "pinocchio", "ray", "fastapi", "matplotlib", "pyarrow")
     assert loaded_by("import gaitswarm.jobs.database.jobs", rare) == set()
 
 
-def test_help_is_that_of_the_innermost_command_wherever_it_is_asked_for(
+def test_help_is_that_of_the_innermost_command(
     gaitswarm: Gaitswarm,
 ) -> None:
     for words in ("db backup --help", "db prune --audit-older-than 1 -h", "db -h backup"):
@@ -48,7 +48,7 @@ def test_help_is_that_of_the_innermost_command_wherever_it_is_asked_for(
         assert shown.out.startswith(f"Usage: gaitswarm {words.partition(' -')[0]} ")
 
 
-def test_a_command_made_alone_is_the_one_among_all() -> None:
+def test_a_command_built_alone_equals_the_one_among_all() -> None:
     every: Any = commands()
     for name, command in every.commands.items():
         alone: Any = commands(name)
@@ -112,7 +112,7 @@ def test_a_reader_that_goes_away_is_no_error(finished: Finished, command: str) -
 @pytest.mark.variants("single")
 @pytest.mark.slow
 @pytest.mark.parametrize("precision", ["double", "single"])
-def test_bench_tells_speed_lanes_and_backend(gaitswarm: Gaitswarm, precision: Precision) -> None:
+def test_bench_reports_speed_lanes_and_backend(gaitswarm: Gaitswarm, precision: Precision) -> None:
     result = gaitswarm("bench", "--repeats", "1", "--precision", precision, "--json")
     assert result.code == 0, result.err
     measured = result.json
@@ -126,14 +126,14 @@ def test_bench_tells_speed_lanes_and_backend(gaitswarm: Gaitswarm, precision: Pr
 
 
 @pytest.mark.parametrize("option", ["--backend", "--precision"])
-def test_bench_names_what_it_does_not_know(gaitswarm: Gaitswarm, option: str) -> None:
+def test_bench_names_unknown_values(gaitswarm: Gaitswarm, option: str) -> None:
     result = gaitswarm("bench", option, "abacus")
     assert result.code == 2
     assert option.removeprefix("--") in result.err
 
 
 @pytest.mark.slow
-def test_a_profile_says_what_each_part_takes_of_the_slots_time(
+def test_a_profile_reports_shares_of_the_slots_time(
     gaitswarm: Gaitswarm, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     brief = cache(partial(profile_job, particles=2, iterations=2, cpus=1))

@@ -1,4 +1,4 @@
-"""Tokens on the command line, and a server that asks for them."""
+"""Tokens on the command line, and a server that requires them."""
 
 from __future__ import annotations
 
@@ -33,15 +33,13 @@ def test_looking_for_tokens_makes_no_database(gaitswarm: Gaitswarm, db: Path) ->
     assert not db.exists()
 
 
-def test_nothing_is_printed_but_the_secret_and_a_line_a_token(
-    gaitswarm: Gaitswarm, db: Path
-) -> None:
+def test_only_secrets_and_one_line_per_token_are_printed(gaitswarm: Gaitswarm, db: Path) -> None:
     secrets = [gaitswarm("token", "create", name, "--db", db).out for name in ("a", "b")]
     assert [secret.count("\n") for secret in secrets] == [1, 1]
     assert len(gaitswarm("token", "list", "--db", db).out.splitlines()) == 2
 
 
-def test_what_cannot_be_made_or_revoked_is_named(gaitswarm: Gaitswarm, db: Path) -> None:
+def test_tokens_that_cannot_be_created_or_revoked_are_named(gaitswarm: Gaitswarm, db: Path) -> None:
     gaitswarm("token", "create", "ci", "--db", db)
     again = gaitswarm("token", "create", "ci", "--db", db)
     assert again.code == ExitCode.BAD_INPUT and "'ci' already" in again.err

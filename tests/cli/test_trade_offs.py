@@ -1,4 +1,4 @@
-"""`gaitswarm front`, `plot front` and `preferences --for`: what designs of a job trade."""
+"""`gaitswarm front`, `plot front` and `preferences --for`."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_published_designs_are_placed_relative_to_the_front(
         (("--output", "front.xlsx"), "output: front.xlsx must end in .csv"),
     ],
 )
-def test_what_makes_no_sense_is_named(
+def test_invalid_input_is_named(
     gaitswarm: Gaitswarm, finished: Finished, options: tuple[str, str], said: str
 ) -> None:
     result = gaitswarm("front", finished.id, "--db", finished.db, *options)
@@ -119,9 +119,7 @@ def test_a_design_that_cannot_win_names_a_better_one(
     assert f"make design {place[0]}.{place[1]} win, which is dominated; under" in result.out
 
 
-def test_a_job_in_worlds_trades_what_it_makes_of_all_of_them(
-    gaitswarm: Gaitswarm, db: Path, write_json: WriteJson
-) -> None:
+def test_a_job_in_worlds_has_a_front(gaitswarm: Gaitswarm, db: Path, write_json: WriteJson) -> None:
     spec = write_json(SMALL_SPEC | {"worlds": {"count": 2, "aggregate": "worst"}}, "spec.json")
     job = gaitswarm(
         "optimize", "--spec", spec, "--db", db, "--evaluator", "in-process", "--json"

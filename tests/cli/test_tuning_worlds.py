@@ -19,7 +19,7 @@ def asked(gaitswarm: Gaitswarm, db: Path, *options: Any) -> dict[str, Any] | Non
     return worlds and {name: value for name, value in worlds.items() if name != "ranges"}
 
 
-def test_worlds_are_asked_for_by_their_number_and_more(gaitswarm: Gaitswarm, db: Path) -> None:
+def test_options_of_worlds_set_the_spec(gaitswarm: Gaitswarm, db: Path) -> None:
     assert asked(gaitswarm, db) is None
     default = {"count": 4, "seed": 1, "aggregate": "cvar", "level": 0.75}
     assert asked(gaitswarm, db, "--worlds", 4) == default
@@ -63,7 +63,7 @@ def test_a_job_in_worlds_is_run_reported_and_ranked(
         (["--worlds", "4", "--level", "1.5"], "worlds.level: "),
     ],
 )
-def test_what_makes_no_sense_names_the_field(
+def test_invalid_input_names_the_field(
     gaitswarm: Gaitswarm, db: Path, options: list[str], said: str
 ) -> None:
     refused = gaitswarm("submit", "--db", db, *options)

@@ -1,4 +1,4 @@
-"""A job whose spec this version cannot read, among others, on the command line."""
+"""Jobs whose spec this version cannot read, on the command line."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def unreadable(gaitswarm: Gaitswarm, small_spec: Path, db: Path) -> str:
     return job_id
 
 
-def test_list_and_status_show_it_and_other_commands_say_why_they_cannot(
+def test_list_and_status_show_an_unreadable_job_and_others_explain(
     gaitswarm: Gaitswarm, small_spec: Path, db: Path, place: Place, unreadable: str
 ) -> None:
     sound = gaitswarm("submit", "--spec", small_spec, "--db", db).out.strip()
@@ -47,7 +47,7 @@ def test_list_and_status_show_it_and_other_commands_say_why_they_cannot(
         assert "schema_version" in refused.err and "Traceback" not in refused.err
 
 
-def test_running_it_here_and_now_sets_it_aside_with_the_reason(
+def test_running_an_unreadable_job_sets_it_aside_with_the_reason(
     gaitswarm: Gaitswarm, db: Path, unreadable: str
 ) -> None:
     optimize = ("optimize", "--resume", unreadable, "--evaluator", "in-process", "--db", db)

@@ -1,4 +1,4 @@
-"""What a command writes, and what becomes of what was there before."""
+"""Output files, and the files that they replace."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_a_link_stays_and_its_file_is_replaced(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["folder", "circle"])
-def test_what_cannot_be_written_is_named(tmp_path: Path, name: str) -> None:
+def test_files_that_cannot_be_written_are_named(tmp_path: Path, name: str) -> None:
     (tmp_path / "folder").mkdir()
     (tmp_path / "circle").symlink_to("circle")
     path = tmp_path / name

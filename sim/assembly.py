@@ -64,7 +64,6 @@ SHORTEST_WALK: Final = 1e-3
 def kernel_of(
     robot: Robot, backend: Backend = "auto", *, precision: Precision = "double"
 ) -> Kernel:
-    """Return the robot's kernel; build it if necessary."""
     if backend == "reference" and precision != "double":
         raise SimulationInputError(
             f"precision: the reference kernel supports double only, not {precision}"
@@ -93,7 +92,6 @@ def has_native_kernel(robot: Robot, precision: Precision = "double") -> bool:
 
 
 def check_precision(robot: Robot, precision: Precision) -> None:
-    """Check that a robot can be simulated in a precision on this machine."""
     if precision != "double" and not has_native_kernel(robot, precision):
         raise SimulationInputError(
             f"precision: {precision} needs the compiled kernel; {without_compiler()},"

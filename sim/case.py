@@ -181,7 +181,6 @@ class MeasuredWalk(Walk):
         return (*OBJECTIVES, *measured)
 
     def walking(self, designs: NDArray[np.float64]) -> Walking[Outcome]:
-        """Prepare the simulation of all designs together with other cases."""
         walked = yield from self._simulating(designs)
         columns = [walked.outcome.objectives, walked.measurements.array()]
         return Outcome(np.concatenate(columns, axis=1), walked.outcome.statuses)

@@ -45,7 +45,6 @@ class CaseFamily:
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """Libraries that are not installed."""
         return tuple(name for name in self.libraries if version_of(name) == MISSING)
 
 
@@ -60,7 +59,6 @@ CASES: Final = Registry[CaseFamily]("case", {}, _accepted)
 
 
 def create_case(settings: CaseSettings, walk: Walk) -> Case:
-    """Create the case that evaluates designs in place of a walk."""
     family = CASES[settings.name]
     if family.missing:
         needed = " ".join(family.missing)

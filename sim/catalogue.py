@@ -12,7 +12,6 @@ from gaitswarm.sim.variables import VariableCatalogue
 
 
 def design_catalogue(controller: str) -> VariableCatalogue:
-    """Return all variables that a design of a controller may set."""
     family = CONTROLLERS[controller]
     known = (*family.variables, *family.conventions, *GAIT_VARIABLES)
     return VariableCatalogue(known)
@@ -49,7 +48,6 @@ def design_numbers(controller: str, design: Mapping[str, float | str]) -> dict[s
 
 
 def design_shown(controller: str, design: Mapping[str, float]) -> dict[str, float | str]:
-    """Convert numbers of a design to choices; the inverse of `design_numbers`."""
     catalogue = design_catalogue(controller)
     return {
         name: catalogue[name].shown(value) if name in catalogue else value

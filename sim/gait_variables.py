@@ -139,7 +139,6 @@ def orders_searched(searched: Iterable[Variable]) -> list[dict[str, float]]:
 
 
 def with_gait(scenario: Scenario, gait: Mapping[str, float]) -> Scenario:
-    """Return a scenario with other gait parameters."""
     if not gait:
         return scenario
     values: dict[str, Any] = {name: v for name, v in gait.items() if split_name(name)[1] is None}

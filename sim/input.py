@@ -32,12 +32,10 @@ def alternatives(
 
 
 def without_tags(location: Location) -> tuple[str | int, ...]:
-    """Return the part of a validation error's location that is in the document."""
     return tuple(part for part in location if not is_tag(part))
 
 
 def is_tag(part: str | int) -> bool:
-    """Check whether a part of a location is the tag of an alternative."""
     return isinstance(part, str) and (part == _KEY or (part[:1] == "<" and part[-1:] == ">"))
 
 
@@ -82,7 +80,6 @@ _PLAIN: Final = {
 
 
 def message_of(error: Mapping[str, Any]) -> str:
-    """Return what is wrong with a value, and what it must be."""
     kind, context = error["type"], error.get("ctx", {})
     if kind == "extra_forbidden" and "known" in context:
         key, inner = str(error["loc"][-1]), context["inner"]

@@ -161,7 +161,6 @@ def serve(answer: Callable[[Document], Document]) -> None:
 
 
 def _limit(name: str, value: int) -> None:
-    """Set a soft limit if the system supports it."""
     with suppress(ImportError, AttributeError, ValueError, OSError):
         import resource  # noqa: PLC0415  not on every system
 

@@ -125,7 +125,6 @@ def plugin_versions() -> dict[str, str]:
 
 
 def _code(plugins: Iterable[Plugin]) -> str:
-    """Digest of the top-level packages of plug-ins, without importing them."""
     digest = hashlib.sha256()
     for package in sorted({plugin.module.partition(".")[0] for plugin in plugins}):
         try:
@@ -140,7 +139,6 @@ def _code(plugins: Iterable[Plugin]) -> str:
 
 
 def _roots(package: str) -> tuple[Path, ...]:
-    """Return the folders of a package, or the file of a module."""
     spec = find_spec(package)
     if spec is None:
         return ()
@@ -220,7 +218,6 @@ class Registry(MutableMapping[str, T]):
         return self._broken.get(plugin)
 
     def distribution(self, name: str) -> tuple[str, ...]:
-        """Return the distribution of a plug-in's name, if any."""
         if name in self._built_in:
             return ()
         return tuple(
@@ -231,7 +228,6 @@ class Registry(MutableMapping[str, T]):
         return f"unknown {self._kind} {name!r}; {self.instead_of(name, self)}"
 
     def instead_of(self, name: str, known: Iterable[str]) -> str:
-        """Suggest how to correct an unknown name, or which package provides it."""
         if name in self._elsewhere and not any(p.name == name for p in self.plugins()):
             return self._elsewhere[name]
         known = list(known)
@@ -296,7 +292,6 @@ class KnownName:
 
 
 def check_is(plugin: Plugin, brought: object, wanted: type[T]) -> T:
-    """Check the type of a plug-in's object."""
     if isinstance(brought, type) or not isinstance(brought, wanted):
         raise PluginError(
             f"{plugin} cannot be used: {plugin.place} is a {type(brought).__name__},"
@@ -306,7 +301,6 @@ def check_is(plugin: Plugin, brought: object, wanted: type[T]) -> T:
 
 
 def check_name(plugin: Plugin, own: object) -> None:
-    """Check that an object has the name of its entry point."""
     if own != plugin.name:
         raise PluginError(f"{plugin} cannot be used: its own name is {own!r}")
 
@@ -330,7 +324,6 @@ class PluginSettings(Generic[T]):
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
-        """Add settings with the names of installed plug-ins."""
         annotated = handler(schema)
         names = [name for name in self._registry if name not in self._registry.built_in]
         if not names:

@@ -80,7 +80,6 @@ class Provenance(BaseModel):
     )
 
     def changes(self, now: Provenance) -> tuple[str, ...]:
-        """Describe the changes since."""
         differences: list[str] = []
         if now.robot != self.robot:
             differences.append(f"the robot {now.robot} instead of {self.robot}")
@@ -128,7 +127,6 @@ def provenance_of(
 
 
 def simulator_files() -> tuple[Path, ...]:
-    """Return the source files of `sim` that a case may use, sorted."""
     left_out = [_ROOT / name for name in _NOT_IN_A_CASE]
     return tuple(
         sorted(

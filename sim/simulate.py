@@ -154,7 +154,6 @@ def _simulating(
     precision: Precision = "double",
     kernel: Kernel | None = None,
 ) -> Walking[Simulation]:
-    """As `simulate`, which documents the arguments."""
     _check_arguments(controller, variables, designs, physics_rate)
     machine = load_robot(robot)
     if noise is not None and noise.kind == "angle":
@@ -236,7 +235,6 @@ def check_gait(
 
 
 def check_drives(law: ControlLaw, robot: RobotChoice) -> None:
-    """Check that a control law can drive a robot's actuators."""
     if law.joint_pd is not None and not load_robot(robot).is_torque_controlled:
         raise SimulationInputError(NO_JOINT_PD)
 
@@ -251,7 +249,6 @@ def prepare(
 
 
 def lanes(precision: Precision = "double") -> int:
-    """Return the number of walkers that the compiled kernel steps together."""
     return target().lanes * (2 if precision == "single" else 1)
 
 

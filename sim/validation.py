@@ -139,12 +139,10 @@ class Tolerance(StrEnum):
 
     @property
     def limit(self) -> float:
-        """Largest RMAE [1] that still belongs to the class."""
         return _LIMITS[self]
 
     @property
     def phrase(self) -> str:
-        """Meaning of the class."""
         return _PHRASES[self]
 
     @classmethod
@@ -290,7 +288,6 @@ def columns_of(log: MeasuredLog, quantity: Quantity, channels: Sequence[str]) ->
 
 
 def channels_of_link(log: MeasuredLog, quantity: Quantity, link: int) -> tuple[str, ...]:
-    """Return the joints at which a quantity of one link was measured."""
     return tuple(joint for joint in log.channels(quantity) if log.link_of(joint) == link)
 
 

@@ -161,7 +161,6 @@ def _dc_electronics(drives: Sequence[Sequence[DriveNumbers]]) -> list[str]:
 
 
 def _sensors(largest: float) -> list[str]:
-    """Return lines of sensors for a largest current [A]."""
     return [
         "[sensors]                           # 16 bits per turn, 12 bits of current",
         "angle_counts = 10430.0              # per rad",

@@ -132,7 +132,6 @@ class Proposal:
         return (*self.guesses, *(f"warning: {problem}" for problem in self.problems))
 
     def with_guesses(self, more: Sequence[str], **changed: Any) -> Proposal:
-        """Return the robot with more guesses, also in robot.toml."""
         guesses = tuple(dict.fromkeys([*self.guesses, *more]))
         toml = self.toml.replace(_guesses(self.guesses), _guesses(guesses), 1)
         return replace(self, toml=toml, guesses=guesses, **changed)

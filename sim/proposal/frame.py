@@ -45,7 +45,6 @@ class Frame:
 
     @property
     def right_angled(self) -> bool:
-        """Whether the two axes are perpendicular."""
         return (self.up or "z")[-1] != (self.forward or "x")[-1]
 
 

@@ -71,7 +71,6 @@ def propose_scenarios(stance: Stance, sole: float, names: Sequence[str]) -> list
 
 
 def walk_within_reach(robot: Robot, values: Mapping[str, Any]) -> tuple[dict[str, Any], str]:
-    """Shorten a proposed scenario's steps until the legs reach."""
     refused: UnreachablePose | BeyondJointLimit | None = None
     for share in _SHARES:
         steps = {name: round(share * values[name], 4) for name in ("stride", "height")}

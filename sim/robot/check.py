@@ -48,7 +48,6 @@ def check_files(toml: str, urdf: str) -> None:
 
 
 def objects_in(document: Any) -> Iterator[tuple[Location, dict[str, Any]]]:
-    """Yield all objects of a JSON document with their locations."""
     waiting: list[tuple[Location, Any]] = [((), document)]
     while waiting:
         where, value = waiting.pop()
@@ -60,7 +59,6 @@ def objects_in(document: Any) -> Iterator[tuple[Location, dict[str, Any]]]:
 
 
 def files_of(part: dict[str, Any]) -> tuple[str, str] | None:
-    """Return the robot files in an object of a document, if any."""
     toml, urdf = part.get("toml"), part.get("urdf")
     return (toml, urdf) if isinstance(toml, str) and isinstance(urdf, str) else None
 

@@ -161,7 +161,6 @@ def _check_gearheads(robot: Robot, values: Mapping[str, float | str]) -> None:
 
 
 def _conventions(values: Mapping[str, float | str]) -> dict[str, float | str]:
-    """Select values of `CONVENTIONAL_VARIABLES`, choices by name."""
     given = [variable for variable in CONVENTIONAL_VARIABLES if variable.name in values]
     try:
         return {v.name: v.shown(v.number(values[v.name])) for v in given}
@@ -215,7 +214,6 @@ def _with_conventions(d: RobotDescription, values: Mapping[str, float | str]) ->
 
 
 def _with_legs(d: RobotDescription, values: Mapping[str, float]) -> RobotDescription:
-    """Give each named joint its own gearhead and each foot its own contact."""
     gearheads, actuators, legs = dict(d.gearheads), dict(d.actuators), list[Leg]()
     for leg in d.legs:
         names = list(leg.actuators)
@@ -243,7 +241,6 @@ Part = TypeVar("Part", bound=BaseModel)
 
 
 def _changed(part: Part, variables: Mapping[str, str], values: Mapping[str, float | str]) -> Part:
-    """Set those fields of a part whose variables have a value."""
     update = {field: values[name] for field, name in variables.items() if name in values}
     if not update:
         return part

@@ -95,7 +95,6 @@ class ChainLeg:
 
     @property
     def lengths(self) -> tuple[float, float, float]:
-        """Distances between the joints and from the last one to the foot [m]."""
         first, second, third = (
             math.hypot(*part.tolist()) for part in (self.offsets[1], self.offsets[2], self.end)
         )
@@ -111,7 +110,6 @@ class ChainLeg:
         return x, y, z
 
     def ends(self, angles: Floats) -> Floats:
-        """Return the foot in the body's frame, (T, 3) [m], at joint angles (T, 3) [rad]."""
         return np.asarray(self._moved(angles, slopes=False)[0])
 
     def feet(self, angles: Floats) -> tuple[Floats, Floats]:

@@ -116,7 +116,6 @@ def limb_of(robot: Robot, number: int, placements: Sequence[Placement], foot: Fl
 
 
 def is_torque_controlled(joint: LimbJoint) -> bool:
-    """Check whether a joint, of numbers or symbols, has a torque-controlled actuator."""
     limit: object = joint.torque_limit
     return not (isinstance(limit, float) and limit == 0.0)
 

@@ -135,7 +135,6 @@ def _is_class(part: str | int) -> bool:
 
 
 def _meaning(location: tuple[str | int, ...]) -> str | None:
-    """Return description and unit of a field of a robot description."""
     own = (TorqueActuator,) if "torque" in location[2:3] else ()
     field = str(location[-1]) if location else ""
     parts: tuple[type[BaseModel], ...] = (*own, *_PARTS)
@@ -231,15 +230,12 @@ class Robot:
 
     @property
     def mass(self) -> float:
-        """Mass of the whole robot without load [kg]."""
         return self.urdf.total_mass - self.urdf.body.mass + self.body.mass
 
     def contacts(self) -> tuple[Contact, ...]:
-        """Return each foot's contact parameters, its own or the robot's."""
         return tuple(leg.contact or self.description.contact for leg in self.description.legs)
 
     def planned_soles(self) -> tuple[float, ...]:
-        """Return the sole length that each leg's gait assumes [m]."""
         if self.description.planned_soles == "own":
             return tuple(contact.sole for contact in self.contacts())
         return (self.description.contact.sole,) * len(self.legs)
@@ -332,7 +328,6 @@ def parse_robot(toml: str, urdf: str) -> Robot:
 
 
 def assembled(description: RobotDescription, urdf: str) -> Robot:
-    """Build a robot from its description and the text of its URDF."""
     check_owners(description.legs)
     tree = parse_urdf(urdf, description.held_joints)
     with by_line(urdf):

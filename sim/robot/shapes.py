@@ -89,7 +89,6 @@ def visible_links(robot: Robot, load: float = 0.0) -> tuple[VisibleLink, ...]:
 
 
 def _derived(robot: Robot) -> dict[str, Shape]:
-    """Derive shapes of body and legs from the kinematic tree, by link."""
     # A foot is named by its fixed joint or by its link.
     carried = {joint.name: joint.child for joint in robot.urdf.joints}
     shapes = {next(iter(robot.urdf.links)): _trunk(robot)}
@@ -131,7 +130,6 @@ def _capsule(end: Floats, radius: float, role: Role) -> Shape:
 
 
 def _sole(robot: Robot, leg: Leg, default: float) -> Shape:
-    """A sphere that touches the ground when the sole does."""
     radius = (leg.contact or robot.description.contact).sole or default
     return _shape("sphere", np.array([radius]), np.zeros(3), _UPRIGHT, "foot")
 
@@ -166,7 +164,6 @@ class VisualMesh:
 
 
 def material_colours(urdf: str) -> Mapping[str, Colour]:
-    """Return the colours of a URDF's materials, which any link may name."""
     root = ET.fromstring(urdf)  # noqa: S314 - it was checked when it was parsed
     colours: dict[str, Colour] = {}
     for material in root.iter("material"):

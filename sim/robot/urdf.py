@@ -55,7 +55,6 @@ class Link:
     element: ET.Element
 
     def solids(self, use: GeometryUse = "visual") -> tuple[Solid, ...]:
-        """Return simple solids of its geometry, without meshes."""
         for part_use in (use, "collision" if use == "visual" else "visual"):
             solids = [
                 self._solid(part, element)

@@ -251,7 +251,6 @@ def check_worlds(variables: Sequence[str], worlds: Floats) -> None:
 
 
 def _first(wrong: NDArray[np.bool_], column: Floats) -> str:
-    """Describe the first wrong value, with its world if there are several."""
     world = int(np.argmax(wrong))
     return f"{column[world]:g}" + (f" in world {world}" if len(column) > 1 else "")
 

@@ -119,7 +119,6 @@ def _parameters(
 def _add_masses(
     robot: Robot, scenario: Scenario, packed: Floats, values: Mapping[str, Floats]
 ) -> None:
-    """Add the changes of body mass, load mass and load position in place."""
     slices, body = Layout(robot).slices, robot.body
     further = values["body_mass_factor"][:, np.newaxis] - 1.0
     load = (scenario.load + values["load_added"])[:, np.newaxis]
@@ -244,7 +243,6 @@ class PerturbedWalk:
         return walked.outcome
 
     def simulate(self, designs: Floats, *, log: bool = False) -> Simulation:
-        """Simulate designs (n, len(variables)) with full results."""
         (simulation,) = walk_together([self._simulating(designs, log=log)])
         return simulation
 
@@ -286,7 +284,6 @@ class PerturbedWalk:
     def _in_world(
         self, robot: Robot, gait: dict[str, float], law: ControlLaw, timestep: float
     ) -> WalkSetup | None:
-        """Return the setup that all designs of one gait share, without control laws."""
         scenario = with_gait(self.scenario, gait)
         plan = (plan_walk if gait else _plan_of_scenario)(robot, scenario, timestep)
         if plan is None:
@@ -359,17 +356,14 @@ class WorldWalk:
         return outcome
 
     def run_with(self, kernel: Kernel | None, worlds: Floats) -> Outcome:
-        """Simulate the design in worlds (n, len(variables)) with a given kernel."""
         (simulation,) = walk_together([self._simulating(worlds, log=False, kernel=kernel)])
         return simulation.outcome
 
     def walking(self, designs: Floats) -> Walking[Outcome]:
-        """Simulate the design in every world together with other cases."""
         walked = yield from self._simulating(designs, log=False)
         return walked.outcome
 
     def simulate(self, worlds: Floats, *, log: bool = False) -> Simulation:
-        """Simulate the design in worlds (n, len(variables)) with full results."""
         (simulation,) = walk_together([self._simulating(worlds, log=log)])
         return simulation
 

@@ -257,7 +257,7 @@ def test_designs_are_ranked_by_another_preference(
     assert torques == sorted(torques) and len(torques) == ranking["evaluations"] == 6
     assert [d["fitness"] for d in ranking["top"]] == pytest.approx(torques)
     table = gaitswarm("rank", finished.id, "--preference", "B", "--top", "2", *where).out
-    assert "of 6 designs" in table and "rank correlation" in table
+    assert "6 designs; fitness of the job's best" in table and "rank correlation" in table
     assert len(table.splitlines()) == 4
 
 

@@ -137,6 +137,6 @@ def test_a_beginning_of_several_ids_is_refused_with_these(
     with open_jobs(None, str(tmp_path / "jobs.db")) as jobs:
         ids = [jobs.submit(controller="pi").id for _ in range(40)]
         shared = next(a[:1] for a in ids if sum(b[:1] == a[:1] for b in ids) > 1)
-        with pytest.raises(InvalidRequest, match=f"'{shared}' fits .*; give more of it"):
+        with pytest.raises(InvalidRequest, match=f"'{shared}' matches .*; type more characters"):
             full_id(jobs, shared)
         assert full_id(jobs, ids[0]) == ids[0]

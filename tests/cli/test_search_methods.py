@@ -104,7 +104,7 @@ def test_progress_of_uneven_iterations_is_in_designs(
     listed = gaitswarm("list", "--db", db).out.split()
     assert {"12/12", "designs"} <= set(listed)
     status = gaitswarm("status", job_id, "--db", db).out
-    assert "6, of 3 designs at most" in status
+    assert "6, of up to 3 designs" in status
     assert "12 of 12" in status
     watched = gaitswarm("watch", job_id, "--db", db)
     assert (watched.code, "6 iterations, 12/12 designs" in watched.err) == (0, True)

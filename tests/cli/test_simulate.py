@@ -40,8 +40,8 @@ def test_measurements_are_printed_in_their_units(
 ) -> None:
     design = write_json(PUBLISHED_A)
     result = gaitswarm("simulate", "--design", design, *FAST)
-    result = gaitswarm("simulate", "--design", design, *FAST, "--json").json
-    measurements = result["scenarios"]["normal-fast"]["measurements"]
+    view = gaitswarm("simulate", "--design", design, *FAST, "--json").json
+    measurements = view["scenarios"]["normal-fast"]["measurements"]
     assert "peak current" in result.out
     assert f"{measurements['motor_heat']:.4g}" in result.out
 

@@ -212,7 +212,7 @@ def test_a_killed_and_continued_certificate_has_the_same_results(files: Path) ->
         _, rest = process.communicate(timeout=60)
         assert process.returncode != 0
         if number == signal.SIGINT:
-            assert "the same command goes on" in rest
+            assert "to resume, run the same command" in rest
     last = run_command(*killed)
     assert last.code == 0, last.err
     assert {**last.json, **_changing(whole)} == whole

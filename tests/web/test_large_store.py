@@ -84,8 +84,10 @@ def multiply_others(connection: Connection, job_id: str) -> None:
     copies = numbers(SHORT_COPIES)
     n = copies.c.n
     number = cast(func.substr(jobs.c.spec["name"].as_string(), 7), Integer) + WRITTEN_SHORT * n
-    spec = func.json_set(jobs.c.spec, "$.name", func.printf("short %04d", number))
-    changes = {"id": copied_id(jobs.c.id, n), "spec": spec}
+    name = func.printf("short %04d", number)
+    spec = func.json_set(jobs.c.spec, "$.name", name)
+    found_by = {"sort_name": name, "search_text": name}
+    changes = {"id": copied_id(jobs.c.id, n), "spec": spec, **found_by}
     copy_rows(connection, jobs, jobs.c.id != job_id, copies, changes)
     for table in (iterations, evaluations):
         changes = {"job_id": copied_id(table.c.job_id, n)}

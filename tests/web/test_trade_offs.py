@@ -155,7 +155,7 @@ def test_a_missing_design_is_reported(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:
     page = visit(server.url, allowed="status of 404").go(
-        f"/jobs/{finished_job}/trade-offs?design=0/4000"
+        f"/jobs/{finished_job}/trade-offs?design=0.4000"
     )
     notice = page.get_by_role("alert")
     expect(notice).to_contain_text("Could not find a preference.")

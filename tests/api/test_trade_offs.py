@@ -95,7 +95,7 @@ def test_a_job_of_which_every_design_failed_has_no_front(
     commit(job, 1, failed=True)
     answer = asked(client, job, "front")
     assert answer.status_code == 409
-    assert "has no design yet that walks in all scenarios" in answer.json()["detail"]
+    assert "has no design yet that succeeds in all scenarios" in answer.json()["detail"]
 
 
 @pytest.mark.parametrize("what", ["front", "preference-for"])

@@ -26,7 +26,7 @@ async function load(job: Job, choice: string, signal: AbortSignal): Promise<Refe
   const [kind, name, study] = choice.split(':')
   if (kind === 'job') {
     const other = await readableJob(name, signal)
-    if (!other.best) throw new Error('that job has no design yet that walks in every scenario')
+    if (!other.best) throw new Error('that job has no feasible design yet')
     return { label: other.name || other.id, scenarios: other.best.scenarios }
   }
   const controllers = await catalogue()

@@ -94,7 +94,7 @@ def sideways(legs: Sequence[ChainLeg], stance: Sequence[Sequence[float]]) -> boo
     Hanging legs swing ahead, about their knees' axes; legs with vertical hip axes stand at the
     body's sides. Legs all around indicate nothing.
     """
-    beside, ahead = 0.0, 0.0
+    sideways, ahead = 0.0, 0.0
     for leg, angles in zip(legs, stance, strict=True):
         if leg.is_upright:
             mounted = [float(np.clip(0.0, *leg.limits[0])), *angles[1:]]
@@ -102,8 +102,8 @@ def sideways(legs: Sequence[ChainLeg], stance: Sequence[Sequence[float]]) -> boo
         else:
             _, slopes = leg.feet(np.array([angles]))
             y, x = np.abs(slopes[0, :2, 2])
-        beside, ahead = beside + y, ahead + x
-    return bool(ahead > _SIDEWAYS * beside)
+        sideways, ahead = sideways + y, ahead + x
+    return bool(ahead > _SIDEWAYS * sideways)
 
 
 def _vector(axis: Axis) -> Floats:

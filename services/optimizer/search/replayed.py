@@ -74,7 +74,7 @@ class _FeedbackState(BaseModel):
     iteration: NonNegativeInt
     asked: NonNegativeInt
     budget: PositiveInt
-    told: Worth
+    told: Worth  # codespell:ignore told
 
 
 @dataclass(slots=True)
@@ -171,7 +171,7 @@ class Replayed:
             "iteration": self._iteration,
             "asked": self._asked,
             "budget": self._budget,
-            "told": worth(self._feedback),
+            "told": worth(self._feedback),  # codespell:ignore told
         }
 
     def load(self, state: dict[str, Any]) -> None:
@@ -184,7 +184,8 @@ class Replayed:
             raise ValueError(f"asked: {dumped.asked} positions, more than {name} asks for at once")
         self._course = None
         self._iteration, self._asked = dumped.iteration, dumped.asked
-        self._budget, self._feedback = dumped.budget, of_worth(dumped.told).tolist()
+        self._budget = dumped.budget
+        self._feedback = of_worth(dumped.told).tolist()  # codespell:ignore told
 
     def _running(self) -> _Course:
         if self._course is None:

@@ -30,7 +30,7 @@ const FRONT = {
 test('a design in the address is parsed; anything else is null', () => {
   expect(placeOf(placeWord({ iteration: 24, particle: 7 }))).toEqual({ iteration: 24, particle: 7 })
   expect(placeWord({ iteration: 24, particle: 7 })).toBe('24.7')
-  expect(placeOf('24/7'), 'as in older addresses').toEqual({ iteration: 24, particle: 7 })
+  expect(placeOf('24/7')).toBeNull()
   expect(placeOf('24')).toBeNull()
   expect(placeOf(null)).toBeNull()
 })

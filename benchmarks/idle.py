@@ -1,4 +1,4 @@
-"""How much of the workers' time a job uses: walking, preparing, waiting, and 1 slot against 2.
+"""Share of the workers' time that a job uses, and one slot against two.
 
     python -m benchmarks.idle [--evaluator in-process] [--precision double] [--slots 1 2]
                               [--particles 25] [--iterations 25] [--rounds 1] [--json]

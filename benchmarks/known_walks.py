@@ -1,4 +1,4 @@
-"""What looking for known walks costs an iteration, in a store that knows many.
+"""Cost of looking up stored results, in a large store.
 
     python -m benchmarks.known_walks [--rows 100000] [--rounds 200] [--json]
 

@@ -1,4 +1,4 @@
-"""How fast the page is before a large store, in the machine's own Chromium.
+"""Speed of the page on a large store, in the machine's own Chromium.
 
     python -m benchmarks.page [jobs.db] [--rounds 5] [--json]
 

@@ -1,4 +1,4 @@
-"""How long people wait: from the key press to the first walk, the result, the prompt, the page.
+"""Waiting times from the key press to the first simulation, the result, the prompt, the page.
 
     python -m benchmarks.startup [--rounds 3] [--iterations 25] [--json]
 

@@ -1,4 +1,4 @@
-"""What the order of statements in emitted C is worth: kernels in that order, and in CasADi's.
+"""Effect of the order of statements in generated C, against CasADi's order.
 
     python -m benchmarks.statement_order [--rounds 9] [--json]
 

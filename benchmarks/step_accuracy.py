@@ -1,4 +1,4 @@
-"""How exact a step is: ours, and MuJoCo's semi-implicit Euler under the same forces.
+"""Accuracy of a time step, and of MuJoCo's semi-implicit Euler under the same forces.
 
     python -m benchmarks.step_accuracy [--rates 2500 5000 10000 20000 40000] [--json]
 

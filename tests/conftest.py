@@ -1,4 +1,4 @@
-"""What every test may rely on: nothing of the user's own is read or written.
+"""Fixtures of every test: nothing of the user's own is read or written.
 
 And what takes long to make, once for all tests of a process.
 """

@@ -1,4 +1,4 @@
-"""What a campaign breaks of a machine: a disk, a network, a clock of its own, no real one."""
+"""Faults of a machine in a campaign: disk, network and clock, all simulated."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which faults come when: drawn from a seed, and nothing else. Pure."""
+"""Schedule of faults, drawn from a seed."""
 
 from __future__ import annotations
 

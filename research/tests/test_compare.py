@@ -151,7 +151,7 @@ def test_methods_are_ranked_by_solved_runs_and_then_by_their_best() -> None:
     assert rank_correlation(groups) == pytest.approx(1.0)
 
 
-def test_equal_runs_are_not_told_apart() -> None:
+def test_equal_runs_are_not_distinguished() -> None:
     ones = [run("D4C0R0I0", "a", k, 2.0) for k in range(5)]
     assert mann_whitney(ones, ones) == pytest.approx(1.0)
     assert median(ones, 25) == 2.0

@@ -61,7 +61,7 @@ def steps(settings: GsaSettings, iterations: int) -> list[float]:
     return found
 
 
-def test_masses_come_to_rest_over_the_budget_and_then_begin_anew() -> None:
+def test_masses_come_to_rest_over_the_budget_and_then_begin_again() -> None:
     found = steps(GsaSettings(particles=10), 40)
     assert np.median(found[:10]) > 0.1
     assert max(found[35:39]) < 1e-3
@@ -73,7 +73,7 @@ def test_without_decay_masses_do_not_come_to_rest() -> None:
     assert min(steps(GsaSettings(particles=10, decay=0.0), 40)) > 0.1
 
 
-def test_a_value_that_leaves_the_box_is_drawn_anew() -> None:
+def test_a_value_that_leaves_the_box_is_drawn_again() -> None:
     proposals = gsa(GsaSettings(particles=10, gravity=1e6), BOX, 1000, random())
     positions, seen = next(proposals), []
     for _ in range(20):

@@ -1,4 +1,4 @@
-"""What local searches are made of: polls, variables that are held, designs asked for once."""
+"""Building blocks of local searches: polls, held variables, designs requested once."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_there_are_no_neighbours_outside_the_bounds() -> None:
     assert designs[:, 1].tolist() == [9, 10, 10, 10]
 
 
-def test_a_poll_goes_on_until_no_neighbour_is_better() -> None:
+def test_a_poll_continues_until_no_neighbour_is_better() -> None:
     found, _ = walked(poll(start(), AXES), bowl)
     assert MIXED.designs(MIXED.from_unit(found.unit[None]))[0, 1:3].tolist() == [7, 2]
     assert found.fitness == bowl(found.unit[None])[0]
@@ -72,7 +72,7 @@ def test_a_poll_of_neighbours_that_are_equal_stays() -> None:
     assert len(proposals) == 1
 
 
-def test_a_mixed_search_goes_on_from_where_a_poll_found_better() -> None:
+def test_a_mixed_search_continues_from_where_a_poll_found_better() -> None:
     """At x = 0.9 an integer of 0 is better, at 0.2, the best x then, one of 1."""
     space = Space([Axis(0.0, 1.0), Axis(0.0, 1.0, "integer")])
     scales = []

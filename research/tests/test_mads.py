@@ -59,7 +59,7 @@ def test_no_design_is_judged_twice_while_there_are_others() -> None:
     assert len(np.unique(asked, axis=0)) == 400
 
 
-def test_a_search_begins_anew_elsewhere_when_its_mesh_is_fine() -> None:
+def test_a_search_begins_again_elsewhere_when_its_mesh_is_fine() -> None:
     line = Space.continuous([0.0], [1.0])
     asked = designs_asked(
         "mads", line, lambda x: np.abs(x[:, 0] - 0.3), 120, mesh_tolerance=0.01, models=False

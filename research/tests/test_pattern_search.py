@@ -126,7 +126,7 @@ def test_no_design_is_asked_for_twice() -> None:
     assert len(np.unique(unit, axis=0)) == len(unit)
 
 
-def test_when_the_mesh_is_fine_it_begins_anew_elsewhere() -> None:
+def test_when_the_mesh_is_fine_it_begins_again_elsewhere() -> None:
     """From 0.25 down to 0.01 there are five sizes; without a success that is five polls."""
     optimizer = search(PLANE, mesh_tolerance=0.01)
     batches = proposals(optimizer, PLANE, lambda x: np.ones(len(x)), 12)

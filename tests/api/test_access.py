@@ -1,4 +1,4 @@
-"""Who is asking: tokens where they are needed, what their scopes allow, and browsers' cookies."""
+"""Access: tokens, their scopes, and browsers' cookies."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def test_tokens_are_needed_beyond_the_machine_itself(host: str, *, required: boo
     assert Settings(api_host=host, api_access="token").tokens_required
 
 
-def test_without_a_token_nothing_is_told(guarded: httpx2.Client, job: Job) -> None:
+def test_without_a_token_nothing_is_reported(guarded: httpx2.Client, job: Job) -> None:
     for path in ("/v1/jobs", f"/v1/jobs/{job.id}", f"/v1/jobs/{job.id}/events", "/v1/robots"):
         answer = guarded.get(path)
         assert answer.status_code == 401, path
@@ -160,7 +160,7 @@ def test_a_token_of_all_rights_commands_every_job(
     assert answer.status_code == 200
 
 
-def test_a_job_that_nobody_may_see_is_not_told_from_one_that_is_not_there(
+def test_a_job_that_a_client_may_not_see_looks_like_a_missing_one(
     guarded: httpx2.Client, job: Job
 ) -> None:
     there, gone = (guarded.post(f"/v1/jobs/{name}/cancel") for name in (job.id, "nosuchjob123"))

@@ -1,4 +1,4 @@
-"""What there is to choose from, over HTTP."""
+"""Catalogues over HTTP."""
 
 from __future__ import annotations
 

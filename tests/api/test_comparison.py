@@ -26,7 +26,7 @@ def other(store: SqlStore, spec: JobSpec) -> Job:
     return store.create_job(spec.model_copy(update=changes))[0]
 
 
-def test_jobs_stand_beside_each_other_with_what_their_specs_say_differently(
+def test_jobs_are_compared_with_what_their_specs_say_differently(
     client: httpx2.Client, job: Job, other: Job, commit: Commit
 ) -> None:
     commit(job, 3)
@@ -52,7 +52,7 @@ def test_jobs_stand_beside_each_other_with_what_their_specs_say_differently(
     assert (first["shares"][0], first["shares"][-1]) == (0.0, 1.0)
 
 
-def test_the_published_design_and_the_gain_over_it_are_told_where_they_are_known(
+def test_the_published_design_and_the_gain_over_it_are_reported_where_they_are_known(
     client: httpx2.Client, store: SqlStore, job: Job, other: Job, commit: Commit
 ) -> None:
     commit(job, 3)
@@ -65,7 +65,7 @@ def test_the_published_design_and_the_gain_over_it_are_told_where_they_are_known
     ]
 
 
-def test_another_measure_is_told_and_a_job_without_designs_has_no_distribution(
+def test_another_measure_is_reported_and_a_job_without_designs_has_no_distribution(
     client: httpx2.Client, store: SqlStore, job: Job, spec: JobSpec, commit: Commit
 ) -> None:
     commit(job, 1)

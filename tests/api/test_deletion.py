@@ -79,7 +79,7 @@ def test_housekeeping_deletes_what_ended_longer_ago_than_it_is_kept(
     assert [job.id for job in store.jobs().items] == [young.id]
 
 
-def test_housekeeping_removes_old_entries_of_the_audit_log_only_if_it_is_told_to(
+def test_housekeeping_removes_old_entries_of_the_audit_log_only_if_configured(
     store: SqlStore, spec: JobSpec
 ) -> None:
     store.create_job(spec)

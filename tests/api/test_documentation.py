@@ -173,7 +173,7 @@ def test_the_page_needs_no_other_host(client: httpx2.Client) -> None:
         assert client.get(f"/docs-assets/{asset}").status_code == 200
 
 
-def test_links_lead_to_operations_that_there_are_and_fill_their_paths(document: Document) -> None:
+def test_links_lead_to_operations_that_exist_and_fill_their_paths(document: Document) -> None:
     known = {
         operation["operationId"]: (path, operation)
         for path, methods in document["paths"].items()

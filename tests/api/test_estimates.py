@@ -1,4 +1,4 @@
-"""What a job would cost, over HTTP."""
+"""Estimates over HTTP."""
 
 from __future__ import annotations
 

@@ -109,7 +109,7 @@ def test_what_a_job_waits_for_is_streamed_once_and_shown_of_the_job(
         assert next(stream)["data"]["waiting"] is None
 
 
-def test_a_broken_stream_goes_on_without_gap_or_repeat(
+def test_a_broken_stream_continues_without_gap_or_repeat(
     client: httpx2.Client, job: Job, commit: Commit
 ) -> None:
     claim = commit(job, 2)
@@ -182,7 +182,7 @@ def test_limit_and_after_bound_a_stream(client: httpx2.Client, job: Job, commit:
     assert ids(events_of(client, job, params={"after": 0})) == ["1", "2"]
 
 
-def test_a_last_event_id_that_is_none_of_ours_is_refused(client: httpx2.Client, job: Job) -> None:
+def test_a_foreign_last_event_id_is_refused(client: httpx2.Client, job: Job) -> None:
     answer = client.get(f"/v1/jobs/{job.id}/events", headers={"Last-Event-ID": "last"})
 
     assert answer.status_code == 422

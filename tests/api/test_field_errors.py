@@ -97,7 +97,7 @@ def test_an_unknown_kind_hears_of_the_known() -> None:
     }
 
 
-def test_a_wrong_key_is_told_by_its_path() -> None:
+def test_a_wrong_key_is_reported_by_its_path() -> None:
     assert list(messages({"fixed": {"not a name": 1.0}})) == ["fixed.not a name"]
 
 

@@ -1,4 +1,4 @@
-"""What a job has committed, over HTTP."""
+"""History of a job over HTTP."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which variables of a job matter, over HTTP."""
+"""Importance of variables over HTTP."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def test_each_output_goes_with_the_variable_that_decides_it(
     assert p["objectives"]["acceleration"] is None
 
 
-def test_a_winner_at_a_bound_is_told_with_bounds_that_can_be_simulated(
+def test_a_winner_at_a_bound_is_reported_with_bounds_that_can_be_simulated(
     client: httpx2.Client, searched: Job
 ) -> None:
     view = importance(client, searched)
@@ -102,7 +102,7 @@ def test_a_winner_at_a_bound_is_told_with_bounds_that_can_be_simulated(
     assert again.status_code == 202, again.text
 
 
-def test_of_few_designs_no_share_is_told(client: httpx2.Client, job: Job, commit: Any) -> None:
+def test_of_few_designs_no_share_is_reported(client: httpx2.Client, job: Job, commit: Any) -> None:
     commit(job, 2)
     view = importance(client, job)
     assert (view["designs"], view["failed"]) == (6, 2)

@@ -36,9 +36,7 @@ def built(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("path", ["/manual", "/manual/", "/manual/docs/cli.html"])
-def test_a_program_is_told_how_to_build_a_manual_that_is_not_there(
-    server: Server, path: str
-) -> None:
+def test_a_program_learns_how_to_build_a_missing_manual(server: Server, path: str) -> None:
     answer = server.client.get(path)
     assert answer.status_code == 404
     assert answer.headers["content-type"] == "application/problem+json"
@@ -47,7 +45,7 @@ def test_a_program_is_told_how_to_build_a_manual_that_is_not_there(
 
 
 @pytest.mark.parametrize("path", ["/manual", "/manual/", "/manual/docs/cli.html"])
-def test_a_browser_is_told_so_by_a_page(server: Server, path: str) -> None:
+def test_a_browser_gets_an_explanatory_page(server: Server, path: str) -> None:
     accept = "text/html,application/xhtml+xml,application/xml;q=0.9,*/*;q=0.8"
     answer = server.client.get(path, headers={"Accept": accept})
     assert answer.status_code == 404

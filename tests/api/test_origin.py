@@ -103,7 +103,7 @@ def test_further_names_are_read_from_the_environment(monkeypatch: pytest.MonkeyP
     assert read_settings().api_allowed_hosts == ("gait.example", "gait.example:8443")
 
 
-def test_a_name_that_is_none_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_name_that_is_invalid_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("GAITSWARM_API_ALLOWED_HOSTS", "https://gait.example")
     with pytest.raises(InvalidRequest, match="GAITSWARM_API_ALLOWED_HOSTS"):
         read_settings()

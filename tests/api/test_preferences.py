@@ -1,4 +1,4 @@
-"""Whose winners are robust, over HTTP."""
+"""Preferences with robust winners over HTTP."""
 
 from __future__ import annotations
 

@@ -192,7 +192,7 @@ def test_currents_that_no_motor_draws_make_no_recording(
     assert "current.210.3" in answer.json()["errors"][0]["message"]
 
 
-def test_a_log_over_its_own_limit_is_told_what_to_do(serve: Serve) -> None:
+def test_a_log_over_its_own_limit_is_refused_with_a_remedy(serve: Serve) -> None:
     client = serve(api_max_body_bytes=1000, api_max_log_bytes=2000).client
     answer = client.post("/v1/measured-walks", json={"log": "x" * 2000})
     assert answer.status_code == 413

@@ -170,7 +170,7 @@ def test_jobs_are_sorted_by_gain_in_pages_either_way(store: SqlStore, commit: Co
         assert (found, after) == (wanted, None)
 
 
-def test_a_gain_that_cannot_be_told_breaks_nothing(
+def test_a_gain_that_cannot_be_computed_breaks_nothing(
     store: SqlStore, commit: Commit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     spec = tuning()

@@ -1,4 +1,4 @@
-"""What every request gets: an id, an answer even to a bug, news of an ill database."""
+"""Every request: its id, answers to bugs, and an unavailable database."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def test_a_bug_is_a_problem_that_shows_nothing_of_the_inside(
         (LeaseLost("another runner has it"), 409),
     ],
 )
-def test_what_cannot_be_done_now_is_told_apart_from_bugs(
+def test_what_cannot_be_done_now_is_distinguished_from_bugs(
     client: httpx2.Client,
     store: SqlStore,
     monkeypatch: pytest.MonkeyPatch,
@@ -144,7 +144,7 @@ def test_a_component_that_has_failed_is_named_and_the_server_is_alive_but_not_re
     assert client.get("/v1/readyz").status_code == 200
 
 
-def test_a_component_that_the_server_can_do_without_is_told_of(serve: Serve) -> None:
+def test_a_component_that_the_server_can_do_without_is_reported(serve: Serve) -> None:
     workers = Component("workers", lambda: "Ray is out of reach", vital=False)
     answer = serve(components=[workers]).client.get("/v1/readyz")
 

@@ -66,7 +66,7 @@ def test_a_robot_that_faces_y_is_turned_when_that_is_said(client: httpx2.Client)
     assert feet[1] == pytest.approx(straight, abs=1e-3) != feet[0]
 
 
-def test_what_no_body_has_is_told_by_a_check(client: httpx2.Client) -> None:
+def test_what_no_body_has_is_reported_by_a_check(client: httpx2.Client) -> None:
     made = propose_robot(dog().replace('ixx="1e-3"', 'ixx="1e-2"'), "dog")
     found = client.post("/v1/robots/checks", json={"toml": made.toml, "urdf": made.urdf}).json()
     assert "no body of" in found["warnings"][0]

@@ -98,7 +98,7 @@ def test_an_answer_of_before_a_change_is_not_given_to_who_asks_after_it(
     run(counted, job, use)
 
 
-def test_a_stream_that_leaves_takes_the_answer_from_nobody(counted: Counted, job: Job) -> None:
+def test_a_stream_that_leaves_takes_the_answer_from_no_one(counted: Counted, job: Job) -> None:
     async def use(topic: Topic) -> None:
         leaves, stays = await asked_by(2, topic)
         leaves.cancel()
@@ -109,7 +109,7 @@ def test_a_stream_that_leaves_takes_the_answer_from_nobody(counted: Counted, job
     run(counted, job, use)
 
 
-def test_a_read_that_failed_is_tried_anew(
+def test_a_read_that_failed_is_tried_again(
     store: SqlStore, job: Job, commit: Commit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     commit(job, 1)

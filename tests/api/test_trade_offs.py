@@ -1,4 +1,4 @@
-"""What designs of a job trade, over HTTP."""
+"""Trade-offs over HTTP."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_a_front_leaves_out_designs_that_failed_and_equal_ones(
     assert view["reference"]["energy"] > view["nadir"]["energy"]
 
 
-def test_a_running_job_has_a_front_that_goes_on(
+def test_a_running_job_has_a_front_that_continues(
     client: httpx2.Client, job: Job, commit: Commit
 ) -> None:
     claim = commit(job, 1)
@@ -48,7 +48,7 @@ def test_a_running_job_has_a_front_that_goes_on(
     assert len(asked(client, job, "front").json()["iterations"]) == 2
 
 
-def test_a_design_that_is_dominated_is_told_its_best_rank(
+def test_a_design_that_is_dominated_gets_its_best_rank(
     client: httpx2.Client, job: Job, commit: Commit
 ) -> None:
     commit(job, 1)

@@ -1,4 +1,4 @@
-"""What calibrations ask for, and how they judge."""
+"""Specs of calibrations and their judgement."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the evidence of several runs says: targets one by one, choices one by one."""
+"""Results of several calibrations: target by target, choice by choice."""
 
 from __future__ import annotations
 

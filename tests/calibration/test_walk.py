@@ -1,4 +1,4 @@
-"""What robots and conventions come to in one of the walks of a calibration."""
+"""Robots and conventions in one walk of a calibration."""
 
 from __future__ import annotations
 

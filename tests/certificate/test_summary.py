@@ -1,4 +1,4 @@
-"""What a certificate says, on outcomes that are made up."""
+"""Summaries of certificates, on synthetic outcomes."""
 
 from __future__ import annotations
 

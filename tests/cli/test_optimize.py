@@ -76,7 +76,7 @@ def test_a_search_in_single_precision_reports_its_best_in_double_with_the_differ
 
 
 @pytest.mark.parametrize("command", ["optimize", "simulate"])
-def test_a_precision_that_there_is_not_is_refused_by_name(
+def test_a_precision_that_does_not_exist_is_refused_by_name(
     gaitswarm: Gaitswarm, command: str, db: Path
 ) -> None:
     given = ("--db", db) if command == "optimize" else ("--design", "published:A")

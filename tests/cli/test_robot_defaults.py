@@ -86,13 +86,13 @@ def test_an_unpublished_design_lists_the_choices(dog: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["optimize", "simulate", "certify", "validate"])
-def test_help_names_every_controller_that_there_is(name: str) -> None:
+def test_help_names_every_controller_that_exists(name: str) -> None:
     shown = " ".join(run_command(*name.split(), "--help").out.replace("│", " ").split())
     for controller in CONTROLLERS.built_in:
         assert f" {controller}" in shown
 
 
 @pytest.mark.parametrize("file", ["docs/cli.md", "docs/robots.md"])
-def test_documents_name_every_controller_that_there_is(file: str) -> None:
+def test_documents_name_every_controller_that_exists(file: str) -> None:
     text = (ROOT / file).read_text(encoding="utf-8")
     assert [name for name in CONTROLLERS.built_in if f"`{name}`" not in text] == []

@@ -1,4 +1,4 @@
-"""What evidence holds, and that it is the same for the same job."""
+"""Contents of evidence, equal for equal jobs."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Earlier(JobService):
 
 
 @pytest.mark.parametrize("precision", ["double", "single"])
-def test_evidence_of_a_job_that_goes_on_meanwhile_is_of_what_was_committed(
+def test_evidence_of_a_job_that_continues_meanwhile_is_of_what_was_committed(
     precision: Precision, tmp_path: Path
 ) -> None:
     db = tmp_path / "jobs.db"

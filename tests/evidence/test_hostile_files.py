@@ -1,4 +1,4 @@
-"""Whatever a file of evidence is made of, checking it ends in a finding."""
+"""Hostile evidence files: checking ends in a finding."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def test_nesting_takes_none_of_the_stack_that_cleaning_up_needs() -> None:
     assert json.dumps(document).encode() == nested
 
 
-def test_a_manifest_that_is_none_is_refused(proved: Proved) -> None:
+def test_a_manifest_that_is_invalid_is_refused(proved: Proved) -> None:
     members = unzipped(proved.content)
     for document, why in (
         (b"[]", "is none of"),

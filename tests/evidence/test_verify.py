@@ -220,7 +220,7 @@ def test_a_search_in_single_precision_is_verified_with_its_best_in_double(tmp_pa
     assert failed(gaitswarm.verify(content, replay=1)) == ["best", "chain", "replay"]
 
 
-def test_a_fork_that_was_judged_anew_is_verified_but_for_the_way_of_its_search(
+def test_a_fork_that_was_judged_by_another_preference_is_verified_but_for_the_way_of_its_search(
     proved: Proved, tmp_path: Path
 ) -> None:
     import shutil
@@ -252,7 +252,7 @@ def test_a_fuzzy_design_and_a_robot_of_ones_own_can_be_proved(tmp_path: Path) ->
     assert "figures/surface-FO.svg" in unzipped(content)
 
 
-def test_a_file_that_is_not_there_and_a_negative_count_are_errors(tmp_path: Path) -> None:
+def test_a_file_that_is_missing_and_a_negative_count_are_errors(tmp_path: Path) -> None:
     with pytest.raises(gaitswarm.NotFound):
         gaitswarm.verify(tmp_path / "none.zip")
     with pytest.raises(gaitswarm.InvalidRequest):
@@ -261,7 +261,7 @@ def test_a_file_that_is_not_there_and_a_negative_count_are_errors(tmp_path: Path
         gaitswarm.verify(b"", seed=-1)
 
 
-def test_what_a_multi_objective_search_was_told_is_checked_too(tmp_path: Path) -> None:
+def test_what_a_multi_objective_search_received_is_checked_too(tmp_path: Path) -> None:
     torque_alone = {"bias": [0.0] * 5, "exponent": [1.0, 0.0, 0.0, 0.0, 0.0]}
     optimizer = {"name": "hype", "particles": 4, "population": 4, "offspring": 4}
     given = {"optimizer": optimizer, "preference": torque_alone, "iterations": 6}

@@ -1,4 +1,4 @@
-"""What a process runs that is forked for a command of `gaitswarm`, or for another program."""
+"""Program of processes that are forked for a command of `gaitswarm`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What tests need that a machine may lack: they are skipped there, or fail where they must run."""
+"""Requirements of tests that a machine may lack: skipped there, or failing where required."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which instances of a test are left to `make test-all`."""
+"""Instances of tests that are left to `make test-all`."""
 
 from __future__ import annotations
 

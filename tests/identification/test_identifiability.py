@@ -1,4 +1,4 @@
-"""Which parameters several runs agree on."""
+"""Identifiability of parameters from several runs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is sent to a server again, when, and how often; what its errors become."""
+"""Retries of requests, and errors of servers."""
 
 from __future__ import annotations
 
@@ -263,7 +263,7 @@ def test_whatever_only_reads_is_sent_again_although_it_has_a_body(
     assert [request.method for request in sent] == ["POST"] * 4
 
 
-def test_a_server_that_is_not_there_is_unavailable_and_named() -> None:
+def test_a_server_that_is_missing_is_unavailable_and_named() -> None:
     with (
         gaitswarm.connect(URL, backoff=QUICK) as jobs,
         pytest.raises(gaitswarm.StoreUnavailable, match=f"{URL}.*gaitswarm serve"),
@@ -286,7 +286,7 @@ def test_a_server_without_certificates_is_trusted_for_none() -> None:
 
 
 @pytest.mark.parametrize("body", [b"<html>", b"{}", b'{"items": 3}'])
-def test_another_kind_of_server_is_told_from_gaitswarms(body: bytes) -> None:
+def test_another_kind_of_server_is_distinguished_from_gaitswarms(body: bytes) -> None:
     way = httpx2.MockTransport(lambda _: httpx2.Response(200, content=body))
     with (
         gaitswarm.ServerJobs(URL, transport=way) as jobs,
@@ -394,7 +394,7 @@ def follow(request: pytest.FixtureRequest) -> Follow:
 
 
 @pytest.mark.slow
-def test_a_broken_stream_goes_on_where_it_broke_and_tells_a_state_once(
+def test_a_broken_stream_resumes_where_it_broke_and_tells_a_state_once(
     follow: Follow, iteration: Callable[[int], str], finished_once: Finished
 ) -> None:
     script = Script(

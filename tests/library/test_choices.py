@@ -68,7 +68,7 @@ def test_a_choice_is_taken_by_name_or_index(reach: Reach, db: Path) -> None:
         assert not np.array_equal(many.objectives[0], many.objectives[1])
 
 
-def test_a_choice_that_there_is_not_is_refused_with_those_that_there_are(
+def test_a_choice_that_does_not_exist_is_refused_with_the_existing_ones(
     reach: Reach, db: Path
 ) -> None:
     with pytest.raises(gaitswarm.InvalidRequest, match="none of its choices moving_average, hamm"):

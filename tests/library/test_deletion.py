@@ -46,7 +46,7 @@ def test_a_job_that_is_kept_is_not_deleted_until_it_is_released(
     jobs.delete(finished.id)
 
 
-def test_whoever_follows_a_job_learns_that_it_was_deleted(reach: Reach, finished: Finished) -> None:
+def test_a_follower_of_a_job_learns_that_it_was_deleted(reach: Reach, finished: Finished) -> None:
     jobs = reach(finished.db)
     job = jobs.submit(**SMALL)
     events = jobs.follow(job.id)

@@ -1,4 +1,4 @@
-"""Which variables of a job matter, asked for in all four ways, and by the terminal."""
+"""Importance of variables: all four clients and the command."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What people write on jobs, in all four ways and by the terminal."""
+"""Labels of jobs: all four clients and the command."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_a_list_says_that_there_is_more(reach: Reach, finished: Finished) -> Non
     assert "there are more" not in run_command("list", "--db", finished.db, "--limit", "3").err
 
 
-def test_jobs_are_set_beside_each_other(reach: Reach, finished: Finished) -> None:
+def test_jobs_are_compared(reach: Reach, finished: Finished) -> None:
     jobs = reach(finished.db)
     queued = jobs.submit(finished.result.job.spec, seed=8)
     view = jobs.comparison([finished.id, queued.id])

@@ -76,7 +76,7 @@ def test_convergence_and_evaluations_are_tables(finished: Finished) -> None:
     assert len(evaluations) == 6
 
 
-def test_progress_is_told_after_each_iteration_is_stored(db: Path) -> None:
+def test_progress_is_reported_after_each_iteration_is_stored(db: Path) -> None:
     received: list[tuple[int, int]] = []
 
     def progress(iteration: gaitswarm.IterationView) -> None:
@@ -324,7 +324,9 @@ def test_resuming_makes_no_database(tmp_path: Path) -> None:
     assert not db.exists()
 
 
-def test_a_queued_job_is_run_by_whoever_has_the_database_open(db: Path, finished: Finished) -> None:
+def test_a_queued_job_is_run_by_any_process_with_the_database_open(
+    db: Path, finished: Finished
+) -> None:
     with gaitswarm.open(db) as jobs:
         job = jobs.submit(**SMALL)
         seen: list[int] = []
@@ -334,7 +336,7 @@ def test_a_queued_job_is_run_by_whoever_has_the_database_open(db: Path, finished
     assert same_history(db, job.id, finished)
 
 
-def test_a_run_that_is_told_to_stop_returns_the_job_as_it_gave_it_back(db: Path) -> None:
+def test_a_run_that_is_stopped_returns_the_job_as_it_gave_it_back(db: Path) -> None:
     stop = threading.Event()
     with gaitswarm.open(db) as jobs:
         job = jobs.submit(**SMALL)
@@ -342,7 +344,7 @@ def test_a_run_that_is_told_to_stop_returns_the_job_as_it_gave_it_back(db: Path)
     assert (stopped.state, stopped.iterations) == ("queued", 1)
 
 
-def test_an_event_loop_goes_on_while_it_runs_a_job(db: Path, finished: Finished) -> None:
+def test_an_event_loop_continues_while_it_runs_a_job(db: Path, finished: Finished) -> None:
     received: list[gaitswarm.JobEvent] = []
 
     async def work() -> gaitswarm.JobView:
@@ -394,7 +396,7 @@ def test_an_exception_of_a_tasks_callback_is_passed_on(db: Path) -> None:
     anyio.run(work)
 
 
-def test_a_database_that_is_not_there_is_found_missing_on_entering(tmp_path: Path) -> None:
+def test_a_missing_database_is_noticed_on_entering(tmp_path: Path) -> None:
     async def enter() -> None:
         async with gaitswarm.open_async(tmp_path / "none.db", create=False):
             raise AssertionError("there is none")

@@ -1,4 +1,4 @@
-"""How texts name a design of a job."""
+"""Places of designs as text."""
 
 from __future__ import annotations
 

@@ -82,7 +82,7 @@ def test_runs_of_different_precision_are_not_compared(finished: Finished) -> Non
         jobs.parameters([finished.id, other.job.id])
 
 
-def test_another_word_is_refused_with_those_that_there_are() -> None:
+def test_another_word_is_refused_with_those_that_exist() -> None:
     with pytest.raises(gaitswarm.InvalidRequest, match=r"precision.*'single' or 'double'"):
         gaitswarm.optimize(precision="half", **SMALL)  # type: ignore[arg-type]
     with pytest.raises(gaitswarm.InvalidRequest, match=r"precision.*'single' or 'double'"):

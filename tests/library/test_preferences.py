@@ -1,4 +1,4 @@
-"""Whose winners are robust, asked for in all four ways."""
+"""Preferences with robust winners: all four clients."""
 
 from __future__ import annotations
 

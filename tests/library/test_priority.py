@@ -58,7 +58,9 @@ def test_a_job_that_has_ended_gets_no_other_priority(reach: Reach, finished: Fin
         reach(finished.db).prioritize(finished.id, 1)
 
 
-def test_who_is_told_of_the_end_is_said_at_submission(reach: Reach, finished: Finished) -> None:
+def test_the_receiver_of_the_notification_is_given_at_submission(
+    reach: Reach, finished: Finished
+) -> None:
     jobs = reach(finished.db)
     for job in (
         jobs.submit(notify_url=HOOK, **SMALL),

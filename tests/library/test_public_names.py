@@ -1,4 +1,4 @@
-"""What `import gaitswarm` gives: quickly, typed, and documented to the last argument."""
+"""The public names of gaitswarm: fast to import and typed."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def declared() -> dict[str, str]:
     }
 
 
-def test_type_checkers_see_the_names_that_there_are() -> None:
+def test_type_checkers_see_the_names_that_exist() -> None:
     assert sorted([*declared(), "__version__"]) == sorted(gaitswarm.__all__)
     for name, module in declared().items():
         assert getattr(gaitswarm, name) is getattr(import_module(module), name)

@@ -1,4 +1,4 @@
-"""Which scenarios of a job matter, asked for in all four ways."""
+"""Importance of scenarios: all four clients."""
 
 from __future__ import annotations
 

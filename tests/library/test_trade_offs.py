@@ -1,4 +1,4 @@
-"""What a job's designs trade, asked for in all four ways."""
+"""Trade-offs: all four clients."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_a_front_has_the_winners_of_preferences_without_biases(
     assert view.iterations[-1].hypervolume == view.hypervolume
 
 
-def test_a_design_is_told_by_which_preference_it_wins(reach: Reach, finished: Finished) -> None:
+def test_a_design_gets_the_preference_under_which_it_wins(reach: Reach, finished: Finished) -> None:
     jobs = reach(finished.db)
     best = finished.result.job.best
     assert best is not None

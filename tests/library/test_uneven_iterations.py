@@ -39,7 +39,7 @@ def test_it_ends_when_all_designs_of_the_budget_are_judged(
     assert list(zip(table["iteration"], table["particle"], strict=True)) == expected
 
 
-def test_its_progress_is_told_in_designs(result: gaitswarm.OptimizationResult) -> None:
+def test_its_progress_is_reported_in_designs(result: gaitswarm.OptimizationResult) -> None:
     assert str(result.job.spent) == "12 of 12 designs"
 
 
@@ -53,7 +53,7 @@ def test_its_progress_is_told_in_designs(result: gaitswarm.OptimizationResult) -
         (6, 12, Spent(12, 12, "designs")),
     ],
 )
-def test_progress_is_told_in_iterations_while_all_are_whole(
+def test_progress_is_reported_in_iterations_while_all_are_whole(
     iterations: int, evaluations: int, said: Spent
 ) -> None:
     spent = budget_spent(

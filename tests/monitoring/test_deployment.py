@@ -1,4 +1,4 @@
-"""What Grafana and Prometheus are given asks for metrics and labels that there are."""
+"""Dashboards and rules for Grafana and Prometheus use existing metrics and labels."""
 
 from __future__ import annotations
 

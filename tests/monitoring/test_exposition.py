@@ -1,4 +1,4 @@
-"""Where metrics are served, and to whom: the API's route, and the port of a runner alone."""
+"""Metrics: the API's route and a runner's port."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How the ground's forces fall as feet move faster: what an implicit step wants to know.
+"""Damping of the ground's forces, for the implicit step.
 
 The step is ours alone, and so are these derivatives; MuJoCo's own steps do without.
 """

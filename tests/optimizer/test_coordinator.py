@@ -1,4 +1,4 @@
-"""What happens next in a job, without a store, workers, clock or threads."""
+"""The coordinator, without a store, workers, clock or threads."""
 
 from __future__ import annotations
 

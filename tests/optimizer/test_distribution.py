@@ -1,4 +1,4 @@
-"""How a swarm is spread, and what is left of it when it is thinned for a picture."""
+"""Distribution of designs, and its thinning for pictures."""
 
 from __future__ import annotations
 

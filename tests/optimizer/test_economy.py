@@ -1,4 +1,4 @@
-"""What is known is not walked again, and nothing else changes."""
+"""Reuse of stored results, without any other effect."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a job will cost: counted exactly, timed by jobs like it or by a walk of its own."""
+"""Estimates: exact counts, and times from similar jobs or a measured simulation."""
 
 from __future__ import annotations
 

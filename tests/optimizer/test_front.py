@@ -1,4 +1,4 @@
-"""What a job's designs trade."""
+"""Pareto fronts of a job's designs."""
 
 from __future__ import annotations
 

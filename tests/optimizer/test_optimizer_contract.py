@@ -1,4 +1,4 @@
-"""What every search method keeps to. A method of the registry is tested as soon as it is in it."""
+"""Contract of all search methods in the registry."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What if another preference had judged: the same arithmetic as the job's own, only faster."""
+"""Ranking by another preference: the job's own arithmetic, vectorized."""
 
 from __future__ import annotations
 

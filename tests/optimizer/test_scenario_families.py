@@ -1,4 +1,4 @@
-"""What fewer scenarios would have taken for the best."""
+"""Winners of fewer scenarios."""
 
 from __future__ import annotations
 

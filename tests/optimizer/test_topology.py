@@ -1,4 +1,4 @@
-"""Who informs whom in a swarm, and what a particle does with it."""
+"""Topologies of swarms."""
 
 from __future__ import annotations
 

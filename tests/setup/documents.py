@@ -1,4 +1,4 @@
-"""What README and docs/ tell users to type."""
+"""Shell commands in README and docs."""
 
 from __future__ import annotations
 

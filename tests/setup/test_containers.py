@@ -50,7 +50,7 @@ def test_there_is_everything_that_a_cluster_needs() -> None:
     assert set(SERVICES) == {"postgres", "ray-head", "ray-worker", "optimizer", "api"}
 
 
-def test_walks_get_less_of_the_processors_than_whoever_waits_for_an_answer() -> None:
+def test_walks_get_less_of_the_processors_than_waiting_clients() -> None:
     usual = 1024
     shares = {name: service.get("cpu_shares", usual) for name, service in SERVICES.items()}
     assert {name for name, share in shares.items() if share < usual} == {"ray-worker"}

@@ -1,4 +1,4 @@
-"""What `make test` leaves to `make test-all`, it shows with another instance or another test."""
+"""Thorough tests name the tests that cover them in `make test`."""
 
 from __future__ import annotations
 

@@ -119,7 +119,7 @@ def test_an_error_is_found_on_its_line_in_no_time_whatever_the_lines_before_are(
     assert time.process_time() - begun < 0.5
 
 
-def test_a_robot_whose_files_were_read_once_is_not_read_again_to_be_told_from_none(
+def test_a_robot_whose_files_were_read_once_is_not_read_again_to_be_distinguished_from_none(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     robots = [{"toml": f"# {k}\n{TOML}", "urdf": URDF} for k in range(40)]

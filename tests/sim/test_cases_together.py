@@ -73,7 +73,7 @@ def test_walks_of_other_kernels_have_calls_of_their_own(calls: list[int]) -> Non
     assert bits(outcome) == bits(laws.run(np.array([[0.0], [1.0], [0.0]])))
 
 
-def test_all_tasks_of_a_scenario_share_one_plan_that_nobody_can_write_to(
+def test_all_tasks_of_a_scenario_share_one_plan_that_is_read_only(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     seen: list[WalkSetup] = []
@@ -108,7 +108,7 @@ class NoWalk:
         return Outcome(designs[:, :1], np.zeros(len(designs), dtype=np.uint8))
 
 
-def test_a_case_without_walks_runs_beside_others() -> None:
+def test_a_case_without_walks_runs_together_with_others() -> None:
     first, second = run_together([NoWalk(), CASES[0]], [GAINS, GAINS])
     assert bits(first) == bits(NoWalk().run(GAINS))
     assert bits(second) == bits(CASES[0].run(GAINS))

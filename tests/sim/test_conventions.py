@@ -1,4 +1,4 @@
-"""What the thesis leaves open: a design may set it, a default serves where it does not."""
+"""Conventions that the thesis leaves open, with defaults."""
 
 from __future__ import annotations
 

@@ -137,7 +137,7 @@ CHOICES = [
 ]
 
 
-def test_conventions_are_beside_the_identified_parameters() -> None:
+def test_conventions_are_next_to_the_identified_parameters() -> None:
     names = {variable.name for variable in CONVENTIONAL_VARIABLES}
     own = {variable.name for variable in identifiable_variables(load_robot("szabadka2"))}
     assert len(names) == len(CONVENTIONAL_VARIABLES)

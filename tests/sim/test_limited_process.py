@@ -102,7 +102,7 @@ def test_a_process_can_write_no_file(processes: LimitedProcesses, tmp_path: Path
         processes.ask({"do": "write", "path": str(tmp_path / "file")})
 
 
-def test_a_request_is_answered_beside_one_that_takes_long() -> None:
+def test_a_request_is_answered_during_a_long_one() -> None:
     processes = hungry(seconds=3.0, count=2)
 
     def wait() -> None:

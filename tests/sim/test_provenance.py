@@ -1,4 +1,4 @@
-"""What the results of a case depend on, as its digests tell it."""
+"""Provenance of a case's results."""
 
 from __future__ import annotations
 

@@ -163,7 +163,7 @@ def test_stepped_signals_cost_the_default_robot_energy_and_shake_it_no_more_than
     assert default[3] > 1.1
 
 
-def test_bad_designs_are_statuses_beside_good_ones() -> None:
+def test_bad_designs_are_statuses_among_good_ones() -> None:
     published = list(PUBLISHED_A.values())
     wide = np.array([[*published, 0.16], [*published, 0.60]])
     outcome = simulate(SCENARIOS[2], "fuzzy-pi", [*PUBLISHED_A, "stride"], wide).outcome

@@ -1,4 +1,4 @@
-"""What robots look like, with geometry in their URDF and without."""
+"""Shapes of robots, with geometry in their URDF and without."""
 
 from __future__ import annotations
 

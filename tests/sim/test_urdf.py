@@ -1,4 +1,4 @@
-"""What a URDF says: inertias as Pinocchio has them, one tree of links, and what cannot be read."""
+"""Reading URDFs: inertias as Pinocchio's, the tree of links, and errors."""
 
 from __future__ import annotations
 
@@ -159,7 +159,7 @@ def test_an_axis_is_made_a_unit_vector_and_a_fixed_joint_needs_none() -> None:
     np.testing.assert_array_equal(plain, [1.0, 0.0, 0.0])
 
 
-def test_what_is_no_xml_is_told_by_line_and_column() -> None:
+def test_what_is_no_xml_is_reported_by_line_and_column() -> None:
     with pytest.raises(RobotFileError, match=r"robot\.urdf, line 2: .*: mismatched tag \(column 2"):
         parse_urdf("<robot><link>\n</robot>")
 

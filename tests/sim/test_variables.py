@@ -1,4 +1,4 @@
-"""What a variable may be, and how its values are written."""
+"""Variables and their values."""
 
 from __future__ import annotations
 

@@ -228,9 +228,7 @@ def test_what_is_asked_but_not_yet_evaluated_is_checked_too(
     assert found.broken_at == 1 and found.problem.startswith("the ask")
 
 
-def test_a_design_that_was_evaluated_anew_is_chained_too(
-    store: SqlStore, database_url: str
-) -> None:
+def test_a_design_that_was_reevaluated_is_chained_too(store: SqlStore, database_url: str) -> None:
     store.create_job(spec().model_copy(update={"precision": "single"}))
     claim = store.claim("runner", lease_seconds=LEASE)
     assert claim is not None
@@ -297,7 +295,7 @@ def test_records_of_provenance_stay_as_they_were_written_when_others_follow(
     assert stored is not None and stored[0] == record and len(stored) == 2
 
 
-def test_an_extended_job_goes_on_with_its_chain(store: SqlStore) -> None:
+def test_an_extended_job_continues_with_its_chain(store: SqlStore) -> None:
     job_id = finished(store)
     before = digests(store, job_id)
     store.extend(job_id, 4)

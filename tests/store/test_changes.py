@@ -53,7 +53,7 @@ def settle(url: str, waiting: SqlStore, woken: threading.Event) -> None:
     assert waiting.jobs().items
 
 
-def test_commits_and_commands_of_another_process_are_told(
+def test_commits_and_commands_of_another_process_are_reported(
     store: SqlStore, waiting: SqlStore, database_url: str, poll_seconds: float
 ) -> None:
     claim = begun(store)
@@ -67,7 +67,7 @@ def test_commits_and_commands_of_another_process_are_told(
         assert woken.wait(10.0)
 
 
-def test_what_a_job_waits_for_is_told_once(
+def test_what_a_job_waits_for_is_reported_once(
     store: SqlStore, waiting: SqlStore, database_url: str, poll_seconds: float
 ) -> None:
     claim = begun(store)
@@ -88,7 +88,7 @@ def test_what_a_job_waits_for_is_told_once(
         assert not mine.is_set()
 
 
-def test_neither_heartbeats_nor_other_jobs_are_told(
+def test_neither_heartbeats_nor_other_jobs_are_reported(
     store: SqlStore, waiting: SqlStore, database_url: str, poll_seconds: float
 ) -> None:
     claim = begun(store)
@@ -132,7 +132,7 @@ def test_all_who_wait_in_a_process_share_a_thread_and_a_connection(
 
 @pytest.mark.parametrize("database_url", ["postgresql"], indirect=True)
 @pytest.mark.slow
-def test_what_is_committed_while_the_listener_is_lost_is_told_as_well(
+def test_what_is_committed_while_the_listener_is_lost_is_reported_as_well(
     store: SqlStore, waiting: SqlStore, database_url: str
 ) -> None:
     claim = begun(store)
@@ -155,7 +155,7 @@ def test_what_is_committed_while_the_listener_is_lost_is_told_as_well(
 
 @pytest.mark.parametrize("database_url", ["postgresql"], indirect=True)
 @pytest.mark.slow
-def test_where_nobody_can_listen_changes_are_polled_for(
+def test_without_a_listener_changes_are_polled_for(
     store: SqlStore, waiting: SqlStore, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
@@ -186,7 +186,7 @@ def test_the_listener_is_back_after_a_crash_of_the_server() -> None:
                 eventually(lambda: len(listening(url)) == 1)
 
 
-def test_who_has_left_is_told_nothing(
+def test_a_listener_that_has_left_receives_nothing(
     store: SqlStore, waiting: SqlStore, database_url: str, poll_seconds: float
 ) -> None:
     claim = begun(store)
@@ -201,7 +201,7 @@ def test_who_has_left_is_told_nothing(
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
-def test_a_thread_that_has_ended_is_told_of_while_somebody_waits(
+def test_a_thread_that_has_ended_is_reported_while_a_client_waits(
     database_url: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with closing(open_store(database_url)) as store:

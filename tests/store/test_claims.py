@@ -1,4 +1,4 @@
-"""Who may write: claims, heartbeats, leases that run out, and fencing."""
+"""Claims, heartbeats, expired leases, and fencing."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_a_certain_job_can_be_claimed_before_its_turn(store: SqlStore, clock: Cl
     assert store.claim("runner-b", lease_seconds=LEASE, job_id=wanted.id) is None
 
 
-def test_a_job_that_is_created_claimed_is_nobody_elses_while_its_lease_lives(
+def test_a_job_that_is_created_claimed_belongs_to_one_runner_while_its_lease_lives(
     store: SqlStore, clock: Clock
 ) -> None:
     claim = store.create_claimed_job(spec(), "runner-a", lease_seconds=LEASE)
@@ -76,7 +76,7 @@ def test_a_job_that_is_created_claimed_is_run_with_its_claim(store: SqlStore) ->
     assert store.commit(claim, completed(0), None) is JobState.SUCCEEDED
 
 
-def test_a_job_is_nobody_elses_while_its_lease_lives(store: SqlStore, clock: Clock) -> None:
+def test_a_job_belongs_to_one_runner_while_its_lease_lives(store: SqlStore, clock: Clock) -> None:
     begun(store)
     clock.advance(LEASE - 0.001)
     assert store.claim("runner-b", lease_seconds=LEASE) is None
@@ -146,7 +146,7 @@ def test_a_heartbeat_prolongs_the_lease(store: SqlStore, clock: Clock) -> None:
     assert store.claim("runner-b", lease_seconds=LEASE) is None
 
 
-def test_a_job_whose_lease_ran_out_goes_on_with_the_ask_that_was_stored(
+def test_a_job_whose_lease_ran_out_continues_with_the_ask_that_was_stored(
     store: SqlStore, clock: Clock
 ) -> None:
     first = begun(store)
@@ -161,7 +161,7 @@ def test_a_job_whose_lease_ran_out_goes_on_with_the_ask_that_was_stored(
 
 
 @pytest.mark.parametrize("ended", [JobState.PAUSED, JobState.FAILED])
-def test_a_resumed_job_goes_on_with_the_ask_that_was_stored(
+def test_a_resumed_job_continues_with_the_ask_that_was_stored(
     store: SqlStore, ended: JobState
 ) -> None:
     first = begun(store)
@@ -316,7 +316,7 @@ def test_how_many_crashes_it_takes_is_a_setting(store: SqlStore, clock: Clock) -
     assert store.job(job.id).state is JobState.FAILED
 
 
-def test_what_a_job_waits_for_is_told_until_it_waits_no_longer(
+def test_what_a_job_waits_for_is_reported_until_it_waits_no_longer(
     store: SqlStore, clock: Clock
 ) -> None:
     claim = begun(store)

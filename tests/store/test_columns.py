@@ -239,7 +239,7 @@ def test_memory_is_waited_for(store: SqlStore) -> None:
     assert len(cache.columns(second)) == 20
 
 
-def test_a_history_that_grows_beyond_half_of_the_memory_is_read_anew(store: SqlStore) -> None:
+def test_a_history_that_grows_beyond_half_of_the_memory_is_read_again(store: SqlStore) -> None:
     claim = begun(store)
     go_on(store, claim, *[(4.0, 3.0)] * 6)
     job = store.job(claim.job.id)

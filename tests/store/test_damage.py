@@ -48,7 +48,7 @@ def test_a_file_overwritten_with_garbage_is_noticed_though_it_can_still_be_read(
         opened.verify()
 
 
-def test_a_file_that_is_gone_is_noticed_and_not_made_anew(opened: SqlStore, file: Path) -> None:
+def test_a_file_that_is_gone_is_noticed_and_not_recreated(opened: SqlStore, file: Path) -> None:
     file.unlink()
     with pytest.raises(StoreUnavailable):
         opened.verify()

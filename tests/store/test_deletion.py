@@ -88,7 +88,7 @@ def test_rows_of_a_long_job_go_by_pieces_that_can_be_gone_on_with(
     assert set(rows(database_url).values()) == {0}
 
 
-def test_a_deleted_job_is_found_by_nobody(store: SqlStore) -> None:
+def test_a_deleted_job_is_not_found(store: SqlStore) -> None:
     job = ended(store, large())
     store.delete_job(job.id)
     for ask_for in (

@@ -61,7 +61,7 @@ def test_no_job_gets_a_budget_that_it_could_not_be_submitted_with(
     assert store.job(job.id) == job
 
 
-def test_a_runner_under_an_older_budget_is_told_before_anything_is_stored(
+def test_a_runner_under_an_older_budget_learns_it_before_anything_is_stored(
     store: SqlStore,
 ) -> None:
     claim = begun(store)
@@ -71,7 +71,7 @@ def test_a_runner_under_an_older_budget_is_told_before_anything_is_stored(
     assert store.job(claim.job.id).progress.iterations == 0
 
 
-def test_a_runner_that_begins_under_an_older_budget_is_told_so_too(store: SqlStore) -> None:
+def test_a_runner_that_begins_under_an_older_budget_learns_it_too(store: SqlStore) -> None:
     store.create_job(spec())
     claim = store.claim("runner-a", lease_seconds=LEASE)
     assert claim is not None

@@ -1,4 +1,4 @@
-"""What is remembered of an iteration, and how it is read."""
+"""Stored iterations."""
 
 from __future__ import annotations
 

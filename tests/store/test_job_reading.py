@@ -1,4 +1,4 @@
-"""What reading jobs costs: no more rows than are shown, and their documents once."""
+"""Cost of reading jobs: no more rows than are shown, and their documents once."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def test_sqlite_reads_a_page_of_the_list_from_an_index_and_sorts_nothing(
     database.close()
 
 
-def test_a_spec_is_read_once_and_anew_when_its_text_is_another(
+def test_a_spec_is_read_once_and_again_when_its_text_is_another(
     store: SqlStore, database_url: str
 ) -> None:
     made, _ = store.create_job(spec(name="first"))
@@ -88,7 +88,7 @@ def test_a_spec_is_read_once_and_anew_when_its_text_is_another(
     assert first.spec.name == "first"
 
 
-def test_what_is_remembered_of_a_job_has_its_state_budget_and_progress_anew(
+def test_what_is_remembered_of_a_job_has_its_current_state_budget_and_progress(
     store: SqlStore,
 ) -> None:
     job, _ = store.create_job(spec())
@@ -114,7 +114,7 @@ def test_rows_that_were_asked_for_longest_ago_are_forgotten_first() -> None:
     assert memory.find(("e" * 1000, None, None)) is None
 
 
-def test_the_list_is_sorted_anew_once_another_process_or_this_one_has_changed_a_job(
+def test_the_list_is_sorted_again_once_another_process_or_this_one_has_changed_a_job(
     store: SqlStore, database_url: str
 ) -> None:
     jobs = [store.create_job(spec(name=name))[0].id for name in "ab"]

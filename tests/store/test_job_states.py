@@ -100,7 +100,7 @@ def test_a_cancelled_failure_still_says_why_it_failed(store: SqlStore) -> None:
     assert store.command(job_id, Command.CANCEL).error == "the evaluator is broken"
 
 
-def test_pausing_a_job_whose_runner_has_gone_needs_nobody_to_complete_it(
+def test_pausing_a_job_whose_runner_has_gone_completes_at_once(
     store: SqlStore, clock: Clock
 ) -> None:
     claim = begun(store)

@@ -1,4 +1,4 @@
-"""What designs came to is found again by the key that was stored with them."""
+"""Stored results of designs, by key."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What people write on jobs, and how they find them by that."""
+"""Labels of jobs, and filters by them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `check` finds in a database, and what `prune` takes away."""
+"""`db check` and `db prune`."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ def test_a_waiting_job_gets_another_place_in_the_queue(store: SqlStore, clock: C
     assert [claimed(store), claimed(store)] == [second.id, first]
 
 
-def test_whoever_runs_a_job_hears_of_its_priority_with_the_next_heartbeat(store: SqlStore) -> None:
+def test_the_runner_of_a_job_learns_its_priority_with_the_next_heartbeat(store: SqlStore) -> None:
     claim = begun(store)
     assert store.renew(claim, lease_seconds=LEASE).priority == 0
     store.prioritize(claim.job.id, -4)

@@ -1,4 +1,4 @@
-"""What the unfinished jobs of an owner may come to."""
+"""Quotas of unfinished jobs."""
 
 from __future__ import annotations
 

@@ -122,7 +122,7 @@ def test_a_job_keeps_its_kind(store: SqlStore) -> None:
     assert store.job(job.id).spec == spec(wanted).resolved()
 
 
-def test_a_job_for_a_recording_that_is_not_there_is_refused(store: SqlStore) -> None:
+def test_a_job_for_a_recording_that_is_missing_is_refused(store: SqlStore) -> None:
     with pytest.raises(InvalidRequest, match="there is no recording") as refused:
         JobService(store).submit(spec("0" * 32))
     assert refused.value.field == "recordings.0"

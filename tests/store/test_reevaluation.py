@@ -65,7 +65,7 @@ def test_the_best_is_the_least_in_double_precision(store: SqlStore) -> None:
     assert [i.best for i in listed] == [3.0, 3.4, 3.3], "statistics of the swarm, in single"
 
 
-def test_a_swarm_that_nobody_looked_at_in_double_adds_no_best(store: SqlStore) -> None:
+def test_a_swarm_that_was_not_reevaluated_in_double_adds_no_best(store: SqlStore) -> None:
     claim = begun(store)
     store.commit(claim, searched(0, (4.0, 3.0), 3.5), ask(1))
     store.commit(claim, searched(1, (1.0, 2.0), None), ask(2))

@@ -62,7 +62,7 @@ def test_a_request_that_spells_the_same_job_differently_is_the_same(store: SqlSt
     assert store.create_job(spelled_out, idempotency_key="k") == (first, False)
 
 
-def test_a_job_whose_request_nobody_kept_is_recognized_by_its_spec(
+def test_a_job_whose_request_was_not_stored_is_recognized_by_its_spec(
     store: SqlStore, database_url: str
 ) -> None:
     first, _ = store.create_job(asked(), idempotency_key="k")

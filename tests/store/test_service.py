@@ -46,7 +46,7 @@ def test_a_late_iteration_counts_for_no_more_than_one() -> None:
     )
 
 
-def test_an_iteration_that_is_far_too_late_is_told() -> None:
+def test_an_iteration_that_is_far_too_late_is_reported() -> None:
     running = job(JobState.RUNNING, iterations=4)
     assert "the current one" not in time_left(running, NOW + timedelta(seconds=3.9)).basis
     late = time_left(running, NOW + timedelta(seconds=60.0))

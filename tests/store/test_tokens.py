@@ -51,7 +51,7 @@ def test_a_name_is_given_once_for_the_owner_of_a_job_stays_who_it_was(store: Sql
 
 
 @pytest.mark.parametrize("name", ["", "a b", "x" * 65, "naïve", "a/b", "a\n"])
-def test_a_name_that_is_none_is_refused(store: SqlStore, name: str) -> None:
+def test_a_name_that_is_invalid_is_refused(store: SqlStore, name: str) -> None:
     with pytest.raises(InvalidRequest, match="letters, digits"):
         store.tokens.create(name, Scope.READ)
 

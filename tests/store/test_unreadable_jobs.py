@@ -124,9 +124,7 @@ def test_lists_show_it_among_the_others(store: SqlStore, clock: Clock, damaged: 
 
 
 @pytest.mark.variants("sqlite-*", "postgresql-newer")
-def test_its_spec_is_refused_with_the_reason_to_whoever_needs_it(
-    store: SqlStore, damaged: Job
-) -> None:
+def test_its_spec_is_refused_with_the_reason_to_its_users(store: SqlStore, damaged: Job) -> None:
     assert not damaged.readable
     with pytest.raises(Conflict, match=rf"{damaged.id}: its spec cannot be read"):
         _ = damaged.spec
@@ -174,7 +172,7 @@ def test_what_is_committed_stays_to_be_read(store: SqlStore, write_spec: Write) 
     assert store.job(claim.job.id).progress.iterations == 1
 
 
-def test_a_job_under_way_that_cannot_be_read_any_more_goes_to_nobody(
+def test_a_job_under_way_that_cannot_be_read_any_more_is_claimed_by_no_runner(
     store: SqlStore, clock: Clock, write_spec: Write
 ) -> None:
     claim = begun(store)

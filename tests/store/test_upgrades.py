@@ -251,7 +251,9 @@ def test_a_process_that_outlived_an_upgrade_is_refused_when_it_connects_again(
                 store.create_job(spec())
 
 
-def test_nobody_comes_in_during_an_upgrade(fresh_url: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_process_opens_the_database_during_an_upgrade(
+    fresh_url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("gaitswarm.services.optimizer.store.connections.engine.BUSY_SECONDS", 0.2)
     open_store(fresh_url).close()
     with (

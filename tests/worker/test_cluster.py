@@ -85,7 +85,7 @@ def other_version(folder: Path) -> dict[str, str]:
 
 @pytest.mark.slow
 @pytest.mark.timeout(120)
-def test_only_nodes_of_this_version_walk_and_without_one_the_reason_is_told(
+def test_only_nodes_of_this_version_walk_and_without_one_the_reason_is_reported(
     host: Process, runner: Process, tmp_path: Path
 ) -> None:
     old = host.run(cluster_host.add, environment=other_version(tmp_path))
@@ -159,7 +159,7 @@ def test_after_all_nodes_are_gone_and_another_has_come_the_bits_are_the_same(
 
 @pytest.mark.slow
 @pytest.mark.timeout(120)
-def test_tasks_that_nobody_waits_for_any_more_leave_their_slots(
+def test_tasks_that_are_no_longer_awaited_leave_their_slots(
     runner: Process, two_nodes: list[str]
 ) -> None:
     case = WANTED.cases[0]
@@ -275,7 +275,7 @@ def test_the_node_of_a_head_that_has_just_begun_to_listen_here_is_waited_for(
     assert not joining.comes_here("127.0.0.1", 6379), "it does not come"
 
 
-def test_requests_that_need_other_robots_or_another_provenance_have_nodes_prepared_anew() -> None:
+def test_requests_that_need_other_robots_or_another_provenance_have_nodes_prepared_again() -> None:
     assert Wanted.by(WANTED) == Wanted.by(replace(WANTED, job_id="b", designs=WANTED.designs[:1]))
     changed = WANTED.provenance.model_copy(update={"code_digest": "other"})
     assert Wanted.by(WANTED) != Wanted.by(replace(WANTED, provenance=changed))

@@ -75,7 +75,7 @@ def head_alone(spec: dict[str, Any], folder: Path) -> str | None:
 
 
 @pytest.mark.thorough(
-    "test_a_runner_that_waits_for_its_cluster_ends_when_it_is_told_to",
+    "test_a_runner_that_waits_for_its_cluster_ends_when_it_is_stopped",
     "test_a_cluster_that_was_lost_is_noticed_and_opened_again_with_the_same_bits",
 )
 def test_a_server_waits_for_its_cluster_and_a_job_whose_head_is_killed_has_the_same_bits(
@@ -109,7 +109,7 @@ def test_a_server_waits_for_its_cluster_and_a_job_whose_head_is_killed_has_the_s
         server.close()
 
 
-def test_a_runner_that_waits_for_its_cluster_ends_when_it_is_told_to(
+def test_a_runner_that_waits_for_its_cluster_ends_when_it_is_stopped(
     environment: None, database: Path
 ) -> None:
     with socket.create_server(("127.0.0.1", 0)) as reserved:

@@ -1,4 +1,4 @@
-"""How an iteration is cut."""
+"""Cutting iterations into tasks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an autoscaler is shown, and when that is withdrawn. The cluster is made up."""
+"""Demand shown to an autoscaler, on a fake cluster."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How long tasks are predicted to take, from those of known pace."""
+"""Predicted durations of tasks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every evaluator keeps to, wherever it lets robots walk."""
+"""Contract of all evaluators."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def test_walks_of_another_provenance_are_refused_in_words(evaluator: Evaluator) 
     assert bits(evaluator.evaluate(sound, never)) == bits(walked_at_once(sound))
 
 
-def test_work_is_dropped_when_it_is_told_to_stop(evaluator: Evaluator) -> None:
+def test_work_is_dropped_when_it_is_stopped(evaluator: Evaluator) -> None:
     long = short_walk(cycle_time=2.0, cycles=5)
     stop = threading.Event()
     threading.Timer(0.3, stop.set).start()
@@ -111,7 +111,7 @@ def test_whether_to_stop_is_asked_at_least_once_a_second(
     assert any(longest_pause() < 1.0 for _ in range(3))
 
 
-def test_a_kernel_that_is_being_built_holds_up_only_those_who_need_it_and_are_not_told_to_stop(
+def test_a_kernel_that_is_being_built_holds_up_only_those_who_need_it_and_are_not_stopped(
     evaluator: Evaluator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     building, may_end = threading.Event(), threading.Event()

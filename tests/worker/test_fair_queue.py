@@ -1,4 +1,4 @@
-"""Who is next, and by how much."""
+"""Fair queuing of jobs."""
 
 from __future__ import annotations
 

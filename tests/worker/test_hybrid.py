@@ -109,7 +109,7 @@ def test_walks_go_on_while_ray_is_started_and_a_stop_is_heard(
 
 
 @pytest.mark.slow
-def test_a_ray_that_cannot_be_started_is_told_once_and_walks_go_on(
+def test_a_ray_that_cannot_be_started_is_reported_once_and_walks_go_on(
     opening: Opening, hybrid: HybridEvaluator, caplog: pytest.LogCaptureFixture
 ) -> None:
     wanted = first_of_many()

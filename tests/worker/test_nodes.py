@@ -1,4 +1,4 @@
-"""Which node of a cluster a task is sent to."""
+"""Placement of tasks on nodes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a cluster is asked to drop, and when. The cluster is made up."""
+"""Cancellation of tasks, on a fake cluster."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def dispatcher(made_up: MadeUpRay, nodes: OwnNode) -> Iterator[Dispatcher]:
         running.result()
 
 
-def test_tasks_that_nobody_waits_for_may_end_before_they_are_cancelled_once(
+def test_tasks_that_no_one_waits_for_may_end_before_they_are_cancelled_once(
     made_up: MadeUpRay, dispatcher: Dispatcher, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(pump, "GRACE_SECONDS", 2.0)

@@ -1,4 +1,4 @@
-"""What is Ray's own: processes that die, the memory they take, and what they leave behind."""
+"""Ray: processes that die, their memory, and leftovers."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ def test_cases_of_all_iterations_of_a_job_are_put_once(store: Store, shelf: Case
     assert len(store.kept) == 2
 
 
-def test_after_a_loss_they_are_put_anew(store: Store, shelf: CaseShelf) -> None:
+def test_after_a_loss_they_are_put_again(store: Store, shelf: CaseShelf) -> None:
     before = shelf.shared(WANTED.cases)
     shelf.forget()
     after = shelf.shared(WANTED.cases)

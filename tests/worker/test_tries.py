@@ -1,4 +1,4 @@
-"""What becomes of tasks whose workers are lost, and which are run twice, without any worker."""
+"""Retries and duplicates of tasks, without workers."""
 
 from __future__ import annotations
 

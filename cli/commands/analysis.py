@@ -209,7 +209,7 @@ def _importance_lines(view: ImportanceView) -> Iterator[str]:
 
     if view.designs < LEAST_DESIGNS:
         yield (
-            f"indices need {LEAST_DESIGNS} designs that walk in every case, and the job has"
+            f"indices need {LEAST_DESIGNS} designs that succeed in every case, and the job has"
             f" {view.designs}: add some by `gaitswarm extend`"
         )
     yield (

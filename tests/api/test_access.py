@@ -288,7 +288,7 @@ def test_what_a_quota_refuses_is_named_by_its_field(
     refused = server.client.post("/v1/jobs", json=spec.model_dump(mode="json"))
     assert refused.status_code == 409
     (error,) = refused.json()["errors"]
-    assert error["field"] == "iterations" and "may walk 10 s" in error["message"]
+    assert error["field"] == "iterations" and "the limit is 10 s" in error["message"]
     with (
         gaitswarm.connect(server.url) as jobs,
         pytest.raises(gaitswarm.QuotaExceeded, match=r"^iterations: the unfinished"),

@@ -254,7 +254,7 @@ def test_a_job_without_a_preference_cannot_be_ranked(
 ) -> None:
     answer = client.post(f"/v1/jobs/{identification.id}/ranking", json={"preference": "A"})
     assert answer.status_code == 422
-    assert "tunes a drive" in answer.json()["detail"]
+    assert "only tuning jobs" in answer.json()["detail"]
 
 
 def test_particles_of_an_identification_have_currents_as_utility(

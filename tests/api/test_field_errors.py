@@ -79,7 +79,7 @@ def test_what_is_neither_a_name_nor_an_object_hears_of_both(
 ) -> None:
     found = messages(document)
     assert list(found) == [field]
-    assert "or an object: " in found[field]
+    assert "or an object" in found[field]
 
 
 def test_a_robot_with_one_of_its_files_hears_of_the_other() -> None:

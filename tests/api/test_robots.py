@@ -69,18 +69,18 @@ def test_a_robot_that_faces_y_is_turned_when_that_is_said(client: httpx2.Client)
 def test_what_no_body_has_is_reported_by_a_check(client: httpx2.Client) -> None:
     made = propose_robot(dog().replace('ixx="1e-3"', 'ixx="1e-2"'), "dog")
     found = client.post("/v1/robots/checks", json={"toml": made.toml, "urdf": made.urdf}).json()
-    assert "no body of" in found["warnings"][0]
+    assert "cannot have the principal moments" in found["warnings"][0]
 
 
 @pytest.mark.parametrize(
     ("change", "field", "said"),
     [
         ({"urdf": "<robot"}, "urdf", "not well-formed XML"),
-        ({"urdf": " "}, "urdf", "is empty; it must hold the URDF"),
+        ({"urdf": " "}, "urdf", "is empty; it must contain the URDF"),
         ({"urdf": chain(4500)}, "urdf", "more than 256 links"),
-        ({"urdf": STATUE}, "urdf", "no joint of it moves"),
-        ({"urdf": dog(joints=2)}, "urdf", "3 joints|three joints"),
-        ({"urdf": dog().replace("-2.7", "-120")}, "urdf", "are degrees"),
+        ({"urdf": STATUE}, "urdf", "no movable joint"),
+        ({"urdf": dog(joints=2)}, "urdf", "three revolute joints"),
+        ({"urdf": dog().replace("-2.7", "-120")}, "urdf", "in degrees"),
         ({"urdf": "x" * 800_001}, "urdf", "800000 characters"),
         ({"name": "../dog"}, "name", "cannot name a robot"),
         ({"actuator": "steam"}, "actuator", "auto"),
@@ -110,7 +110,7 @@ def test_a_robot_that_is_larger_than_walks_may_be_is_refused(client: httpx2.Clie
     assert "robot.toml: a walk of this robot has a hip_height of 1.28" in error["message"]
     giant = dog().replace("0 0 -0.2", "0 0 -20")
     error = refused(client, "drafts", name="dog", urdf=giant)
-    assert "should be less than or equal to 1; lengths are metres" in error["message"]
+    assert "should be less than or equal to 1; lengths are in metres" in error["message"]
 
 
 def test_a_proposal_that_takes_too_much_is_ended(

@@ -90,7 +90,7 @@ def test_shipped_robots_have_the_presets() -> None:
 def test_a_spec_says_which_of_its_scenarios_are_held_out() -> None:
     assert small(held_out=["uphill"]).held_out_names == ("uphill",)
     assert small().held_out_names == ()
-    with pytest.raises(ValidationError, match="held_out: 'hidden' is none of the scenarios"):
+    with pytest.raises(ValidationError, match="held_out: 'hidden' is not among the scenarios"):
         small(held_out=["hidden"])
 
 

@@ -105,7 +105,7 @@ def test_a_certificate_is_not_forked_into_other_scenarios(
     store: Store, evaluator: Evaluator, given: dict[str, Any]
 ) -> None:
     parent = run(store, evaluator, small())
-    with pytest.raises(InvalidRequest, match="submit a new job in place of a fork"):
+    with pytest.raises(InvalidRequest, match="submit a new job instead"):
         JobService(store).fork(parent, ForkRequest(from_iteration=2, **given))
     assert [job.id for job in store.jobs().items] == [parent]
 

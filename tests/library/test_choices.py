@@ -71,9 +71,13 @@ def test_a_choice_is_taken_by_name_or_index(reach: Reach, db: Path) -> None:
 def test_a_choice_that_does_not_exist_is_refused_with_the_existing_ones(
     reach: Reach, db: Path
 ) -> None:
-    with pytest.raises(gaitswarm.InvalidRequest, match="none of its choices moving_average, hamm"):
+    with pytest.raises(
+        gaitswarm.InvalidRequest, match="not one of its choices moving_average, hamm"
+    ):
         reach(db).simulate({**PI, "fir_window": "boxcar"}, controller="pi", scenarios="1")
-    with pytest.raises(gaitswarm.InvalidRequest, match="none of its choices moving_average, hamm"):
+    with pytest.raises(
+        gaitswarm.InvalidRequest, match="not one of its choices moving_average, hamm"
+    ):
         gaitswarm.simulate({**PI, "fir_window": "boxcar"}, controller="pi", scenarios="1")
 
 
@@ -82,6 +86,6 @@ def test_a_design_file_may_name_choices(tmp_path: Path) -> None:
     path.write_text(json.dumps({**PI, "fir_window": "hamming"}))
     assert read_design(str(path), "pi") == {**PI, "fir_window": 1.0}
     path.write_text(json.dumps({**PI, "fir_window": "boxcar"}))
-    with pytest.raises(gaitswarm.InvalidRequest, match="none of its choices") as refused:
+    with pytest.raises(gaitswarm.InvalidRequest, match="not one of its choices") as refused:
         read_design(str(path), "pi")
     assert refused.value.field == "design.fir_window"

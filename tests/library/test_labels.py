@@ -50,7 +50,7 @@ def test_the_terminal_writes_and_finds_them(finished: Finished) -> None:
         in run_command("list", "--db", finished.db).err
     )
     nothing = run_command("list", "--db", finished.db, "--all", "--search", "nowhere")
-    assert (nothing.out, nothing.err) == ("", "no job fits\n")
+    assert (nothing.out, nothing.err) == ("", "no job matches\n")
     everything = run_command("list", "--db", finished.db, "--all")
     assert {"#a", "archived"} <= set(everything.out.split())
     emptied = run_command("label", finished.id, "--db", finished.db, "--no-tags", "--json").json
@@ -63,8 +63,8 @@ def test_a_list_says_that_there_is_more(reach: Reach, finished: Finished) -> Non
         for seed in (8, 9):
             jobs.submit(spec, seed=seed)
     result = run_command("list", "--db", finished.db, "--limit", "2")
-    assert "there are more than 2: see them by --limit" in result.err
-    assert "there are more" not in run_command("list", "--db", finished.db, "--limit", "3").err
+    assert "more than 2 jobs match: raise --limit" in result.err
+    assert "jobs match" not in run_command("list", "--db", finished.db, "--limit", "3").err
 
 
 def test_jobs_are_compared(reach: Reach, finished: Finished) -> None:

@@ -88,7 +88,7 @@ def test_an_extension_counts_what_is_spent_of_the_budget_not_iterations(
 ) -> None:
     job_id = run_uneven(db).job.id
     jobs = reach(db)
-    with pytest.raises(gaitswarm.InvalidRequest, match="more than the 4"):
+    with pytest.raises(gaitswarm.InvalidRequest, match="must exceed the 4 committed"):
         jobs.extend(job_id, 4)
     assert jobs.extend(job_id, 5).evaluations_planned == 15
     with uneven_iterations():

@@ -53,7 +53,7 @@ def test_many_designs_walk_in_a_world_as_each_alone() -> None:
 @pytest.mark.parametrize(
     ("world", "field", "said"),
     [
-        ({"gravity": 3.0}, "world.gravity", "no perturbation; known are friction_factor"),
+        ({"gravity": 3.0}, "world.gravity", "unknown perturbation; known are friction_factor"),
         ({"friction_factor": -1.0}, "world.friction_factor", "-1 must lie in 0 to 100"),
         ({"slope_added": float("nan")}, "world.slope_added", "finite number"),
         ([0.8], "world", "must be a mapping"),

@@ -117,7 +117,7 @@ def test_a_pose_that_the_legs_do_not_reach_is_refused(
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--scenario", "1,2"), "scenario: one scenario, not several"),
+        (("--scenario", "1,2"), "scenario: must name one scenario"),
         (("--scenario", "moon"), "unknown scenario 'moon'"),
         (("--robot", "moon"), "robot: unknown robot 'moon'"),
         (("-o", "/nowhere/robot.xml"), "output: cannot write /nowhere/robot.xml"),

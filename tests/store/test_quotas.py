@@ -25,7 +25,7 @@ def test_an_owner_has_only_so_many_unfinished_jobs(store: SqlStore, owner: str |
     first = submit(store, owner)
     store.command(submit(store, owner), Command.PAUSE)
     submit(store, "another")
-    with pytest.raises(QuotaExceeded, match=r"2 unfinished jobs.*may be 2.*cancel one"):
+    with pytest.raises(QuotaExceeded, match=r"2 unfinished jobs.*limit of 2.*cancel one"):
         submit(store, owner)
     submit(store, owner, quota=None)
     store.command(first, Command.CANCEL)
@@ -36,7 +36,7 @@ def test_an_owner_has_only_so_many_unfinished_jobs(store: SqlStore, owner: str |
 def test_unfinished_jobs_walk_only_so_long_together(store: SqlStore) -> None:
     quota = Quota(jobs=100, seconds=100.0)
     submit(store, "ci", quota, seconds=60.0)
-    with pytest.raises(QuotaExceeded, match="with this one 120 s, and may walk 100 s") as refused:
+    with pytest.raises(QuotaExceeded, match="with this one 120 s; the limit is 100 s") as refused:
         submit(store, "ci", quota, seconds=60.0)
     assert refused.value.field == "iterations"
     submit(store, "ci", quota, seconds=40.0)

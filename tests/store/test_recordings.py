@@ -131,6 +131,6 @@ def test_a_job_for_a_recording_that_is_missing_is_refused(store: SqlStore) -> No
 
 def test_a_job_for_a_recording_of_other_joints_is_refused(store: SqlStore) -> None:
     other = recording(joints=load_robot("szabadka2").joint_names[::-1])
-    with pytest.raises(InvalidRequest, match="other joints") as refused:
+    with pytest.raises(InvalidRequest, match="joints differ from the robot") as refused:
         JobService(store).submit(spec(store.add_recording(other)))
     assert refused.value.field == "recordings.0"

@@ -89,7 +89,7 @@ def test_a_urdf_is_simulated_and_submitted(
     urdf = page.get_by_label("URDF", exact=True)
     urdf.set_input_files(file("broken.urdf", dog().replace("-2.7", "-120")))
     error = page.get_by_role("alert").filter(has_text="Could not create a robot from broken.urdf.")
-    expect(error).to_contain_text(re.compile("urdf: .*line .*are degrees"))
+    expect(error).to_contain_text(re.compile("urdf: .*line .*in degrees"))
 
     urdf.set_input_files(file("dog.urdf", dog(foot="cylinder")))
     results = page.get_by_role("region", name="Check results")

@@ -262,7 +262,7 @@ def _reason_for_new_search(parent: AnySpec, changed: Sequence[str]) -> str:
     """Return why no method's search can be taken over; "" if it may be."""
     others = [name for name in changed if name not in _OUTCOMES_HOLD]
     if others:
-        return f"results of the parent's designs do not hold for another {' and '.join(others)}"
+        return f"results of the parent's designs do not hold for a different {' and '.join(others)}"
     if "optimizer" in changed:
         return "another search method or other settings cannot continue the parent's search"
     if "preference" in changed and parent.precision == "single":

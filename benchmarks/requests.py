@@ -3,7 +3,7 @@
     python -m benchmarks.requests [--seconds 60] [--rate 20] [--streams 50] [--jobs 200]
 
 Starts `gaitswarm serve` on a new SQLite database with finished jobs and one that runs in its
-process in one slot, opens the streams, and sends requests at a fixed rate. Latency counts from the
+process, opens the streams, and sends requests at a fixed rate. Latency counts from the
 time at which a request was due.
 """
 
@@ -30,7 +30,7 @@ def start(folder: str) -> tuple[subprocess.Popen[str], str]:
     log = Path(folder) / "log"
     with log.open("w") as stream:
         command = [sys.executable, "-m", "gaitswarm", "serve", "--evaluator", "in-process"]
-        command += ["--cpus", "1", "--db", f"{folder}/jobs.db", "--port", "0"]
+        command += ["--db", f"{folder}/jobs.db", "--port", "0"]
         process = subprocess.Popen(command, stderr=stream, text=True)
     while " serves " not in (text := log.read_text()):
         if process.poll() is not None:

@@ -34,7 +34,7 @@ T = TypeVar("T")
 
 
 class AsyncDatabaseFindings(ABC):
-    """Findings, read while the event loop goes on."""
+    """Findings, read without blocking the event loop."""
 
     @abstractmethod
     async def _jobs(self) -> DatabaseFindings:

@@ -73,7 +73,7 @@ class OpenFile:
         with self._lock:
             self._connections += 1
             if self._connections == 1:
-                # SQLite follows links to the file, and has its log beside where they lead.
+                # SQLite follows links, and keeps its log next to the target.
                 real = self._file.resolve()
                 self._log = real.with_name(f"{real.name}-wal")
                 self._file_identity, self._log_identity = self._present()

@@ -15,8 +15,8 @@ from pydantic.json_schema import JsonSchemaMode, models_json_schema
 
 from gaitswarm.api.middleware import security_policy
 from gaitswarm.api.problems import MEDIA_TYPE
+from gaitswarm.services.optimizer.views import MEDIA_TYPE as BINARY
 from gaitswarm.views import ParticlesHeaderView, ProblemView
-from gaitswarm.views.base import MEDIA_TYPE as BINARY
 from gaitswarm.views.replay import ReplayHeaderView
 
 DESCRIPTION: Final = """

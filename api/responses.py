@@ -9,7 +9,7 @@ from typing import Final
 from fastapi import Response, status
 from pydantic import BaseModel
 
-from gaitswarm.views.base import MEDIA_TYPE
+from gaitswarm.services.optimizer.views import MEDIA_TYPE
 
 NOT_STORED: Final = {"Cache-Control": "no-store"}
 

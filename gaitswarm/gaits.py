@@ -9,12 +9,12 @@ from pydantic import Field
 
 from gaitswarm.errors import simulation_errors
 from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.views import View
 from gaitswarm.sim.errors import BeyondJointLimit, UnreachablePose
 from gaitswarm.sim.gait.gaits import GAITS, find_gait, leg_gaits, suits, supporting
 from gaitswarm.sim.gait.stability import static_stability
 from gaitswarm.sim.robot import Robot, RobotChoice, load_robot
 from gaitswarm.sim.scenario import GaitName, Scenario
-from gaitswarm.views.base import View
 from gaitswarm.views.simulation import PlannedGaitView
 
 COLUMNS: Final = 40

@@ -13,9 +13,9 @@ from gaitswarm.api.documentation import binary, problems
 from gaitswarm.api.responses import BinaryResponse, tagged_response
 from gaitswarm.meshes import MeshLibrary
 from gaitswarm.robots import RobotDraftRequest, check_robot, run_robot_draft
+from gaitswarm.services.optimizer.views import MEDIA_TYPE
 from gaitswarm.sim.robot import RobotFiles
 from gaitswarm.views import PREFIX, CatalogueView
-from gaitswarm.views.base import MEDIA_TYPE
 from gaitswarm.views.robots import MeshFileView, RobotCheckView, RobotDraftView
 
 router = APIRouter(prefix=f"{PREFIX}/robots")

@@ -37,6 +37,7 @@ from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.services.optimizer.views import finite
 from gaitswarm.settings import place_of
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.variables import Variable
@@ -49,7 +50,6 @@ from gaitswarm.views.analysis import (
     VariableImportanceView,
     WidenedView,
 )
-from gaitswarm.views.base import finite
 from gaitswarm.views.certificate import CertificateView
 from gaitswarm.views.robustness import IndexView
 from gaitswarm.views.trade_offs import FrontView, PreferenceForView

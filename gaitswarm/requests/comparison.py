@@ -12,9 +12,9 @@ from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
 from gaitswarm.services.optimizer.jobs.iteration import Iteration
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.optimizer.views import finite
 from gaitswarm.sim.scenario import Scenario
 from gaitswarm.sim.variables import Variable
-from gaitswarm.views.base import finite
 from gaitswarm.views.catalogue import ReferenceView
 from gaitswarm.views.comparison import (
     ComparedJobView,

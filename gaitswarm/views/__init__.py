@@ -5,6 +5,14 @@ Nothing in this package knows FastAPI or HTTP.
 
 from __future__ import annotations
 
+from gaitswarm.services.optimizer.analysis.evaluations import (
+    EvaluationView,
+    ObjectiveView,
+    ScenarioResultView,
+    encoded_evaluations,
+    evaluation_views,
+)
+from gaitswarm.services.optimizer.views import PageView, View, finite
 from gaitswarm.views.analysis import (
     DistributionItemView,
     DistributionView,
@@ -15,11 +23,8 @@ from gaitswarm.views.analysis import (
 from gaitswarm.views.base import (
     PREFIX,
     FieldErrorView,
-    PageView,
     ProblemView,
-    View,
     field_errors,
-    finite,
 )
 from gaitswarm.views.catalogue import (
     CaseView,
@@ -40,16 +45,11 @@ from gaitswarm.views.catalogue import (
 )
 from gaitswarm.views.history import (
     BestView,
-    EvaluationView,
     HistoryIterationView,
     IterationView,
-    ObjectiveView,
     ParticlesHeaderView,
-    ScenarioResultView,
-    encoded_evaluations,
     encoded_iterations,
     encoded_particles,
-    evaluation_views,
 )
 from gaitswarm.views.job import (
     EstimateView,

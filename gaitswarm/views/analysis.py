@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from gaitswarm.services.optimizer.analysis.distribution import QUANTILES, Distribution
+from gaitswarm.services.optimizer.analysis.evaluations import ScenarioResultView, evaluation_views
 from gaitswarm.services.optimizer.analysis.ranking import RankedDesign, RankedJob
 from gaitswarm.services.optimizer.analysis.scenario_families import (
     Family,
@@ -21,12 +22,11 @@ from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice
+from gaitswarm.services.optimizer.views import View, finite
 from gaitswarm.sim.controllers import ControllerName
 from gaitswarm.sim.controllers.mamdani import Rule
 from gaitswarm.sim.controllers.quantisation import OUTPUT_BITS
 from gaitswarm.sim.controllers.surface import Memberships, Surface
-from gaitswarm.views.base import View, finite
-from gaitswarm.views.history import ScenarioResultView, evaluation_views
 from gaitswarm.views.robustness import IndexView
 
 

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from gaitswarm.services.optimizer.analysis.targets import Reached, TargetResult, TargetResults
 from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
-from gaitswarm.views.base import View, finite
+from gaitswarm.services.optimizer.views import View, finite
 
 
 class ReachedView(View):

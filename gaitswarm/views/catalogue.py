@@ -16,6 +16,7 @@ from gaitswarm.services.optimizer.search.automatic import (
     ChosenSettings,
 )
 from gaitswarm.services.optimizer.search.registry import METHODS
+from gaitswarm.services.optimizer.views import View, finite, listing_name
 from gaitswarm.sim.case_registry import CASES
 from gaitswarm.sim.catalogue import design_shown
 from gaitswarm.sim.controllers import CONTROLLERS
@@ -25,7 +26,6 @@ from gaitswarm.sim.robot import DEFAULT_ROBOT, SHIPPED, RobotName, load_robot
 from gaitswarm.sim.robot.identifiable import CONVENTIONAL_VARIABLES, identifiable_variables
 from gaitswarm.sim.scenario import PRESETS, Scenario
 from gaitswarm.sim.variables import Variable
-from gaitswarm.views.base import View, finite, listing_name
 
 T = TypeVar("T")
 

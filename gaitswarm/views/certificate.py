@@ -19,10 +19,9 @@ from gaitswarm.services.optimizer.analysis.certificate import (
 )
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 from gaitswarm.services.optimizer.jobs.preference import Preference
+from gaitswarm.services.optimizer.views import StatusName, View, finite
 from gaitswarm.sim.mujoco.engines import ENGINES
 from gaitswarm.sim.robot import RobotSource
-from gaitswarm.views.base import View, finite
-from gaitswarm.views.history import StatusName
 
 
 class ProportionView(View):

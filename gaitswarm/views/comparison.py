@@ -5,7 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from gaitswarm.services.optimizer.jobs.job import JobState
-from gaitswarm.views.base import View
+from gaitswarm.services.optimizer.views import View
 from gaitswarm.views.catalogue import ReferenceView
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pydantic import Field
 
+from gaitswarm.services.optimizer.views import View, finite
 from gaitswarm.sim.controllers import ControllerName
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.firmware import BUDGET, Firmware
-from gaitswarm.views.base import View, finite
 
 
 class FirmwareTableView(View):

@@ -14,12 +14,12 @@ from gaitswarm.services.optimizer.analysis.identifiability import (
     Trust,
 )
 from gaitswarm.services.optimizer.store.port.recordings import RecordingEntry
+from gaitswarm.services.optimizer.views import View, finite
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.identification.recorded_walk import RecordedWalk
 from gaitswarm.sim.measurement.measured_log import MeasuredLog, Quantity
 from gaitswarm.sim.measurement.synchronise import Synchronised
 from gaitswarm.sim.scenario import Scenario
-from gaitswarm.views.base import View, finite
 
 
 class IntervalView(View):

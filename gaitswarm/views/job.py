@@ -8,6 +8,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from gaitswarm.services.optimizer.analysis.evaluations import ObjectiveView
 from gaitswarm.services.optimizer.errors import Unreadable
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.estimate import Estimate, time_left
@@ -23,10 +24,11 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.labels import FacetCounts, preference_name, robot_name
 from gaitswarm.services.optimizer.jobs.priority import HIGHEST, LOWEST
 from gaitswarm.services.optimizer.jobs.provenance import ProvenanceRecord
+from gaitswarm.services.optimizer.views import View, finite
 from gaitswarm.sim.kernel.walk import Precision
-from gaitswarm.views.base import View, finite, job_links
+from gaitswarm.views.base import job_links
 from gaitswarm.views.catalogue import ReferenceView
-from gaitswarm.views.history import BestView, ObjectiveView
+from gaitswarm.views.history import BestView
 
 
 @dataclass(frozen=True, slots=True)
@@ -338,7 +340,7 @@ class JobView(JobSummaryView):
         if job.readable:
             spec = job.spec
             view = None if best is None else BestView.from_evaluation(best, spec)
-            objectives = [ObjectiveView.from_objective(o) for o in spec.objectives]
+            objectives = [ObjectiveView.model_validate(o) for o in spec.objectives]
         return cls.model_validate(
             {
                 **_summary(job),

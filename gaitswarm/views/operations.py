@@ -17,7 +17,7 @@ from gaitswarm.services.monitoring.activity import (
 )
 from gaitswarm.services.optimizer.jobs.audit import AuditAction, AuditEntry
 from gaitswarm.services.optimizer.jobs.notification import Notification
-from gaitswarm.views.base import View
+from gaitswarm.services.optimizer.views import View
 
 Level = Literal["DEBUG", "INFO", "WARNING", "ERROR", "CRITICAL"]
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from gaitswarm.services.optimizer.views import StatusName, View, finite, framed, unframed
 from gaitswarm.sim.kernel.parameters import gravity_on
 from gaitswarm.sim.outcome import OBJECTIVE_NAMES, OBJECTIVES, Status
 from gaitswarm.sim.replay import Replay
@@ -18,8 +19,6 @@ from gaitswarm.sim.robot import Robot
 from gaitswarm.sim.robot.shapes import Role, Shape, VisibleLink
 from gaitswarm.sim.robot.urdf import SolidKind
 from gaitswarm.sim.scenario import Scenario
-from gaitswarm.views.base import View, finite, framed, unframed
-from gaitswarm.views.history import StatusName
 from gaitswarm.views.robots import LinkMeshView
 from gaitswarm.views.simulation import QUANTITIES
 

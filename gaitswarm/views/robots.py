@@ -7,9 +7,10 @@ from typing import Any
 from pydantic import Field
 
 from gaitswarm.meshes import FoundMesh, MeshFormat
+from gaitswarm.services.optimizer.views import View
 from gaitswarm.sim.robot.shapes import VisualMesh
 from gaitswarm.sim.variables import Variable
-from gaitswarm.views.base import PREFIX, View
+from gaitswarm.views.base import PREFIX
 
 
 class LinkMeshView(View):

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from gaitswarm.services.optimizer.analysis.evaluations import ObjectiveView
 from gaitswarm.services.optimizer.analysis.robustness_index import (
     NORMALISED_OBJECTIVES,
     LocalSample,
@@ -15,12 +16,11 @@ from gaitswarm.services.optimizer.analysis.robustness_index import (
     Sensitivity,
 )
 from gaitswarm.services.optimizer.analysis.statistics import Interval
+from gaitswarm.services.optimizer.views import View, finite
 from gaitswarm.sim.catalogue import design_shown
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.robot import RobotSource
 from gaitswarm.sim.variables import Variable
-from gaitswarm.views.base import View, finite
-from gaitswarm.views.history import ObjectiveView
 
 _NAMES = tuple(objective.name for objective in NORMALISED_OBJECTIVES)
 
@@ -179,7 +179,7 @@ class RobustnessView(View):
             seed=seed,
             variables=[_sampled(sample, variable) for variable in sample.varied],
             held=list(sample.held),
-            objectives=[ObjectiveView.from_objective(o) for o in NORMALISED_OBJECTIVES],
+            objectives=[ObjectiveView.model_validate(o) for o in NORMALISED_OBJECTIVES],
             index=IndexView.from_interval(found.index),
             by_objective=_by_name(_NAMES, found.by_objective),
             by_variable=_by_name(names, found.by_variable),

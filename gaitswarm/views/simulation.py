@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, WithJsonSchema
 
+from gaitswarm.services.optimizer.analysis.evaluations import ScenarioResultView, case_results
 from gaitswarm.services.optimizer.jobs.preference import Preference, figure_of_merit, judge
+from gaitswarm.services.optimizer.views import View, finite
 from gaitswarm.sim.catalogue import design_shown
 from gaitswarm.sim.gait.stability import Stability
 from gaitswarm.sim.kernel.observation import WalkLog
 from gaitswarm.sim.kernel.walk import Precision
-from gaitswarm.sim.outcome import MEASUREMENT_NAMES, OBJECTIVES, Status
+from gaitswarm.sim.outcome import MEASUREMENT_NAMES, OBJECTIVE_NAMES, Status
 from gaitswarm.sim.robot import RobotSource
-from gaitswarm.views.base import View, finite
-from gaitswarm.views.history import ScenarioResultView, case_results
 
 LOG_RATE: Final = 500
 """Rows of a log per second of simulated time [Hz]."""
@@ -200,7 +200,9 @@ class SimulationView(View):
     ) -> SimulationView:
         """Make a view of one design's walks, one in each of K scenarios."""
         judged = judge(objectives[None], (statuses != Status.OK)[None], preference)
-        results = case_results(names, OBJECTIVES, statuses, objectives, judged.log_utilities[0])
+        results = case_results(
+            names, OBJECTIVE_NAMES, statuses, objectives, judged.log_utilities[0]
+        )
         recorded = [None if log is None else WalkLogView.from_log(log) for log in logs]
         planned = list[PlannedGaitView | None](map(PlannedGaitView.from_stability, gaits))
         return cls(
@@ -213,7 +215,7 @@ class SimulationView(View):
             figure_of_merit=figure_of_merit(float(judged.fitness[0]), preference),
             scenarios={
                 name: SimulatedScenarioView.model_construct(
-                    **dict(results[name]),
+                    **results[name],
                     measurements=MeasurementsView.from_row(row),
                     gait=gait,
                     log=log,

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from gaitswarm.services.optimizer.analysis.evaluations import ObjectiveView
 from gaitswarm.services.optimizer.analysis.front import Front
 from gaitswarm.services.optimizer.analysis.robustness_index import NORMALISED_OBJECTIVES
 from gaitswarm.services.optimizer.analysis.utilities import objective_vectors
@@ -16,8 +17,7 @@ from gaitswarm.services.optimizer.analysis.winning_preference import PreferenceF
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.preference import Preference
-from gaitswarm.views.base import View, finite
-from gaitswarm.views.history import ObjectiveView
+from gaitswarm.services.optimizer.views import View, finite
 
 OBJECTIVE_NAMES: Final = tuple(objective.name for objective in NORMALISED_OBJECTIVES)
 
@@ -188,7 +188,7 @@ class FrontView(View):
         marks = _marks(front)
         judged = int(np.isfinite(front.vectors[:, 0]).sum())
         return cls(
-            objectives=[ObjectiveView.from_objective(f) for f in NORMALISED_OBJECTIVES],
+            objectives=[ObjectiveView.model_validate(f) for f in NORMALISED_OBJECTIVES],
             designs_judged=judged,
             failed=len(columns) - judged,
             size=len(front.rows),

@@ -6,7 +6,7 @@ from typing import Annotated, Final
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from gaitswarm.views.base import View
+from gaitswarm.services.optimizer.views import View
 
 DIGEST: Final = "^[0-9a-f]{64}$"
 """Of an iteration: SHA-256, in hexadecimal digits."""

@@ -13,6 +13,7 @@ from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Reevaluation
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
 from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.views import StatusName
 from gaitswarm.sim.kernel.observation import WalkLog
 from gaitswarm.sim.outcome import N_MEASUREMENTS, N_OBJECTIVES, OBJECTIVES, Status
 from gaitswarm.views import (
@@ -23,7 +24,6 @@ from gaitswarm.views import (
     WalkLogView,
     evaluation_views,
 )
-from gaitswarm.views.history import StatusName
 from tests.api.conftest import Commit
 from tests.examples.processes import loaded_by
 

@@ -1,0 +1,131 @@
+"""Evaluations of a job as JSON"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, TypeAdapter
+from pydantic_core import to_json
+
+from gaitswarm.services.optimizer.jobs.iteration import Evaluation
+from gaitswarm.services.optimizer.jobs.judgement import exponential
+from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.services.optimizer.views import (
+    DesignValues,
+    IterationIndex,
+    Particle,
+    StatusName,
+    View,
+    finite,
+)
+from gaitswarm.sim.outcome import OBJECTIVES, Status
+
+
+class ObjectiveView(View):
+    """One thing that a job minimizes in every case."""
+
+    name: str = Field(description="Name, as in results.", examples=["torque"])
+    unit: str = Field(description="Its unit.", examples=["N m"])
+    description: str = Field(description="Its meaning.")
+
+
+class ScenarioResultView(View):
+    """Result of a design in one case of its job: a scenario, or a fit to a recording."""
+
+    status: StatusName = Field(description="Status of the simulation; only `ok` is a success.")
+    explanation: str = Field(description="The status in a sentence, with what to do about it.")
+    utility: float | None = Field(
+        description="Minimized; null if the simulation failed. In a scenario the bias-weighted"
+        " product of objectives (eq. 3.8, 4.1) [1], of a fit the mean absolute error [A].",
+        examples=[21.05],
+    )
+    objectives: dict[str, float | None] = Field(
+        description="Raw objectives by name, minimized; units are in the job's `objectives`, those"
+        f" of table 4.1 {', '.join(f'{o.name} [{o.unit}]' for o in OBJECTIVES)}.",
+        examples=[{"torque": 8.71, "acceleration": 1.77, "height_loss": 0.0038}],
+    )
+
+
+class EvaluationView(View):
+    """One design, judged in every case of its job."""
+
+    iteration: IterationIndex
+    particle: Particle
+    fitness: float | None = Field(
+        description="Minimized: geometric mean of the scenarios' utilities (eq. 4.2) [1], or mean"
+        " error of the fits (eq. 2.21) [A]; null if the design failed in any case.",
+        examples=[20.87],
+    )
+    figure_of_merit: float | None = Field(
+        default=None,
+        description="Maximized: F of eq. 3.1 [1] under the preference chapter-3, else null.",
+        examples=[6.9],
+    )
+    design: DesignValues
+    scenarios: dict[str, ScenarioResultView] = Field(
+        description="Result in each case, by the scenario's name or the recording's short id."
+    )
+
+
+_EVALUATIONS: Final = TypeAdapter(list[EvaluationView])
+
+
+def evaluation_views(evaluations: Sequence[Evaluation], spec: Spec) -> list[EvaluationView]:
+    """Make views of evaluations of one job."""
+    # One validation for all: a call for each result would dominate.
+    return _EVALUATIONS.validate_python(_documents(evaluations, spec))
+
+
+def encoded_evaluations(evaluations: Sequence[Evaluation], spec: Spec) -> bytes:
+    """Encode views of evaluations of one job, of which none is made."""
+    return to_json({"items": _documents(evaluations, spec)})
+
+
+def _documents(evaluations: Sequence[Evaluation], spec: Spec) -> list[dict[str, object]]:
+    """Fields of `EvaluationView`, in its order."""
+    if not evaluations:
+        return []
+    space = spec.design_space()
+    objectives = np.stack([evaluation.objectives for evaluation in evaluations])
+    statuses = np.stack([evaluation.statuses for evaluation in evaluations])
+    logs = spec.judge(objectives, statuses != Status.OK).log_utilities
+    columns = [objective.name for objective in spec.objectives]
+    return [
+        {
+            "iteration": evaluation.iteration,
+            "particle": evaluation.particle,
+            "fitness": finite(evaluation.fitness),
+            "figure_of_merit": spec.figure_of_merit(evaluation.fitness),
+            "design": space.shown(evaluation.design.tolist()),
+            "scenarios": case_results(
+                spec.case_names, columns, evaluation.statuses, evaluation.objectives, log_utilities
+            ),
+        }
+        for evaluation, log_utilities in zip(evaluations, logs, strict=True)
+    ]
+
+
+def case_results(
+    names: Sequence[str],
+    objectives: Sequence[str],
+    statuses: NDArray[np.uint8],
+    values: NDArray[np.float64],
+    log_utilities: NDArray[np.float64],
+) -> dict[str, dict[str, Any]]:
+    """Return the fields of the `ScenarioResultView` of one design in each of K cases."""
+    # Few designs lack a number; checking each would dominate.
+    row_values = list if np.isfinite(values).all() else lambda row: list(map(finite, row))
+    return {
+        name: {
+            "status": (status := Status(code)).label,
+            "explanation": status.phrase,
+            "utility": finite(exponential(log)),
+            "objectives": dict(zip(objectives, row_values(row), strict=True)),
+        }
+        for name, code, row, log in zip(
+            names, statuses.tolist(), values.tolist(), log_utilities.tolist(), strict=True
+        )
+    }

@@ -1,7 +1,7 @@
 /** A surface as a heat map with a movable point and a numeric readout. */
 
 import { useEffect, useRef, useState } from 'preact/hooks'
-import { ChartFrame } from '../charts/chart-frame'
+import { ChartCard } from '../charts/chart-card'
 import { type Column, Table } from '../components/table/table'
 import { formatNumber, quantity } from '../format/number'
 import { useTheme } from '../theme'
@@ -63,7 +63,7 @@ export function HeatMap({
   }
   const [low, high] = extent(layer.values)
   return (
-    <ChartFrame
+    <ChartCard
       title={layer.title}
       note={layer.note}
       table={() => <LayerTable layer={layer} />}
@@ -96,7 +96,7 @@ export function HeatMap({
       <p class="heat-reading" aria-live={focused ? 'polite' : 'off'}>
         {reading(layer, cell)}
       </p>
-    </ChartFrame>
+    </ChartCard>
   )
 }
 

@@ -2,7 +2,7 @@
 
 import { useEffect, useRef, useState } from 'preact/hooks'
 import { messageOf } from '../api/problem'
-import { ChartFrame } from '../charts/chart-frame'
+import { ChartCard } from '../charts/chart-card'
 import { Segmented } from '../components/fields/segmented'
 import { describeCanvas } from '../export/canvas-source'
 import { quantity, withUnit } from '../format/number'
@@ -36,7 +36,7 @@ export function SurfaceView({
   const [key, setKey] = useQueryValue('surface', LAYER, 'inference')
   const layer = layers.find((each) => each.key === key) ?? layers[0]
   return (
-    <ChartFrame
+    <ChartCard
       title={withUnit(`Surface of ${name}`, layer.unit)}
       note="Output over error and current; the ball marks the selected point. Drag to rotate."
       table={() => <Summary layers={layers} />}
@@ -51,7 +51,7 @@ export function SurfaceView({
       }
     >
       <Stage layer={layer} cell={cell} />
-    </ChartFrame>
+    </ChartCard>
   )
 }
 

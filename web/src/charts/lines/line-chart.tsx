@@ -5,6 +5,7 @@ import uPlot from 'uplot'
 import 'uplot/dist/uPlot.min.css'
 import { describeCanvas } from '../../export/canvas-source'
 import { formatExact, formatNumber, withUnit } from '../../format/number'
+import { RANGE, useQueryValue } from '../../router/query-value'
 import { themeColour, useTheme } from '../../theme'
 import { logRange, logTicks } from '../log-axis'
 import { drawLines, drawMarker } from './line-drawing'
@@ -58,10 +59,8 @@ export interface LineChartProps {
   readonly marker?: number | null
   /** Called with the x under the pointer on a click. */
   readonly onPick?: (x: number) => void
-  /** Initial range of x; null for all. */
-  readonly zoom?: Zoom
-  /** Called when the user changes the range; null for all. */
-  readonly onZoom?: (range: Zoom) => void
+  /** Query parameter of the zoom; charts with the same one zoom together. */
+  readonly zoomName?: string
   /** Charts with the same key share their pointer. */
   readonly sync?: string
 }
@@ -77,7 +76,13 @@ export function LineChart(props: LineChartProps) {
   const plot = useRef<uPlot | null>(null)
   const latest = useRef(props)
   latest.current = props
-  const zoom = useZoom(props)
+  const [initial, writeZoom] = useQueryValue(props.zoomName ?? 'zoom', RANGE, null)
+  /** Requested range of x. New data must not undo it, even if it reaches beyond them. */
+  const zoom = useRef<Zoom>(initial)
+  const onZoom = (range: Zoom) => {
+    zoom.current = range
+    writeZoom(range)
+  }
   const theme = useTheme()
   const height = remPixels((props.height ?? 260) / 14)
 
@@ -85,7 +90,7 @@ export function LineChart(props: LineChartProps) {
     const parent = box.current!
     const width = Math.max(120, parent.clientWidth)
     const drawn = new uPlot(
-      { ...options(latest, zoom, readout.current!), width, height },
+      { ...options(latest, zoom, onZoom, readout.current!), width, height },
       dataOf(latest.current),
       parent,
     )
@@ -126,17 +131,6 @@ export function LineChart(props: LineChartProps) {
 }
 
 type Zoom = readonly [number, number] | null
-
-/**
- * Requested range of x: the latest of the user's choice and the property. New data may arrive before a
- * choice comes back as a property, and must not undo it.
- */
-function useZoom({ zoom = null }: LineChartProps): { current: Zoom } {
-  const requested = useRef<Zoom>(zoom)
-  const previous = useRef<Zoom>(zoom)
-  if (zoom?.join() !== previous.current?.join()) requested.current = previous.current = zoom
-  return requested
-}
 
 /** Everything that requires a new plot; other changes are data. */
 function shapeOf({
@@ -186,7 +180,8 @@ function dataOf({ x, series, logarithmic }: LineChartProps): uPlot.AlignedData {
 /** props: by reference, since callbacks outlive a render. */
 function options(
   props: { current: LineChartProps },
-  requested: { current: Zoom },
+  requested: { readonly current: Zoom },
+  onZoom: (range: Zoom) => void,
   readout: HTMLElement,
 ) {
   const { series, bands = [], logarithmic, sync, counted, xMargin = 0 } = props.current
@@ -275,8 +270,7 @@ function options(
           // A requested range may reach beyond the data received so far.
           if (before?.[0] === min && before?.[1] === max) return
           if (!u.root.dataset.settled || range?.join() === before?.join()) return
-          requested.current = range
-          props.current.onZoom?.(range)
+          onZoom(range)
         },
       ],
       ready: [

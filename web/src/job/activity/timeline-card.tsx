@@ -2,7 +2,7 @@
 
 import { useMemo } from 'preact/hooks'
 import type { Activity } from '../../api/types'
-import { ChartFrame } from '../../charts/chart-frame'
+import { ChartCard } from '../../charts/chart-card'
 import { Empty } from '../../components/feedback'
 import { type Column, Table } from '../../components/table/table'
 import { formatCount, formatNumber } from '../../format/number'
@@ -18,7 +18,7 @@ export function TimelineCard({ activity }: { activity: Activity }) {
   const timeline = useMemo(() => timelineOf(activity, MOST), [activity])
   const drawn = Math.min(MOST, activity.tasks.length)
   return (
-    <ChartFrame
+    <ChartCard
       title="Timeline"
       note={`The last ${formatCount(drawn)} tasks over ${formatNumber(timeline.seconds, 3)} s by machine; lines mark the starts of iterations.`}
       legend={
@@ -46,7 +46,7 @@ export function TimelineCard({ activity }: { activity: Activity }) {
           ))}
         </div>
       )}
-    </ChartFrame>
+    </ChartCard>
   )
 }
 

@@ -1,7 +1,7 @@
 /** Sobol’ indices of the variables, with confidence intervals. */
 
 import type { Importance, VariableImportance } from '../../api/types'
-import { ChartFrame } from '../../charts/chart-frame'
+import { ChartCard } from '../../charts/chart-card'
 import { BrokenName } from '../../components/broken-name'
 import { Empty } from '../../components/feedback'
 import { type Column, Table } from '../../components/table/table'
@@ -16,7 +16,7 @@ export function ImportanceCard({ importance }: { importance: Importance }) {
   const output = outputs.find((name) => name === query.get('of')) ?? 'fitness'
   const hasEstimate = importance.variables.some((variable) => indexOf(variable, output) !== null)
   return (
-    <ChartFrame
+    <ChartCard
       title="Variable importance"
       note={`Share of the variance of ${outputWords(output)}, by rank, explained by each variable alone: first-order Sobol’ index with its 95 % interval as a line.`}
       tools={
@@ -52,7 +52,7 @@ export function ImportanceCard({ importance }: { importance: Importance }) {
         towards failing. The search does not sample independently: correlated variables share their
         effect, and interactions between variables are not included.
       </p>
-    </ChartFrame>
+    </ChartCard>
   )
 }
 

@@ -5,12 +5,12 @@ import type uPlot from 'uplot'
 import { getBytes } from '../../api/client'
 import { useResource, useSlowly } from '../../api/resource'
 import type { Iteration, Job } from '../../api/types'
-import { ChartFrame, LegendEntry } from '../../charts/chart-frame'
+import { ChartCard, LegendEntry } from '../../charts/chart-card'
 import { type Band, LineChart, type Series } from '../../charts/lines/line-chart'
 import { lineLabel, type ReferenceLine } from '../../charts/lines/reference-line'
 import { Check } from '../../components/fields/check'
 import { formatCount, formatNumber, withUnit } from '../../format/number'
-import { flag, RANGE, useQueryValue } from '../../router/query-value'
+import { flag, useQueryValue } from '../../router/query-value'
 import { ByIteration } from '../by-iteration'
 import { decodeParticles } from '../designs/particles'
 import { fitnessUnit } from '../fitness'
@@ -41,7 +41,6 @@ export function ConvergenceChart({
   reference: ReferenceLine | null
 }) {
   const [logarithmic, setLogarithmic] = useQueryValue('log', flag(true), true)
-  const [zoom, setZoom] = useQueryValue('zoom', RANGE, null)
   const [single, setSingle] = useQueryValue('dots', flag(false), false)
   const dots = useDots(job, iterations.length, single)
   const drawn = useMemo(() => content(iterations, distribution), [iterations, distribution])
@@ -56,7 +55,7 @@ export function ConvergenceChart({
   const paint = useCallback((plot: uPlot) => paintDots(plot, painted), [painted])
   const over = useCallback((plot: uPlot) => paintOver(plot, painted), [painted])
   return (
-    <ChartFrame
+    <ChartCard
       title="Convergence"
       note="Fitness by iteration; lower is better. Drag to zoom, double-click to reset."
       tools={
@@ -93,14 +92,12 @@ export function ConvergenceChart({
         series={drawn.series}
         bands={drawn.bands}
         logarithmic={logarithmic}
-        zoom={zoom}
-        onZoom={setZoom}
         yRange={range}
         paint={paint}
         paintOver={over}
         height={320}
       />
-    </ChartFrame>
+    </ChartCard>
   )
 }
 

@@ -3,9 +3,8 @@
 import { useMemo } from 'preact/hooks'
 import type uPlot from 'uplot'
 import type { DistributionItem, Iteration, Job } from '../../api/types'
-import { ChartFrame, LegendEntry } from '../../charts/chart-frame'
-import { withAlpha } from '../../charts/lines/line-chart'
-import { LinkedChart } from '../../charts/lines/linked-chart'
+import { ChartCard, LegendEntry } from '../../charts/chart-card'
+import { LineChart, withAlpha } from '../../charts/lines/line-chart'
 import { formatNumber, percent } from '../../format/number'
 import { themeColour } from '../../theme'
 import { ByIteration } from '../by-iteration'
@@ -42,7 +41,7 @@ export function DistributionChart({
   }, [items, quantiles])
   const last = iterations.at(-1)
   return (
-    <ChartFrame
+    <ChartCard
       title="Distribution of fitness"
       note="Each iteration is a strip; darker areas contain more designs."
       legend={
@@ -72,7 +71,7 @@ export function DistributionChart({
         />
       )}
     >
-      <LinkedChart
+      <LineChart
         zoomName="zoom-distribution"
         label={`Distribution of fitness over ${items.length} iterations`}
         x={drawn.x}
@@ -85,7 +84,7 @@ export function DistributionChart({
         xMargin={0.5}
         paint={(plot) => paintStrips(plot, quantiles, drawn.strips)}
       />
-    </ChartFrame>
+    </ChartCard>
   )
 }
 

@@ -1,10 +1,8 @@
 /** Spread of the designs over the search space. */
 
 import { useMemo } from 'preact/hooks'
-import { ChartFrame } from '../../charts/chart-frame'
-import { LinkedChart } from '../../charts/lines/linked-chart'
+import { LineCard } from '../../charts/chart-card'
 import { percent } from '../../format/number'
-import { ByIteration } from '../by-iteration'
 import type { Distribution } from './use-distribution'
 
 export function DiversityChart({ distribution }: { distribution: Distribution }) {
@@ -23,40 +21,24 @@ export function DiversityChart({ distribution }: { distribution: Distribution })
     [items],
   )
   return (
-    <ChartFrame
+    <LineCard
       title="Diversity of the designs"
       note={
         items.some(({ diversity }) => diversity !== null)
           ? 'Spread of the designs as a share of each variable’s range; near zero, the search has converged.'
           : 'The method evaluates one design at a time, which has no spread.'
       }
-      table={() => (
-        <ByIteration
-          caption="Diversity by iteration"
-          rows={items}
-          columns={[
-            {
-              key: 'diversity',
-              label: 'Diversity',
-              numeric: true,
-              value: (item) => item.diversity,
-              cell: (item) => percent(item.diversity),
-            },
-          ]}
-        />
-      )}
-    >
-      <LinkedChart
-        zoomName="zoom-diversity"
-        label={`Diversity of the designs, now ${percent(items.at(-1)?.diversity)} of the range`}
-        x={drawn.x}
-        xLabel="iteration"
-        counted
-        yLabel="diversity"
-        yUnit="%"
-        series={drawn.series}
-        fromZero
-      />
-    </ChartFrame>
+      caption="Diversity by iteration"
+      order={{ column: 'x', descending: true }}
+      zoomName="zoom-diversity"
+      label={`Diversity of the designs, now ${percent(items.at(-1)?.diversity)} of the range`}
+      x={drawn.x}
+      xLabel="iteration"
+      counted
+      yLabel="diversity"
+      yUnit="%"
+      series={drawn.series}
+      fromZero
+    />
   )
 }

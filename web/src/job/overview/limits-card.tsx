@@ -1,7 +1,7 @@
 /** Factors that limit the winner. */
 
 import type { Job, JobSpec, Preference } from '../../api/types'
-import { ChartFrame } from '../../charts/chart-frame'
+import { ChartCard } from '../../charts/chart-card'
 import { Table } from '../../components/table/table'
 import { formatNumber, percent, quantity } from '../../format/number'
 import { inWords } from '../../format/words'
@@ -13,7 +13,7 @@ export function LimitsCard({ job, spec }: { job: Job; spec: JobSpec }) {
   if (!analysis) return null
   const units = new Map(job.objectives.map((o) => [o.name, o.unit]))
   return (
-    <ChartFrame
+    <ChartCard
       title="Limiting factors"
       table={() => <FactorTable analysis={analysis} units={units} />}
     >
@@ -23,7 +23,7 @@ export function LimitsCard({ job, spec }: { job: Job; spec: JobSpec }) {
         </p>
         {Object.keys(analysis.utilities).length > 1 && <ContributionTable analysis={analysis} />}
       </div>
-    </ChartFrame>
+    </ChartCard>
   )
 }
 

@@ -1,7 +1,7 @@
 /** Values of the winner and their positions between the bounds. */
 
 import type { Job } from '../../api/types'
-import { ChartFrame } from '../../charts/chart-frame'
+import { ChartCard } from '../../charts/chart-card'
 import { BrokenName } from '../../components/broken-name'
 import { Table } from '../../components/table/table'
 import { formatExact, percent } from '../../format/number'
@@ -17,7 +17,7 @@ export function WinnerCard({ job }: { job: Job }) {
   const atBound = rows.filter(({ at }) => at !== null)
   const place = { job: job.id, iteration: best.iteration, particle: best.particle }
   return (
-    <ChartFrame
+    <ChartCard
       title="Winner"
       note={`Design ${placeWord(best)}. Bars show the search ranges.${
         atBound.length > 0 ? ` At a bound: ${atBound.map(({ name }) => name).join(', ')}.` : ''
@@ -49,7 +49,7 @@ export function WinnerCard({ job }: { job: Job }) {
           </div>
         ))}
       </dl>
-    </ChartFrame>
+    </ChartCard>
   )
 }
 

@@ -1,7 +1,7 @@
 /** Interval charts of the parameters (fig. 2.14). */
 
 import type { FittedParameter, Identifiability } from '../../api/types'
-import { ChartFrame } from '../../charts/chart-frame'
+import { ChartCard } from '../../charts/chart-card'
 import { BrokenName } from '../../components/broken-name'
 import { type Column, Table } from '../../components/table/table'
 import { Unit } from '../../components/unit'
@@ -31,7 +31,7 @@ export function IntervalPanels({
   const [least, most] = [Math.min(...thresholds), Math.max(...thresholds)]
   const runs = labels.length > 1 ? `${labels.length} runs` : 'the run'
   return (
-    <ChartFrame
+    <ChartCard
       title="Intervals by threshold"
       note={
         `Values of designs of ${runs} whose fitness is within a threshold of the run’s best.` +
@@ -67,7 +67,7 @@ export function IntervalPanels({
           <Panel key={parameter.name} identifiability={identifiability} parameter={parameter} />
         ))}
       </div>
-    </ChartFrame>
+    </ChartCard>
   )
 }
 

@@ -2,8 +2,7 @@
 
 import { useMemo } from 'preact/hooks'
 import type { Job, Preference, RankedDesign, Ranking } from '../../api/types'
-import { ChartFrame } from '../../charts/chart-frame'
-import { LinkedChart } from '../../charts/lines/linked-chart'
+import { LineCard } from '../../charts/chart-card'
 import { Empty } from '../../components/feedback'
 import { type Column, Table } from '../../components/table/table'
 import { change, formatCount, formatNumber } from '../../format/number'
@@ -218,38 +217,18 @@ function BestSoFar({ ranking }: { ranking: Ranking }) {
     [ranking],
   )
   return (
-    <ChartFrame
+    <LineCard
       title="Best so far under this preference"
       note={lastGain(ranking)}
-      table={() => (
-        <Table
-          caption="Best so far by iteration"
-          tall
-          rows={ranking.best_so_far}
-          rowKey={(point) => String(point.index)}
-          columns={[
-            { key: 'index', label: 'Iteration', header: true, value: (p) => p.index },
-            {
-              key: 'fitness',
-              label: 'Best so far',
-              numeric: true,
-              value: (p) => p.fitness,
-              cell: (p) => formatNumber(p.fitness, 5),
-            },
-          ]}
-        />
-      )}
-    >
-      <LinkedChart
-        label="Best fitness so far under this preference by iteration"
-        x={drawn.x}
-        xLabel="iteration"
-        counted
-        yLabel="fitness"
-        series={drawn.series}
-        logarithmic
-        height={220}
-      />
-    </ChartFrame>
+      caption="Best so far by iteration"
+      label="Best fitness so far under this preference by iteration"
+      x={drawn.x}
+      xLabel="iteration"
+      counted
+      yLabel="fitness"
+      series={drawn.series}
+      logarithmic
+      height={220}
+    />
   )
 }

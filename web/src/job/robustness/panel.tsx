@@ -3,7 +3,7 @@
 import { post } from '../../api/client'
 import { useResource } from '../../api/resource'
 import type { Job, JobSpec, Robustness, RobustnessIndex } from '../../api/types'
-import { ChartFrame, LegendEntry } from '../../charts/chart-frame'
+import { ChartCard, LegendEntry } from '../../charts/chart-card'
 import { Empty, ErrorNotice, Loading } from '../../components/feedback'
 import { type Column, Table } from '../../components/table/table'
 import { formatNumber, NONE, percent } from '../../format/number'
@@ -95,7 +95,7 @@ function ByScenario({ robustness }: { robustness: Robustness }) {
   ]
   const most = Math.max(...rows.map((row) => row.index?.high ?? 0), 1e-12)
   return (
-    <ChartFrame
+    <ChartCard
       title="Robustness index by scenario"
       note="Relative change of the objectives with the variables over their entire bounds; lower is more robust."
       legend={
@@ -123,7 +123,7 @@ function ByScenario({ robustness }: { robustness: Robustness }) {
         bounds.
         {robustness.held.length > 0 && <> Fixed: {robustness.held.join(', ')}.</>}
       </p>
-    </ChartFrame>
+    </ChartCard>
   )
 }
 
@@ -169,7 +169,7 @@ function ByVariable({ robustness }: { robustness: Robustness }) {
   )
   const most = Math.max(...rows.map((row) => robustness.by_variable[row.name] ?? 0), 1e-12)
   return (
-    <ChartFrame
+    <ChartCard
       title="Sensitivity by variable"
       note="The robustness index by variable, over all scenarios and objectives."
       table={() => (
@@ -204,7 +204,7 @@ function ByVariable({ robustness }: { robustness: Robustness }) {
           <Bar key={name} name={name} value={robustness.by_variable[name] ?? null} most={most} />
         ))}
       </ul>
-    </ChartFrame>
+    </ChartCard>
   )
 }
 

@@ -1,7 +1,7 @@
 /** Bar chart of the winner's utilities by scenario, with those of a reference. */
 
 import type { ComponentChildren } from 'preact'
-import { ChartFrame, LegendEntry } from '../../charts/chart-frame'
+import { ChartCard, LegendEntry } from '../../charts/chart-card'
 import { quantity } from '../../format/number'
 import { capitalized } from '../../format/words'
 import type { CaseWords } from '../fitness'
@@ -29,7 +29,7 @@ export function UtilityBars({
 }) {
   const most = Math.max(...rows.flatMap((row) => [row.winner ?? 0, row.other ?? 0]), 1e-12)
   return (
-    <ChartFrame
+    <ChartCard
       title={`${capitalized(words.measure)} by ${words.item}`}
       note={`${words.note}; lower is better. The ${words.item} with the longest bar limits the winner.`}
       legend={
@@ -53,7 +53,7 @@ export function UtilityBars({
           </li>
         ))}
       </ul>
-    </ChartFrame>
+    </ChartCard>
   )
 }
 

@@ -4,7 +4,7 @@ import { useMemo } from 'preact/hooks'
 import { useResource } from '../../api/resource'
 import { isPublished } from '../../api/robots'
 import type { Front, Job, JobSpec } from '../../api/types'
-import { ChartFrame, LegendEntry } from '../../charts/chart-frame'
+import { ChartCard, LegendEntry } from '../../charts/chart-card'
 import { Scatter } from '../../charts/scatter/scatter'
 import { ErrorNotice } from '../../components/feedback'
 import { Check } from '../../components/fields/check'
@@ -69,7 +69,7 @@ export function ScatterCard({
       ? ` An evenly spaced subset of ${formatCount(front.designs.length)} is shown.`
       : ''
   return (
-    <ChartFrame
+    <ChartCard
       title="Pareto front"
       note={`Each objective is its geometric mean over the scenarios; lower is better.${listed} Click a design to find the preference that selects it.`}
       tools={
@@ -158,7 +158,7 @@ export function ScatterCard({
         chosen={index < 0 ? null : index}
         onChoose={(k) => onChoose(front.designs[k])}
       />
-    </ChartFrame>
+    </ChartCard>
   )
 }
 

@@ -1,6 +1,6 @@
 /** Designs over two of their axes, linked to the selection of the other charts. */
 
-import { ChartFrame, LegendEntry } from '../../charts/chart-frame'
+import { ChartCard, LegendEntry } from '../../charts/chart-card'
 import { PairMap } from '../../charts/pair/pair-map'
 import { CELLS, cellsOf, SAMPLE } from '../../charts/pair/pair-model'
 import { type Brushes, withBrush } from '../../charts/parallel/parallel-coordinates'
@@ -40,7 +40,7 @@ export function PairCard({
   const [across, up] = [model.axes[x], model.axes[y]]
   const sampled = selected.length > SAMPLE ? ` A sample of ${formatCount(SAMPLE)} is drawn.` : ''
   return (
-    <ChartFrame
+    <ChartCard
       title="Two axes"
       note={`Drag to select designs in all charts; click a design to highlight it.${sampled}`}
       tools={
@@ -81,7 +81,7 @@ export function PairCard({
         onSelect={(a, b) => onBrush(withBrush(withBrush(brushes, x, a), y, b))}
         onChoose={onChoose}
       />
-    </ChartFrame>
+    </ChartCard>
   )
 }
 

@@ -4,7 +4,7 @@ import { useMemo, useRef, useState } from 'preact/hooks'
 import { getBytes } from '../../api/client'
 import { useResource, useSlowly } from '../../api/resource'
 import type { Job } from '../../api/types'
-import { ChartFrame, LegendEntry } from '../../charts/chart-frame'
+import { ChartCard, LegendEntry } from '../../charts/chart-card'
 import { type Brushes, ParallelCoordinates } from '../../charts/parallel/parallel-coordinates'
 import {
   bestRows,
@@ -87,7 +87,7 @@ function Designs({ job, particles }: { job: Job; particles: Particles }) {
   const count = `${formatCount(selected.length)} of ${formatCount(particles.rows)} designs`
   return (
     <div class="stack" data-selected={selected.length}>
-      <ChartFrame
+      <ChartCard
         title="Designs by variable"
         note={`Each line is a design. Drag along an axis to select; click it to clear.${
           thinned
@@ -148,7 +148,7 @@ function Designs({ job, particles }: { job: Job; particles: Particles }) {
           label={`Parallel coordinates of ${count}`}
         />
         <BrushFields model={model} brushes={brushes} onBrush={setBrushes} />
-      </ChartFrame>
+      </ChartCard>
       <PairCard
         model={model}
         selected={selected}

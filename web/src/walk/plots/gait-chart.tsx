@@ -1,16 +1,16 @@
 /** Gait diagram: stance phases of all feet over time. */
 
 import { useMemo, useRef } from 'preact/hooks'
-import { ChartFrame } from '../../charts/chart-frame'
+import { ChartCard } from '../../charts/chart-card'
 import { linearTicks } from '../../charts/log-axis'
 import { Table } from '../../components/table/table'
 import { useVisible } from '../../components/use-visible'
 import { formatExact, formatNumber, percent, quantity } from '../../format/number'
+import { inWords } from '../../format/words'
 import type { Playback } from '../player/playback'
 import { usePlaybackTime } from '../player/use-playback'
 import { stances } from '../replay/contact'
 import type { Recorded } from '../replay/recorded'
-import { words } from './plot-specs'
 
 interface Row {
   readonly key: string
@@ -31,7 +31,7 @@ export function GaitChart({ walks, playback }: { walks: readonly Recorded[]; pla
   const place = (moment: number) => `${(100 * moment) / end}%`
   return (
     <div class="plot" ref={box} data-plot="gait">
-      <ChartFrame
+      <ChartCard
         title="Gait diagram"
         note="Bars show stance phases."
         table={() => <GaitTable rows={rows} comparing={walks.length > 1} />}
@@ -76,7 +76,7 @@ export function GaitChart({ walks, playback }: { walks: readonly Recorded[]; pla
             </span>
           </div>
         </div>
-      </ChartFrame>
+      </ChartCard>
     </div>
   )
 }
@@ -118,7 +118,7 @@ function rowsOf(walks: readonly Recorded[]): Row[] {
       const spans = stances(replay, k)
       const stood = spans.reduce((sum, [from, to]) => sum + to - from, 0)
       const share = replay.end > 0 ? stood / replay.end : 0
-      return { key: `${leg} ${walk}`, leg: words(leg), walk, label, spans, share }
+      return { key: `${leg} ${walk}`, leg: inWords(leg), walk, label, spans, share }
     }),
   )
 }

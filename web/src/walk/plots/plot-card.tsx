@@ -1,17 +1,14 @@
 /** A chart over time, synchronized with the replay. */
 
 import { useMemo, useRef } from 'preact/hooks'
-import { ChartFrame } from '../../charts/chart-frame'
+import { LineCard } from '../../charts/chart-card'
 import type { Series } from '../../charts/lines/line-chart'
-import { LinkedChart } from '../../charts/lines/linked-chart'
-import { type Column, Table } from '../../components/table/table'
 import { useVisible } from '../../components/use-visible'
 import { formatNumber, quantity } from '../../format/number'
 import type { Playback } from '../player/playback'
 import { usePlaybackTime } from '../player/use-playback'
 import type { Recorded } from '../replay/recorded'
-import { moments, seriesOf } from './plot-data'
-import type { PlotSpec } from './plot-specs'
+import { moments, type PlotSpec, seriesOf } from './plot-specs'
 
 /** Update interval of the time marker during playback [ms]. */
 const RENEWED = 120
@@ -33,28 +30,26 @@ export function PlotCard({
   const frame = Math.max(...walks.map(({ replay }) => replay.frameAt(time)))
   return (
     <div class="plot" ref={box} data-plot={spec.key}>
-      <ChartFrame
+      <LineCard
         title={spec.title}
         note={spec.note}
-        table={() => <PlotTable spec={spec} x={x} series={series} />}
+        caption={`${spec.title} over time`}
+        format={(value) => formatNumber(rounded(value))}
         legend={
           <PlotLegend series={series} curves={spec.curves.length} frame={frame} unit={spec.unit} />
         }
-      >
-        <LinkedChart
-          label={`${spec.title} over time`}
-          x={x}
-          xLabel="time"
-          xUnit="s"
-          yLabel={spec.quantity}
-          yUnit={spec.unit}
-          series={series}
-          height={220}
-          marker={time}
-          sync="walk"
-          onPick={(moment) => playback.seek(moment)}
-        />
-      </ChartFrame>
+        label={`${spec.title} over time`}
+        x={x}
+        xLabel="time"
+        xUnit="s"
+        yLabel={spec.quantity}
+        yUnit={spec.unit}
+        series={series}
+        height={220}
+        marker={time}
+        sync="walk"
+        onPick={(moment) => playback.seek(moment)}
+      />
     </div>
   )
 }
@@ -98,46 +93,4 @@ function PlotLegend({
 /** Round numerical noise to zero. */
 function rounded(value: number | null): number | null {
   return value !== null && Math.abs(value) < 1e-6 ? 0 : value
-}
-
-function PlotTable({
-  spec,
-  x,
-  series,
-}: {
-  spec: PlotSpec
-  x: Float32Array
-  series: readonly Series[]
-}) {
-  const columns: Column<number>[] = [
-    {
-      key: 'time',
-      label: 'Time',
-      unit: 's',
-      numeric: true,
-      header: true,
-      value: (frame) => x[frame],
-      cell: (frame) => x[frame].toFixed(3),
-    },
-    ...series.map(
-      ({ label, values }): Column<number> => ({
-        key: label,
-        label,
-        unit: spec.unit,
-        numeric: true,
-        value: (frame) => values[frame],
-        cell: (frame) => formatNumber(rounded(values[frame])),
-      }),
-    ),
-  ]
-  const frames = Array.from(x, (_, frame) => frame)
-  return (
-    <Table
-      caption={`${spec.title} over time`}
-      columns={columns}
-      rows={frames}
-      rowKey={String}
-      tall
-    />
-  )
 }

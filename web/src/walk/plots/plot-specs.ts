@@ -1,5 +1,8 @@
 /** Charts of a walk and their curves. */
 
+import type { Series } from '../../charts/lines/line-chart'
+import { inWords } from '../../format/words'
+import type { Recorded } from '../replay/recorded'
 import type { Replay } from '../replay/replay'
 
 /** One component of a channel over time. */
@@ -33,7 +36,7 @@ const COLOURS = [
 /** All charts of a walk, joint charts for one leg. Charts of missing channels are omitted. */
 export function plotSpecs(replay: Replay, leg: number): PlotSpec[] {
   const { legs } = replay.header.robot
-  const name = words(legs[leg])
+  const name = inWords(legs[leg])
   const specs: PlotSpec[] = [
     {
       key: 'angles',
@@ -85,7 +88,7 @@ export function plotSpecs(replay: Replay, leg: number): PlotSpec[] {
       quantity: 'normal force',
       unit: 'N',
       curves: legs.map((each, k) => ({
-        label: words(each),
+        label: inWords(each),
         channel: 'foot_force',
         index: 3 * k + 2,
         colour: COLOURS[k % COLOURS.length],
@@ -103,11 +106,6 @@ export function plotSpecs(replay: Replay, leg: number): PlotSpec[] {
   return specs.filter(({ curves }) => curves.every(({ channel }) => replay.channel(channel)))
 }
 
-/** Readable form of a name: right_front is right front. */
-export function words(name: string): string {
-  return name.replaceAll('_', ' ')
-}
-
 // A leg's joints start with its name.
 function ofJoints(replay: Replay, leg: number): Omit<Curve & { channel: string }, 'thin'>[] {
   const { joints, legs } = replay.header.robot
@@ -115,7 +113,7 @@ function ofJoints(replay: Replay, leg: number): Omit<Curve & { channel: string }
   const ofLeg = joints.flatMap((joint, index) => (joint.startsWith(prefix) ? [index] : []))
   const shown = ofLeg.length > 0 ? ofLeg : joints.map((_, index) => index)
   return shown.map((index, k) => ({
-    label: words(joints[index].replace(prefix, '')),
+    label: inWords(joints[index].replace(prefix, '')),
     channel: 'joint_angle',
     index,
     colour: COLOURS[k % COLOURS.length],
@@ -129,4 +127,36 @@ function ofAxes(channel: string, first: number): Curve[] {
     index: first + k,
     colour: COLOURS[k],
   }))
+}
+
+/** Dash pattern of the second walk [px]. */
+const DASH = [7, 4] as const
+
+/** Times of the longest walk [s]; all have the same rate. */
+export function moments(walks: readonly Recorded[]): Float32Array {
+  const [longest] = walks.map(({ replay }) => replay).sort((a, b) => b.frames - a.frames)
+  return longest.column('time', 0)
+}
+
+/** Curves of all walks, those of the second dashed; null after the end of a walk. */
+export function seriesOf(curves: readonly Curve[], walks: readonly Recorded[]): Series[] {
+  const length = Math.max(...walks.map(({ replay }) => replay.frames))
+  return walks.flatMap(({ label, replay }, k) =>
+    curves.map((curve) => ({
+      label: k === 0 ? curve.label : `${curve.label}, ${label}`,
+      values: valuesOf(replay, curve, length),
+      colour: curve.colour,
+      width: curve.thin ? 1 : 2,
+      dash: k === 0 ? undefined : DASH,
+    })),
+  )
+}
+
+function valuesOf(replay: Replay, curve: Curve, length: number): (number | null)[] {
+  const values: (number | null)[] = new Array(length).fill(null)
+  for (let frame = 0; frame < replay.frames; frame++) {
+    const value = replay.value(curve.channel, frame, curve.index)
+    if (Number.isFinite(value)) values[frame] = value
+  }
+  return values
 }

@@ -1,12 +1,13 @@
 /** Plots of a walk over time: one leg, the body, all feet. */
 
 import { useId, useMemo, useState } from 'preact/hooks'
+import { inWords } from '../../format/words'
 import type { Playback } from '../player/playback'
 import type { Recorded } from '../replay/recorded'
 import { ObjectivesTable } from '../walk-result'
 import { GaitChart } from './gait-chart'
 import { PlotCard } from './plot-card'
-import { plotSpecs, words } from './plot-specs'
+import { plotSpecs } from './plot-specs'
 
 export function WalkPlots({
   walks,
@@ -42,7 +43,7 @@ export function WalkPlots({
           >
             {legs.map((name, k) => (
               <option key={name} value={String(k)}>
-                {words(name)}
+                {inWords(name)}
               </option>
             ))}
           </select>

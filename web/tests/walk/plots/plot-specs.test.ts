@@ -1,6 +1,5 @@
 import { expect, test } from 'vitest'
-import { moments, seriesOf } from '../../../src/walk/plots/plot-data'
-import { plotSpecs } from '../../../src/walk/plots/plot-specs'
+import { moments, plotSpecs, seriesOf } from '../../../src/walk/plots/plot-specs'
 import { stances } from '../../../src/walk/replay/contact'
 import { parseReplay } from '../../../src/walk/replay/replay'
 import { encoded, frames, header } from '../replay/replay-bytes'

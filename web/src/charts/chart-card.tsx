@@ -1,13 +1,18 @@
-/** A chart card: title, legend, export menu, and the same numbers as a table. */
+/** Cards of charts: title, legend, export menu, and the same numbers as a table. */
 
 import type { ComponentChildren } from 'preact'
 import { useId, useRef, useState } from 'preact/hooks'
 import { ErrorNotice } from '../components/feedback'
 import { Menu } from '../components/menu'
+import type { SortOrder } from '../components/table/rows'
+import { type Column, Table } from '../components/table/table'
 import type { DataTable } from '../export/csv'
 import type { Kind } from '../export/save'
+import { formatExact, formatNumber } from '../format/number'
+import { capitalized } from '../format/words'
+import { LineChart, type LineChartProps } from './lines/line-chart'
 
-export function ChartFrame({
+export function ChartCard({
   title,
   note,
   table,
@@ -92,5 +97,80 @@ export function LegendEntry({
       <i class={area ? 'swatch' : ''} style={{ background: `var(${colour})` }} aria-hidden="true" />
       {label}
     </span>
+  )
+}
+
+interface LineCardProps extends LineChartProps {
+  readonly title: string
+  readonly note?: string
+  readonly tools?: ComponentChildren
+  /** The names of the series by default. */
+  readonly legend?: ComponentChildren
+  /** Caption of the table. */
+  readonly caption: string
+  readonly order?: SortOrder
+  /** Text of a value in the table. */
+  readonly format?: (value: number | null) => string
+}
+
+/** A line chart whose table and legend list its series. */
+export function LineCard({
+  title,
+  note,
+  tools,
+  legend,
+  caption,
+  order,
+  format = (value) => formatNumber(value, 5),
+  ...chart
+}: LineCardProps) {
+  const { x, xLabel, xUnit, yUnit, series } = chart
+  const columns: Column<number>[] = [
+    {
+      key: 'x',
+      label: capitalized(xLabel),
+      unit: xUnit,
+      numeric: true,
+      header: true,
+      value: (k) => x[k],
+      cell: (k) => formatExact(x[k]),
+    },
+    ...series.map(
+      ({ label, values }): Column<number> => ({
+        key: label,
+        label,
+        unit: yUnit,
+        numeric: true,
+        value: (k) => values[k],
+        cell: (k) => format(values[k]),
+      }),
+    ),
+  ]
+  return (
+    <ChartCard
+      title={title}
+      note={note}
+      tools={tools}
+      legend={
+        legend ??
+        (series.length > 1 &&
+          series.map(({ label, colour }) => (
+            <LegendEntry key={label} colour={colour} label={label} />
+          )))
+      }
+      table={() => (
+        <Table
+          caption={caption}
+          columns={columns}
+          rows={Array.from(x, (_, k) => k)}
+          rowKey={String}
+          order={order}
+          tall
+        />
+      )}
+    >
+      {/* Another quantity has another zoom. */}
+      <LineChart key={xLabel} {...chart} />
+    </ChartCard>
   )
 }

@@ -1,0 +1,167 @@
+/** Convergence and distribution of fitness of several jobs. */
+
+import { useCallback, useMemo } from 'preact/hooks'
+import type uPlot from 'uplot'
+import { ChartCard, LegendEntry, LineCard } from '../charts/chart-card'
+import { LineChart } from '../charts/lines/line-chart'
+import { lineLabel, paintReference } from '../charts/lines/reference-line'
+import { Check } from '../components/fields/check'
+import { Table } from '../components/table/table'
+import { formatNumber, percent } from '../format/number'
+import { fittedRange } from '../job/overview/convergence-model'
+import { setQuery } from '../router/navigation'
+import { flag, oneOf, useQueryValue } from '../router/query-value'
+import {
+  type Axis,
+  type ComparedJob,
+  colourOf,
+  convergences,
+  dashOf,
+  distributions,
+  referencesOf,
+} from './series'
+
+const AXES: Readonly<Record<Axis, { label: string; unit?: string }>> = {
+  iterations: { label: 'iteration' },
+  evaluations: { label: 'evaluations' },
+  seconds: { label: 'time of evaluation', unit: 's' },
+}
+
+const BY = oneOf(Object.keys(AXES) as Axis[], 'iterations')
+
+/** Shares listed in the table of the distribution. */
+const LISTED = [0, 0.05, 0.25, 0.5, 0.75, 0.95, 1]
+
+function seriesOf(jobs: readonly ComparedJob[], lines: readonly (number | null)[][], width = 1.5) {
+  return jobs.map((job, k) => ({
+    label: job.name || job.id,
+    values: lines[k],
+    colour: colourOf(k),
+    dash: dashOf(k),
+    width,
+    stepped: true,
+  }))
+}
+
+/** Best fitness so far by iterations, evaluations or time. comparable: whether it is one quantity. */
+export function ConvergenceCard({
+  jobs,
+  comparable,
+}: {
+  jobs: readonly ComparedJob[]
+  comparable: boolean
+}) {
+  const [axis, setAxis] = useQueryValue<Axis>('by', BY, 'iterations')
+  const [logarithmic, setLogarithmic] = useQueryValue('log', flag(true), true)
+  const { x, series, references, range } = useMemo(() => {
+    const { x, lines } = convergences(jobs, axis)
+    const references = comparable ? referencesOf(jobs) : []
+    const levels = references.map(({ fitness }) => fitness)
+    return {
+      x,
+      series: seriesOf(jobs, lines, 2),
+      references,
+      range: fittedRange(lines, levels, logarithmic),
+    }
+  }, [jobs, axis, comparable, logarithmic])
+  const over = useCallback(
+    (plot: uPlot) => {
+      for (const each of references) paintReference(plot, each)
+    },
+    [references],
+  )
+  const { label, unit } = AXES[axis]
+  return (
+    <LineCard
+      title="Convergence"
+      note="Best fitness so far; lower is better. Drag to zoom, double-click to reset."
+      tools={
+        <>
+          <label class="row small">
+            <span>By</span>
+            <select
+              value={axis}
+              onChange={(event) => {
+                // A range of the previous axis is meaningless on the new one.
+                setQuery({ zoom: null })
+                setAxis(event.currentTarget.value as Axis)
+              }}
+            >
+              {Object.entries(AXES).map(([name, each]) => (
+                <option key={name} value={name}>
+                  {each.label}
+                </option>
+              ))}
+            </select>
+          </label>
+          <Check label="logarithmic" checked={logarithmic} onChange={setLogarithmic} />
+        </>
+      }
+      caption={`Best so far by ${label}`}
+      label={`Convergence of ${jobs.length} jobs by ${label}${references.map((each) => `; ${lineLabel(each)}`).join('')}`}
+      x={x}
+      xLabel={label}
+      xUnit={unit}
+      yLabel="fitness"
+      series={series}
+      logarithmic={logarithmic}
+      yRange={range}
+      paintOver={over}
+      height={320}
+    />
+  )
+}
+
+/** Cumulative distribution of the fitness. */
+export function DistributionCard({ jobs }: { jobs: readonly ComparedJob[] }) {
+  const { x, series } = useMemo(() => {
+    const { x, lines } = distributions(jobs)
+    return { x, series: seriesOf(jobs, lines) }
+  }, [jobs])
+  const at = ({ fitness, shares }: ComparedJob, share: number) =>
+    fitness[shares.findIndex((s) => Math.abs(s - share) < 1e-9)] ?? null
+  return (
+    <ChartCard
+      title="Distribution of fitness"
+      note="Share of the designs that walk in every scenario with at most this fitness."
+      legend={jobs.map((job, k) => (
+        <LegendEntry key={job.id} colour={colourOf(k)} label={job.name || job.id} />
+      ))}
+      table={() => (
+        <Table
+          caption="Fitness by share of the designs"
+          rows={LISTED}
+          rowKey={String}
+          columns={[
+            {
+              key: 'share',
+              label: 'Share',
+              header: true,
+              value: (share) => share,
+              cell: (share) => percent(share, 2),
+            },
+            ...jobs.map((job) => ({
+              key: job.id,
+              label: job.name || job.id,
+              numeric: true,
+              value: (share: number) => at(job, share),
+              cell: (share: number) => formatNumber(at(job, share), 5),
+            })),
+          ]}
+        />
+      )}
+    >
+      <LineChart
+        zoomName="zoom-distribution"
+        label={`Distribution of fitness of ${jobs.length} jobs`}
+        x={x}
+        xLabel="fitness"
+        xLogarithmic={x.length > 0 && x[0] > 0}
+        yLabel="share of the designs"
+        series={series}
+        fromZero
+        height={260}
+      />
+    </ChartCard>
+  )
+}

@@ -8,8 +8,7 @@ from ipaddress import ip_address, ip_network
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationError
-from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from gaitswarm.services.optimizer.errors import InvalidRequest, StoreUnavailable
 from gaitswarm.services.optimizer.jobs.job import LONGEST_LEASE_SECONDS, QUARANTINE_AFTER
@@ -56,16 +55,14 @@ def _parts(value: object) -> object:
     return [part.strip() for part in value.split(",")] if isinstance(value, str) else value
 
 
-class Settings(BaseSettings):
+class Settings(BaseModel):
     """Settings of a process; each variable is a field's name after `GAITSWARM_`.
 
     Options of a job are in its spec instead. An empty variable counts as unset.
     Use `read_settings`, whose errors name the variable.
     """
 
-    model_config = SettingsConfigDict(
-        env_prefix="GAITSWARM_", env_ignore_empty=True, frozen=True, extra="ignore"
-    )
+    model_config = ConfigDict(frozen=True, extra="ignore")
 
     server: str | None = Field(
         default=None, description="URL of the server that commands about jobs use."
@@ -126,12 +123,12 @@ class Settings(BaseSettings):
         le=1000,
         description="Runner processes in a row that may die with a job before it fails.",
     )
-    robots: Annotated[tuple[Path, ...], NoDecode, BeforeValidator(_paths)] = Field(
+    robots: Annotated[tuple[Path, ...], BeforeValidator(_paths)] = Field(
         default=(),
         description="Folders of robots, or of such folders, separated by `:`, whose meshes a server"
         " serves to clients that may read its jobs.",
     )
-    webhook_hosts: Annotated[tuple[HostName, ...], NoDecode, BeforeValidator(_parts)] = Field(
+    webhook_hosts: Annotated[tuple[HostName, ...], BeforeValidator(_parts)] = Field(
         default=(),
         description="Hosts, with or without port and separated by commas, that may be notified of"
         " ended jobs; none: no notifications.",
@@ -185,7 +182,7 @@ class Settings(BaseSettings):
         description="`auto`: requests need a token where the server listens beyond its own machine;"
         " `token`: always.",
     )
-    api_allowed_hosts: Annotated[tuple[HostName, ...], NoDecode, BeforeValidator(_parts)] = Field(
+    api_allowed_hosts: Annotated[tuple[HostName, ...], BeforeValidator(_parts)] = Field(
         default=(),
         description="Host names, with or without port and separated by commas, of the server, or"
         " a runner's metrics port, besides its addresses, `localhost`, its host and"
@@ -260,7 +257,7 @@ class Settings(BaseSettings):
     api_idle_seconds: int = Field(
         default=15, ge=1, description="Idle time after which a connection is closed [s]."
     )
-    api_trusted_proxies: Annotated[tuple[Network, ...], NoDecode, BeforeValidator(_parts)] = Field(
+    api_trusted_proxies: Annotated[tuple[Network, ...], BeforeValidator(_parts)] = Field(
         default=("127.0.0.1", "::1"),
         description="Addresses or networks, separated by commas, of proxies trusted to state"
         " the client's address and scheme.",
@@ -291,8 +288,9 @@ class Settings(BaseSettings):
 def read_settings(**options: Any) -> Settings:
     """Read settings from the environment, overridden by options of a command."""
     given = {name: value for name, value in options.items() if value is not None}
+    variables = {name: os.environ.get(variable_of(name)) for name in Settings.model_fields}
     try:
-        return Settings(**given)
+        return Settings(**{n: v for n, v in variables.items() if v} | given)
     except ValidationError as error:
         problems = [
             (_source(str(problem["loc"][0]), given), message_of(problem))
@@ -326,4 +324,9 @@ def is_loopback(host: str) -> bool:
 
 def _source(field: str, given: dict[str, Any]) -> str:
     """Name of the option or variable that sets a field."""
-    return field.removeprefix("api_") if field in given else f"GAITSWARM_{field.upper()}"
+    return field.removeprefix("api_") if field in given else variable_of(field)
+
+
+def variable_of(field: str) -> str:
+    """Environment variable of a setting."""
+    return f"GAITSWARM_{field.upper()}"

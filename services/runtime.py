@@ -25,14 +25,14 @@ from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store.port.base import Store
 from gaitswarm.services.optimizer.store.sql_store import open_store
 from gaitswarm.services.worker import EvaluatorKind
-from gaitswarm.services.worker.hybrid import HybridEvaluator
-from gaitswarm.services.worker.in_process import InProcessEvaluator
-from gaitswarm.services.worker.ray_evaluator import RayEvaluator
 
 if TYPE_CHECKING:
     from gaitswarm.services.monitoring.activity import Activity
     from gaitswarm.services.monitoring.metrics import Metrics
     from gaitswarm.services.monitoring.tracing import Tracing
+    from gaitswarm.services.worker.hybrid import HybridEvaluator
+    from gaitswarm.services.worker.in_process import InProcessEvaluator
+    from gaitswarm.services.worker.ray_evaluator import RayEvaluator
 
 
 def open_evaluator(
@@ -44,6 +44,10 @@ def open_evaluator(
     patient: bool = False,
 ) -> InProcessEvaluator | HybridEvaluator | RayEvaluator:
     """Create the evaluator of a kind."""
+    from gaitswarm.services.worker.hybrid import HybridEvaluator  # noqa: PLC0415
+    from gaitswarm.services.worker.in_process import InProcessEvaluator  # noqa: PLC0415
+    from gaitswarm.services.worker.ray_evaluator import RayEvaluator  # noqa: PLC0415
+
     check_address(address)
     if kind == "in-process":
         return InProcessEvaluator(cpus)

@@ -9,7 +9,7 @@ from typing import Any, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from gaitswarm.settings import Settings
+from gaitswarm.settings import Settings, variable_of
 from scripts.manual.tables import code, head, kind_of, row
 
 
@@ -30,10 +30,9 @@ def models(model: type[BaseModel]) -> Iterator[str]:
 
 def settings() -> Iterator[str]:
     """Every setting by the variable that it is read from: lines of Markdown."""
-    prefix = Settings.model_config["env_prefix"]
     yield from head("variable", "type", "default", "meaning")
     for name, schema in Settings.model_json_schema()["properties"].items():
-        variable = code(f"{prefix}{name}".upper())
+        variable = code(variable_of(name))
         # Where a setting may be null, that is the variable that is not set.
         kind = kind_of(schema).removesuffix(" or null")
         yield row([variable, kind, _variable(schema.get("default")), schema["description"]])

@@ -92,7 +92,7 @@ def test_a_cached_token_reads_metrics_while_the_database_is_unavailable() -> Non
 def test_a_runners_port_asks_for_a_token_beyond_the_machine(
     settings: dict[str, str], *, needed: bool
 ) -> None:
-    assert Settings(**settings).metrics_need_token is needed  # type: ignore[arg-type]
+    assert Settings(**settings).metrics_need_token is needed
 
 
 def served(

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from gaitswarm.settings import Settings
+from gaitswarm.settings import Settings, variable_of
 
 
 def variables() -> set[str]:
     """Names of the environment variables."""
-    prefix = Settings.model_config["env_prefix"]
-    return {f"{prefix}{field}".upper() for field in Settings.model_fields}
+    return set(map(variable_of, Settings.model_fields))

@@ -11,10 +11,14 @@ export interface Resource<T> {
   readonly reload: () => void
 }
 
-/** Fetch when `key` changes, dropping outdated responses; a null key fetches nothing. */
+/**
+ * Fetch when `key` changes, dropping outdated responses; a null key fetches nothing.
+ * keep: whether the data of the previous key stay until those of the next one arrive.
+ */
 export function useResource<T>(
   key: string | null,
   load: (signal: AbortSignal) => Promise<T>,
+  { keep = false } = {},
 ): Resource<T> {
   const [state, setState] = useState<Omit<Resource<T>, 'reload'> & { key: string | null }>({
     data: null,
@@ -32,7 +36,7 @@ export function useResource<T>(
     }
     const abort = new AbortController()
     setState((s) => ({
-      data: s.key === key ? s.data : null,
+      data: keep || s.key === key ? s.data : null,
       error: null,
       loading: true,
       key,

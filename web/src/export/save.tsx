@@ -2,7 +2,7 @@
 
 import { type ComponentChildren, render } from 'preact'
 import type { Cell } from '../components/table/rows'
-import type { Column } from '../components/table/table'
+import { type Column, headingOf } from '../components/table/table'
 import { type CollectedTable, TableSink } from '../components/table/table-sink'
 import { withUnit } from '../format/number'
 import { pageName } from '../title'
@@ -64,7 +64,7 @@ function tablesOf(content: ComponentChildren): readonly DataTable[] {
 function dataOf({ caption, columns, rows }: CollectedTable): DataTable {
   return {
     name: caption,
-    header: columns.map(({ label, unit = '1' }) => withUnit(label, unit)),
+    header: columns.map((column) => withUnit(headingOf(column), column.unit ?? '1')),
     rows: rows.map((row) => columns.map((column) => cellOf(column, row))),
   }
 }

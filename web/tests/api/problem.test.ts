@@ -1,6 +1,5 @@
 import { expect, test } from 'vitest'
 import { problemOf } from '../../src/api/problem'
-import { quoted, submitCommand } from '../../src/job/reproduce/commands'
 
 test('a problem keeps the detail and the field errors of the API', async () => {
   const errors = [{ field: 'iterations', message: 'must be at least 1' }]
@@ -18,13 +17,4 @@ test('a response without problem details is reported by its status', async () =>
   const answer = new Response('<html>', { status: 502, statusText: 'Bad Gateway' })
   const problem = await problemOf(answer)
   expect(problem.message).toBe('the server responded with 502: Bad Gateway')
-})
-
-test('commands quote the whole spec', () => {
-  expect(quoted(`it's`)).toBe(`'it'\\''s'`)
-  const command = submitCommand({ name: 'x' }, 'http://127.0.0.1:8000')
-  expect(command).toContain('"name": "x"')
-  expect(command.split('\n').at(-1)).toBe(
-    'gaitswarm submit --spec job.json --server http://127.0.0.1:8000',
-  )
 })

@@ -2,17 +2,23 @@
 
 import type { ComponentChildren } from 'preact'
 import { useContext, useState } from 'preact/hooks'
-import { formatCount } from '../../format/number'
+import { formatCount, formatNumber, percent } from '../../format/number'
+import { capitalized } from '../../format/words'
 import { Unit } from '../unit'
 import { type Cell, paged, type SortOrder, sorted } from './rows'
 import { type CollectedTable, TableSink } from './table-sink'
 
 export interface Column<R> {
   readonly key: string
-  readonly label: string
+  /** The key, capitalized, by default. */
+  readonly label?: string
   /** Shown in brackets in the header; `1` is omitted. */
   readonly unit?: string
   readonly numeric?: boolean
+  /** Digits of a numeric column. */
+  readonly digits?: number
+  /** Digits of a numeric column of shares, shown in percent. */
+  readonly percent?: number
   /** Sort key; columns without one cannot be sorted by the table. */
   readonly value?: (row: R) => Cell
   /** Exported value; the sort key by default, otherwise the text shown. */
@@ -44,7 +50,8 @@ export function Table<R>({
   caption: string
   columns: readonly Column<R>[]
   rows: readonly R[]
-  rowKey: (row: R) => string
+  /** The position by default. */
+  rowKey?: (row: R) => string
   order?: SortOrder
   onOrder?: (order: SortOrder) => void
   pageSize?: number
@@ -100,8 +107,8 @@ export function Table<R>({
             </tr>
           </thead>
           <tbody>
-            {page.rows.map((row) => (
-              <tr key={rowKey(row)} {...rowData?.(row)}>
+            {page.rows.map((row, index) => (
+              <tr key={rowKey?.(row) ?? index} {...rowData?.(row)}>
                 {columns.map((column) => cell(column, row))}
               </tr>
             ))}
@@ -122,8 +129,20 @@ export function Table<R>({
   )
 }
 
+/** Heading of a column, without its unit. */
+export function headingOf({ key, label }: Pick<Column<unknown>, 'key' | 'label'>): string {
+  return label ?? capitalized(key)
+}
+
+function contentOf<R>({ cell, value, digits, percent: share }: Column<R>, row: R) {
+  if (cell) return cell(row)
+  const content = value?.(row)
+  if (digits !== undefined) return formatNumber(content as number | null, digits)
+  return share === undefined ? content : percent(content as number | null, share)
+}
+
 function cell<R>(column: Column<R>, row: R) {
-  const content = column.cell ? column.cell(row) : column.value?.(row)
+  const content = contentOf(column, row)
   if (column.header) {
     return (
       <th key={column.key} scope="row" class={classes(column)}>
@@ -152,7 +171,7 @@ function Header<R>({
   const active = order?.column === column.key
   const label = (
     <>
-      {column.label}
+      {headingOf(column)}
       <Unit unit={column.unit} />
     </>
   )
@@ -229,6 +248,7 @@ function Pager({
   )
 }
 
-function classes<R>(column: Column<R>): string {
-  return `${column.numeric ? 'numeric' : ''}${column.minor ? ' minor' : ''}`
+function classes<R>({ numeric, digits, percent, minor }: Column<R>): string {
+  const isNumeric = numeric ?? (digits ?? percent) !== undefined
+  return `${isNumeric ? 'numeric' : ''}${minor ? ' minor' : ''}`
 }

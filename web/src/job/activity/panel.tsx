@@ -3,12 +3,15 @@
 import { get } from '../../api/client'
 import { usePolling, useResource } from '../../api/resource'
 import type { Activity, Job } from '../../api/types'
-import { Empty, ErrorNotice, Loading } from '../../components/feedback'
+import { Card, EmptyCard, Loaded } from '../../components/card'
+import { Empty } from '../../components/feedback'
+import { Select } from '../../components/fields/controls'
 import { type Column, Table } from '../../components/table/table'
-import { formatCount, formatNumber } from '../../format/number'
+import { formatCount } from '../../format/number'
 import { formatMoment } from '../../format/time'
 import { sentence } from '../../format/words'
 import { oneOf, useQueryValue } from '../../router/query-value'
+import { isActive } from '../state'
 import './activity.css'
 import { TimelineCard } from './timeline-card'
 
@@ -22,53 +25,42 @@ export function ActivityPanel({ job }: { job: Job }) {
   const activity = useResource(`activity ${job.id} ${level} ${job.state}`, (signal) =>
     get('/v1/jobs/{job_id}/activity', { path: { job_id: job.id }, query: { level }, signal }),
   )
-  usePolling(activity.reload, POLL_MS, ['queued', 'running', 'pausing'].includes(job.state))
-  if (activity.error && !activity.data) {
-    return (
-      <ErrorNotice
-        what="Could not load the activity."
-        error={activity.error}
-        retry={activity.reload}
-      />
-    )
-  }
-  if (!activity.data) return <Loading what="the activity" />
-  if (activity.data.reason !== null) {
-    return (
-      <section class="card">
-        <Empty title="No activity recorded">
-          <p>{sentence(activity.data.reason)}</p>
-        </Empty>
-      </section>
-    )
-  }
+  usePolling(activity.reload, POLL_MS, isActive(job))
   return (
-    <div class="stack">
-      <TimelineCard activity={activity.data} />
-      <div class="grid">
-        <WorkersCard workers={activity.data.workers} />
-        <LogCard messages={activity.data.messages} level={level} onLevel={setLevel} />
-      </div>
-    </div>
+    <Loaded resource={activity} what="the activity">
+      {({ reason, workers, messages }) =>
+        reason !== null ? (
+          <EmptyCard title="No activity recorded">{sentence(reason)}</EmptyCard>
+        ) : (
+          <div class="stack">
+            <TimelineCard activity={activity.data!} />
+            <div class="grid">
+              <Card title="Workers">
+                {workers.length === 0 ? (
+                  <Empty title="No worker has responded yet" />
+                ) : (
+                  <Table caption="Workers of the job" rows={workers} columns={WORKER_COLUMNS} />
+                )}
+              </Card>
+              <LogCard messages={messages} level={level} onLevel={setLevel} />
+            </div>
+          </div>
+        )
+      }
+    </Loaded>
   )
 }
 
 type Worker = Activity['workers'][number]
 
-function counted(key: 'tasks' | 'walks' | 'failures', label: string): Column<Worker> {
-  return {
-    key,
-    label,
-    numeric: true,
-    value: (worker) => worker[key],
-    cell: (worker) => formatCount(worker[key]),
-  }
+function counted(key: 'tasks' | 'walks' | 'failures'): Column<Worker> {
+  const value = (worker: Worker) => worker[key]
+  return { key, numeric: true, value, cell: (worker) => formatCount(value(worker)) }
 }
 
 const WORKER_COLUMNS: readonly Column<Worker>[] = [
   {
-    key: 'name',
-    label: 'Machine',
+    key: 'machine',
     header: true,
     value: ({ name }) => name,
     cell: ({ name, error }) => (
@@ -79,41 +71,15 @@ const WORKER_COLUMNS: readonly Column<Worker>[] = [
     ),
   },
   {
-    key: 'seen',
-    label: 'Last seen',
+    key: 'last seen',
     value: ({ last_seen_at }) => last_seen_at,
     cell: ({ last_seen_at }) => formatMoment(last_seen_at),
   },
-  counted('tasks', 'Tasks'),
-  counted('walks', 'Walks'),
-  counted('failures', 'Failures'),
-  {
-    key: 'computed',
-    label: 'Computed',
-    unit: 's',
-    numeric: true,
-    value: ({ compute_seconds }) => compute_seconds,
-    cell: ({ compute_seconds }) => formatNumber(compute_seconds, 3),
-  },
+  counted('tasks'),
+  counted('walks'),
+  counted('failures'),
+  { key: 'computed', unit: 's', digits: 3, value: ({ compute_seconds }) => compute_seconds },
 ]
-
-function WorkersCard({ workers }: { workers: readonly Worker[] }) {
-  return (
-    <section class="card" aria-labelledby="workers">
-      <h2 id="workers">Workers</h2>
-      {workers.length === 0 ? (
-        <Empty title="No worker has responded yet" />
-      ) : (
-        <Table
-          caption="Workers of the job"
-          rows={workers}
-          rowKey={({ name }) => name}
-          columns={WORKER_COLUMNS}
-        />
-      )}
-    </section>
-  )
-}
 
 function LogCard({
   messages,
@@ -125,21 +91,18 @@ function LogCard({
   onLevel: (level: Level) => void
 }) {
   return (
-    <section class="card" aria-labelledby="log">
-      <header class="row spread">
-        <h2 id="log">Log</h2>
-        <select
-          aria-label="Minimum level"
+    <Card
+      title="Log"
+      tools={
+        <Select
+          hidden
+          label="Minimum level"
           value={level}
-          onChange={(event) => onLevel(event.currentTarget.value as Level)}
-        >
-          {LEVELS.map((name) => (
-            <option key={name} value={name}>
-              {name.toLowerCase()} and above
-            </option>
-          ))}
-        </select>
-      </header>
+          options={LEVELS.map((name) => [name, `${name.toLowerCase()} and above`] as const)}
+          onChoose={onLevel}
+        />
+      }
+    >
       {messages.length === 0 ? (
         <Empty title="No messages">
           <p>The server keeps a job’s latest messages at or above its log level.</p>
@@ -157,6 +120,6 @@ function LogCard({
           </ol>
         </section>
       )}
-    </section>
+    </Card>
   )
 }

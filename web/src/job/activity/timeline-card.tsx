@@ -28,7 +28,13 @@ export function TimelineCard({ activity }: { activity: Activity }) {
           <LegendEntry of="task-failed" label="failed" />
         </>
       }
-      table={() => <TaskTable tasks={activity.tasks} />}
+      table={() => (
+        <Table
+          caption="Tasks, newest first"
+          rows={[...activity.tasks].reverse()}
+          columns={COLUMNS}
+        />
+      )}
     >
       {drawn === 0 ? (
         <Empty title="No task has finished yet" />
@@ -94,46 +100,19 @@ function inWords({ workers, seconds }: Timeline): string {
   return `Timeline of ${formatNumber(seconds, 3)} s. ${each.join('; ')}`
 }
 
-type Row = { readonly task: Activity['tasks'][number]; readonly number: number }
+type Task = Activity['tasks'][number]
 
-const COLUMNS: readonly Column<Row>[] = [
+const COLUMNS: readonly Column<Task>[] = [
   {
-    key: 'begun',
-    label: 'Started',
+    key: 'started',
     header: true,
-    value: ({ task }) => task.begun_at,
-    cell: ({ task }) => formatMoment(task.begun_at),
+    value: (task) => task.begun_at,
+    cell: (task) => formatMoment(task.begun_at),
   },
-  { key: 'iteration', label: 'Iteration', numeric: true, value: ({ task }) => task.iteration },
-  { key: 'worker', label: 'Machine', value: ({ task }) => task.worker || 'no response' },
-  { key: 'walks', label: 'Walks', numeric: true, value: ({ task }) => task.walks },
-  {
-    key: 'seconds',
-    label: 'Time',
-    unit: 's',
-    numeric: true,
-    value: ({ task }) => task.seconds,
-    cell: ({ task }) => formatNumber(task.seconds, 3),
-  },
-  {
-    key: 'computed',
-    label: 'Computed',
-    unit: 's',
-    numeric: true,
-    value: ({ task }) => task.compute_seconds,
-    cell: ({ task }) => formatNumber(task.compute_seconds, 3),
-  },
-  { key: 'error', label: 'Error', value: ({ task }) => task.error ?? '' },
+  { key: 'iteration', numeric: true, value: (task) => task.iteration },
+  { key: 'machine', value: (task) => task.worker || 'no response' },
+  { key: 'walks', numeric: true, value: (task) => task.walks },
+  { key: 'time', unit: 's', digits: 3, value: (task) => task.seconds },
+  { key: 'computed', unit: 's', digits: 3, value: (task) => task.compute_seconds },
+  { key: 'error', value: (task) => task.error ?? '' },
 ]
-
-function TaskTable({ tasks }: { tasks: Activity['tasks'] }) {
-  const rows = [...tasks].reverse().map((task, number) => ({ task, number }))
-  return (
-    <Table
-      caption="Tasks, newest first"
-      rows={rows}
-      rowKey={({ number }) => String(number)}
-      columns={COLUMNS}
-    />
-  )
-}

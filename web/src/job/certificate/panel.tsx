@@ -4,23 +4,59 @@ import { get } from '../../api/client'
 import { usePolling, useResource } from '../../api/resource'
 import type {
   Certificate,
-  CertifiedScenario,
+  Compared,
+  ComparedEngine,
   Influence,
   Job,
   Proportion,
   Spread,
   World,
 } from '../../api/types'
-import { Empty, ErrorNotice, Loading } from '../../components/feedback'
+import { Card, EmptyCard, Loaded } from '../../components/card'
 import { type Column, Table } from '../../components/table/table'
-import { change, formatCount, formatNumber, percent } from '../../format/number'
+import { change, formatCount, formatNumber, percent, withUnit } from '../../format/number'
 import { inWords } from '../../format/words'
 import { withQuery } from '../../router/routes'
 import { isRunning } from '../state'
-import { OtherEngine } from './other-engine'
 
 /** Polling interval while the job runs [ms]. */
 const RENEW_MS = 15_000
+
+export function CertificatePanel({ job }: { job: Job }) {
+  // The first evaluation is the nominal world.
+  const exists = job.evaluations >= 2
+  const certificate = useResource(exists ? job.id : null, (signal) =>
+    get('/v1/jobs/{job_id}/certificate', {
+      path: { job_id: job.id },
+      query: { most: 20 },
+      signal,
+    }),
+  )
+  usePolling(certificate.reload, RENEW_MS, isRunning(job))
+  if (!exists) {
+    return (
+      <EmptyCard title="No world yet">
+        The summary appears here once the first batch of worlds has been simulated.
+      </EmptyCard>
+    )
+  }
+  return (
+    <div class="stack">
+      <Loaded resource={certificate} what="the certificate">
+        {(data) => (
+          <>
+            <Scenarios certificate={data} />
+            {Object.entries(data.engines ?? {}).map(([name, engine]) => (
+              <OtherEngine key={name} name={name} engine={engine} objectives={job.objectives} />
+            ))}
+            <Worlds job={job} worlds={data.worst} />
+            <Influences influences={data.influences} />
+          </>
+        )}
+      </Loaded>
+    </div>
+  )
+}
 
 interface Row {
   readonly name: string
@@ -29,58 +65,18 @@ interface Row {
   readonly spread: Spread
 }
 
-export function CertificatePanel({ job }: { job: Job }) {
-  // The first evaluation is the nominal world.
-  if (job.evaluations < 2) {
-    return (
-      <section class="card">
-        <Empty title="No world yet">
-          <p>The summary appears here once the first batch of worlds has been simulated.</p>
-        </Empty>
-      </section>
-    )
-  }
-  return <Certified job={job} />
-}
-
-function Certified({ job }: { job: Job }) {
-  const certificate = useResource(job.id, (signal) =>
-    get('/v1/jobs/{job_id}/certificate', {
-      path: { job_id: job.id },
-      query: { most: 20 },
-      signal,
+function Scenarios({ certificate }: { certificate: Certificate }) {
+  const { failed, fell, fitness } = certificate
+  const rows = Object.entries(certificate.scenarios).map(
+    ([name, { held_out: heldOut, failed, utility: spread }]): Row => ({
+      name,
+      heldOut,
+      failed,
+      spread,
     }),
   )
-  usePolling(certificate.reload, RENEW_MS, isRunning(job))
   return (
-    <div class="stack">
-      {certificate.error && (
-        <ErrorNotice
-          what="Could not load the certificate."
-          error={certificate.error}
-          retry={certificate.reload}
-        />
-      )}
-      {certificate.loading && !certificate.data && <Loading what="the certificate" />}
-      {certificate.data && (
-        <>
-          <Scenarios certificate={certificate.data} />
-          {Object.entries(certificate.data.engines ?? {}).map(([name, engine]) => (
-            <OtherEngine key={name} name={name} engine={engine} objectives={job.objectives} />
-          ))}
-          <Worlds job={job} worlds={certificate.data.worst} />
-          <Influences influences={certificate.data.influences} />
-        </>
-      )}
-    </div>
-  )
-}
-
-function Scenarios({ certificate }: { certificate: Certificate }) {
-  const { failed, fell } = certificate
-  return (
-    <section class="card" aria-labelledby="certificate">
-      <h2 id="certificate">Failures in {formatCount(certificate.worlds)} worlds</h2>
+    <Card title={<>Failures in {formatCount(certificate.worlds)} worlds</>}>
       <p data-failed={failed.count} data-fell={fell.count}>
         A simulation failed in <strong>{formatCount(failed.count)}</strong> of them
         {failed.count > 0 && <>; the robot fell in {formatCount(fell.count)}</>}. The probability of
@@ -89,151 +85,159 @@ function Scenarios({ certificate }: { certificate: Certificate }) {
       </p>
       <Table
         caption="Utility by scenario"
-        rows={rowsOf(certificate)}
-        rowKey={({ name }) => name}
-        columns={COLUMNS}
+        rows={[...rows, { name: 'all', heldOut: false, failed, spread: fitness }]}
+        columns={SCENARIO_COLUMNS}
         rowData={({ name }) => ({ 'data-scenario': name })}
       />
       <p class="muted small table-note">
         Lower is better. CVaR is the mean of the worst 5&nbsp;% of worlds; a failure counts as the
         worst success. Held-out scenarios are not among those of table 4.2.
       </p>
-    </section>
+    </Card>
   )
 }
 
-function rowsOf(certificate: Certificate): readonly Row[] {
-  const rowOf = ([name, scenario]: [string, CertifiedScenario]): Row => ({
-    name,
-    heldOut: scenario.held_out,
-    failed: scenario.failed,
-    spread: scenario.utility,
-  })
-  const all = {
-    name: 'all',
-    heldOut: false,
-    failed: certificate.failed,
-    spread: certificate.fitness,
-  }
-  return [...Object.entries(certificate.scenarios).map(rowOf), all]
-}
-
-const COLUMNS: readonly Column<Row>[] = [
+const SCENARIO_COLUMNS: readonly Column<Row>[] = [
   {
     key: 'scenario',
-    label: 'Scenario',
     header: true,
     value: ({ name }) => name,
     cell: ({ name, heldOut }) => (heldOut ? `${name} (held out)` : name),
   },
   {
     key: 'failed',
-    label: 'Failed',
     numeric: true,
     value: ({ failed }) => failed.count,
     cell: ({ failed }) => formatCount(failed.count),
   },
-  {
-    key: 'high',
-    label: 'Failure rate at most',
-    numeric: true,
-    minor: true,
-    value: ({ failed }) => failed.high,
-    cell: ({ failed }) => percent(failed.high, 2),
-  },
-  spreadColumn('nominal', 'Nominal', ({ nominal }) => nominal),
-  spreadColumn('median', 'Median', ({ quantiles }) => quantiles[2]),
-  spreadColumn('upper', '95 %', ({ quantiles }) => quantiles[4]),
-  spreadColumn('cvar', 'CVaR 95 %', ({ cvar }) => cvar),
-  spreadColumn('worst', 'Worst', ({ worst }) => worst),
+  { key: 'failure rate at most', percent: 2, minor: true, value: ({ failed }) => failed.high },
+  { key: 'nominal', digits: 4, value: ({ spread }) => spread.nominal },
+  { key: 'median', digits: 4, value: ({ spread }) => spread.quantiles[2] },
+  { key: '95 %', digits: 4, value: ({ spread }) => spread.quantiles[4] },
+  { key: 'CVaR 95 %', digits: 4, value: ({ spread }) => spread.cvar },
+  { key: 'worst', digits: 4, value: ({ spread }) => spread.worst },
 ]
 
-function spreadColumn(
-  key: string,
-  label: string,
-  value: (spread: Spread) => number | null,
-): Column<Row> {
-  return {
-    key,
-    label,
-    numeric: true,
-    value: ({ spread }) => value(spread),
-    cell: ({ spread }) => formatNumber(value(spread)),
-  }
-}
-
 function Worlds({ job, worlds }: { job: Job; worlds: readonly World[] }) {
-  const walk = ({ iteration, particle, scenario }: World) =>
-    withQuery('/walk', { job: job.id, iteration, particle, scenario })
-  const failures = (world: World) =>
-    Object.entries(world.failures).map(([name, status]) => `${name} (${status})`)
   return (
-    <section class="card" aria-labelledby="worlds">
-      <h2 id="worlds">Worst worlds</h2>
-      <Table
+    <Card title="Worst worlds">
+      <Table<World>
         caption="Worst worlds"
         rows={worlds}
-        rowKey={({ world }) => String(world)}
         pageSize={10}
         columns={[
           {
             key: 'world',
-            label: 'World',
             header: true,
             value: ({ world }) => world,
-            cell: (world) => <a href={walk(world)}>{world.world}</a>,
+            cell: ({ world, iteration, particle, scenario }) => (
+              <a href={withQuery('/walk', { job: job.id, iteration, particle, scenario })}>
+                {world}
+              </a>
+            ),
           },
+          { key: 'fitness', digits: 4, value: ({ fitness }) => fitness },
           {
-            key: 'fitness',
-            label: 'Fitness',
-            numeric: true,
-            value: ({ fitness }) => fitness,
-            cell: ({ fitness }) => formatNumber(fitness),
-          },
-          {
-            key: 'where',
-            label: 'Failed in, or worst in',
-            cell: (world) => failures(world).join(', ') || world.scenario,
+            key: 'failed in, or worst in',
+            cell: ({ failures, scenario }) =>
+              Object.entries(failures)
+                .map(([name, status]) => `${name} (${status})`)
+                .join(', ') || scenario,
           },
         ]}
       />
       <p class="muted small table-note">A world’s number links to its simulation.</p>
-    </section>
+    </Card>
   )
 }
 
 function Influences({ influences }: { influences: readonly Influence[] }) {
   if (influences.length === 0) return null
   return (
-    <section class="card" aria-labelledby="influences">
-      <h2 id="influences">Perturbations that correlate with poor fitness</h2>
-      <Table
+    <Card title="Perturbations that correlate with poor fitness">
+      <Table<Influence>
         caption="Rank correlation of perturbations with fitness"
         rows={influences}
-        rowKey={({ name }) => name}
         columns={[
+          { key: 'perturbation', header: true, value: ({ name }) => inWords(name) },
           {
-            key: 'name',
-            label: 'Perturbation',
-            header: true,
-            value: ({ name }) => name,
-            cell: ({ name }) => inWords(name),
-          },
-          {
-            key: 'correlation',
-            label: 'Rank correlation',
+            key: 'rank correlation',
             numeric: true,
             value: ({ correlation }) => Math.abs(correlation),
             cell: ({ correlation }) => change(correlation, '1', 2),
           },
           {
-            key: 'interval',
-            label: '95 % interval',
+            key: '95 % interval',
             numeric: true,
             cell: ({ low, high }) => `${change(low, '1', 2)} to ${change(high, '1', 2)}`,
           },
         ]}
       />
-    </section>
+    </Card>
   )
+}
+
+interface ComparedRow {
+  /** With both final statuses, if either failed. */
+  readonly scenario: string
+  readonly quantity: string
+  readonly compared: Compared
+}
+
+/** The nominal world in another physics engine, compared with gaitswarm. */
+function OtherEngine({
+  name,
+  engine: { description, fitness, scenarios },
+  objectives,
+}: {
+  name: string
+  engine: ComparedEngine
+  objectives: Job['objectives']
+}) {
+  const entries = Object.entries(scenarios)
+  const rows = entries.flatMap(([scenario, result]): ComparedRow[] => {
+    const { ours, theirs, utility } = result
+    const label = ours === 'ok' && theirs === 'ok' ? scenario : `${scenario} (${ours}, ${theirs})`
+    const measured = objectives.flatMap(({ name, unit }) => {
+      const compared = result.objectives[name]
+      const quantity = withUnit(inWords(name), unit)
+      return compared ? [{ scenario: label, quantity, compared }] : []
+    })
+    return [...measured, { scenario: label, quantity: 'utility', compared: utility }]
+  })
+  return (
+    <Card title={<>Nominal world in {name}</>} data={{ 'data-engine': name }}>
+      <p>
+        {description}. <strong>{entries.filter(([, { theirs }]) => theirs === 'ok').length}</strong>{' '}
+        of {entries.length} scenarios succeed, with a fitness of {formatNumber(fitness.theirs)}{' '}
+        instead of {formatNumber(fitness.ours)}: {differenceInWords(fitness)}.
+      </p>
+      <Table<ComparedRow>
+        caption={`Scenarios and objectives in ${name}`}
+        rows={rows}
+        columns={[
+          { key: 'scenario', header: true, value: ({ scenario }) => scenario },
+          { key: 'objective', value: ({ quantity }) => quantity },
+          {
+            key: 'gaitswarm',
+            label: 'gaitswarm',
+            digits: 4,
+            value: ({ compared }) => compared.ours,
+          },
+          { key: 'theirs', label: name, digits: 4, value: ({ compared }) => compared.theirs },
+          {
+            key: 'difference',
+            numeric: true,
+            value: ({ compared: { difference } }) => difference && Math.abs(difference),
+            cell: ({ compared }) => differenceInWords(compared),
+          },
+        ]}
+        pageSize={2 * (objectives.length + 1)}
+      />
+    </Card>
+  )
+}
+
+function differenceInWords({ difference }: Compared): string {
+  return change(difference === null ? null : 100 * difference, '%', 2)
 }

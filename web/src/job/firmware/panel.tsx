@@ -4,9 +4,10 @@ import { useState } from 'preact/hooks'
 import { get, url } from '../../api/client'
 import { useResource } from '../../api/resource'
 import type { Firmware, Job } from '../../api/types'
+import { Card, EmptyCard, Loaded } from '../../components/card'
 import { CopyBlock } from '../../components/copy-button'
-import { Empty, ErrorNotice, Loading } from '../../components/feedback'
-import { Table } from '../../components/table/table'
+import { Select } from '../../components/fields/controls'
+import { type Column, Table } from '../../components/table/table'
 import { formatCount, formatNumber, NONE, percent, quantity } from '../../format/number'
 import { inWords } from '../../format/words'
 
@@ -15,43 +16,37 @@ const TABLE_BITS = ['10x6', '9x6', '8x6', '8x5']
 const [USUAL_BITS] = TABLE_BITS
 
 export function FirmwarePanel({ job }: { job: Job }) {
-  if (job.best_fitness === null) {
-    return (
-      <section class="card">
-        <Empty title="No firmware yet">
-          <p>Firmware is available once a design has walked in every scenario.</p>
-        </Empty>
-      </section>
-    )
-  }
-  return <OfBest job={job} />
-}
-
-function OfBest({ job }: { job: Job }) {
   const [bits, setBits] = useState(USUAL_BITS)
   const query = { table_bits: bits === USUAL_BITS ? undefined : bits }
-  const summary = useResource(`${job.id} ${job.best_iteration} ${bits}`, (signal) =>
+  const exists = job.best_fitness !== null
+  const summary = useResource(exists ? `${job.id} ${job.best_iteration} ${bits}` : null, (signal) =>
     get('/v1/jobs/{job_id}/firmware/summary', { path: { job_id: job.id }, query, signal }),
   )
+  if (!exists) {
+    return (
+      <EmptyCard title="No firmware yet">
+        Firmware is available once a design has walked in every scenario.
+      </EmptyCard>
+    )
+  }
   const firmware = summary.data
   const hasTables = firmware === null || firmware.tables.length > 0
   return (
     <div class="stack">
-      <section class="card" aria-labelledby="firmware" data-fits={firmware?.memory.fits ?? ''}>
-        <header class="row spread">
-          <h2 id="firmware">Firmware of the winner</h2>
+      <Card
+        title="Firmware of the winner"
+        data={{ 'data-fits': firmware?.memory.fits ?? '' }}
+        tools={
           <span class="row">
             {hasTables && (
-              <label class="row small">
-                <span>Fuzzy table</span>
-                <select value={bits} onChange={(event) => setBits(event.currentTarget.value)}>
-                  {TABLE_BITS.map((choice) => (
-                    <option key={choice} value={choice}>
-                      {choice.replace('x', ' × ')} bits
-                    </option>
-                  ))}
-                </select>
-              </label>
+              <Select
+                label="Fuzzy table"
+                value={bits}
+                options={TABLE_BITS.map(
+                  (size) => [size, `${size.replace('x', ' × ')} bits`] as const,
+                )}
+                onChoose={setBits}
+              />
             )}
             <a
               class="button primary compact"
@@ -61,7 +56,8 @@ function OfBest({ job }: { job: Job }) {
               Download
             </a>
           </span>
-        </header>
+        }
+      >
         <div class="stack">
           <p class="muted small">
             C99 source for the microcontroller of one leg, without floating point, with a test that
@@ -71,19 +67,15 @@ function OfBest({ job }: { job: Job }) {
             label="the test"
             text={`unzip ${job.id}-firmware.zip -d firmware && make -C firmware test`}
           />
-          {summary.error && (
-            <ErrorNotice
-              what="Could not generate the firmware."
-              error={summary.error}
-              retry={summary.reload}
-            />
-          )}
-          {summary.loading && !firmware && (
-            <Loading what="the firmware; simulating the winner for its test" />
-          )}
-          {firmware && <Memory firmware={firmware} />}
+          <Loaded
+            resource={summary}
+            what="the firmware; simulating the winner for its test"
+            failed="Could not generate the firmware."
+          >
+            {(data) => <Memory firmware={data} />}
+          </Loaded>
         </div>
-      </section>
+      </Card>
       {firmware && <Contents firmware={firmware} />}
     </div>
   )
@@ -112,9 +104,8 @@ function Memory({ firmware: { memory, table_difference: difference } }: { firmwa
       <Table
         caption="Memory of a leg's microcontroller"
         rows={rows}
-        rowKey={({ name }) => name}
         columns={[
-          { key: 'name', label: 'Per leg', header: true, cell: ({ name }) => name },
+          { key: 'per leg', header: true, cell: ({ name }) => name },
           memoryColumn('flash', 'Flash', memory.flash),
           memoryColumn('ram', 'RAM', memory.ram),
         ]}
@@ -144,12 +135,12 @@ function Memory({ firmware: { memory, table_difference: difference } }: { firmwa
   )
 }
 
-function memoryColumn(key: 'flash' | 'ram', label: string, limit: number) {
+function memoryColumn(key: 'flash' | 'ram', label: string, limit: number): Column<MemoryRow> {
   return {
     key,
     label,
     numeric: true,
-    cell: (row: MemoryRow) => {
+    cell: (row) => {
       const bytes = row[key]
       if (bytes === null) return NONE
       return (
@@ -162,29 +153,26 @@ function memoryColumn(key: 'flash' | 'ram', label: string, limit: number) {
   }
 }
 
-function Contents({ firmware }: { firmware: Firmware }) {
-  const walks = new Map(firmware.walks.map((walk) => [walk.scenario, walk]))
+function Contents({ firmware: { walks, trajectories, samples, files } }: { firmware: Firmware }) {
+  const walkOf = (scenario: string) => walks.find((walk) => walk.scenario === scenario)
+  const size = Object.values(files).reduce((sum, bytes) => sum + bytes, 0)
   return (
-    <section class="card" aria-labelledby="firmware-walks">
-      <h2 id="firmware-walks">Trajectories and simulations</h2>
-      <Table
+    <Card title="Trajectories and simulations">
+      <Table<Firmware['trajectories'][number]>
         caption="Trajectories and simulations by scenario"
-        rows={firmware.trajectories}
-        rowKey={({ scenario }) => scenario}
+        rows={trajectories}
         columns={[
-          { key: 'scenario', label: 'Scenario', header: true, value: ({ scenario }) => scenario },
-          { key: 'rows', label: 'Rows', numeric: true, value: ({ rows }) => rows },
+          { key: 'scenario', header: true, value: ({ scenario }) => scenario },
+          { key: 'rows', numeric: true, value: ({ rows }) => rows },
           {
-            key: 'leg',
-            label: 'One leg',
+            key: 'one leg',
             unit: 'B',
             numeric: true,
             value: (row) => row.bytes_of_a_leg,
             cell: (row) => formatCount(row.bytes_of_a_leg),
           },
           {
-            key: 'bytes',
-            label: 'All joints',
+            key: 'all joints',
             unit: 'B',
             numeric: true,
             minor: true,
@@ -192,28 +180,18 @@ function Contents({ firmware }: { firmware: Firmware }) {
             cell: ({ bytes }) => formatCount(bytes),
           },
           {
-            key: 'samples',
-            label: 'Samples compared',
+            key: 'samples compared',
             numeric: true,
-            value: ({ scenario }) => walks.get(scenario)?.samples ?? null,
-            cell: ({ scenario }) => formatCount(walks.get(scenario)?.samples),
+            value: ({ scenario }) => walkOf(scenario)?.samples ?? null,
+            cell: ({ scenario }) => formatCount(walkOf(scenario)?.samples),
           },
-          {
-            key: 'status',
-            label: 'Status',
-            value: ({ scenario }) => walks.get(scenario)?.status ?? null,
-          },
+          { key: 'status', value: ({ scenario }) => walkOf(scenario)?.status ?? null },
         ]}
       />
       <p class="muted small table-note">
-        {formatCount(firmware.samples)} samples compared in total,{' '}
-        {formatCount(Object.keys(firmware.files).length)} files,{' '}
-        {formatNumber(total(firmware) / 1e6, 2)}&nbsp;MB.
+        {formatCount(samples)} samples compared in total, {formatCount(Object.keys(files).length)}{' '}
+        files, {formatNumber(size / 1e6, 2)}&nbsp;MB.
       </p>
-    </section>
+    </Card>
   )
-}
-
-function total({ files }: Firmware): number {
-  return Object.values(files).reduce((sum, size) => sum + size, 0)
 }

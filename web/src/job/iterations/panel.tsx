@@ -1,11 +1,12 @@
 /** Table of all committed iterations, with filters and downloads. */
 
 import type { Iteration, Job } from '../../api/types'
+import { Card } from '../../components/card'
 import { Empty } from '../../components/feedback'
-import { Check } from '../../components/fields/check'
+import { Check } from '../../components/fields/controls'
 import { type Column, Table } from '../../components/table/table'
-import { formatNumber } from '../../format/number'
 import { formatMoment } from '../../format/time'
+import { capitalized, inWords } from '../../format/words'
 import { type Codec, flag, ORDER, PAGE_NUMBER, useQueryValue } from '../../router/query-value'
 import { jobPath } from '../../router/routes'
 import { fitnessUnit } from '../fitness'
@@ -24,17 +25,16 @@ export function IterationsPanel({ live, job }: { live: LiveJob; job: Job }) {
   const [least, setLeast] = useQueryValue('most', AT_MOST, '')
   const [improved, setImproved] = useQueryValue('improved', flag(false), false)
   const [order, setOrder] = useQueryValue('sort', ORDER, NEWEST)
-  const below = least === '' ? Number.POSITIVE_INFINITY : Number(least)
   const shown = iterations.filter(
     (i) =>
-      (below === Number.POSITIVE_INFINITY || (i.best !== null && i.best <= below)) &&
+      (least === '' || (i.best !== null && i.best <= Number(least))) &&
       (!improved || isImprovement(iterations, i)),
   )
   const paging = useQueryValue('page', PAGE_NUMBER, 0)
   return (
-    <section class="card" aria-labelledby="iterations">
-      <header class="row spread">
-        <h2 id="iterations">Iterations</h2>
+    <Card
+      title="Iterations"
+      tools={
         <span class="row">
           <a class="button compact" href={`/v1/jobs/${job.id}/export?format=csv`} download>
             Download CSV
@@ -43,7 +43,8 @@ export function IterationsPanel({ live, job }: { live: LiveJob; job: Job }) {
             Download Parquet
           </a>
         </span>
-      </header>
+      }
+    >
       {iterations.length === 0 ? (
         <Empty title="No iteration yet">
           <p>Iterations appear here as they are committed.</p>
@@ -78,7 +79,7 @@ export function IterationsPanel({ live, job }: { live: LiveJob; job: Job }) {
           />
         </div>
       )}
-    </section>
+    </Card>
   )
 }
 
@@ -91,16 +92,14 @@ function columns(job: Job): readonly Column<Iteration>[] {
   const unit = fitnessUnit(job)
   const fitness = (
     key: 'best' | 'median' | 'mean' | 'worst' | 'best_so_far',
-    label: string,
     minor = false,
   ): Column<Iteration> => ({
     key,
-    label,
+    label: capitalized(inWords(key)),
     unit,
-    numeric: true,
+    digits: 5,
     minor,
     value: (i) => i[key],
-    cell: (i) => formatNumber(i[key], 5),
   })
   return [
     {
@@ -110,25 +109,16 @@ function columns(job: Job): readonly Column<Iteration>[] {
       value: (i) => i.index,
       cell: (i) => <a href={jobPath(job.id, `iterations/${i.index}`)}>{i.index}</a>,
     },
-    { key: 'designs', label: 'Designs', numeric: true, minor: true, value: (i) => i.designs },
-    fitness('best', 'Best'),
-    fitness('median', 'Median'),
-    fitness('mean', 'Mean', true),
-    fitness('worst', 'Worst', true),
-    fitness('best_so_far', 'Best so far'),
-    { key: 'failed', label: 'Failed', numeric: true, value: (i) => i.failed },
-    {
-      key: 'seconds',
-      label: 'Time',
-      unit: 's',
-      numeric: true,
-      minor: true,
-      value: (i) => i.evaluate_seconds,
-      cell: (i) => formatNumber(i.evaluate_seconds, 3),
-    },
+    { key: 'designs', numeric: true, minor: true, value: (i) => i.designs },
+    fitness('best'),
+    fitness('median'),
+    fitness('mean', true),
+    fitness('worst', true),
+    fitness('best_so_far'),
+    { key: 'failed', numeric: true, value: (i) => i.failed },
+    { key: 'time', unit: 's', digits: 3, minor: true, value: (i) => i.evaluate_seconds },
     {
       key: 'committed',
-      label: 'Committed',
       minor: true,
       value: (i) => i.committed_at,
       cell: (i) => formatMoment(i.committed_at),

@@ -1,24 +1,31 @@
 /** Spec of a job, commands to run it again, evidence and provenance. */
 
-import { url } from '../../api/client'
-import type { Job } from '../../api/types'
-import { CopyBlock } from '../../components/copy-button'
+import { useState } from 'preact/hooks'
+import { get, post, url } from '../../api/client'
+import { useResource } from '../../api/resource'
+import type { HistoryVerification, Job } from '../../api/types'
+import { Card } from '../../components/card'
+import { CopyBlock, CopyButton } from '../../components/copy-button'
+import { ErrorNotice } from '../../components/feedback'
+import { Table } from '../../components/table/table'
+import { formatCount } from '../../format/number'
+import { type Design, formatExactValue } from '../../format/value'
+import { inWords, sentence } from '../../format/words'
 import { withQuery } from '../../router/routes'
-import { curlCommand, submitCommand } from './commands'
-import { OptimizerCard } from './optimizer-card'
-import { ProvenanceCard } from './provenance-card'
-import { StartCard } from './start-card'
+import { methodNamed, settingText, settingTexts } from '../../submission/draft/optimizer'
+import { startDesigns } from '../start'
 
 export function ReproducePanel({ job }: { job: Job }) {
   return (
     <div class="stack">
-      <section class="card" aria-labelledby="again">
-        <header class="row spread">
-          <h2 id="again">Run this job again</h2>
+      <Card
+        title="Run this job again"
+        tools={
           <a class="button compact" href={withQuery('/jobs/new', { clone: job.id })}>
             Clone in the form
           </a>
-        </header>
+        }
+      >
         <div class="stack">
           <p class="muted small">
             The same spec with the same seed yields the same designs, bit for bit, if the provenance
@@ -26,46 +33,216 @@ export function ReproducePanel({ job }: { job: Job }) {
           </p>
           <div class="stack-tight">
             <h3>With the command line</h3>
-            <CopyBlock label="the command" text={submitCommand(job.spec, location.origin)} />
+            <CopyBlock label="the command" text={submitCommand(job.spec)} />
           </div>
           <div class="stack-tight">
             <h3>With curl</h3>
-            <CopyBlock label="the curl command" text={curlCommand(job.spec, location.origin)} />
+            <CopyBlock label="the curl command" text={curlCommand(job.spec)} />
           </div>
         </div>
-      </section>
+      </Card>
       {job.iterations > 0 && <EvidenceCard job={job} />}
       <OptimizerCard job={job} />
-      <StartCard job={job} />
+      <StartCard designs={startDesigns(job)} />
       <ProvenanceCard job={job} />
-      <section class="card" aria-labelledby="spec">
-        <h2 id="spec">Spec as JSON</h2>
+      <Card title="Spec as JSON">
         <CopyBlock label="the spec" text={JSON.stringify(job.spec, null, 2)} />
-      </section>
+      </Card>
     </div>
   )
 }
 
-function EvidenceCard({ job }: { job: Job }) {
+function submitCommand(spec: object): string {
+  const file = `cat > job.json <<'END'\n${JSON.stringify(spec, null, 1)}\nEND`
+  return `${file}\ngaitswarm submit --spec job.json --server ${location.origin}`
+}
+
+function curlCommand(spec: object): string {
+  const quoted = `'${JSON.stringify(spec).replaceAll("'", `'\\''`)}'`
+  return `curl -s -X POST ${location.origin}/v1/jobs -H 'Content-Type: application/json' -d ${quoted}`
+}
+
+function EvidenceCard({ job: { id } }: { job: Job }) {
   return (
-    <section class="card" aria-labelledby="evidence">
-      <header class="row spread">
-        <h2 id="evidence">Evidence</h2>
+    <Card
+      title="Evidence"
+      tools={
         <a
           class="button compact"
-          href={url('/v1/jobs/{job_id}/evidence', { job_id: job.id })}
-          download={`${job.id}.zip`}
+          href={url('/v1/jobs/{job_id}/evidence', { job_id: id })}
+          download={`${id}.zip`}
         >
           Download
         </a>
-      </header>
+      }
+    >
       <div class="stack">
         <p class="muted small">
           One file with spec, robot, provenance and every evaluation. It can be verified anywhere,
           bit for bit.
         </p>
-        <CopyBlock label="the verification" text={`gaitswarm verify ${job.id}.zip --replay 50`} />
+        <CopyBlock label="the verification" text={`gaitswarm verify ${id}.zip --replay 50`} />
       </div>
-    </section>
+    </Card>
   )
+}
+
+/** Search method and its settings, next to the defaults. */
+function OptimizerCard({ job: { optimizer, spec } }: { job: Job }) {
+  const catalogue = useResource('optimizers', (signal) => get('/v1/optimizers', { signal }))
+  const method = methodNamed(catalogue.data?.items ?? [], optimizer ?? '')
+  const defaults = new Map<string, unknown>(Object.entries(method?.settings ?? {}))
+  const settings = settingTexts(typeof spec.optimizer === 'object' ? spec.optimizer : {})
+  const rows = Object.entries(settings)
+    .filter(([name]) => name !== 'name')
+    .map(([name, value]) => {
+      const usual = method ? settingText(defaults.get(name)) : value
+      return { name, value, usual, changed: usual !== value }
+    })
+  return (
+    <Card title={<>Search method: {optimizer}</>}>
+      <div class="stack-tight">
+        {method && <p class="muted small">{sentence(method.description)}</p>}
+        <Table<(typeof rows)[number]>
+          caption="Settings of the search method"
+          rows={rows}
+          rowData={({ name, changed }) => ({
+            'data-setting': name,
+            'data-changed': String(changed),
+          })}
+          columns={[
+            { key: 'setting', header: true, cell: ({ name }) => inWords(name) },
+            {
+              key: 'value',
+              cell: ({ value, changed }) => (changed ? <strong>{value}</strong> : value),
+            },
+            {
+              key: 'default',
+              cell: ({ usual, changed }) =>
+                changed ? usual : method && <span class="muted">the same</span>,
+            },
+          ]}
+        />
+      </div>
+    </Card>
+  )
+}
+
+function StartCard({ designs }: { designs: readonly Design[] }) {
+  if (designs.length === 0) return null
+  const names = [...new Set(designs.flatMap((design) => Object.keys(design)))]
+  return (
+    <Card title="Start designs">
+      <p class="muted small">
+        {formatCount(designs.length)} given designs that were evaluated first; the search starts
+        from them if its method supports it.
+      </p>
+      <Table<Design>
+        caption="Start designs"
+        rows={designs}
+        pageSize={20}
+        columns={[
+          { key: 'design', header: true, numeric: true, value: (row) => designs.indexOf(row) },
+          ...names.map((name) => ({
+            key: name,
+            label: name,
+            numeric: true,
+            value: (row: Design) => row[name] ?? null,
+            cell: (row: Design) => formatExactValue(row[name]),
+          })),
+        ]}
+      />
+    </Card>
+  )
+}
+
+/** Provenance of the numbers by iteration, and verification of the history. */
+function ProvenanceCard({ job }: { job: Job }) {
+  return (
+    <Card title="Provenance">
+      <Table<Job['provenance'][number]>
+        caption="Provenance by iteration"
+        rows={job.provenance}
+        rowData={({ from_iteration }) => ({ 'data-from-iteration': from_iteration })}
+        columns={[
+          { key: 'from iteration', cell: ({ from_iteration }) => from_iteration },
+          { key: 'gaitswarm', label: 'gaitswarm', cell: ({ provenance }) => provenance.gaitswarm },
+          {
+            key: 'backend',
+            cell: ({ provenance: { simulation } }) =>
+              `${simulation.backend}, ${simulation.precision}`,
+          },
+          {
+            key: 'robot',
+            cell: ({ provenance: { simulation } }) => (
+              <>
+                {simulation.robot} <Digest digits={simulation.robot_digest} />
+              </>
+            ),
+          },
+          {
+            key: 'simulation code',
+            cell: ({ provenance }) => <Digest digits={provenance.simulation.code_digest} />,
+          },
+          {
+            key: 'search code',
+            cell: ({ provenance }) => <Digest digits={provenance.optimizer_digest} />,
+          },
+          {
+            key: 'libraries',
+            cell: ({ provenance }) =>
+              Object.entries(provenance.simulation.libraries)
+                .map(([name, version]) => `${name} ${version}`)
+                .join(', '),
+          },
+        ]}
+      />
+      {job.head && <HistoryCheck id={job.id} head={job.head} />}
+    </Card>
+  )
+}
+
+function Digest({ digits, shown = 8 }: { digits: string; shown?: number }) {
+  return <code title={digits}>{digits.slice(0, shown)}</code>
+}
+
+/** Digest of the history, and its verification on request. */
+function HistoryCheck({ id, head }: { id: string; head: string }) {
+  const [verification, setVerification] = useState<HistoryVerification | null>(null)
+  const [busy, setBusy] = useState(false)
+  const [error, setError] = useState<unknown>(null)
+  const verify = () => {
+    setBusy(true)
+    setError(null)
+    post('/v1/jobs/{job_id}/verify', { path: { job_id: id }, body: { replay: 0 } })
+      .then(setVerification, setError)
+      .finally(() => setBusy(false))
+  }
+  return (
+    <div class="stack-tight" data-head={head}>
+      <div class="row">
+        <span class="muted small">
+          History: head <Digest digits={head} shown={16} />…
+        </span>
+        <CopyButton text={head} label="the head" />
+        <button type="button" class="compact" disabled={busy} onClick={verify}>
+          Verify
+        </button>
+      </div>
+      {/* Always present, so that screen readers announce its content. */}
+      <p
+        class="small"
+        role="status"
+        data-verified={verification ? String(verification.verified) : undefined}
+      >
+        {verification && outcome(verification)}
+      </p>
+      {error !== null && <ErrorNotice what="Could not verify the history." error={error} />}
+    </div>
+  )
+}
+
+function outcome({ verified, checks }: HistoryVerification): string {
+  const details = checks.map(({ detail }) => detail).join('; ')
+  return verified ? `History verified: ${details}.` : `The history was modified: ${details}.`
 }

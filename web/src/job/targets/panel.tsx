@@ -3,87 +3,75 @@
 import { get } from '../../api/client'
 import { usePolling, useResource } from '../../api/resource'
 import type { Job, TargetResult, Targets } from '../../api/types'
-import { Empty, ErrorNotice, Loading } from '../../components/feedback'
+import { Card, EmptyCard, Loaded } from '../../components/card'
+import { Select } from '../../components/fields/controls'
 import { type Column, Table } from '../../components/table/table'
-import { change, formatExact, formatNumber, percent, quantity } from '../../format/number'
+import { change, formatExact, formatNumber, NONE, percent, quantity } from '../../format/number'
 import { placeWord } from '../../format/place'
 import { inWords } from '../../format/words'
 import { setQuery, usePlace } from '../../router/navigation'
 import { isRunning } from '../state'
-import { isWithin, LEFT_OUT, type LeaveOut, leaveOutOf, withinCount } from './targets'
 
 /** Polling interval while the job runs [ms]. */
 const RENEW_MS = 15_000
 
-export function TargetsPanel({ job }: { job: Job }) {
-  if (!job.best) {
-    return (
-      <section class="card">
-        <Empty title="Nothing to compare yet">
-          <p>No design has succeeded in every walk yet. The first one that does appears here.</p>
-        </Empty>
-      </section>
-    )
-  }
-  return <Compared job={job} />
-}
+const LEAVE_OUT = [
+  ['', 'nothing: compare only'],
+  ['target', 'itself'],
+  ['walk', 'all targets of its walk'],
+] as const
 
-function Compared({ job }: { job: Job }) {
-  const leaveOut = leaveOutOf(usePlace().query)
-  const targets = useResource(`${job.id} ${leaveOut}`, (signal) =>
+export function TargetsPanel({ job }: { job: Job }) {
+  const word = usePlace().query.get('leave_out')
+  const leaveOut = LEAVE_OUT.find(([what]) => what === word)?.[0] ?? ''
+  const targets = useResource(job.best ? `${job.id} ${leaveOut}` : null, (signal) =>
     get('/v1/jobs/{job_id}/targets', {
       path: { job_id: job.id },
-      query: leaveOut === null ? {} : { leave_out: leaveOut },
+      query: leaveOut === '' ? {} : { leave_out: leaveOut },
       signal,
     }),
   )
   usePolling(targets.reload, RENEW_MS, isRunning(job))
+  if (!job.best) {
+    return (
+      <EmptyCard title="Nothing to compare yet">
+        No design has succeeded in every walk yet. The first one that does appears here.
+      </EmptyCard>
+    )
+  }
   return (
-    <section class="card" aria-labelledby="targets">
-      <header class="row spread">
-        <h2 id="targets">Targets</h2>
-        <LeaveOutPicker chosen={leaveOut} />
-      </header>
-      {targets.error && (
-        <ErrorNotice
-          what="Could not load the targets."
-          error={targets.error}
-          retry={targets.reload}
+    <Card
+      title="Targets"
+      tools={
+        <Select
+          label="Predict each target without"
+          value={leaveOut}
+          options={LEAVE_OUT}
+          onChoose={(what) => setQuery({ leave_out: what || null })}
         />
-      )}
-      {targets.loading && !targets.data && <Loading what="the targets" />}
-      {targets.data && <TargetsTable targets={targets.data} predicts={leaveOut !== null} />}
-    </section>
+      }
+    >
+      <Loaded resource={targets} what="the targets">
+        {(data) => <TargetsTable targets={data} predicts={leaveOut !== ''} />}
+      </Loaded>
+    </Card>
   )
 }
 
-function LeaveOutPicker({ chosen }: { chosen: LeaveOut | null }) {
-  return (
-    <label class="row">
-      <span class="label">Predict each target without</span>
-      <select
-        value={chosen ?? ''}
-        onChange={(event) => setQuery({ leave_out: event.currentTarget.value || null })}
-      >
-        <option value="">nothing: compare only</option>
-        {LEFT_OUT.map(({ what, words }) => (
-          <option key={what} value={what}>
-            {words}
-          </option>
-        ))}
-      </select>
-    </label>
-  )
+/** Whether a difference in tolerances is at most one; false for a failure. */
+function isWithin(difference: number | null): boolean {
+  return difference !== null && Math.abs(difference) <= 1
 }
 
 function TargetsTable({ targets, predicts }: { targets: Targets; predicts: boolean }) {
-  const { within, fitted } = withinCount(targets)
+  const fitted = targets.targets.filter(({ use }) => use === 'fit')
+  const within = fitted.filter(({ difference }) => isWithin(difference)).length
   return (
     <>
-      <p data-within={within} data-fitted={fitted}>
+      <p data-within={within} data-fitted={fitted.length}>
         The best design, {placeWord(targets)}, is within tolerance of{' '}
         <strong>
-          {within} of {fitted}
+          {within} of {fitted.length}
         </strong>{' '}
         fitted targets. Its misfit, the root mean square over them, is{' '}
         {formatNumber(targets.fitness)} tolerances.
@@ -91,7 +79,6 @@ function TargetsTable({ targets, predicts }: { targets: Targets; predicts: boole
       <Table
         caption="Targets and results of the best design"
         rows={targets.targets}
-        rowKey={({ walk, relative_to, quantity }) => `${walk} ${relative_to} ${quantity}`}
         columns={columns(predicts)}
         rowData={({ walk, quantity, use }) => ({
           'data-target': `${walk} ${quantity}`,
@@ -110,77 +97,47 @@ function TargetsTable({ targets, predicts }: { targets: Targets; predicts: boole
 }
 
 function columns(predicts: boolean): readonly Column<TargetResult>[] {
+  const leftOut: readonly Column<TargetResult>[] = [
+    { key: 'left out', numeric: true, cell: (t) => quantity(t.left_out?.simulated, t.unit) },
+    {
+      key: 'deviation, left out',
+      numeric: true,
+      cell: (t) => <Deviation value={t.left_out?.difference ?? null} />,
+    },
+  ]
   return [
     {
       key: 'walk',
-      label: 'Walk',
       header: true,
       value: ({ walk }) => walk,
       cell: ({ walk, relative_to }) => (relative_to ? `${walk} / ${relative_to}` : walk),
     },
-    {
-      key: 'quantity',
-      label: 'Quantity',
-      value: (t) => t.quantity,
-      cell: (t) => inWords(t.quantity),
-    },
-    {
-      key: 'value',
-      label: 'Target',
-      numeric: true,
-      cell: (t) => quantity(t.value, t.unit),
-    },
+    { key: 'quantity', value: (t) => inWords(t.quantity) },
+    { key: 'target', numeric: true, cell: (t) => quantity(t.value, t.unit) },
     {
       key: 'tolerance',
-      label: 'Tolerance',
       numeric: true,
       minor: true,
       cell: (t) =>
         t.quantity === 'height_loss' ? `${formatExact(t.tolerance)} m` : percent(t.tolerance, 2),
     },
+    { key: 'simulated', numeric: true, cell: (t) => quantity(t.simulated, t.unit) },
     {
-      key: 'simulated',
-      label: 'Simulated',
-      numeric: true,
-      cell: (t) => quantity(t.simulated, t.unit),
-    },
-    {
-      key: 'off',
-      label: 'Deviation, in tolerances',
+      key: 'deviation, in tolerances',
       numeric: true,
       value: (t) => (t.difference === null ? null : Math.abs(t.difference)),
-      cell: (t) => <Off difference={t.difference} />,
+      cell: (t) => <Deviation value={t.difference} />,
     },
-    ...(predicts
-      ? ([
-          {
-            key: 'left-out',
-            label: 'Left out',
-            numeric: true,
-            cell: (t) => quantity(t.left_out?.simulated, t.unit),
-          },
-          {
-            key: 'left-out-off',
-            label: 'Deviation, left out',
-            numeric: true,
-            cell: (t) => <Off difference={t.left_out?.difference ?? null} />,
-          },
-        ] satisfies Column<TargetResult>[])
-      : []),
-    {
-      key: 'use',
-      label: 'Use',
-      value: ({ use }) => use,
-      cell: ({ use }) => (use === 'fit' ? 'fitted' : 'predicted'),
-    },
+    ...(predicts ? leftOut : []),
+    { key: 'use', value: ({ use }) => (use === 'fit' ? 'fitted' : 'predicted') },
   ]
 }
 
-function Off({ difference }: { difference: number | null }) {
-  if (difference === null) return <>–</>
+function Deviation({ value }: { value: number | null }) {
+  if (value === null) return <>{NONE}</>
   return (
-    <span class="off" data-within={isWithin(difference)}>
-      {change(difference)}
+    <span class="off" data-within={isWithin(value)}>
+      {change(value)}
     </span>
   )
 }

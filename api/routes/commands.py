@@ -82,7 +82,7 @@ def extend_job(
     """Change the budget. A job that has succeeded is queued and continues from its last iteration.
 
     Committed iterations stay, and the current iteration is committed unchanged. Later ones follow
-    the schedule of the new budget, over which the inertia of `pso` falls: a job of 25 iterations
+    the schedule of the new budget, over which a falling inertia falls: a job of 25 iterations
     extended to 50 is reproducible, but differs from a job of 50. 409 if the job was cancelled.
     """
     job = service.extend(job_id, extension.iterations, actor=actor, quota=quota)

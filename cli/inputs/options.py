@@ -195,7 +195,7 @@ class SpecOptions:
         str | None,
         typer.Option(
             metavar="NAME",
-            help="Search method: cma-es, pso-thesis, auto, ...; `gaitswarm optimizers` lists all.",
+            help="Search method: cma-es, pso, auto, ...; `gaitswarm optimizers` lists all.",
         ),
     ] = None
     optimizer_settings: Annotated[

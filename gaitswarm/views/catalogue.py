@@ -78,7 +78,7 @@ class PreferenceView(Preference):
 class OptimizerView(View):
     """A search method by its default settings, or a preset of one."""
 
-    name: ChoiceName = Field(description="Name, as in job specs.", examples=["pso-thesis"])
+    name: ChoiceName = Field(description="Name, as in job specs.", examples=["pso-falling-inertia"])
     description: str = Field(
         description="What the method is, with its source.",
         examples=["Particle swarm optimization (Kennedy and Eberhart 1995; thesis 3.4.1)"],

@@ -68,14 +68,14 @@ def test_finished_jobs_are_reused(research: Command, db: Path) -> None:
     }
     (comparison,) = more["comparisons"]
     assert comparison["pi"]["values"][:1] == first["comparisons"][0]["pi"]["values"]
-    study(research, db, "--seeds", "1", "--chapters", "3", "--optimizer", "pso")
+    study(research, db, "--seeds", "1", "--chapters", "3", "--optimizer", "pso-falling-inertia")
     assert len(names(db)) == 6
 
 
 @pytest.mark.slow
 def test_an_interrupted_study_is_resumed(research: Command, db: Path) -> None:
     (planned,) = comparisons(
-        [3], ["szabadka2"], 1, particles=2, iterations=1, optimizer="pso-thesis", precision="double"
+        [3], ["szabadka2"], 1, particles=2, iterations=1, optimizer="pso", precision="double"
     )
     with gaitswarm.open(db) as jobs:
         paused = jobs.submit(planned.fuzzy.specs[0])

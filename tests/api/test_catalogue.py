@@ -66,10 +66,10 @@ def test_optimizers_have_their_settings(client: httpx2.Client) -> None:
     found = {item["name"]: item for item in items(client, "optimizers")}
 
     assert list(found) == list(CHOICES)
-    swarms = {name: found[name]["settings"] for name in ("pso", "pso-thesis")}
+    swarms = {name: found[name]["settings"] for name in ("pso", "pso-falling-inertia")}
     assert {name: (s["inertia_start"], s["inertia_end"]) for name, s in swarms.items()} == {
-        "pso": (0.9, 0.7),
-        "pso-thesis": (0.9, 0.9),
+        "pso": (0.9, 0.9),
+        "pso-falling-inertia": (0.9, 0.7),
     }
     assert all((s["cognitive"], s["social"]) == (0.5, 1.5) for s in swarms.values())
     for item in found.values():

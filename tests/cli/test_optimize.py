@@ -103,7 +103,7 @@ def test_controller_and_gait_are_searched_together(
     assert len(job["best"]["design"]) == searched and gait < set(job["best"]["design"])
     assert job["best"]["figure_of_merit"] == pytest.approx(1e5 / job["best"]["fitness"])
 
-    options = "--with-gait --scenarios straight --preference chapter-3 --optimizer pso-thesis"
+    options = "--with-gait --scenarios straight --preference chapter-3 --optimizer pso"
     asked = ("optimize", "--controller", controller, *options.split(), *small)
     assert gaitswarm(*asked, *where).json["best"] == job["best"]
 
@@ -127,9 +127,18 @@ def test_a_robot_is_fitted_without_a_gait(gaitswarm: Gaitswarm, write_json: Writ
 def test_an_optimizer_is_named_and_its_settings_are_written_out(
     gaitswarm: Gaitswarm, small_spec: Path, db: Path
 ) -> None:
-    named = ("submit", "--spec", small_spec, "--db", db, "--optimizer", "pso-thesis", "--json")
+    named = (
+        "submit",
+        "--spec",
+        small_spec,
+        "--db",
+        db,
+        "--optimizer",
+        "pso-falling-inertia",
+        "--json",
+    )
     whole = gaitswarm(*named).json["spec"]["optimizer"]
-    assert (whole["inertia_start"], whole["inertia_end"], whole["particles"]) == (0.9, 0.9, 25)
+    assert (whole["inertia_start"], whole["inertia_end"], whole["particles"]) == (0.9, 0.7, 25)
     assert gaitswarm(*named, "--particles", "4").json["spec"]["optimizer"] == {
         **whole,
         "particles": 4,

@@ -37,11 +37,11 @@ def test_settings_are_laid_over_those_of_the_method(
     gaitswarm: Gaitswarm, db: Path, write_json: WriteJson
 ) -> None:
     changed = {"sigma": 0.5}
-    thesis = submitted(
-        *(gaitswarm, db, "--optimizer", "pso-thesis"),
+    swarm = submitted(
+        *(gaitswarm, db, "--optimizer", "pso-falling-inertia"),
         *("--optimizer-settings", '{"social": 1.0}'),
     )
-    assert (thesis["inertia_end"], thesis["social"]) == (0.9, 1.0)
+    assert (swarm["inertia_end"], swarm["social"]) == (0.7, 1.0)
     file = write_json(changed, "settings.json")
     for given in (json.dumps(changed), file, f"@{file}"):
         own = submitted(gaitswarm, db, "--optimizer-settings", given, "--particles", 7)

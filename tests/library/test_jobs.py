@@ -66,7 +66,7 @@ MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
     "unknown field": ({"budget": 5}, "budget"),
     "no particles": ({"particles": 0}, "optimizer.particles"),
     "empty preset": (
-        {"optimizer": "pso-thesis", "particles": 0},
+        {"optimizer": "pso-falling-inertia", "particles": 0},
         "optimizer.particles",
     ),
     "unknown robot": ({"robot": "spot"}, "robot"),

@@ -25,7 +25,7 @@ SPEC = JobSpec.model_validate(
         "name": "formula",
         "controller": "pi",
         "scenarios": ["normal-fast", "slope-fast"],
-        "optimizer": {"name": "pso", "particles": 4},
+        "optimizer": {"name": "pso", "particles": 4, "inertia_end": 0.7},
         "iterations": 6,
         "seed": 11,
     }

@@ -179,14 +179,14 @@ def speeds(name: str, iterations: int) -> list[float]:
     return found
 
 
-def test_the_thesis_swarm_keeps_its_inertia_and_that_of_the_default_falls() -> None:
-    thesis, default = (
+def test_the_thesis_swarm_keeps_its_inertia_and_that_of_the_preset_falls() -> None:
+    thesis, falling = (
         [later / earlier for earlier, later in pairwise(speeds(name, 10))]
-        for name in ("pso-thesis", "pso")
+        for name in ("pso", "pso-falling-inertia")
     )
     assert thesis == pytest.approx([0.9] * 9)
-    assert default == sorted(default, reverse=True)
-    assert default[-1] == pytest.approx(0.7)
+    assert falling == sorted(falling, reverse=True)
+    assert falling[-1] == pytest.approx(0.7)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

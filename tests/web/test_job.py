@@ -234,7 +234,7 @@ def test_a_clone_has_the_same_spec(server: ServerProcess, visit: Callable[..., V
             "variables": ["P", "I", window],
             "fixed": {"duty_phase": "swing"},
             "preference": "chapter-3",
-            "optimizer": "pso-thesis",
+            "optimizer": "pso-falling-inertia",
             "iterations": 1,
             "precision": "single",
         }

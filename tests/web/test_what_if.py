@@ -37,13 +37,13 @@ def test_the_preference_of_chapter_3_weights_a_sixth_objective(
     page.get_by_role("link", name="Start a job from here").click()
     chosen = page.get_by_role("button", name="chapter-3", exact=True)
     expect(chosen).to_have_attribute("aria-pressed", "true")
-    page.get_by_role("button", name="pso-thesis", exact=True).click()
+    page.get_by_role("button", name="pso-falling-inertia", exact=True).click()
     page.get_by_label("Name", exact=True).fill("as in chapter 3")
     page.get_by_role("button", name="Submit the job").click()
     expect(page.get_by_role("heading", name="as in chapter 3")).to_be_visible()
     spec = server.job(page.url.rpartition("/")[2])["spec"]
     assert spec["preference"]["bias"] == [0.0] * 5 + [0.03]
-    assert (spec["optimizer"]["inertia_end"], spec["optimizer"]["particles"]) == (0.9, 8)
+    assert (spec["optimizer"]["inertia_end"], spec["optimizer"]["particles"]) == (0.7, 8)
     expect(page.get_by_text("Figure of merit F (eq. 3.1)")).to_be_visible(timeout=30_000)
 
 

@@ -46,7 +46,7 @@ PLANS: Final[dict[str, Plan]] = {
             **{f"chapter-4.{name}": 625 for name in "ABC"},
             **{f"chapter-3.{name}": 625 for name in ("pi", "fuzzy-pi")},
         },
-        (*THESIS, "pso-thesis", "nelder-mead", "mads", "cma-es", "de", "random", *RIVALS),
+        (*THESIS, "pso-falling-inertia", "nelder-mead", "mads", "cma-es", "de", "random", *RIVALS),
         20,
     ),
 }

@@ -181,7 +181,7 @@ def controllers(
     iterations: Annotated[
         int | None, typer.Option(help="Iterations per run. Default: 70 in chapter 3, 25 in 4.")
     ] = None,
-    optimizer: Annotated[str, typer.Option(help="pso-thesis or pso.")] = "pso-thesis",
+    optimizer: Annotated[str, typer.Option(help="pso or pso-falling-inertia.")] = "pso",
     precision: Annotated[
         str, typer.Option(help="Precision of the simulations: single or double.")
     ] = "double",

@@ -38,7 +38,7 @@ class SwarmSettings(SearchSettings):
     cognitive: float = Field(default=0.5, ge=0.0, le=10.0, description="Pull to a particle's best.")
     social: float = Field(default=1.5, ge=0.0, le=10.0, description="Pull to the swarm's best.")
     inertia_start: float = Field(default=0.9, ge=0.0, le=2.0, description="Inertia at the start.")
-    inertia_end: float = Field(default=0.7, ge=0.0, le=2.0, description="Inertia at the end.")
+    inertia_end: float = Field(default=0.9, ge=0.0, le=2.0, description="Inertia at the end.")
     velocity_limit: float = Field(
         default=0.5,
         gt=0.0,
@@ -68,7 +68,7 @@ class SwarmSettings(SearchSettings):
 
 
 class PsoSettings(SwarmSettings):
-    """Settings of the particle swarm; the thesis's defaults, except for a falling inertia."""
+    """Settings of the particle swarm; the thesis's by default."""
 
     name: Literal["pso"] = "pso"
 

@@ -21,6 +21,7 @@ class PsoPsSettings(SwarmSettings, PollSettings):
     """Settings of the hybrid: those of swarm and polls, and of the change between them."""
 
     name: Literal["pso-ps"] = "pso-ps"
+    inertia_end: float = Field(default=0.7, ge=0.0, le=2.0, description="Inertia at the end.")
     swarm_share: float = Field(
         default=0.5, gt=0.0, lt=1.0, description="Share of the budget of the swarm."
     )

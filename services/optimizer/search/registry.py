@@ -136,7 +136,7 @@ _PRESETS: Final[dict[str, SearchSettings]] = {
         social=1.49618,
         topology="ring",
     ),
-    "pso-thesis": PsoSettings(inertia_end=0.9),
+    "pso-falling-inertia": PsoSettings(inertia_end=0.7),
 }
 
 
@@ -171,8 +171,8 @@ class NamedSettings(Mapping[str, SearchSettings]):
 OPTIMIZERS: Final = NamedSettings()
 """Default settings by method, and presets of `pso`.
 
-`pso` has a falling inertia, `pso-thesis` an inertia of 0.9 throughout. `pso-constriction` has the
-coefficients of Clerc and Kennedy (2002) in the ring of Bratton and Kennedy (2007).
+`pso` is the thesis's swarm, whose inertia is constant. `pso-constriction` has the coefficients of
+Clerc and Kennedy (2002) in the ring of Bratton and Kennedy (2007).
 """
 
 

@@ -11,7 +11,7 @@ export const DOCUMENT: OpenApiDocument = {
           controller: { type: 'string', enum: ['pi', 'p'], default: 'pi' },
           scenarios: { default: ['fast', 'loaded'] },
           preference: { default: 'A' },
-          optimizer: { default: { name: 'pso', particles: 25, inertia_end: 0.7 } },
+          optimizer: { default: { name: 'pso', particles: 25, inertia_end: 0.9 } },
           iterations: { type: 'integer', minimum: 1, maximum: 1_000_000, default: 25 },
           seed: { type: 'integer', minimum: 0, exclusiveMaximum: 2 ** 63, default: 1 },
           precision: { type: 'string', enum: ['single', 'double'], default: 'double' },
@@ -75,7 +75,7 @@ const PSO = {
   properties: {
     name: { const: 'pso', default: 'pso', type: 'string' },
     particles: PARTICLES,
-    inertia_end: { type: 'number', minimum: 0, maximum: 2, default: 0.7 },
+    inertia_end: { type: 'number', minimum: 0, maximum: 2, default: 0.9 },
   },
 }
 
@@ -124,13 +124,13 @@ export const CATALOGUE = {
     {
       name: 'pso',
       description: 'a swarm',
-      settings: { name: 'pso', particles: 25, inertia_end: 0.7 },
+      settings: { name: 'pso', particles: 25, inertia_end: 0.9 },
       settings_schema: PSO,
     },
     {
-      name: 'pso-thesis',
+      name: 'pso-falling-inertia',
       description: 'a swarm',
-      settings: { name: 'pso', particles: 25, inertia_end: 0.9 },
+      settings: { name: 'pso', particles: 25, inertia_end: 0.7 },
       settings_schema: PSO,
     },
     {

@@ -9,16 +9,16 @@ import { EMPTY } from './drafts'
 
 describe('the optimizer', () => {
   const { optimizers } = CATALOGUE
-  const [pso, thesis, simplex] = optimizers
+  const [pso, falling, simplex] = optimizers
 
   test('is the default method with its settings', () => {
-    expect(EMPTY.optimizer).toEqual({ name: 'pso', particles: '25', inertia_end: '0.7' })
+    expect(EMPTY.optimizer).toEqual({ name: 'pso', particles: '25', inertia_end: '0.9' })
     expect(specOf(EMPTY).optimizer).toEqual(pso.settings)
   })
 
   test('keeps the size of its iterations with a preset or another method', () => {
-    const large = { name: 'pso', particles: '40', inertia_end: '0.7' }
-    expect(withPreset(large, thesis)).toEqual({ name: 'pso', particles: '40', inertia_end: '0.9' })
+    const large = { name: 'pso', particles: '40', inertia_end: '0.9' }
+    expect(withPreset(large, falling)).toEqual({ name: 'pso', particles: '40', inertia_end: '0.7' })
     expect(withPreset(large, simplex)).toMatchObject({ name: 'simplex', particles: '40' })
     expect(withPreset(large, simplex)).not.toHaveProperty('inertia_end')
   })
@@ -51,15 +51,15 @@ describe('the optimizer', () => {
   })
 
   test('of a cloned job may be a name, or settings without their defaults', () => {
-    const named = draftOf({ ...specOf(EMPTY), optimizer: 'pso-thesis' }, CATALOGUE)
-    expect(named.optimizer.inertia_end).toBe('0.9')
+    const named = draftOf({ ...specOf(EMPTY), optimizer: 'pso-falling-inertia' }, CATALOGUE)
+    expect(named.optimizer.inertia_end).toBe('0.7')
     expect(optimizerDraft(optimizers, { name: 'simplex', particles: 3 }, 'pso')).toMatchObject({
       particles: '3',
       restarts: 'true',
     })
     expect(optimizerDraft(optimizers, { particles: 3 }, 'pso')).toMatchObject({
       name: 'pso',
-      inertia_end: '0.7',
+      inertia_end: '0.9',
     })
   })
 })

@@ -84,7 +84,7 @@ def test_a_stopped_comparison_resumes_with_what_is_missing(tmp_path: Path) -> No
     running.append(path, execute(wanted[0]))
     found = running.execute_missing(wanted, path, processes=1, progress=done.append)
     assert [one.task for one in found] == wanted
-    assert [one.task for one in done] == wanted[1:]
+    assert {one.task for one in done} == set(wanted[1:])
     again = running.execute_missing(wanted, path, processes=1, progress=done.append)
     assert len(done) == 3
     assert [(one.best[1], one.to_best) for one in again] == [

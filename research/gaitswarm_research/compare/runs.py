@@ -7,7 +7,7 @@ import json
 import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
@@ -279,14 +279,11 @@ def execute_missing(
     if missing:
         with ProcessPoolExecutor(processes, get_context("spawn")) as pool:
             try:
-                waiting = {pool.submit(execute, task) for task in missing}
-                while waiting:
-                    done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
-                    for future in done:
-                        run = future.result()
-                        append(path, run)
-                        recorded[run.task] = run
-                        progress(run)
+                for future in as_completed([pool.submit(execute, task) for task in missing]):
+                    run = future.result()
+                    append(path, run)
+                    recorded[run.task] = run
+                    progress(run)
             except BaseException:
                 pool.shutdown(wait=False, cancel_futures=True)
                 raise

@@ -1,4 +1,4 @@
-"""BFGS with gradients from differences, inside bounds (Nocedal and Wright 2006, algorithm 6.1)."""
+"""BFGS with finite-difference gradients and bounds (Nocedal and Wright 2006, algorithm 6.1)."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from gaitswarm_research.methods.local_search import Axes, Point, Walk, gains, ju
 Floats = NDArray[np.float64]
 
 _SUFFICIENT: Final = 1e-4
-"""Share of the decrease that a gradient promises which a step must bring (Armijo)."""
+"""Required share of the decrease predicted by the gradient (Armijo)."""
 
 _LONGEST: Final = 0.5
 """Longest step in any variable [unit]."""
 
 _MOST_STEPS: Final = 200
-"""Steps of a search."""
+"""Maximum number of steps."""
 
 
 def bfgs(
@@ -31,12 +31,13 @@ def bfgs(
     difference: float,
     least: float = 1e-8,
 ) -> Walk:
-    """Go downhill by quasi-Newton steps, until a step gains next to nothing.
+    """Descend by quasi-Newton steps until a step gains less than the tolerance.
 
-    A gradient is the differences to one neighbour in each smooth variable, which are one batch; an
-    integer's neighbour is one away at least. A variable at a bound that its gradient would leave is
-    held for the step, and a step is cut at the bounds (projection; Bertsekas 1982). Steps are
-    halved, or cut to the least of a parabola, until they decrease the fitness enough (Armijo).
+    Gradients are forward differences to one neighbour per smooth variable, evaluated as one batch;
+    the neighbour of an integer differs by at least one. Variables at a bound with a gradient
+    pointing outwards are fixed for the step, and steps are projected onto the bounds (Bertsekas
+    1982). Steps are halved, or cut to the minimum of a parabola, until they satisfy Armijo's
+    condition.
     """
     here = start
     gradient, nearby = yield from _gradient(here, axes, difference)
@@ -75,7 +76,7 @@ def bfgs(
 def _gradient(
     here: Point, axes: Axes, difference: float
 ) -> Generator[Floats, Floats, tuple[Floats, Point]]:
-    """The gradient (m,) over smooth variables, and the best of here and its neighbours."""
+    """Return the gradient (m,), and the best of the point and its neighbours."""
     smooth = axes.smooth
     away = np.maximum(difference, axes.least[smooth])
     away = np.where(here.unit[smooth] + away <= 1.0, away, -away)
@@ -86,7 +87,7 @@ def _gradient(
     best = Point(near[k], float(fitness[k])) if fitness[k] < here.fitness else here
     if not math.isfinite(here.fitness):
         return np.zeros(len(smooth)), best
-    # What failed says nothing of a slope.
+    # A failed evaluation has no slope.
     rise = np.where(np.isfinite(fitness), fitness, here.fitness) - here.fitness
     return rise / away, best
 
@@ -94,7 +95,7 @@ def _gradient(
 def _line_search(
     here: Point, direction: Floats, slope: Floats, axes: Axes, least: float
 ) -> Generator[Floats, Floats, Point | None]:
-    """A point along a direction (m,) that is better by enough; None if there is none."""
+    """Return a point along a direction (m,) that satisfies Armijo's condition, or None."""
     length, span = 1.0, float(np.abs(direction).max())
     while length * span > least:
         unit = here.unit.copy()
@@ -103,14 +104,14 @@ def _line_search(
         there = yield from judged(unit)
         if there.fitness < here.fitness and there.fitness <= here.fitness + _SUFFICIENT * promised:
             return there
-        # The least of the parabola through both points with the slope here.
+        # Minimum of the parabola through both points with the slope at the first.
         bend = there.fitness - here.fitness - promised
         length *= min(0.5, max(0.1, -0.5 * promised / bend)) if bend > 0.0 else 0.5
     return None
 
 
 def _updated(inverse: Floats | None, moved: Floats, turned: Floats) -> Floats | None:
-    """The inverse Hessian after a step (Nocedal and Wright 2006, equations 6.17 and 6.20)."""
+    """Return the updated inverse Hessian (Nocedal and Wright 2006, eq. 6.17 and 6.20)."""
     bend = _dot(moved, turned)
     if bend <= 1e-12:
         return inverse

@@ -27,7 +27,7 @@ from gaitswarm_research.methods.nelder_mead import simplex_search
 Floats = NDArray[np.float64]
 
 _CANDIDATES: Final = 50
-"""Random positions to choose a start from that is far from visited regions."""
+"""Random candidates for the start of the next exploration."""
 
 
 class DirectedTabuSettings(SearchSettings):
@@ -35,7 +35,7 @@ class DirectedTabuSettings(SearchSettings):
 
     name: Literal["dts"] = "dts"
     step: float = Field(
-        default=0.2, gt=0, le=0.5, description="First step of an exploration, of each range."
+        default=0.2, gt=0, le=0.5, description="First step of an exploration, share of each range."
     )
     patience: int = Field(
         default=4,
@@ -44,28 +44,28 @@ class DirectedTabuSettings(SearchSettings):
         description="Iterations in a row without a new best that end an exploration.",
     )
     tabu_list: int = Field(
-        default=7, ge=1, le=1_000, description="Visited points whose neighbourhoods are tabu."
+        default=7, ge=1, le=1_000, description="Number of points whose neighbourhoods are tabu."
     )
     tabu_radius: float = Field(
-        default=0.02, gt=0, le=0.5, description="Of a tabu region, as a share of each range."
+        default=0.02, gt=0, le=0.5, description="Radius of a tabu region, as a share of each range."
     )
     semi_tabu_radius: float = Field(
         default=0.1,
         gt=0,
         le=1,
-        description="Of a semi-tabu region around it, out of which steps are directed.",
+        description="Radius of the semi-tabu region, in which steps are directed outwards.",
     )
     region_radius: float = Field(
         default=0.2,
         gt=0,
         le=1,
-        description="Of a visited region, outside of which an exploration begins.",
+        description="Radius of a visited region; explorations begin outside of these.",
     )
     tolerance: float = Field(
         default=1e-4,
         ge=0,
         lt=1,
-        description="At which an intensification has converged, as a share of the best fitness.",
+        description="Convergence tolerance of an intensification, as a share of the best fitness.",
     )
 
 
@@ -78,17 +78,16 @@ def directed_tabu(
 ) -> Proposals:
     """Explore by a tabu search whose trial points are directed, then intensify, then diversify.
 
-    An exploration's iteration judges one neighbour in each variable, as one batch, and then points
-    along the approximate descent direction that these give. It goes to the best of all, though that
-    may be worse than where it was, but never into a tabu region: the neighbourhood of one of the
-    last points that it has been at. From within a semi-tabu region, neighbours are on the side that
-    leads out. Steps are halved when nothing was better. After `patience` iterations without a
-    new best, the exploration ends; if its best is the best so far, a Nelder-Mead simplex
-    intensifies the search there. The next exploration begins outside the regions that were visited,
-    the farther the more often they were. The regions and the best are kept.
+    Each iteration of an exploration evaluates one neighbour per variable, as one batch, and then
+    points along the approximate descent direction that these define. It moves to the best of them
+    even if that is worse than the current point, but never into a tabu region (the neighbourhood of
+    a recent point). Inside a semi-tabu region, neighbours are on the side that leads out. Steps are
+    halved when no point was better. The exploration ends after `patience` iterations without a new
+    best; if its best is the best so far, a Nelder-Mead simplex intensifies the search there. The
+    next exploration begins outside the visited regions, whose radii grow with the number of visits.
 
-    Integers move by one at least. A choice's neighbour is another one at random; it has no part in
-    descent directions.
+    Integers move by at least one. The neighbour of a categorical value is a random other value;
+    categorical variables do not contribute to descent directions.
     """
     first = known_points(space, start)[:1]
     return evaluated_once(space, _explorations(settings, Axes(space), random, first), start)
@@ -97,7 +96,7 @@ def directed_tabu(
 def _explorations(
     settings: DirectedTabuSettings, axes: Axes, random: RandomNumbers, first: list[Point]
 ) -> Endless:
-    """Explore, intensify, diversify, for ever."""
+    """Explore, intensify and diversify, endlessly."""
 
     def search(start: Point, scale: float) -> Walk:
         return simplex_search(start, axes, 0.25 * settings.step * scale, settings.tolerance)
@@ -124,21 +123,21 @@ def explore(
     visited: VisitedRegions,
     random: RandomNumbers,
 ) -> Walk:
-    """Explore from a point, until there is no new best for a while."""
+    """Explore from a point until `patience` iterations bring no new best."""
     here, best, step, failures = start, start, settings.step, 0
     tabu = TabuList(settings.tabu_list, settings.tabu_radius, settings.semi_tabu_radius)
     while failures < settings.patience:
         visited.visit(here.unit)
         tabu.visit(here.unit)
         near = neighbours(here.unit, axes, step, tabu, random)
-        trials = yield from _judged_unless_tabu(near, tabu)
+        trials = yield from _evaluated_unless_tabu(near, tabu)
         direction = descent_direction(here, trials, axes)
         if direction.any():
             ahead = np.clip(here.unit + step * direction, 0.0, 1.0)
-            trials += yield from _judged_unless_tabu(ahead[None], tabu)
+            trials += yield from _evaluated_unless_tabu(ahead[None], tabu)
             if min(trials, key=_fitness) is trials[-1]:
                 farther = np.clip(here.unit + 2.0 * step * direction, 0.0, 1.0)
-                trials += yield from _judged_unless_tabu(farther[None], tabu)
+                trials += yield from _evaluated_unless_tabu(farther[None], tabu)
         if not trials:
             break
         there = min(trials, key=_fitness)
@@ -150,8 +149,8 @@ def explore(
     return best
 
 
-def _judged_unless_tabu(unit: Floats, tabu: TabuList) -> Generator[Floats, Floats, list[Point]]:
-    """Judge positions (n, d), but for those in tabu regions."""
+def _evaluated_unless_tabu(unit: Floats, tabu: TabuList) -> Generator[Floats, Floats, list[Point]]:
+    """Evaluate positions (n, d) outside of tabu regions."""
     allowed = unit[[not tabu.is_tabu(row) for row in unit]]
     if not len(allowed):
         return []
@@ -162,12 +161,12 @@ def _judged_unless_tabu(unit: Floats, tabu: TabuList) -> Generator[Floats, Float
 def neighbours(
     unit: Floats, axes: Axes, step: float, tabu: TabuList, random: RandomNumbers
 ) -> Floats:
-    """Give a neighbour in each variable, on the side that leads out of semi-tabu regions."""
+    """Return a neighbour in each variable, on the side that leads out of semi-tabu regions."""
     d, space = len(unit), axes.space
     away, draws = tabu.way_out(unit), random.uniform(d)
     sides = np.where(away == 0.0, np.where(draws < 0.5, -1.0, 1.0), np.sign(away))
     steps = np.maximum(step, axes.least)
-    # Where a bound is nearer than half of the step, the other side.
+    # On the other side if a bound is nearer than half of the step.
     sides = np.where(
         np.abs(np.clip(unit + sides * steps, 0, 1) - unit) < 0.5 * steps, -sides, sides
     )
@@ -181,7 +180,7 @@ def neighbours(
 
 
 def descent_direction(here: Point, trials: list[Point], axes: Axes) -> Floats:
-    """The approximate descent direction that neighbours give (Hedar and Fukushima 2004)."""
+    """Return the approximate descent direction from neighbours (Hedar and Fukushima 2004)."""
     direction = np.zeros(len(here.unit))
     for trial in trials:
         away = np.where(axes.space.categorical, 0.0, here.unit - trial.unit)
@@ -193,40 +192,38 @@ def descent_direction(here: Point, trials: list[Point], axes: Axes) -> Floats:
 
 
 class TabuList:
-    """The last points that were visited, with the regions around them."""
+    """Most recent points, with the regions around them."""
 
     def __init__(self, length: int, radius: float, semi_radius: float) -> None:
-        """Begin with no point."""
         self._length: Final = length
         self._radius: Final = radius
         self._semi_radius: Final = semi_radius
         self._points: list[Floats] = []
 
     def visit(self, unit: Floats) -> None:
-        """Remember a point, and forget the oldest beyond the list's length."""
+        """Add a point; drop the oldest beyond the list's length."""
         self._points = [*self._points, unit][-self._length :]
 
     def is_tabu(self, unit: Floats) -> bool:
-        """Tell whether a position lies in a tabu region."""
+        """Return whether a position lies in a tabu region."""
         return any(float(np.abs(unit - point).max()) < self._radius for point in self._points)
 
     def way_out(self, unit: Floats) -> Floats:
-        """Give the direction out of semi-tabu regions."""
+        """Return the direction out of semi-tabu regions, zero outside of them."""
         near = [p for p in self._points if float(np.abs(unit - p).max()) < self._semi_radius]
         return unit - np.array(near).sum(axis=0) / len(near) if near else np.zeros(len(unit))
 
 
 class VisitedRegions:
-    """Regions that were explored, with how often."""
+    """Explored regions with their number of visits."""
 
     def __init__(self, dimension: int, radius: float) -> None:
-        """Begin with no region."""
         self._radius: Final = radius
         self._centres: Floats = np.empty((0, dimension))
         self._visits: Floats = np.empty(0)
 
     def visit(self, unit: Floats) -> None:
-        """Count a visit to the nearest region; a point outside of all is the centre of a new one"""
+        """Count a visit to the nearest region; outside of all, add a region."""
         distances = np.abs(self._centres - unit).max(axis=1)
         if (distances < self._radius).any():
             self._visits[int(np.argmin(distances))] += 1.0
@@ -235,8 +232,8 @@ class VisitedRegions:
             self._visits = np.append(self._visits, 1.0)
 
     def farthest(self, candidates: Floats) -> Floats:
-        """Choose where to go next."""
-        # Their number of digits in base 2 is the same on every processor.
+        """Return the first candidate outside of all regions, or the least visited one."""
+        # frexp instead of log2: the same on every processor.
         doublings = np.frexp(self._visits)[1] - 1
         radii = self._radius * (1.0 + 0.5 * doublings)
         clear = [

@@ -27,34 +27,34 @@ from gaitswarm_research.methods.unirandi import unirandi
 Floats = NDArray[np.float64]
 
 _SAME_MINIMUM: Final = 0.1
-"""Distance of two minimizers that are one, as a share of the critical distance."""
+"""Distance below which two minimizers are the same, as a share of the critical distance."""
 
 _MOST_SELECTED: Final = 20
-"""Points that a cycle adds to the reduced sample, at most."""
+"""Maximum number of points that a cycle adds to the reduced sample."""
 
 _MOST_CLUSTERED: Final = 500
-"""Points of the reduced sample, at most; the source ends at 100."""
+"""Maximum size of the reduced sample; 100 in the published code."""
 
 
 class _GlobalSettings(SearchSettings):
-    """What the settings of GLOBAL have with every local search."""
+    """Settings of GLOBAL that every local search shares."""
 
     sample_per_variable: int = Field(
-        default=10, ge=1, le=1_000, description="Random designs of a cycle, for each variable."
+        default=10, ge=1, le=1_000, description="Random designs of a cycle per variable."
     )
     selected_per_variable: int = Field(
         default=2,
         ge=1,
         le=20,
-        description="Best designs that a cycle adds to those that are clustered, for each variable;"
-        " 20 in all at most.",
+        description="Best designs that a cycle adds to the reduced sample per variable, at most 20"
+        " in all.",
     )
     alpha: float = Field(
         default=0.01,
         gt=0,
         lt=1,
-        description="Of the critical distance: the smaller, the larger are clusters, and the fewer"
-        " local searches begin.",
+        description="Significance level of the critical distance; a smaller value makes larger"
+        " clusters and fewer local searches.",
     )
     step: float = Field(
         default=0.1,
@@ -66,7 +66,7 @@ class _GlobalSettings(SearchSettings):
         default=1e-4,
         ge=0,
         lt=1,
-        description="Gain at which a local search ends, as a share of the fitness.",
+        description="Gain below which a local search ends, as a share of the fitness.",
     )
 
 
@@ -90,7 +90,7 @@ class GlobalBfgsSettings(_GlobalSettings):
         default=1e-4,
         gt=0,
         le=0.1,
-        description="Distance of the neighbours that give a gradient, as a share of each range.",
+        description="Step of finite differences, as a share of each range.",
     )
 
 
@@ -104,18 +104,17 @@ def global_search(
     random: RandomNumbers,
     start: Start | None = None,
 ) -> Proposals:
-    """Search locally from sample points that belong to no cluster yet.
+    """Start local searches from sample points outside of all clusters.
 
-    A cycle adds random designs to the sample, and clusters the best of it around the minima that
-    are known: a point joins a cluster when it is worse than a member that is nearer than the
-    critical distance. Points that are left start a local search each, best first; one that ends at
-    a known minimum joins its cluster, another one founds a cluster. Where the published algorithm
-    would end, because a cycle found no new minimum, the next cycle begins all the same, and keeps
-    all that is known.
+    A cycle adds random designs to the sample, and clusters the best of the sample around the local
+    minima: a point joins a cluster if it is worse than a member that is nearer than the critical
+    distance. Each remaining point starts a local search, best first; its minimum joins an existing
+    cluster or founds one. Unlike the published algorithm, which ends when a cycle finds no new
+    minimum, cycles continue and keep the clusters.
 
-    A cycle's sample is one batch. Local searches run one after the other, because what one finds
-    decides whether the next is needed. They move continuous variables and integers of many values;
-    other integers and choices are held and polled.
+    The sample of a cycle is one batch. Local searches run in sequence, because the minimum of one
+    decides whether the next is needed. They move continuous variables and integers with many
+    values; other integers and categorical variables are polled.
     """
     axes = Axes(space)
 
@@ -127,8 +126,8 @@ def global_search(
             return simplex_search(start, axes, step, settings.tolerance)
         return bfgs(start, axes, step, settings.tolerance, settings.difference)
 
-    known = known_points(space, start)
-    return evaluated_once(space, _cycles(settings, axes, search, random, known), start)
+    sample = known_points(space, start)
+    return evaluated_once(space, _cycles(settings, axes, search, random, sample), start)
 
 
 def _cycles(
@@ -138,7 +137,7 @@ def _cycles(
     random: RandomNumbers,
     sample: list[Point],
 ) -> Endless:
-    """Sample, cluster, search locally, for ever."""
+    """Sample, cluster and search locally, endlessly."""
     d = axes.space.dimension
     count = settings.sample_per_variable * d
     selected = min(settings.selected_per_variable * d, _MOST_SELECTED)
@@ -146,7 +145,7 @@ def _cycles(
     while True:
         cycles += 1
         drawn = yield from sampled(axes, random, count)
-        # A design that is drawn again, as can happen with integers alone, counts once.
+        # Repeated designs, possible if all variables are integers, count once.
         points = [*drawn, *sample]
         designs = axes.space.designs(axes.space.from_unit(np.array([p.unit for p in points])))
         distinct = {row.tobytes(): point for row, point in zip(designs, points, strict=True)}
@@ -156,26 +155,25 @@ def _cycles(
         clusters.reduce(sample)
         clusters.grow()
         while (start := clusters.unclustered()) is not None:
-            found = yield from mixed(start, axes, search)
-            clusters.add(start, found)
+            minimum = yield from mixed(start, axes, search)
+            clusters.add(start, minimum)
 
 
 def critical_distance(count: int, dimension: int, alpha: float) -> float:
-    """Distance below which two sample points belong to one cluster."""
+    """Return the distance below which two sample points belong to one cluster."""
     share: float = 1.0 - alpha ** (1.0 / max(count - 1, 1))
     return float(0.5 * share ** (1.0 / dimension))
 
 
 class Clusters:
-    """Sample points by the local minimum that they are thought to lead to.
+    """Sample points by the local minimum that they are expected to lead to.
 
     Attributes:
-        minima: The local minimum of each cluster.
-        critical: Critical distance [unit].
+        minima: local minimum of each cluster.
+        critical: critical distance [unit].
     """
 
     def __init__(self, axes: Axes) -> None:
-        """Begin without a cluster."""
         self.minima: list[Point] = []
         self.critical = 0.0
         self._categorical: Final = axes.space.categorical
@@ -184,37 +182,37 @@ class Clusters:
         self._cluster: dict[bytes, int] = {}
 
     def reduce(self, sample: list[Point]) -> None:
-        """Take the sample to be clustered; a point keeps the cluster that it was in."""
+        """Set the sample to be clustered; points keep their cluster."""
         self._sample = [point for point in sample if np.isfinite(point.fitness)]
 
     def grow(self) -> None:
-        """Let every cluster take what is linked to it, in the order of their discovery."""
+        """Add linked points to every cluster, in the order of their discovery."""
         for k in range(len(self.minima)):
             members = [point for point in self._sample if self._cluster.get(_key(point)) == k]
             self._link(k, [*self._seeds[k], *members])
 
     def unclustered(self) -> Point | None:
-        """Give the best point that belongs to no cluster."""
+        """Return the best point outside of all clusters."""
         return next((point for point in self._sample if _key(point) not in self._cluster), None)
 
-    def add(self, start: Point, found: Point) -> None:
-        """Take what a local search found."""
-        same = self._distances(found.unit, [minimum.unit for minimum in self.minima])
+    def add(self, start: Point, minimum: Point) -> None:
+        """Add the start and the minimum of a local search."""
+        same = self._distances(minimum.unit, [other.unit for other in self.minima])
         near = np.flatnonzero(same < _SAME_MINIMUM * self.critical)
         if len(near):
             k, seeds = int(near[0]), [start]
-            if found.fitness < self.minima[k].fitness:
-                self.minima[k] = found
+            if minimum.fitness < self.minima[k].fitness:
+                self.minima[k] = minimum
         else:
-            k, seeds = len(self.minima), [found, start]
-            self.minima.append(found)
+            k, seeds = len(self.minima), [minimum, start]
+            self.minima.append(minimum)
             self._seeds.append([])
         self._seeds[k] += seeds
         self._cluster[_key(start)] = k
         self._link(k, seeds)
 
     def _link(self, k: int, members: list[Point]) -> None:
-        """Add points that are worse than a member and near it, and what is linked to those."""
+        """Add points that are worse than a member and near it, and points linked to those."""
         free = [point for point in self._sample if _key(point) not in self._cluster]
         queue = list(members)
         while queue and free:
@@ -230,7 +228,7 @@ class Clusters:
             queue.extend(joined)
 
     def _distances(self, unit: Floats, others: list[Floats]) -> Floats:
-        """(n,) in the variable that differs most; 1, the largest, if a choice differs."""
+        """Return the largest difference (n,) over variables; 1 if a category differs."""
         apart = np.abs(np.array(others).reshape(-1, len(unit)) - unit)
         apart[:, self._categorical] = apart[:, self._categorical] > 0.0
         largest: Floats = apart.max(axis=1, initial=0.0)

@@ -1,12 +1,11 @@
-"""What local searches are made of: unit positions, polls of discrete variables, known designs.
+"""Building blocks of local searches: unit positions, polls of discrete variables, memory.
 
-A local search is a generator over unit positions: it yields (n, d) of them, is sent their fitness
-(n,), and returns where it ended. So one method can run another with `yield from`.
+A local search is a generator over unit positions: it yields an array (n, d), receives the fitness
+(n,), and returns its last point. Methods are composed by `yield from`.
 
-Variables are of two sorts. *Smooth* ones are moved by steps of any size: continuous variables, and
-integers of many values, which are never moved by less than one. *Polled* ones are categorical, or
-integers of few values: a local search holds them, and polls their neighbours where it begins and
-where it ends.
+Variables are of two sorts. *Smooth* ones take steps of any size: continuous variables, and integers
+with many values (at least one per step). *Polled* ones are categorical, or integers with few
+values: a local search holds them constant, and their neighbours are polled before and after it.
 """
 
 from __future__ import annotations
@@ -25,23 +24,23 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 FEW_VALUES: Final = 32
-"""Integer variables of at most so many values are polled."""
+"""Integer variables with at most this number of values are polled."""
 
 _RESUMED: Final = 0.25
-"""First steps of a local search that is resumed after a poll, as a share of its usual ones."""
+"""Scale of the first steps of a local search that is resumed after a poll."""
 
 _PATIENCE: Final = 16
-"""Proposals in a row of which everything is known, until one is evaluated again. After that half as
-many, and so on, until there is something new: a space of a few designs is soon known."""
+"""Proposals in a row without a new design before one is evaluated again; halved each time until
+there is a new one."""
 
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """A position that was judged.
+    """An evaluated position.
 
     Attributes:
-        unit: (d,) its unit position.
-        fitness: Minimized; +inf for a failed evaluation.
+        unit: (d,) unit position.
+        fitness: minimized; +inf for a failed evaluation.
     """
 
     unit: Floats
@@ -49,27 +48,25 @@ class Point:
 
 
 Walk = Generator[Floats, Floats, Point]
-"""Yields unit positions (n, d); is sent their fitness (n,); returns where it ended."""
+"""Yields unit positions (n, d), receives their fitness (n,), returns the last point."""
 
 Endless = Generator[Floats, Floats, None]
-"""The same, but it never ends."""
+"""The same, without end."""
 
 LocalSearch = Callable[[Point, float], Walk]
-"""(start, scale of its first steps, 1 for the usual ones) -> a walk over smooth variables."""
+"""(start, scale of the first steps) -> a search over the smooth variables."""
 
 
 class Axes:
-    """How the variables of a space are moved.
+    """Step rules of the variables of a space.
 
     Attributes:
-        space: The box.
-        smooth: (m,) indices of variables that are moved by steps of any size.
-        polled: (d - m,) indices of the others.
-        least: (d,) least step that may change a design [unit]: one for an integer, else 0.
+        smooth: (m,) indices of smooth variables.
+        polled: (d - m,) indices of polled variables.
+        least: (d,) smallest step [unit] that may change a design: one for an integer, else 0.
     """
 
     def __init__(self, space: Space) -> None:
-        """Sort the variables."""
         few = space.categorical | (space.integer & (space.span < FEW_VALUES))
         self.space: Final = space
         self.smooth: Final[Indices] = np.flatnonzero(~few)
@@ -77,14 +74,14 @@ class Axes:
         self.least: Final[Floats] = np.where(space.integer, 1.0 / space.span, 0.0)
 
     def design(self, unit: Floats) -> Floats:
-        """Give what is judged for a unit position."""
+        """Return the design at a unit position."""
         design: Floats = self.space.designs(self.space.from_unit(unit[None]))[0]
         return design
 
     def neighbours(self, unit: Floats) -> Floats:
-        """Unit positions that differ in one polled variable: an integer by one, or a choice."""
+        """Return unit positions with one polled variable changed (an integer by one)."""
         here = self.design(unit)
-        found = []
+        positions = []
         for j in self.polled.tolist():
             if self.space.categorical[j]:
                 values = [v for v in range(int(self.space.high[j]) + 1) if v != here[j]]
@@ -96,8 +93,8 @@ class Axes:
                 design[j] = value
                 there = unit.copy()
                 there[j] = self.space.to_unit(self.space.positions(design[None]))[0, j]
-                found.append(there)
-        return np.array(found, dtype=np.float64).reshape(-1, self.space.dimension)
+                positions.append(there)
+        return np.array(positions, dtype=np.float64).reshape(-1, self.space.dimension)
 
     def random(self, random: RandomNumbers, count: int) -> Floats:
         """Draw unit positions of designs that are uniform in the box."""
@@ -106,7 +103,7 @@ class Axes:
 
 
 def gains(new: Point, old: Point, tolerance: float) -> bool:
-    """Tell whether a point is better than another one by more than a tolerance."""
+    """Return whether a point is better than another one by more than a tolerance."""
     if not math.isfinite(old.fitness):
         return new.fitness < old.fitness
     return new.fitness < old.fitness - tolerance * abs(old.fitness)
@@ -115,7 +112,7 @@ def gains(new: Point, old: Point, tolerance: float) -> bool:
 def sampled(
     axes: Axes, random: RandomNumbers, count: int
 ) -> Generator[Floats, Floats, list[Point]]:
-    """Judge random positions, as one batch."""
+    """Evaluate random positions as one batch; best first."""
     unit = axes.random(random, count)
     fitness = yield unit
     order = np.argsort(fitness, kind="stable")
@@ -123,14 +120,14 @@ def sampled(
 
 
 def judged(unit: Floats) -> Walk:
-    """Judge one position, brought to the nearest face of the box."""
+    """Evaluate one position, clipped to the box."""
     inside = np.clip(unit, 0.0, 1.0)
     fitness = yield inside[None]
     return Point(inside, float(fitness[0]))
 
 
 def known_points(space: Space, start: Start | None) -> list[Point]:
-    """Give what was judged before a method began."""
+    """Return the points that were evaluated before the search, best first."""
     if start is None:
         return []
     positions, fitness = start.best_first
@@ -139,7 +136,7 @@ def known_points(space: Space, start: Start | None) -> list[Point]:
 
 
 def poll(start: Point, axes: Axes) -> Walk:
-    """Go to the best neighbour in the polled variables as long as it is better."""
+    """Move to the best neighbour in the polled variables while it is better."""
     here = start
     while True:
         near = axes.neighbours(here.unit)
@@ -153,35 +150,34 @@ def poll(start: Point, axes: Axes) -> Walk:
 
 
 def mixed(start: Point, axes: Axes, search: LocalSearch) -> Walk:
-    """Search smooth variables by a local search and the others by polls, in turn."""
+    """Alternate a local search over smooth variables and polls of the others."""
     here, scale = (yield from poll(start, axes)), 1.0
     if not len(axes.smooth):
         return here
     while True:
-        found = yield from search(here, scale)
-        here = yield from poll(found, axes)
-        if here is found:
+        minimum = yield from search(here, scale)
+        here = yield from poll(minimum, axes)
+        if here is minimum:
             return here
         scale = _RESUMED
 
 
 def evaluated_once(space: Space, search: Endless, start: Start | None = None) -> Proposals:
-    """Run a search in unit coordinates, and ask for no design twice.
+    """Run a search in unit coordinates that evaluates no design twice.
 
-    A design that was judged is answered from memory. Where there is nothing new to ask for, as in a
-    space of a few designs that are all known, one is asked for again from time to time: a method
-    never ends.
+    Repeated designs are answered from memory. When no new design is proposed for some time, as in a
+    space of few designs, one is evaluated again, because a search never ends.
     """
-    known: dict[bytes, float] = {}
+    cached: dict[bytes, float] = {}
     if start is not None:
         # 0.0 and -0.0 are one value, but not the same bytes.
         designs = space.designs(start.positions) + 0.0
-        known = {k.tobytes(): f for k, f in zip(designs, start.fitness.tolist(), strict=True)}
+        cached = {k.tobytes(): f for k, f in zip(designs, start.fitness.tolist(), strict=True)}
     unit, idle, patience = next(search), 0, _PATIENCE
     while True:
         positions = space.from_unit(unit)
         keys = [row.tobytes() for row in space.designs(positions) + 0.0]
-        new = {key: k for k, key in reversed(list(enumerate(keys))) if key not in known}
+        new = {key: k for k, key in reversed(list(enumerate(keys))) if key not in cached}
         if new:
             idle, patience = 0, _PATIENCE
         elif idle >= patience:
@@ -189,7 +185,7 @@ def evaluated_once(space: Space, search: Endless, start: Start | None = None) ->
         else:
             idle += 1
         if new:
-            asked = sorted(new.values())
-            fitness = yield positions[asked]
-            known.update(zip([keys[k] for k in asked], fitness.tolist(), strict=True))
-        unit = search.send(np.array([known[key] for key in keys]))
+            rows = sorted(new.values())
+            fitness = yield positions[rows]
+            cached.update(zip([keys[k] for k in rows], fitness.tolist(), strict=True))
+        unit = search.send(np.array([cached[key] for key in keys]))

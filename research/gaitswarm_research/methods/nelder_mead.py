@@ -34,10 +34,13 @@ class NelderMeadSettings(SearchSettings):
         default=10,
         ge=1,
         le=10_000,
-        description="Random designs before each start; the best of them is started from.",
+        description="Random designs before each start, which begins at the best of them.",
     )
     simplex: float = Field(
-        default=0.25, gt=0, le=0.5, description="Edge of a first simplex, as a share of each range."
+        default=0.25,
+        gt=0,
+        le=0.5,
+        description="Edge of the first simplex, share of each range.",
     )
     tolerance: float = Field(
         default=1e-4,
@@ -55,16 +58,16 @@ def nelder_mead(
     random: RandomNumbers,
     start: Start | None = None,
 ) -> Proposals:
-    """Search by a simplex that is restarted where it ended, and then elsewhere.
+    """Search by a simplex with restarts, first around its minimum, then from random samples.
 
-    The first simplex is one batch, and so is a shrunken one; all other steps are one design each,
-    because evaluating reflection, expansion and contractions together would use at most two of
-    four. A simplex that has converged is restarted around its best vertex (Kelley 1999: it may have
-    collapsed into a subspace) until that gains nothing; then from the best of a new random sample,
-    keeping nothing.
+    The first simplex and a shrunken one are evaluated as one batch; all other steps are single
+    designs, because evaluating reflection, expansion and contractions together would use at most
+    two of four. A converged simplex is restarted around its best vertex (Kelley 1999: it may have
+    collapsed into a subspace) until that brings no gain; then from the best of a new random sample.
 
-    Integers of few values and choices are held by a simplex and polled before and after it; a
-    simplex is never smaller than one in an integer of many values. Bounds are kept by projection.
+    Integers with few values and categorical variables are held constant by the simplex and polled
+    before and after it. In an integer with many values, a simplex spans at least one. Bounds are
+    kept by projection.
     """
     first = known_points(space, start)[:1]
     return evaluated_once(space, _restarted(settings, Axes(space), random, first), start)
@@ -79,19 +82,19 @@ def _restarted(
     while True:
         here = first.pop() if first else (yield from sampled(axes, random, settings.sample))[0]
         while True:
-            found = yield from mixed(here, axes, search)
-            if not gains(found, here, settings.tolerance):
+            minimum = yield from mixed(here, axes, search)
+            if not gains(minimum, here, settings.tolerance):
                 break
-            here = found
+            here = minimum
 
 
 def simplex_search(
     start: Point, axes: Axes, edge: float, tolerance: float, least: float = 1e-9
 ) -> Walk:
-    """Move a simplex over the smooth variables until it has converged."""
+    """Move a simplex over the smooth variables until it converges."""
     smooth = axes.smooth
     n = len(smooth)
-    # Gao and Han (2012), equation 4.1; in one dimension they would shrink to a point.
+    # Gao and Han (2012), equation 4.1; in one dimension the simplex would shrink to a point.
     m = max(n, 2)
     expansion, contraction, shrinkage = 1.0 + 2.0 / m, 0.75 - 0.5 / m, 1.0 - 1.0 / m
     smallest = np.maximum(least, axes.least[smooth])

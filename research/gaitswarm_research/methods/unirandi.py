@@ -1,4 +1,4 @@
-"""UniRandi: a walk along random directions (Järvi 1973; Csendes et al. 2008)."""
+"""UniRandi: local search along random directions (Järvi 1973; Csendes et al. 2008)."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ def unirandi(
     tolerance: float,
     least: float = 1e-8,
 ) -> Walk:
-    """Try random directions and their opposites; go on along one that is better, by doubled steps.
+    """Try random directions and their opposites, with doubled steps along a better one.
 
-    After two directions of which neither side was better, the step is halved; the walk ends when
-    it is at its least, or when the last step that was better gained next to nothing. An integer is
-    moved by what the direction comes to, which may be less than one and then is no move in it.
+    The step is halved after two directions without success. The search ends at the smallest step,
+    or when the last successful step gained less than the tolerance. An integer variable does not
+    change where the step rounds to zero.
     """
     here, failures, is_level = start, 0, False
     while True:

@@ -15,14 +15,16 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from gaitswarm.views import SimulationView
-    from gaitswarm.views.trade_offs import (
+    from gaitswarm.services.optimizer.analysis.front import (
         FrontView,
         FrontWinnerView,
         NormalisedDesignView,
+    )
+    from gaitswarm.services.optimizer.analysis.preferences import (
         PreferenceFitView,
         PreferenceForView,
     )
+    from gaitswarm.views import SimulationView
 
 _INK: Final = "#1f3a5f"
 _ACCENT: Final = "#d1495b"

@@ -10,7 +10,8 @@ from gaitswarm.cli.tables import MISSING, SHORT, Table, number
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from gaitswarm.views.robustness import IndexView, RobustnessView
+    from gaitswarm.services.optimizer.analysis.preferences import IndexView
+    from gaitswarm.views.robustness import RobustnessView
 
 
 def scenarios_table(view: RobustnessView) -> Table:

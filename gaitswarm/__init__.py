@@ -52,6 +52,11 @@ if TYPE_CHECKING:
     from gaitswarm.preferences import robust_preferences
     from gaitswarm.requests.firmware import FirmwareOptions
     from gaitswarm.requests.robustness import RobustnessOptions
+    from gaitswarm.services.optimizer.analysis.front import FrontView
+    from gaitswarm.services.optimizer.analysis.preferences import (
+        PreferenceForView,
+        RobustPreferencesView,
+    )
     from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
     from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
     from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
@@ -90,12 +95,7 @@ if TYPE_CHECKING:
         RankingView,
         StateView,
     )
-    from gaitswarm.views.analysis import (
-        ImportanceView,
-        RobustPreferencesView,
-        ScenarioFamiliesView,
-        SurfaceView,
-    )
+    from gaitswarm.views.analysis import ImportanceView, ScenarioFamiliesView, SurfaceView
     from gaitswarm.views.calibration import TargetsView
     from gaitswarm.views.certificate import CertificateView
     from gaitswarm.views.comparison import JobComparisonView
@@ -103,7 +103,6 @@ if TYPE_CHECKING:
     from gaitswarm.views.identification import IdentifiabilityView
     from gaitswarm.views.replay import WalkReplay
     from gaitswarm.views.robustness import RobustnessView
-    from gaitswarm.views.trade_offs import FrontView, PreferenceForView
     from gaitswarm.views.verification import VerificationView
 
     __version__: str
@@ -241,14 +240,15 @@ _MODULES: Final = {
     "gaitswarm.views.comparison": ("JobComparisonView",),
     "gaitswarm.views.firmware": ("FirmwareView",),
     "gaitswarm.views.certificate": ("CertificateView",),
-    "gaitswarm.views.analysis": (
-        "ImportanceView", "RobustPreferencesView", "ScenarioFamiliesView", "SurfaceView",
-    ),
+    "gaitswarm.views.analysis": ("ImportanceView", "ScenarioFamiliesView", "SurfaceView"),
     "gaitswarm.views.identification": ("IdentifiabilityView",),
     "gaitswarm.views.replay": ("WalkReplay",),
     "gaitswarm.views.robustness": ("RobustnessView",),
-    "gaitswarm.views.trade_offs": ("FrontView", "PreferenceForView"),
     "gaitswarm.views.verification": ("VerificationView",),
+    "gaitswarm.services.optimizer.analysis.preferences": (
+        "PreferenceForView", "RobustPreferencesView",
+    ),
+    "gaitswarm.services.optimizer.analysis.front": ("FrontView",),
     "gaitswarm.services.optimizer.jobs.kinds.calibration": ("CalibrationSpec",),
     "gaitswarm.services.optimizer.jobs.kinds.certificate": ("CertificateSpec",),
     "gaitswarm.services.optimizer.jobs.labels": ("JobFilter",),

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from gaitswarm.jobs.port import Jobs
-from gaitswarm.requests import arguments
-from gaitswarm.requests.analysis import ranked_preferences, tuning_spec
+from gaitswarm.requests.arguments import checked
+from gaitswarm.requests.robustness import Progress, sampled_indices
+from gaitswarm.services.optimizer.analysis.preferences import (
+    PreferencesRequest,
+    RobustPreferencesView,
+)
+from gaitswarm.services.optimizer.analysis.preferences import (
+    robust_preferences as ranked_preferences,
+)
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.outcome import Status
-from gaitswarm.tables import EvaluationTable
-from gaitswarm.views.analysis import RobustPreferencesView
 
 
 def robust_preferences(
@@ -26,7 +31,7 @@ def robust_preferences(
     radius: float = 0.02,
     seed: int = 1,
     precision: Precision = "double",
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> RobustPreferencesView:
     """Find the preference whose winner among a job's designs is the most robust.
 
@@ -53,26 +58,23 @@ def robust_preferences(
         InvalidRequest: The job tunes no drive, or an argument is invalid; names it.
         Conflict: No design of the job succeeds in all scenarios.
     """
-    request = arguments.preferences(
-        drawn=drawn,
-        candidates=candidates,
-        samples=samples,
-        radius=radius,
-        seed=seed,
-        precision=precision,
-    )
-    spec = tuning_spec(job_id, jobs.job(job_id).spec)
-    columns = _columns(jobs.evaluations(job_id))
-    return ranked_preferences(job_id, spec, columns, request, progress=progress)
-
-
-def _columns(table: EvaluationTable) -> EvaluationColumns:
-    return EvaluationColumns(
+    document = {
+        "drawn": drawn,
+        "candidates": candidates,
+        "samples": samples,
+        "radius": radius,
+        "seed": seed,
+        "precision": precision,
+    }
+    request, table = checked(PreferencesRequest, document), jobs.evaluations(job_id)
+    columns = EvaluationColumns(
         table.iteration,
         table.particle,
         table.designs,
         table.objectives,
-        # Whether a walk failed is all that matters to a ranking.
+        # Rankings do not distinguish failures.
         np.where(table.statuses == Status.OK.label, Status.OK, Status.FELL).astype(np.uint8),
         np.where(np.isfinite(table.fitness), table.fitness, np.inf),
     )
+    index = partial(sampled_indices, progress=progress)
+    return ranked_preferences(job_id, jobs.job(job_id).spec, columns, request, index)

@@ -23,20 +23,21 @@ from gaitswarm.api.dependencies import (
 from gaitswarm.api.documentation import binary, problems
 from gaitswarm.api.responses import BinaryResponse, json_response
 from gaitswarm.requests.analysis import (
-    DESIGNS,
-    MOST_FRONT_DESIGNS,
     TOLERANCE,
-    PreferencesRequest,
     run_certificate,
-    run_front,
     run_importance,
-    run_preference_for,
-    run_preferences,
     run_scenario_families,
 )
 from gaitswarm.requests.comparison import MOST_JOBS, run_comparison, run_convergences
 from gaitswarm.requests.identification import run_targets
+from gaitswarm.requests.robustness import sampled_indices
 from gaitswarm.services.optimizer.analysis.certificate import MOST_WORST
+from gaitswarm.services.optimizer.analysis.front import FRONT_DESIGNS, MOST_FRONT_DESIGNS, FrontView
+from gaitswarm.services.optimizer.analysis.preferences import (
+    PreferenceForView,
+    PreferencesRequest,
+    RobustPreferencesView,
+)
 from gaitswarm.services.optimizer.analysis.targets import LeaveOut
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.job import Job
@@ -47,13 +48,12 @@ from gaitswarm.views import (
     RankingView,
     encoded_particles,
 )
-from gaitswarm.views.analysis import ImportanceView, RobustPreferencesView, ScenarioFamiliesView
+from gaitswarm.views.analysis import ImportanceView, ScenarioFamiliesView
 from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.catalogue import JobReferenceView
 from gaitswarm.views.certificate import CertificateView
 from gaitswarm.views.comparison import ConvergencesView, JobComparisonView
 from gaitswarm.views.identification import IdentifiabilityView
-from gaitswarm.views.trade_offs import FrontView, PreferenceForView
 
 PreferencesBody = Annotated[PreferencesRequest, Depends(validated(PreferencesRequest, "request"))]
 
@@ -212,14 +212,14 @@ def get_front(
             description="Maximum number of designs; of more, marked designs and others that cover"
             " the front evenly.",
         ),
-    ] = DESIGNS,
+    ] = FRONT_DESIGNS,
 ) -> Response:
     """Return the Pareto front over f1 to f5: nondominated designs, its knees, the best in each
     objective and under A, B and C, and its hypervolume by iteration.
 
     From stored objectives; nothing is simulated. For any job that tunes a drive.
     """
-    return json_response(run_front(service, job_id, most=most))
+    return json_response(service.front(job_id, most=most))
 
 
 @router.get(
@@ -244,7 +244,7 @@ def get_preference_for(
 
     409 for a design that fails in a scenario.
     """
-    return run_preference_for(service, job_id, iteration, particle)
+    return service.preference_for(job_id, iteration, particle)
 
 
 @router.post(
@@ -268,10 +268,8 @@ async def find_robust_preferences(
     ranked designs and the simulated time are limited.
     """
     _check_ranked(request, job)
-    check = partial(check_sampled_length, settings)
-    return await computing.run(
-        lambda: json_response(run_preferences(service, job.id, request, check=check))
-    )
+    index = partial(sampled_indices, check=partial(check_sampled_length, settings))
+    return await computing.run(lambda: json_response(service.preferences(job.id, request, index)))
 
 
 def _check_ranked(request: PreferencesRequest, job: Job) -> None:

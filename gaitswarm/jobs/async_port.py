@@ -18,6 +18,11 @@ from gaitswarm.sim.robot import DEFAULT_ROBOT
 if TYPE_CHECKING:
     from gaitswarm.requests.firmware import FirmwareOptions
     from gaitswarm.requests.robustness import RobustnessOptions
+    from gaitswarm.services.optimizer.analysis.front import FrontView
+    from gaitswarm.services.optimizer.analysis.preferences import (
+        PreferenceForView,
+        RobustPreferencesView,
+    )
     from gaitswarm.services.optimizer.analysis.targets import LeaveOut
     from gaitswarm.sim.identification.recorded_walk import RecordedWalk
     from gaitswarm.simulation_result import SimulationResult
@@ -39,12 +44,7 @@ if TYPE_CHECKING:
         JobView,
         RankingView,
     )
-    from gaitswarm.views.analysis import (
-        ImportanceView,
-        RobustPreferencesView,
-        ScenarioFamiliesView,
-        SurfaceView,
-    )
+    from gaitswarm.views.analysis import ImportanceView, ScenarioFamiliesView, SurfaceView
     from gaitswarm.views.calibration import TargetsView
     from gaitswarm.views.certificate import CertificateView
     from gaitswarm.views.comparison import JobComparisonView
@@ -56,7 +56,6 @@ if TYPE_CHECKING:
     )
     from gaitswarm.views.replay import WalkReplay
     from gaitswarm.views.robustness import RobustnessView
-    from gaitswarm.views.trade_offs import FrontView, PreferenceForView
     from gaitswarm.views.verification import HistoryVerificationView
 
 

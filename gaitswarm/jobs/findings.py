@@ -7,17 +7,21 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from gaitswarm.services.optimizer.analysis.front import FrontView
+    from gaitswarm.services.optimizer.analysis.preferences import (
+        PreferenceForView,
+        RobustPreferencesView,
+    )
     from gaitswarm.services.optimizer.analysis.targets import LeaveOut
     from gaitswarm.sim.kernel.walk import Precision
     from gaitswarm.specs import PreferenceInput
     from gaitswarm.tables import EvaluationTable, TableFormat
     from gaitswarm.views import BestView, HistoryIterationView, IterationView, RankingView
-    from gaitswarm.views.analysis import ImportanceView, RobustPreferencesView, ScenarioFamiliesView
+    from gaitswarm.views.analysis import ImportanceView, ScenarioFamiliesView
     from gaitswarm.views.calibration import TargetsView
     from gaitswarm.views.certificate import CertificateView
     from gaitswarm.views.comparison import JobComparisonView
     from gaitswarm.views.identification import IdentifiabilityView
-    from gaitswarm.views.trade_offs import FrontView, PreferenceForView
     from gaitswarm.views.verification import HistoryVerificationView
 
 

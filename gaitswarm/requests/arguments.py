@@ -13,8 +13,8 @@ from typing import Any, TypeVar, cast, get_args
 from pydantic import BaseModel, ValidationError
 
 from gaitswarm.errors import InvalidRequest, NotFound, invalid_request
-from gaitswarm.requests.analysis import PreferencesRequest
 from gaitswarm.services.optimizer.analysis.certificate import MOST_WORST
+from gaitswarm.services.optimizer.analysis.preferences import PreferencesRequest
 from gaitswarm.services.optimizer.analysis.targets import LeaveOut
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
 from gaitswarm.services.optimizer.jobs.job import Command, JobOrder, JobState

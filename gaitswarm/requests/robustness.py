@@ -7,15 +7,18 @@ from contextlib import closing
 from typing import Final, TypedDict
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, ValidationError
 
+from gaitswarm.errors import invalid_request, simulation_errors
 from gaitswarm.requests.simulations import WalksRequest
+from gaitswarm.services.optimizer.analysis.preferences import IndexView, PreferencesRequest
 from gaitswarm.services.optimizer.analysis.robustness_index import (
     LocalSample,
     local_sample,
     robustness,
 )
 from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
 from gaitswarm.sim.case import Walk
 from gaitswarm.sim.catalogue import design_catalogue
@@ -162,3 +165,48 @@ def _walked(
         )
         for parts in zip(*blocks, strict=True)
     ]
+
+
+def sampled_indices(
+    spec: JobSpec,
+    request: PreferencesRequest,
+    designs: list[dict[str, float | str]],
+    *,
+    progress: Progress | None = None,
+    check: Callable[[float], None] = lambda _seconds: None,
+) -> list[IndexView | None]:
+    """Simulate samples around designs of a job and estimate the robustness index of each.
+
+    `check` is called with the simulated time of all of them [s].
+    """
+    if spec.case is not None:
+        raise InvalidRequest(
+            f"the job's designs were evaluated by {spec.case.name}, and samples would use"
+            " gaitswarm's simulator; give 0",
+            field="samples",
+        )
+    document = {
+        "robot": spec.robot,
+        "controller": spec.controller,
+        "scenarios": spec.resolved_scenarios(),
+        "variables": spec.design_space().variables,
+        **request.model_dump(include={"samples", "radius", "seed", "precision"}),
+    }
+    try:
+        requests = [
+            RobustnessRequest.model_validate({**document, "design": design}) for design in designs
+        ]
+    except ValidationError as error:
+        raise invalid_request(error) from error
+    seconds = sum(one.simulated_seconds(one.resolved_scenarios()) for one in requests)
+    check(seconds * (1 + request.samples))
+    indices = []
+    for number, one in enumerate(requests):
+
+        def overall(done: int, planned: int, before: int = number) -> None:
+            if progress is not None:
+                progress(before * planned + done, len(requests) * planned)
+
+        with simulation_errors("job_id"):
+            indices.append(run_robustness(one, progress=overall).index)
+    return indices

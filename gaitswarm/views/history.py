@@ -14,8 +14,11 @@ from pydantic_core import to_json
 
 from gaitswarm.services.optimizer.analysis.distribution import thinned
 from gaitswarm.services.optimizer.analysis.evaluations import EvaluationView, evaluation_views
-from gaitswarm.services.optimizer.analysis.robustness_index import NORMALISED_OBJECTIVES
-from gaitswarm.services.optimizer.analysis.utilities import objective_vectors, utilities
+from gaitswarm.services.optimizer.analysis.utilities import (
+    NORMALISED_OBJECTIVES,
+    objective_vectors,
+    utilities,
+)
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Iteration
 from gaitswarm.services.optimizer.jobs.job import Job

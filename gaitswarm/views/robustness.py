@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from gaitswarm.services.optimizer.analysis.evaluations import ObjectiveView
+from gaitswarm.services.optimizer.analysis.preferences import IndexView
 from gaitswarm.services.optimizer.analysis.robustness_index import (
-    NORMALISED_OBJECTIVES,
     LocalSample,
     Robustness,
     Sensitivity,
 )
-from gaitswarm.services.optimizer.analysis.statistics import Interval
+from gaitswarm.services.optimizer.analysis.utilities import NORMALISED_OBJECTIVES
 from gaitswarm.services.optimizer.views import View, finite
 from gaitswarm.sim.catalogue import design_shown
 from gaitswarm.sim.kernel.walk import Precision
@@ -23,21 +23,6 @@ from gaitswarm.sim.robot import RobotSource
 from gaitswarm.sim.variables import Variable
 
 _NAMES = tuple(objective.name for objective in NORMALISED_OBJECTIVES)
-
-
-class IndexView(View):
-    """A robustness index with its interval; the smaller, the more robust."""
-
-    value: float = Field(description="The estimate [1].", examples=[1.42])
-    low: float = Field(description="Lower end of the interval of 95 % [1].", examples=[1.31])
-    high: float = Field(description="Upper end [1].", examples=[1.55])
-
-    @classmethod
-    def from_interval(cls, interval: Interval | None) -> IndexView | None:
-        """Make a view of an estimate."""
-        if interval is None:
-            return None
-        return cls(value=interval.value, low=interval.low, high=interval.high)
 
 
 class SampledVariableView(View):
@@ -96,7 +81,7 @@ class ScenarioRobustnessView(View):
         """Make a view of one scenario's part."""
         names = [variable.name for variable in variables]
         return cls(
-            index=IndexView.from_interval(found.index),
+            index=None if found.index is None else IndexView.model_validate(found.index),
             spectral_norm=finite(found.spectral_norm),
             by_objective=_by_name(_NAMES, found.by_objective),
             by_variable=_by_name(names, found.by_variable),
@@ -180,7 +165,7 @@ class RobustnessView(View):
             variables=[_sampled(sample, variable) for variable in sample.varied],
             held=list(sample.held),
             objectives=[ObjectiveView.model_validate(o) for o in NORMALISED_OBJECTIVES],
-            index=IndexView.from_interval(found.index),
+            index=None if found.index is None else IndexView.model_validate(found.index),
             by_objective=_by_name(_NAMES, found.by_objective),
             by_variable=_by_name(names, found.by_variable),
             scenarios={

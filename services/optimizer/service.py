@@ -21,6 +21,12 @@ from gaitswarm.services.optimizer.analysis.fork import (
     forked,
     with_start_designs,
 )
+from gaitswarm.services.optimizer.analysis.front import (
+    FRONT_DESIGNS,
+    MOST_FRONT_DESIGNS,
+    FrontView,
+    pareto_front,
+)
 from gaitswarm.services.optimizer.analysis.history import (
     PIECE,
     HistoryCache,
@@ -32,9 +38,27 @@ from gaitswarm.services.optimizer.analysis.identifiability import (
     check_comparable,
     identifiability,
 )
+from gaitswarm.services.optimizer.analysis.preferences import (
+    Index,
+    PreferenceForView,
+    PreferencesRequest,
+    RobustPreferencesView,
+    preference_for,
+    robust_preferences,
+)
 from gaitswarm.services.optimizer.analysis.ranking import RankedJob, rank, tuning_of
 from gaitswarm.services.optimizer.analysis.reference import with_reference
-from gaitswarm.services.optimizer.errors import ProvenanceChanged
+from gaitswarm.services.optimizer.analysis.utilities import (
+    objective_vectors,
+    require_success,
+    tuning_spec,
+)
+from gaitswarm.services.optimizer.errors import (
+    Conflict,
+    InvalidRequest,
+    NotFound,
+    ProvenanceChanged,
+)
 from gaitswarm.services.optimizer.jobs.audit import LOCAL
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.estimate import (
@@ -46,6 +70,7 @@ from gaitswarm.services.optimizer.jobs.estimate import (
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Iteration, Reevaluation
 from gaitswarm.services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState, refusal
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.labels import ANY_JOB, FacetCounts, JobFilter, LabelsChange
 from gaitswarm.services.optimizer.jobs.preference import Preference
 from gaitswarm.services.optimizer.jobs.priority import check_priority
@@ -336,6 +361,42 @@ class JobService:
         following = iteration_starts(columns)[limit:]
         page = columns.rows(slice(int(following[0]) if len(following) else None))
         return distribution(page, job.spec.design_space()), len(following) > 0
+
+    def front(self, job_id: str, *, most: int = FRONT_DESIGNS) -> FrontView:
+        """Find the Pareto front of a tuning job over f1 to f5; `most` designs of it are listed."""
+        if not 1 <= most <= MOST_FRONT_DESIGNS:
+            raise InvalidRequest(f"must be 1 to {MOST_FRONT_DESIGNS}", field="most")
+        spec, columns = self._tuning(job_id, "objectives to trade")
+        vectors = objective_vectors(columns, worlds=spec.worlds)
+        require_success(job_id, vectors)
+        return pareto_front(columns, vectors, spec, most=most)
+
+    def preference_for(self, job_id: str, iteration: int, particle: int) -> PreferenceForView:
+        """Find preferences under which a design wins its job."""
+        for name, number in (("iteration", iteration), ("particle", particle)):
+            if number < 0:
+                raise InvalidRequest("must be at least 0", field=name)
+        spec, columns = self._tuning(job_id, "objectives to trade")
+        rows = np.flatnonzero((columns.iteration == iteration) & (columns.particle == particle))
+        if not len(rows):
+            raise NotFound(f"job {job_id} has no design {iteration}.{particle}")
+        if not np.isfinite(objective_vectors(columns.rows(rows), worlds=spec.worlds)).all():
+            raise Conflict(
+                f"design {iteration}.{particle} fails in a scenario, so it wins under no preference"
+            )
+        return preference_for(columns, int(rows[0]), spec)
+
+    def preferences(
+        self, job_id: str, request: PreferencesRequest, index: Index
+    ) -> RobustPreferencesView:
+        """Find the preference whose winner among a job's designs is the most robust."""
+        job = self.job(job_id)
+        tuning_spec(job_id, job.spec, "a preference")
+        return robust_preferences(job_id, job.spec, self.columns(job), request, index)
+
+    def _tuning(self, job_id: str, has: str) -> tuple[JobSpec, EvaluationColumns]:
+        job = self.job(job_id)
+        return tuning_spec(job_id, job.spec, has), self.columns(job)
 
     def rank(self, job: Job, preference: Preference, *, top: int) -> RankedJob:
         """Rank all designs by another preference, from stored objectives."""

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gaitswarm.services.optimizer.analysis.ranking import fitness_by
+from gaitswarm.services.optimizer.analysis.utilities import fitness_by
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference
 from gaitswarm.sim.outcome import Status
@@ -31,7 +32,7 @@ def columns_of(
     columns = EvaluationColumns(
         iteration=np.arange(rows) // particles,
         particle=np.arange(rows) % particles,
-        designs=np.zeros((rows, 1)),
+        designs=np.zeros((rows, len(JobSpec().design_space().names))),
         objectives=np.concatenate([walks, np.zeros((rows, cases, 1))], axis=2),
         statuses=statuses,
         fitness=np.empty(rows),

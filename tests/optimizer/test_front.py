@@ -3,23 +3,46 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from gaitswarm.services.optimizer.analysis.front import Front, knees, pareto_front
-from gaitswarm.services.optimizer.analysis.ranking import rank
-from gaitswarm.services.optimizer.analysis.utilities import objective_vectors
+from gaitswarm.services.optimizer.analysis.front import (
+    FrontView,
+    FrontWinnerView,
+    TradeOffDesignView,
+    front_knees,
+    pareto_front,
+)
+from gaitswarm.services.optimizer.analysis.utilities import fitness_by, objective_vectors
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
 from gaitswarm.services.optimizer.jobs.preference import objective_vectors as stored_vectors
 from tests.examples.columns import columns_of
 
 
-def front_of(columns: EvaluationColumns, worlds: TuningWorlds | None = None) -> Front:
-    return pareto_front(columns, objective_vectors(columns, worlds=worlds), worlds=worlds)
+def front_of(
+    columns: EvaluationColumns, worlds: TuningWorlds | None = None, most: int = 1000
+) -> FrontView:
+    """Iterations of its designs are their rows, where each has one particle."""
+    vectors = objective_vectors(columns, worlds=worlds)
+    return pareto_front(columns, vectors, JobSpec(worlds=worlds), most=most)
+
+
+def rows_of(designs: Sequence[TradeOffDesignView]) -> list[int]:
+    return [design.iteration for design in designs]
+
+
+def values(named: dict[str, float]) -> list[float]:
+    return list(named.values())
+
+
+def winners_of(front: FrontView) -> dict[str, FrontWinnerView]:
+    return {str(winner.preference): winner for winner in front.winners}
 
 
 def walks(rows: int, scenarios: int, seed: int = 1) -> np.ndarray:
@@ -43,39 +66,38 @@ def test_vectors_are_those_that_jobs_compute_one_by_one() -> None:
 def test_designs_that_are_dominated_equal_to_earlier_ones_or_failed_are_not_on_it() -> None:
     objectives = trade_off((0, 4), (4, 0), (5, 1), (1, 1), (0, 4), (0, 0))
     front = front_of(columns_of(objectives, failed=(5,)))
-    assert front.rows.tolist() == [0, 1, 3]
-    np.testing.assert_allclose(front.ideal, np.exp([0, 0, 0, 0, 0]))
-    np.testing.assert_allclose(front.nadir, np.exp([4, 4, 0, 0, 0]))
-    np.testing.assert_allclose(front.reference[:2], np.exp([4.4, 4.4]))
+    assert rows_of(front.designs) == [0, 1, 3]
+    assert (front.size, front.designs_judged, front.failed) == (3, 5, 1)
+    np.testing.assert_allclose(values(front.ideal), np.exp([0, 0, 0, 0, 0]))
+    np.testing.assert_allclose(values(front.nadir), np.exp([4, 4, 0, 0, 0]))
+    np.testing.assert_allclose(values(front.reference)[:2], np.exp([4.4, 4.4]))
 
 
 def test_objectives_are_normalised_by_logarithms_between_ideal_and_nadir() -> None:
     front = front_of(columns_of(trade_off((0, 4), (1, 2), (4, 0))))
-    np.testing.assert_allclose(
-        front.normalised[:, :2], [[0.0, 1.0], [0.25, 0.5], [1.0, 0.0]], atol=1e-12
-    )
-    assert (front.normalised[:, 2:] == 0.0).all()
+    normalised = np.array([values(design.normalised) for design in front.designs])
+    np.testing.assert_allclose(normalised[:, :2], [[0.0, 1.0], [0.25, 0.5], [1.0, 0.0]], atol=1e-12)
+    assert (normalised[:, 2:] == 0.0).all()
 
 
 def test_the_extremes_are_the_best_in_each_objective() -> None:
-    objectives = walks(200, 2)
-    front = front_of(columns_of(objectives))
-    assert front.extremes.tolist() == front.vectors.argmin(axis=0).tolist()
+    columns = columns_of(walks(200, 2))
+    best = objective_vectors(columns).argmin(axis=0)
+    assert rows_of(front_of(columns).extremes) == best.tolist()
 
 
 def test_of_designs_that_are_best_in_an_objective_the_one_nearest_to_the_ideal_is_named() -> None:
     # All are the best in the last three objectives.
     front = front_of(columns_of(trade_off((0, 4), (1, 1), (4, 0))))
-    assert front.extremes.tolist() == [0, 2, 1, 1, 1]
+    assert rows_of(front.extremes) == [0, 2, 1, 1, 1]
 
 
 def test_a_knee_is_where_the_front_bends() -> None:
     # Two straight branches that meet at (1, 1).
     left = [(x, 10.0 - 9.0 * x) for x in np.linspace(0.0, 1.0, 21)]
     right = [(x, 1.0 - (x - 1.0) / 9.0) for x in np.linspace(1.0, 10.0, 21)[1:]]
-    front = front_of(columns_of(trade_off(*left, *right)))
-    (knee,) = front.knees
-    np.testing.assert_allclose(np.log(front.vectors[knee.row, :2]), [1.0, 1.0])
+    (knee,) = front_of(columns_of(trade_off(*left, *right))).knees
+    np.testing.assert_allclose(np.log(values(knee.objectives)[:2]), [1.0, 1.0])
 
 
 def normalised_front(pairs: list[tuple[float, float]]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -91,29 +113,29 @@ def test_a_front_that_bends_twice_has_two_knees_the_sharper_one_first() -> None:
         for share in np.linspace(0.0, 1.0, 10, endpoint=False)
     ]
     points.append(corners[-1])
-    found = knees(*normalised_front(points))
-    assert [points[knee.row] for knee in found] == [corners[3], corners[1]]
+    (first, distance), (second, _) = front_knees(*normalised_front(points))
+    assert [points[first], points[second]] == [corners[3], corners[1]]
     # The plane is x + y = 1.
-    assert found[0].distance == pytest.approx((1.0 - 0.5) / math.sqrt(2.0))
+    assert distance == pytest.approx((1.0 - 0.5) / math.sqrt(2.0))
 
 
 def test_neighbors_of_a_knee_are_none_and_neither_is_a_front_that_bulges() -> None:
     straight = [(x, 1.0 - x) for x in np.linspace(0.0, 1.0, 11)]
-    assert knees(*normalised_front([*straight, (0.4, 0.4), (0.45, 0.36)]))[0].row == 11
+    assert front_knees(*normalised_front([*straight, (0.4, 0.4), (0.45, 0.36)]))[0][0] == 11
     bulging = [(math.sin(a), math.cos(a)) for a in np.linspace(0.0, math.pi / 2.0, 30)]
-    assert knees(*normalised_front(bulging)) == ()
+    assert front_knees(*normalised_front(bulging)) == []
 
 
 def test_c_without_biases_always_wins_on_the_front_and_the_others_are_placed() -> None:
     columns = columns_of(walks(300, 4, seed=3), own=PREFERENCES["B"])
     front = front_of(columns)
-    assert list(front.winners) == ["A", "B", "C", "job"]
+    winners = winners_of(front)
+    assert list(winners) == ["A", "B", "C", "job"]
     for name in ("A", "B", "C"):
-        (first,) = rank(columns, PREFERENCES[name], top=1).top
-        assert front.winners[name].row == first.row
-    assert front.winners["job"] == front.winners["B"]
-    assert front.winners["C"].on_front
-    assert front.winners["C"].row in front.rows
+        assert winners[name].iteration == fitness_by(columns, PREFERENCES[name]).argmin()
+    assert winners["job"] == winners["B"].model_copy(update={"preference": "job"})
+    assert winners["C"].on_front
+    assert winners["C"].iteration in rows_of(front.designs)
 
 
 def test_a_winner_may_be_dominated_and_then_its_distance_is_given() -> None:
@@ -124,60 +146,63 @@ def test_a_winner_may_be_dominated_and_then_its_distance_is_given() -> None:
     objectives[1, :, 3] = 0.3, 0.3
     columns = columns_of(objectives, own=PREFERENCES["A"])
     front = front_of(columns)
-    assert front.rows.tolist() == [0]
-    winner = front.winners["A"]
-    assert (winner.row, winner.on_front, winner.dominated_by) == (1, False, 1)
+    assert rows_of(front.designs) == [0]
+    winner = winners_of(front)["A"]
+    assert (winner.iteration, winner.on_front, winner.dominated_by) == (1, False, 1)
     # The other objectives are equal.
     assert winner.behind == 0.0
     objectives[0, :, [0, 1, 2, 4]] = 0.98
-    winner = front_of(columns_of(objectives, own=PREFERENCES["A"])).winners["A"]
-    assert winner.row == 1
+    winner = winners_of(front_of(columns_of(objectives, own=PREFERENCES["A"])))["A"]
+    assert winner.iteration == 1
     assert winner.behind == pytest.approx(0.02)
 
 
 def test_hypervolume_grows_iteration_by_iteration_in_the_box_of_the_whole() -> None:
     pairs = [(3, 3), (3.5, 3.5), (2, 2), (2.5, 3), (0, 4), (4, 0)]
     front = front_of(columns_of(trade_off(*pairs), particles=2))
-    assert front.iterations.tolist() == [0, 1, 2]
+    assert [iteration.index for iteration in front.iterations] == [0, 1, 2]
     side, last = 4.4, 4.4 - 4.0
     # Objectives without a range are at the ideal, and the box reaches a tenth beyond.
     squares = [(side - 3.0) ** 2, (side - 2.0) ** 2, (side - 2.0) ** 2 + 2.0 * 2.0 * last]
-    np.testing.assert_allclose(front.hypervolume, np.array(squares) / side**2)
-    assert front.standard_error == 0.0
+    volumes = [iteration.hypervolume for iteration in front.iterations]
+    np.testing.assert_allclose(volumes, np.array(squares) / side**2)
+    assert (front.hypervolume, front.hypervolume_error) == (volumes[-1], 0.0)
 
 
 def test_in_worlds_an_objective_is_what_the_job_makes_of_it_in_all_of_them() -> None:
     worlds = TuningWorlds(count=2, aggregate="worst")
     objectives = walks(50, 4)
     columns = columns_of(objectives, worlds=worlds)
-    by_scenario = objectives.reshape(50, 2, 2, 5).max(axis=2)
+    by_scenario = np.exp(np.log(objectives.reshape(50, 2, 2, 5).max(axis=2)).mean(axis=1))
     front = front_of(columns, worlds)
-    np.testing.assert_allclose(front.vectors, np.exp(np.log(by_scenario).mean(axis=1)))
-    assert front.winners["job"] == front.winners["A"]
+    for design in front.designs:
+        np.testing.assert_allclose(values(design.objectives), by_scenario[design.iteration])
+    winners = winners_of(front)
+    assert winners["job"] == winners["A"].model_copy(update={"preference": "job"})
 
 
 def test_a_front_of_many_is_covered_by_some_of_its_designs_with_all_named_ones() -> None:
     directions = np.abs(np.random.default_rng(4).normal(size=(400, 5)))
-    front = front_of(columns_of(np.exp(-directions / np.linalg.norm(directions, axis=1)[:, None])))
-    assert len(front.rows) == 400
-    some = front.spread(40)
-    assert len(some) == 40
-    assert set(front.extremes.tolist()) <= set(some.tolist()) <= set(front.rows.tolist())
-    assert {winner.row for winner in front.winners.values() if winner.on_front} <= set(some)
-    points = front.normalised
+    columns = columns_of(np.exp(-directions / np.linalg.norm(directions, axis=1)[:, None]))
+    front, some = front_of(columns), front_of(columns, most=40)
+    assert front.size == some.size == len(front.designs) == 400
+    assert len(some.designs) == 40
+    rows = set(rows_of(some.designs))
+    assert set(rows_of(front.extremes)) <= rows
+    assert {winner.iteration for winner in front.winners if winner.on_front} <= rows
+    points = np.array([values(design.normalised) for design in front.designs])
 
-    def gap(chosen: np.ndarray) -> float:
+    def gap(chosen: list[int]) -> float:
         apart = np.linalg.norm(points[:, None] - points[chosen][None], axis=2)
         return float(apart.min(axis=1).max())
 
-    assert gap(some) < gap(front.rows[:40])
-    assert front.spread(1000).tolist() == front.rows.tolist()
+    assert gap(rows_of(some.designs)) < gap(list(range(40)))
 
 
 def test_an_objective_of_nothing_does_not_break_the_scale() -> None:
     objectives = trade_off((0, 4), (4, 0), (2, 2))
     objectives[0, 0] = 0.0
     front = front_of(columns_of(objectives))
-    assert front.rows.tolist() == [0, 1, 2]
-    assert np.isfinite(front.normalised).all()
-    assert front.ideal[0] == 0.0
+    assert rows_of(front.designs) == [0, 1, 2]
+    assert np.isfinite([values(design.normalised) for design in front.designs]).all()
+    assert values(front.ideal)[0] == 0.0

@@ -7,11 +7,8 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from gaitswarm.services.optimizer.analysis.preference_winners import (
-    drawn_preferences,
-    winners,
-)
-from gaitswarm.services.optimizer.analysis.utilities import fitness_of, log_utilities
+from gaitswarm.services.optimizer.analysis.preferences import drawn_preferences, preference_winners
+from gaitswarm.services.optimizer.analysis.utilities import fitness_by
 from tests.examples.columns import columns_of
 
 TRADE_OFF = np.array(
@@ -28,17 +25,17 @@ TRADE_OFF = np.array(
 def test_each_winner_wins_under_the_preference_that_is_named_with_it() -> None:
     columns = columns_of(TRADE_OFF)
     drawn = drawn_preferences(columns, count=400, seed=1)
-    found = winners(columns, drawn)
+    found = preference_winners(columns, drawn)
     assert {winner.row for winner in found} == {0, 1, 2}
     for winner in found:
-        fitness = fitness_of(log_utilities(columns, winner.preference))
+        fitness = fitness_by(columns, winner.preference)
         assert fitness.argmin() == winner.row
     assert sum(winner.share for winner in found) == 1.0
 
 
 def test_the_winners_of_table_4_5_come_first_with_their_names() -> None:
     columns = columns_of(TRADE_OFF)
-    found = winners(columns, drawn_preferences(columns, count=50, seed=1))
+    found = preference_winners(columns, drawn_preferences(columns, count=50, seed=1))
     assert found[0].named
     assert sorted(name for winner in found for name in winner.named) == ["A", "B", "C"]
     unnamed = [winner.share for winner in found if not winner.named]
@@ -47,7 +44,7 @@ def test_the_winners_of_table_4_5_come_first_with_their_names() -> None:
 
 def test_a_design_that_fails_never_wins() -> None:
     columns = columns_of(TRADE_OFF, failed=(2,))
-    found = winners(columns, drawn_preferences(columns, count=200, seed=1))
+    found = preference_winners(columns, drawn_preferences(columns, count=200, seed=1))
     assert {winner.row for winner in found} == {0, 1}
 
 
@@ -55,7 +52,7 @@ def test_many_preferences_take_no_memory_for_each_design() -> None:
     columns = columns_of(np.random.default_rng(1).uniform(1.0, 2.0, size=(20_000, 5)))
     drawn = drawn_preferences(columns, count=100, seed=1)
     tracemalloc.start()
-    found = winners(columns, drawn)
+    found = preference_winners(columns, drawn)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert sum(winner.share for winner in found) == pytest.approx(1.0)

@@ -10,6 +10,11 @@ from typing import TypeVar
 from anyio import to_thread
 
 from gaitswarm.jobs.database.findings import DatabaseFindings
+from gaitswarm.services.optimizer.analysis.front import FrontView
+from gaitswarm.services.optimizer.analysis.preferences import (
+    PreferenceForView,
+    RobustPreferencesView,
+)
 from gaitswarm.services.optimizer.analysis.targets import LeaveOut
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.specs import (
@@ -22,12 +27,11 @@ from gaitswarm.views import (
     IterationView,
     RankingView,
 )
-from gaitswarm.views.analysis import ImportanceView, RobustPreferencesView, ScenarioFamiliesView
+from gaitswarm.views.analysis import ImportanceView, ScenarioFamiliesView
 from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.certificate import CertificateView
 from gaitswarm.views.comparison import JobComparisonView
 from gaitswarm.views.identification import IdentifiabilityView
-from gaitswarm.views.trade_offs import FrontView, PreferenceForView
 from gaitswarm.views.verification import HistoryVerificationView
 
 T = TypeVar("T")

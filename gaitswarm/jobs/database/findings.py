@@ -9,16 +9,17 @@ from gaitswarm.jobs.database.news import PAGE
 from gaitswarm.jobs.findings import Findings
 from gaitswarm.requests import arguments
 from gaitswarm.requests.analysis import (
-    DESIGNS,
     run_certificate,
-    run_front,
     run_importance,
-    run_preference_for,
-    run_preferences,
     run_scenario_families,
 )
 from gaitswarm.requests.comparison import run_comparison
 from gaitswarm.requests.identification import run_targets
+from gaitswarm.services.optimizer.analysis.front import FRONT_DESIGNS, FrontView
+from gaitswarm.services.optimizer.analysis.preferences import (
+    PreferenceForView,
+    RobustPreferencesView,
+)
 from gaitswarm.services.optimizer.analysis.targets import LeaveOut
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.sim.kernel.walk import Precision
@@ -30,12 +31,11 @@ from gaitswarm.views import (
     IterationView,
     RankingView,
 )
-from gaitswarm.views.analysis import ImportanceView, RobustPreferencesView, ScenarioFamiliesView
+from gaitswarm.views.analysis import ImportanceView, ScenarioFamiliesView
 from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.certificate import CertificateView
 from gaitswarm.views.comparison import JobComparisonView
 from gaitswarm.views.identification import IdentifiabilityView
-from gaitswarm.views.trade_offs import FrontView, PreferenceForView
 from gaitswarm.views.verification import HistoryVerificationView
 
 
@@ -113,15 +113,17 @@ class DatabaseFindings(Findings):
             seed=seed,
             precision=precision,
         )
-        return run_preferences(self._service, job_id, request)
+        from gaitswarm.requests.robustness import sampled_indices
 
-    def front(self, job_id: str, *, most: int = DESIGNS) -> FrontView:
+        return self._service.preferences(job_id, request, sampled_indices)
+
+    def front(self, job_id: str, *, most: int = FRONT_DESIGNS) -> FrontView:
         """Find a job's front from what is stored."""
-        return run_front(self._service, job_id, most=most)
+        return self._service.front(job_id, most=most)
 
     def preference_for(self, job_id: str, iteration: int, particle: int) -> PreferenceForView:
         """Find a design's preference from what is stored."""
-        return run_preference_for(self._service, job_id, iteration, particle)
+        return self._service.preference_for(job_id, iteration, particle)
 
     def parameters(self, job_ids: Sequence[str]) -> IdentifiabilityView:
         """Compare runs from what is stored."""

@@ -5,14 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from gaitswarm.jobs.server.call import Call, got, job_path, posted
-from gaitswarm.requests.analysis import PreferencesRequest
+from gaitswarm.services.optimizer.analysis.front import FrontView
+from gaitswarm.services.optimizer.analysis.preferences import (
+    PreferenceForView,
+    PreferencesRequest,
+    RobustPreferencesView,
+)
 from gaitswarm.views import (
     RankingRequest,
     RankingView,
 )
-from gaitswarm.views.analysis import ImportanceView, RobustPreferencesView, ScenarioFamiliesView
+from gaitswarm.views.analysis import ImportanceView, ScenarioFamiliesView
 from gaitswarm.views.comparison import JobComparisonView
-from gaitswarm.views.trade_offs import FrontView, PreferenceForView
 
 
 def ranking(job_id: str, request: RankingRequest) -> Call[RankingView]:

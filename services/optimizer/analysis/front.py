@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Annotated, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
-from gaitswarm.services.optimizer.analysis.preference_winners import NAMED
-from gaitswarm.services.optimizer.analysis.ranking import fitness_by
+from gaitswarm.services.optimizer.analysis.evaluations import ObjectiveView
+from gaitswarm.services.optimizer.analysis.utilities import (
+    NAMED,
+    NORMALISED_NAMES,
+    NORMALISED_OBJECTIVES,
+    PreferenceOwner,
+    fitness_by,
+)
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
-from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.search.random_stream import uniform
+from gaitswarm.services.optimizer.views import DesignValues, Finite, IterationIndex, Particle, View
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -113,27 +121,16 @@ _AT_ONCE: Final = 4_000_000
 """Comparisons held in memory at a time."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class HypervolumeCurve:
-    """Hypervolume after each point of a sequence.
+def hypervolume_curve(points: Floats, *, most_bounds: int = MOST_BOUNDS) -> tuple[Floats, float]:
+    """Return the (n,) hypervolumes after each of (n, M) points, minimized, in their order.
 
-    Attributes:
-        values: (n,) share of the unit box dominated by the first 1, 2, ... points.
-        standard_error: of the last value for estimates; 0 for exact values.
-    """
-
-    values: Floats
-    standard_error: float
-
-
-def hypervolume_curve(points: Floats, *, most_bounds: int = MOST_BOUNDS) -> HypervolumeCurve:
-    """Return the hypervolume after each of (n, M) points, minimized, in their order.
+    With the standard error of the last one: 0 if they are exact.
 
     The box is the unit box with the reference point at 1; values below 0 count as 0.
     """
     clipped = np.maximum(points, 0.0)
     exact = _exact(clipped, most_bounds)
-    return _estimated(clipped) if exact is None else HypervolumeCurve(exact, 0.0)
+    return _estimated(clipped) if exact is None else (exact, 0.0)
 
 
 def _exact(points: Floats, most_bounds: int) -> Floats | None:
@@ -230,7 +227,7 @@ class _Undominated:
             self.volumes = np.pad(self.volumes, (0, more))
 
 
-def _estimated(points: Floats) -> HypervolumeCurve:
+def _estimated(points: Floats) -> tuple[Floats, float]:
     size = points.shape[1]
     samples = min(_MOST_SAMPLES, _COMPARISONS // len(points))
     drawn = uniform(0, _DRAW, iteration=0, particle=0, count=samples * size)
@@ -247,7 +244,7 @@ def _estimated(points: Floats) -> HypervolumeCurve:
         step = max(1, _AT_ONCE // max(1, len(left)))
     values = np.cumsum(hits) / samples
     last = float(values[-1])
-    return HypervolumeCurve(values, math.sqrt(last * (1.0 - last) / samples))
+    return values, math.sqrt(last * (1.0 - last) / samples)
 
 
 def _first_below(points: Floats, samples: Floats) -> Rows:
@@ -268,126 +265,218 @@ KNEE_DISTANCE: Final = 0.25
 """Share of the front's range by which two knees differ in at least one objective."""
 
 
-@dataclass(frozen=True, slots=True)
-class Knee:
-    """A design of the front that is closer to the ideal than its neighborhood.
+FRONT_DESIGNS: Final = 1000
+"""Designs of a front that are listed by default."""
 
-    Attributes:
-        distance: from the plane through the mean of the extremes, in normalised objectives.
-    """
+MOST_FRONT_DESIGNS: Final = 10_000
+"""Limit on the designs of a front that are listed."""
 
-    row: int
-    distance: float
-
-
-@dataclass(frozen=True, slots=True)
-class FrontWinner:
-    """The job's best design by a preference, relative to the front.
-
-    Attributes:
-        on_front: whether it belongs to the front, or equals a design of it.
-        dominated_by: number of designs of the front that dominate it.
-        behind: share by which one of them is better in every objective; 0 on the front.
-    """
-
-    row: int
-    on_front: bool
-    dominated_by: int
-    behind: float
+_EXAMPLE: Final = {
+    "torque": 8.7,
+    "acceleration": 1.8,
+    "angular_acceleration": 16.1,
+    "energy": 42.0,
+    "reciprocal_speed": 6.4,
+}
+OwnFitness = Annotated[
+    Finite, Field(description="By the job's own preference, minimized [1].", examples=[20.87])
+]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Front:
-    """Trade-off between a job's designs: five objectives over all scenarios.
+class TradeOffDesignView(View):
+    """A design of a job, by its objectives over all scenarios."""
 
-    Normalised objectives are logarithms, 0 at the ideal and 1 at the nadir.
-
-    Attributes:
-        vectors: (r, M) objectives of all designs, see `objective_vectors`.
-        rows: (f,) rows of the front, ascending; of equal designs the earliest.
-        ideal: (M,) minimum of the front.
-        nadir: (M,) maximum of the front.
-        normalised: (r, M) objectives of all designs.
-        reference: (M,) reference point of the hypervolume.
-        extremes: (M,) row of the best in each objective; of equal ones the nearest to the ideal.
-        knees: most pronounced first.
-        winners: best designs by A, B and C, and by the job's own preference as `job`.
-        iterations: (k,) iterations with evaluations.
-        hypervolume: (k,) share of the box between ideal and reference dominated up to each
-            iteration.
-        standard_error: of the last hypervolume if estimated, else 0.
-    """
-
-    vectors: Floats
-    rows: Rows
-    ideal: Floats
-    nadir: Floats
-    normalised: Floats
-    reference: Floats
-    extremes: Rows
-    knees: tuple[Knee, ...]
-    winners: Mapping[str, FrontWinner]
-    iterations: NDArray[np.int64]
-    hypervolume: Floats
-    standard_error: float
-
-    def spread(self, most: int) -> Rows:
-        """Return rows that cover the front: named designs, then repeatedly the farthest one."""
-        if most >= len(self.rows):
-            return self.rows
-        winners = [winner.row for winner in self.winners.values() if winner.on_front]
-        named = [*self.extremes.tolist(), *(knee.row for knee in self.knees), *winners]
-        chosen = np.isin(self.rows, named)
-        points = self.normalised[self.rows]
-        distance = np.full(len(points), np.inf)
-        for point in points[chosen]:
-            np.minimum(distance, np.square(points - point).sum(axis=1), out=distance)
-        while np.count_nonzero(chosen) < most:
-            farthest = int(distance.argmax())
-            chosen[farthest] = True
-            apart = np.square(points - points[farthest]).sum(axis=1)
-            np.minimum(distance, apart, out=distance)
-        return self.rows[chosen]
+    iteration: IterationIndex
+    particle: Particle
+    design: DesignValues
+    objectives: dict[str, float] = Field(
+        description="Each objective's geometric mean over the scenarios, minimized; units are in"
+        " the front's `objectives`.",
+        examples=[_EXAMPLE],
+    )
+    fitness: OwnFitness
 
 
-def pareto_front(
-    columns: EvaluationColumns,
-    vectors: Floats,
-    *,
-    worlds: TuningWorlds | None = None,
-) -> Front:
-    """Find the front of (r, M) objective vectors, at least one row finite."""
-    record_rows = _best_at_their_time(vectors)
-    rows = record_rows[non_dominated(vectors[record_rows])]
-    ideal, nadir = vectors[rows].min(axis=0), vectors[rows].max(axis=0)
-    logarithms, low, span = _logarithms(vectors, rows)
-    normalised = (logarithms - low) / span
-    iterations, hypervolume, error = _over_iterations(columns.iteration, normalised, record_rows)
-    with np.errstate(over="ignore"):
-        reference = np.exp(low + (1.0 + BEYOND_NADIR) * span)
-    extremes = _extremes(vectors, normalised, rows)
-    judged = {name: fitness_by(columns, chosen, worlds=worlds) for name, chosen in NAMED.items()}
-    judged["job"] = columns.fitness
-    return Front(
-        vectors=vectors,
-        rows=rows,
-        ideal=ideal,
-        nadir=nadir,
-        normalised=normalised,
-        reference=reference,
-        extremes=extremes,
-        knees=knees(normalised, rows, extremes),
-        winners={
-            name: _winner(vectors, rows, int(fitness.argmin())) for name, fitness in judged.items()
-        },
-        iterations=iterations,
-        hypervolume=hypervolume,
-        standard_error=error,
+class NormalisedDesignView(TradeOffDesignView):
+    """A design of a job with respect to the job's front."""
+
+    normalised: dict[str, float] = Field(
+        description="Logarithm of each objective, 0 at the front's ideal and 1 at its nadir [1].",
+        examples=[dict.fromkeys(_EXAMPLE, 0.25)],
     )
 
 
-def knees(normalised: Floats, rows: Rows, extremes: Rows) -> tuple[Knee, ...]:
-    """Find the knees of a front.
+class FrontDesignView(NormalisedDesignView):
+    """A design that no other of its job dominates."""
+
+    marks: list[str] = Field(
+        description="Labels: `knee 1`, `least energy`, `best under A`, `best of the job` and so on."
+    )
+
+
+class KneeView(NormalisedDesignView):
+    """A design that is nearer to the ideal than those around it."""
+
+    distance: float = Field(
+        description="From the plane of equal intercepts through the mean of the extremes, in"
+        " normalised objectives [1]."
+    )
+
+
+class ExtremeView(NormalisedDesignView):
+    """The best design in one objective."""
+
+    objective: str = Field(description="Its name.", examples=["energy"])
+
+
+class FrontWinnerView(NormalisedDesignView):
+    """The best design of the job under a preference, which need not be on the front.
+
+    The effect of biases differs from scenario to scenario, so that a dominated design can win.
+    """
+
+    preference: PreferenceOwner = Field(description="A, B or C of table 4.5, or the job's own.")
+    on_front: bool = Field(description="Whether no design of the job dominates it.")
+    dominated_by: int = Field(description="Designs of the front that dominate it.")
+    behind: float = Field(description="Share by which one of these is better in all objectives.")
+
+
+class FrontIterationView(View):
+    """Hypervolume of the front at an iteration."""
+
+    index: IterationIndex
+    hypervolume: float = Field(description="Of the front up to this iteration [1].")
+
+
+class FrontView(View):
+    """The Pareto front of a job, without simulation."""
+
+    objectives: list[ObjectiveView] = Field(description="f1 to f5 of table 4.1, in order.")
+    designs_judged: int = Field(description="Designs of the job that succeed in all scenarios.")
+    failed: int = Field(description="Designs that do not.")
+    size: int = Field(description="Nondominated designs; of equal ones the earliest.")
+    ideal: dict[str, float] = Field(description="Least of the front in each objective.")
+    nadir: dict[str, float] = Field(description="Greatest of the front in each objective.")
+    reference: dict[str, float] = Field(
+        description="Reference point of the hypervolume: a tenth of the front's range beyond the"
+        " nadir, in logarithms."
+    )
+    hypervolume: float = Field(
+        description="Share of the box between ideal and reference that the front dominates, in"
+        " logarithms [1].",
+        examples=[0.63],
+    )
+    hypervolume_error: float = Field(
+        description="Its standard error [1]: 0 if exact; fronts of thousands may be sampled."
+    )
+    iterations: list[FrontIterationView] = Field(
+        description="Hypervolume by iteration, in the same box; it never falls."
+    )
+    knees: list[KneeView] = Field(
+        description="At most five, the most pronounced first: nearer to the ideal than all designs"
+        " that differ by less than a quarter of the front's range in each objective."
+    )
+    extremes: list[ExtremeView] = Field(description="The best design in each objective.")
+    winners: list[FrontWinnerView] = Field(
+        description="The best designs under A, B and C and under the job's own preference."
+    )
+    designs: list[FrontDesignView] = Field(
+        description="Designs of the front, in the order in which they were tried. Of a front of"
+        " more than requested: labelled designs, and others that cover it evenly."
+    )
+
+
+def pareto_front(
+    columns: EvaluationColumns, vectors: Floats, spec: JobSpec, *, most: int
+) -> FrontView:
+    """Find the front of (r, M) objective vectors, at least one row finite.
+
+    Normalised objectives are logarithms, 0 at the ideal and 1 at the nadir.
+    """
+    records = _best_at_their_time(vectors)
+    rows = records[non_dominated(vectors[records])]
+    logarithms, low, span = _logarithms(vectors, rows)
+    normalised = (logarithms - low) / span
+    with np.errstate(over="ignore"):
+        reference = np.exp(low + (1.0 + BEYOND_NADIR) * span)
+    volumes, error = hypervolume_curve(normalised[records] / (1.0 + BEYOND_NADIR))
+    iterations = np.unique(columns.iteration)
+    counts = np.searchsorted(columns.iteration[records], iterations, side="right")
+    hypervolume = np.concatenate([[0.0], volumes])[counts].tolist()
+    # Of equal ones the nearest to the ideal.
+    sums = normalised[rows].sum(axis=1)
+    extremes = rows[[np.lexsort((sums, values))[0] for values in vectors[rows].T]]
+    knees = front_knees(normalised, rows, extremes)
+    winners = {
+        name: int(fitness_by(columns, preference, worlds=spec.worlds).argmin())
+        for name, preference in NAMED.items()
+    } | {"job": int(columns.fitness.argmin())}
+
+    marks: dict[int, list[str]] = {}
+    for number, (row, _) in enumerate(knees, start=1):
+        marks.setdefault(row, []).append(f"knee {number}")
+    for name, row in zip(NORMALISED_NAMES, extremes.tolist(), strict=True):
+        marks.setdefault(row, []).append(f"least {name}")
+    for name, row in winners.items():
+        label = "best of the job" if name == "job" else f"best under {name}"
+        marks.setdefault(row, []).append(label)
+
+    def fields(row: int) -> dict[str, Any]:
+        return {
+            **design_fields(columns, vectors, spec, row),
+            "normalised": by_objective(normalised[row]),
+        }
+
+    judged = int(np.isfinite(vectors[:, 0]).sum())
+    return FrontView(
+        objectives=[ObjectiveView.model_validate(f) for f in NORMALISED_OBJECTIVES],
+        designs_judged=judged,
+        failed=len(columns) - judged,
+        size=len(rows),
+        ideal=by_objective(vectors[rows].min(axis=0)),
+        nadir=by_objective(vectors[rows].max(axis=0)),
+        reference=by_objective(reference),
+        hypervolume=hypervolume[-1],
+        hypervolume_error=error,
+        iterations=[
+            FrontIterationView(index=index, hypervolume=value)
+            for index, value in zip(iterations.tolist(), hypervolume, strict=True)
+        ],
+        knees=[KneeView(**fields(row), distance=distance) for row, distance in knees],
+        extremes=[
+            ExtremeView(**fields(row), objective=name)
+            for name, row in zip(NORMALISED_NAMES, extremes.tolist(), strict=True)
+        ],
+        winners=[
+            FrontWinnerView(**fields(row), preference=name, **_dominance(vectors, rows, row))
+            for name, row in winners.items()
+        ],
+        designs=[
+            FrontDesignView(**fields(row), marks=marks.get(row, []))
+            for row in _spread(normalised, rows, list(marks), most).tolist()
+        ],
+    )
+
+
+def design_fields(
+    columns: EvaluationColumns, vectors: Floats, spec: JobSpec, row: int
+) -> dict[str, Any]:
+    """Return the fields of the `TradeOffDesignView` of one row."""
+    return {
+        "iteration": int(columns.iteration[row]),
+        "particle": int(columns.particle[row]),
+        "design": spec.design_space().shown(columns.designs[row].tolist()),
+        "objectives": by_objective(vectors[row]),
+        "fitness": float(columns.fitness[row]),
+    }
+
+
+def by_objective(values: Floats) -> dict[str, float]:
+    return dict(zip(NORMALISED_NAMES, values.tolist(), strict=True))
+
+
+def front_knees(normalised: Floats, rows: Rows, extremes: Rows) -> list[tuple[int, float]]:
+    """Return the rows of a front's knees with their distances, most pronounced first.
 
     A design's distance is that from the plane of equal intercepts through the mean of the extremes,
     towards the ideal (Das 1999). A knee has the greatest distance among all designs that differ
@@ -397,15 +486,15 @@ def knees(normalised: Floats, rows: Rows, extremes: Rows) -> tuple[Knee, ...]:
     distances = (plane - normalised[rows].sum(axis=1)) / math.sqrt(normalised.shape[1])
     order = np.argsort(-distances, kind="stable")
     points, free = normalised[rows[order]], distances[order] > 0.0
-    result: list[Knee] = []
+    result: list[tuple[int, float]] = []
     while len(result) < MOST_KNEES and free.any():
         place = int(free.argmax())
         near = (np.abs(points - points[place]) < KNEE_DISTANCE).all(axis=1)
         if not near[:place].any():
-            result.append(Knee(int(rows[order[place]]), float(distances[order[place]])))
+            result.append((int(rows[order[place]]), float(distances[order[place]])))
         # It is the farthest of the remaining designs, so its neighbors are no knees.
         free &= ~near
-    return tuple(result)
+    return result
 
 
 def _best_at_their_time(vectors: Floats) -> Rows:
@@ -427,34 +516,31 @@ def _logarithms(vectors: Floats, rows: Rows) -> tuple[Floats, Floats, Floats]:
     return logarithms, low, np.where(span > 0.0, span, 1.0)
 
 
-def _extremes(vectors: Floats, normalised: Floats, rows: Rows) -> Rows:
-    """(M,) row of the best in each objective."""
-    sums = normalised[rows].sum(axis=1)
-    best = [np.lexsort((sums, vectors[rows, m]))[0] for m in range(vectors.shape[1])]
-    return rows[best]
-
-
-def _winner(vectors: Floats, rows: Rows, row: int) -> FrontWinner:
+def _dominance(vectors: Floats, rows: Rows, row: int) -> dict[str, Any]:
+    """By how many designs of the front (f,) a design is dominated, and by how much."""
     vector, front = vectors[row], vectors[rows]
-    no_worse = (front <= vector).all(axis=1)
     equal = (front == vector).all(axis=1)
-    dominating = front[no_worse & ~equal]
+    dominating = front[(front <= vector).all(axis=1) & ~equal]
     if not len(dominating):
-        return FrontWinner(row, on_front=True, dominated_by=0, behind=0.0)
+        return {"on_front": True, "dominated_by": 0, "behind": 0.0}
     # 0 where both are 0.
     ratios = np.divide(dominating, vector, out=np.ones_like(dominating), where=vector > 0.0)
     behind = 1.0 - float(ratios.max(axis=1).min())
-    return FrontWinner(row, on_front=False, dominated_by=len(dominating), behind=behind)
+    return {"on_front": False, "dominated_by": len(dominating), "behind": behind}
 
 
-def _over_iterations(
-    iteration: NDArray[np.int64], normalised: Floats, record_rows: Rows
-) -> tuple[NDArray[np.int64], Floats, float]:
-    """(k,) iterations; (k,) hypervolume after each; standard error of the last.
-
-    iteration: (r,); normalised: (r, M); record_rows: rows that no earlier one dominates.
-    """
-    curve: HypervolumeCurve = hypervolume_curve(normalised[record_rows] / (1.0 + BEYOND_NADIR))
-    iterations = np.unique(iteration)
-    counts = np.searchsorted(iteration[record_rows], iterations, side="right")
-    return iterations, np.concatenate([[0.0], curve.values])[counts], curve.standard_error
+def _spread(normalised: Floats, rows: Rows, named: Sequence[int], most: int) -> Rows:
+    """Choose rows that cover a front: named designs, then repeatedly the farthest one."""
+    if most >= len(rows):
+        return rows
+    chosen = np.isin(rows, named)
+    points = normalised[rows]
+    distance = np.full(len(points), np.inf)
+    for point in points[chosen]:
+        np.minimum(distance, np.square(points - point).sum(axis=1), out=distance)
+    while np.count_nonzero(chosen) < most:
+        farthest = int(distance.argmax())
+        chosen[farthest] = True
+        apart = np.square(points - points[farthest]).sum(axis=1)
+        np.minimum(distance, apart, out=distance)
+    return rows[chosen]

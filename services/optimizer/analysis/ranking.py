@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaitswarm.services.optimizer.analysis.statistics import spearman
-from gaitswarm.services.optimizer.analysis.utilities import fitness_of, log_utilities
+from gaitswarm.services.optimizer.analysis.utilities import fitness_by
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.job import Job
@@ -93,14 +93,6 @@ def rank(
         best_so_far=best_so_far(columns.iteration, fitness),
         correlation=rank_correlation(fitness, before),
     )
-
-
-def fitness_by(
-    columns: EvaluationColumns, preference: Preference, *, worlds: TuningWorlds | None = None
-) -> Floats:
-    """Return the (r,) fitness by a preference, +inf for a failed design."""
-    logarithms = log_utilities(columns, preference)
-    return fitness_of(logarithms if worlds is None else worlds.aggregated(logarithms))
 
 
 def best_so_far(iteration: NDArray[np.int64], fitness: Floats) -> Floats:

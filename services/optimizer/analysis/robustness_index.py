@@ -16,14 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaitswarm.services.optimizer.analysis.statistics import CONFIDENCE, Interval
+from gaitswarm.services.optimizer.analysis.utilities import NORMALISED_OBJECTIVES
 from gaitswarm.services.optimizer.search.random_stream import swarm_uniform
-from gaitswarm.sim.outcome import OBJECTIVES
 from gaitswarm.sim.variables import Variable
 
 Floats = NDArray[np.float64]
-
-NORMALISED_OBJECTIVES: Final = OBJECTIVES[:5]
-"""f1 to f5 of table 4.1, weighed by the preferences of chapter 4; f6 may be negative."""
 
 _RESAMPLES: Final = 400
 _SAMPLE, _RESAMPLE = 0x10CA1, 0xB0075

@@ -6,22 +6,55 @@ differ from Python's in the last bit, so stored values are not computed here.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Final
+from collections.abc import Mapping, Sequence
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
-from gaitswarm.services.optimizer.jobs.preference import HEIGHT_LOSS, Preference
+from gaitswarm.services.optimizer.jobs.preference import HEIGHT_LOSS, PREFERENCES, Preference
 from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.sim.outcome import OBJECTIVES
 
 Floats = NDArray[np.float64]
 
+PreferenceOwner = Literal["job", "A", "B", "C"]
+
+NAMED: Final[Mapping[PreferenceOwner, Preference]] = {
+    "A": PREFERENCES["A"],
+    "B": PREFERENCES["B"],
+    "C": PREFERENCES["C"],
+}
+"""Preferences of table 4.5."""
+
+NORMALISED_OBJECTIVES: Final = OBJECTIVES[:5]
+"""f1 to f5 of table 4.1, weighed by the preferences of chapter 4; f6 may be negative."""
+
+NORMALISED_NAMES: Final = tuple(objective.name for objective in NORMALISED_OBJECTIVES)
+
 _BLOCK: Final = 4096
 """Rows at a time, for the processor's cache."""
+
+
+def tuning_spec(job_id: str, spec: AnySpec, has: str) -> JobSpec:
+    """Return the spec of a job that tunes a drive; `has` says what only such a job has."""
+    if not isinstance(spec, JobSpec):
+        raise InvalidRequest(
+            f"job {job_id} is of kind {spec.kind}; only a job that tunes a drive has {has}",
+            field="job_id",
+        )
+    return spec
+
+
+def require_success(job_id: str, values: Floats) -> None:
+    """Check that any of a job's designs has finite values (r, n)."""
+    if not np.isfinite(values).all(axis=1).any():
+        raise Conflict(f"job {job_id} has no design yet that succeeds in all scenarios")
 
 
 def log_utilities(columns: EvaluationColumns, preference: Preference) -> Floats:
@@ -58,6 +91,14 @@ def fitness_of(log_utility: Floats) -> Floats:
     with np.errstate(over="ignore", invalid="ignore"):
         fitness = np.exp(log_utility.mean(axis=1))
     return np.where(failed, np.inf, fitness)
+
+
+def fitness_by(
+    columns: EvaluationColumns, preference: Preference, *, worlds: TuningWorlds | None = None
+) -> Floats:
+    """Return the (r,) fitness by a preference, +inf for a failed design."""
+    logarithms = log_utilities(columns, preference)
+    return fitness_of(logarithms if worlds is None else worlds.aggregated(logarithms))
 
 
 def objective_vectors(

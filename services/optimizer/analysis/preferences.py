@@ -1,0 +1,427 @@
+"""Preferences: those under which a chosen design wins, and the one whose winner is most robust
+
+For given biases the logarithm of fitness is linear in the exponents (eq. 4.1, 4.2), so the
+exponents under which a design has the greatest lead solve a linear program. A preference whose
+optimum is robust is proposed by the thesis as future research (4.5).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Annotated, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from gaitswarm.services.optimizer.analysis.front import (
+    OwnFitness,
+    TradeOffDesignView,
+    design_fields,
+)
+from gaitswarm.services.optimizer.analysis.utilities import (
+    NAMED,
+    NORMALISED_OBJECTIVES,
+    PreferenceOwner,
+    fitness_by,
+    objective_vectors,
+    require_success,
+    tuning_spec,
+)
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.documents import AnySpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
+from gaitswarm.services.optimizer.jobs.preference import Preference
+from gaitswarm.services.optimizer.search.random_stream import swarm_uniform, uniform
+from gaitswarm.services.optimizer.views import (
+    DesignValues,
+    Finite,
+    IterationIndex,
+    Particle,
+    Request,
+    View,
+)
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.memory import require_room_for_scipy
+
+Floats = NDArray[np.float64]
+Rows = NDArray[np.intp]
+
+_DRAWN: Final = 512
+"""Sampled exponents for a design that cannot win."""
+
+_DRAW, _DRAW_PREFERENCE = 0xE4B0, 0xB1A5
+
+_AT_ONCE: Final = 4_000_000
+"""Fitness values held in memory at a time."""
+
+_RIVALS: Final = 32
+"""Designs added to a linear program at a time."""
+
+_ROUNDS: Final = 200
+"""Limit on the number of linear programs; each has more rivals than the previous one."""
+
+_DECIMALS: Final = 4
+"""Of exponents, if rounding does not worsen the rank."""
+
+_LP: Final = 1e-10
+"""Tolerance of linear programs; the smallest that HiGHS supports."""
+
+_TOLERANCE: Final = 1e-9
+"""Tolerance of a lead relative to the linear program's, in the logarithm of fitness."""
+
+
+MOST: Final = 100_000
+"""Limit on the preferences and candidates of a request."""
+
+Drawn = Annotated[int, Field(description="Preferences drawn in addition to A, B and C.")]
+Radius = Annotated[
+    float, Field(description="Largest distance from it, as a share of the bounds [1].")
+]
+
+
+class PreferenceFitView(View):
+    """Rank of a design under a preference, among all designs of the job."""
+
+    preference: Preference = Field(description="Its exponents sum to about 1.")
+    biases_of: list[PreferenceOwner] = Field(description="Whose biases these are.")
+    rank: int = Field(description="Of the design, from 1; equal designs share it.")
+    fitness: float = Field(description="Of the design under it [1].", examples=[4.81])
+    margin: Finite = Field(
+        description="Share by which the rival's fitness is worse, negative if it is better [1], for"
+        " exponents that sum to 1; null without a rival."
+    )
+    rival: TradeOffDesignView | None = Field(description="The best of all other designs under it.")
+
+
+class PreferenceForView(View):
+    """Preferences under which a design wins its job, without simulation."""
+
+    chosen: TradeOffDesignView = Field(description="The design.")
+    on_front: bool = Field(description="Whether no other design of the job dominates it.")
+    wins: bool = Field(description="Whether no design is better under the best of the fits.")
+    certain: bool = Field(
+        description="Whether it wins, or it is proven that no exponents with these biases let it"
+        " win; not proven for a job that judges in worlds."
+    )
+    fits: list[PreferenceFitView] = Field(
+        description="One for each set of biases, the job's own and those of A, B and C, the best"
+        " first: the exponents of the widest margin, or else of the best rank."
+    )
+
+
+def preference_for(columns: EvaluationColumns, row: int, spec: JobSpec) -> PreferenceForView:
+    """Find preferences that suit a design, one for each set of biases.
+
+    For the job's own biases and those of table 4.5, the exponents maximize the design's lead. If it
+    cannot win, they give its best rank among the linear program's solution, where it is least
+    behind, and some samples.
+
+    With worlds the linear program is an approximation: the aggregate of a product is not the
+    product of the aggregates.
+    """
+    plain = objective_vectors(columns, worlds=spec.worlds)
+
+    def design(index: int) -> TradeOffDesignView:
+        return TradeOffDesignView(**design_fields(columns, plain, spec, index))
+
+    preferences: dict[PreferenceOwner, Preference] = {"job": spec.resolved_preference(), **NAMED}
+    owners: dict[tuple[float, ...], list[PreferenceOwner]] = {}
+    for name, preference in preferences.items():
+        owners.setdefault(preference.bias, []).append(name)
+    fits = []
+    for bias, names in owners.items():
+        vectors = objective_vectors(columns, bias, worlds=spec.worlds)
+        others = np.flatnonzero((vectors != vectors[row]).any(axis=1))
+        exponent = _exponents(vectors, row, others)
+        exact, rounded = (
+            _fit(columns, row, others, Preference(bias=bias, exponent=tuple(e)), spec.worlds)
+            for e in (exponent.tolist(), np.round(exponent, _DECIMALS).tolist())
+        )
+        fits.append((names, rounded if rounded.rank <= exact.rank else exact))
+    fits.sort(key=lambda fit: (fit[1].rank, -(fit[1].margin or 0.0)))
+    better = (plain <= plain[row]).all(axis=1) & (plain < plain[row]).any(axis=1)
+    wins = fits[0][1].rank == 1
+    return PreferenceForView(
+        chosen=design(row),
+        on_front=not better.any(),
+        wins=wins,
+        certain=wins or spec.worlds is None,
+        fits=[
+            PreferenceFitView(
+                preference=fit.preference,
+                biases_of=names,
+                rank=fit.rank,
+                fitness=fit.fitness,
+                margin=fit.margin,
+                rival=None if fit.rival is None else design(fit.rival),
+            )
+            for names, fit in fits
+        ],
+    )
+
+
+class _Fit(NamedTuple):
+    """Rank of a design under a preference; rival: the best row that is not equal to it."""
+
+    preference: Preference
+    rank: int
+    fitness: float
+    rival: int | None
+    margin: float | None
+
+
+def _fit(
+    columns: EvaluationColumns,
+    row: int,
+    others: Rows,
+    preference: Preference,
+    worlds: TuningWorlds | None,
+) -> _Fit:
+    """Rank a design by a preference; others: rows not equal to it."""
+    fitness = fitness_by(columns, preference, worlds=worlds)
+    rank = int(np.count_nonzero(fitness[others] < fitness[row])) + 1
+    rival = int(others[fitness[others].argmin()]) if len(others) else row
+    if rival == row or not np.isfinite(fitness[rival]):
+        return _Fit(preference, rank, float(fitness[row]), None, None)
+    with np.errstate(all="ignore"):
+        ratio = float((fitness[rival] / fitness[row]) ** (1.0 / sum(preference.exponent)))
+    return _Fit(preference, rank, float(fitness[row]), rival, ratio - 1.0)
+
+
+def _exponents(vectors: Floats, row: int, others: Rows) -> Floats:
+    """(M,) exponents under which a design has the greatest lead, or else a good rank.
+
+    vectors: (r, M) objectives with their biases, +inf for a failed design.
+    """
+    rivals = vectors[others[np.isfinite(vectors[others]).all(axis=1)]]
+    if not len(rivals):
+        return np.full(vectors.shape[1], 1.0 / vectors.shape[1])
+    candidates = np.vstack([vectors[row], rivals])
+    # An objective of 0, which has no logarithm, counts as the least positive one.
+    least = np.where(candidates > 0.0, candidates, np.inf).min(axis=0)
+    logarithms = np.log(np.maximum(candidates, np.where(np.isfinite(least), least, 1.0)))
+    lead = logarithms[1:] - logarithms[0]
+    exponent, margin = _widest_lead(lead)
+    return exponent if margin > 0.0 else _best_rank(lead, exponent)
+
+
+def _widest_lead(lead: Floats) -> tuple[Floats, float]:
+    """Return exponents that sum to 1 and maximize the least lead, and that lead.
+
+    lead: (n, M) logarithms of the objectives relative to the design's.
+    """
+    rivals = lead.argmin(axis=0)
+    exponent, promised = _program(lead[rivals])
+    for _ in range(_ROUNDS):
+        leads = lead @ exponent
+        if leads.min() >= promised - _TOLERANCE:
+            break
+        least = np.argpartition(leads, min(_RIVALS, len(leads)) - 1)[:_RIVALS]
+        rivals = np.union1d(rivals, least)
+        exponent, promised = _program(lead[rivals])
+    return exponent, float((lead @ exponent).min())
+
+
+def _program(lead: Floats) -> tuple[Floats, float]:
+    """As `_widest_lead`, for few designs."""
+    require_room_for_scipy()
+    from scipy.optimize import linprog  # noqa: PLC0415 - slow to import
+
+    count, size = lead.shape
+    # Variables: exponents, and the least lead, which is maximized.
+    solved = linprog(
+        np.append(np.zeros(size), -1.0),
+        A_ub=np.column_stack([-lead, np.ones(count)]),
+        b_ub=np.zeros(count),
+        A_eq=np.append(np.ones(size), 0.0)[None],
+        b_eq=[1.0],
+        bounds=[(0.0, 1.0)] * size + [(None, None)],
+        options={"primal_feasibility_tolerance": _LP, "dual_feasibility_tolerance": _LP},
+    )
+    solution = np.asarray(solved.x, dtype=np.float64)
+    return np.clip(solution[:size], 0.0, 1.0) + 0.0, float(solution[size])
+
+
+def _best_rank(lead: Floats, exponent: Floats) -> Floats:
+    """The best-ranking of these exponents, each objective alone, and samples."""
+    size = lead.shape[1]
+    numbers = uniform(0, _DRAW, iteration=0, particle=0, count=_DRAWN * size)
+    # Uniform on the simplex.
+    drawn = -np.log1p(-numbers.reshape(_DRAWN, size))
+    drawn /= drawn.sum(axis=1, keepdims=True)
+    candidates = np.vstack([exponent, np.eye(size), drawn])
+    step = max(1, _AT_ONCE // len(lead))
+    better = np.concatenate(
+        [
+            np.count_nonzero(lead @ candidates[first : first + step].T < 0.0, axis=0)
+            for first in range(0, len(candidates), step)
+        ]
+    )
+    return np.asarray(candidates[better.argmin()])
+
+
+class IndexView(View):
+    """A robustness index with its interval; the smaller, the more robust."""
+
+    value: float = Field(description="The estimate [1].", examples=[1.42])
+    low: float = Field(description="Lower end of the interval of 95 % [1].", examples=[1.31])
+    high: float = Field(description="Upper end [1].", examples=[1.55])
+
+
+class PreferenceWinnerView(View):
+    """A design that is the best of its job under at least one preference."""
+
+    iteration: IterationIndex
+    particle: Particle
+    design: DesignValues
+    preference: Preference = Field(
+        description="One under which it wins: of table 4.5 if possible, else of the greatest lead."
+    )
+    named: list[str] = Field(description="Preferences of table 4.5 under which it wins.")
+    share: float = Field(description="Of the drawn preferences under which it wins [1].")
+    fitness: OwnFitness
+    loss: Finite = Field(
+        description="By how much that is worse than the job's best, as a share [1]."
+    )
+    index: IndexView | None = Field(
+        description="Robustness index over all scenarios; null if too many simulations failed."
+    )
+
+
+class RobustPreferencesView(View):
+    """Which preference's winner is the most robust, among the designs of one job."""
+
+    drawn: Drawn
+    winners: int = Field(description="Different designs that win under any.")
+    samples: int = Field(description="Designs simulated around each candidate.")
+    radius: Radius
+    seed: int = Field(description="Of preferences and samples.")
+    candidates: list[PreferenceWinnerView] = Field(
+        description="Winners of A, B and C, and of most other preferences; the most robust first."
+    )
+
+
+class PreferencesRequest(Request):
+    """Preferences to rank a job's designs by, and how to compare their winners."""
+
+    drawn: Drawn = Field(default=512, ge=1, le=MOST)
+    candidates: int = Field(
+        default=8,
+        ge=1,
+        le=MOST,
+        description="Winners to list: those of A, B and C, and of the others those that win under"
+        " most preferences.",
+    )
+    samples: int = Field(
+        default=0,
+        ge=0,
+        le=4096,
+        description="Designs to simulate around each of them, to estimate its robustness index;"
+        " 0 for no simulation and no index.",
+    )
+    radius: Radius = Field(default=0.02, gt=0.0, le=0.5)
+    seed: int = Field(default=1, ge=0, lt=2**63, description="Of preferences and samples.")
+    precision: Precision = Field(default="double", description="Of the physics.")
+
+
+Index = Callable[
+    [JobSpec, PreferencesRequest, list[dict[str, float | str]]], list[IndexView | None]
+]
+"""Estimates the robustness index of each of several designs of a job by simulation."""
+
+
+def robust_preferences(
+    job_id: str,
+    spec: AnySpec,
+    columns: EvaluationColumns,
+    request: PreferencesRequest,
+    index: Index,
+) -> RobustPreferencesView:
+    """Rank a job's designs under many preferences and compare the winners."""
+    spec = tuning_spec(job_id, spec, "a preference")
+    require_success(job_id, columns.fitness[:, np.newaxis])
+    drawn = drawn_preferences(columns, count=request.drawn, seed=request.seed)
+    winners = preference_winners(columns, drawn, worlds=spec.worlds)
+    chosen = winners[: max(request.candidates, sum(bool(winner.named) for winner in winners))]
+    space, best = spec.design_space(), float(columns.fitness.min())
+    designs = [space.shown(columns.designs[winner.row].tolist()) for winner in chosen]
+    indices = index(spec, request, designs) if request.samples else [None] * len(designs)
+    candidates = [
+        PreferenceWinnerView(
+            iteration=int(columns.iteration[winner.row]),
+            particle=int(columns.particle[winner.row]),
+            design=design,
+            preference=winner.preference,
+            named=list(winner.named),
+            share=winner.share,
+            fitness=(fitness := float(columns.fitness[winner.row])),
+            loss=fitness / best - 1.0,
+            index=estimate,
+        )
+        for winner, design, estimate in zip(chosen, designs, indices, strict=True)
+    ]
+    return RobustPreferencesView(
+        drawn=request.drawn,
+        winners=len(winners),
+        samples=request.samples,
+        radius=request.radius,
+        seed=request.seed,
+        candidates=sorted(candidates, key=lambda c: math.inf if c.index is None else c.index.value),
+    )
+
+
+def drawn_preferences(columns: EvaluationColumns, *, count: int, seed: int) -> list[Preference]:
+    """Draw preferences of five objectives.
+
+    Exponents are uniform in 0 to 1, as in table 4.5; only their ratios affect a ranking. Biases are
+    uniform between 0 and the median of their objective in the job: a bias as large as its objective
+    halves the effect of a relative change.
+    """
+    size = len(NORMALISED_OBJECTIVES)
+    values = columns.objectives[columns.statuses == 0][:, :size]
+    scale = np.median(values[np.isfinite(values).all(axis=1)], axis=0)
+    numbers = swarm_uniform(seed, _DRAW_PREFERENCE, iteration=0, particles=count, count=2 * size)
+    return [
+        Preference(
+            bias=tuple((row[:size] * np.abs(scale)).tolist()),
+            exponent=tuple((1.0 - row[size:]).tolist()),
+        )
+        for row in numbers
+    ]
+
+
+class Winner(NamedTuple):
+    """The best row under some preferences; see `PreferenceWinnerView`."""
+
+    row: int
+    preference: Preference
+    named: tuple[str, ...]
+    share: float
+
+
+def preference_winners(
+    columns: EvaluationColumns,
+    drawn: Sequence[Preference],
+    *,
+    worlds: TuningWorlds | None = None,
+) -> list[Winner]:
+    """Return the winners under any of the preferences."""
+    preferences = [*NAMED.values(), *drawn]
+    names = [*NAMED, *("" for _ in drawn)]
+    best = np.array([fitness_by(columns, p, worlds=worlds).argmin() for p in preferences])
+    rows = np.unique(best)
+    # Lead of each winner over the others, under every preference.
+    winning = columns.rows(rows)
+    rivals = np.sort([np.log(fitness_by(winning, p, worlds=worlds)) for p in preferences], axis=1)
+    lead = rivals[:, 1] - rivals[:, 0] if len(rows) > 1 else np.zeros(len(preferences))
+    winners = []
+    for row in rows.tolist():
+        won = np.flatnonzero(best == row)
+        named = tuple(names[index] for index in won if names[index])
+        chosen = won[0] if named else won[lead[won].argmax()]
+        share = np.count_nonzero(won >= len(NAMED)) / max(1, len(drawn))
+        winners.append(Winner(row, preferences[chosen], named, share))
+    return sorted(winners, key=lambda winner: (not winner.named, -winner.share, winner.row))

@@ -1,4 +1,4 @@
-# One image for every service: API, optimizer, Ray head and Ray workers.
+# One image for server, runner, Ray head and Ray workers.
 
 FROM python:3.13-slim-bookworm AS code
 ENV PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_CACHE_DIR=1 PIP_ROOT_USER_ACTION=ignore
@@ -26,12 +26,11 @@ RUN cd /src/web && npm run types && npm run build
 FROM code AS manual
 COPY requirements/manual.lock /src/requirements/
 RUN pip install --no-deps --require-hashes --only-binary :all: -r /src/requirements/manual.lock
-COPY ARCHITECTURE.md CHANGELOG.md docker-compose.yml /src/
+COPY ARCHITECTURE.md CHANGELOG.md /src/
 COPY docs /src/docs
 COPY research/README.md /src/research/
 COPY research/docs /src/research/docs
 COPY examples /src/examples
-COPY deploy/kubernetes/kustomization.yaml /src/deploy/kubernetes/
 COPY scripts/manual /src/scripts/manual
 RUN cd /src && python -m sphinx -q -b html -d /tmp/manual -c docs . api/manual
 
@@ -45,7 +44,7 @@ COPY --from=manual /src/api/manual /src/api/manual
 RUN pip install --no-deps --no-build-isolation /src
 
 FROM python:3.13-slim-bookworm
-# The compiler stays for robots of one's own.
+# The compiler stays for other robots.
 RUN apt-get update \
     && apt-get install --yes --no-install-recommends gcc libc6-dev \
     && rm -rf /var/lib/apt/lists/* \

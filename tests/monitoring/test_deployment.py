@@ -13,6 +13,7 @@ import yaml
 from gaitswarm.settings import is_loopback
 from tests.examples.paths import ROOT
 from tests.monitoring.scraped import Scrape
+from tests.setup.compose import CLUSTER
 
 DASHBOARD: dict[str, Any] = json.loads(
     (ROOT / "deploy" / "grafana" / "gaitswarm.json").read_text(encoding="utf-8")
@@ -73,7 +74,7 @@ def exposed(scrape: Scrape) -> dict[str, str]:
 
 
 def test_prometheus_reads_what_docker_compose_opens() -> None:
-    services = yaml.safe_load((ROOT / "docker-compose.yml").read_text(encoding="utf-8"))["services"]
+    services = CLUSTER["services"]
     (job,) = yaml.safe_load((PROMETHEUS / "prometheus.yml").read_text(encoding="utf-8"))[
         "scrape_configs"
     ]
@@ -88,7 +89,7 @@ def test_prometheus_reads_what_docker_compose_opens() -> None:
     assert not is_loopback(services[runner]["environment"]["GAITSWARM_METRICS_HOST"])
     assert f":{runner_port}/healthz" in str(services[runner]["healthcheck"]["test"])
     # One network leads to both.
-    assert "database" in services[api]["networks"] and "database" in services[runner]["networks"]
+    assert all("monitoring" in services[name]["networks"] for name in (api, runner, "prometheus"))
 
 
 @pytest.mark.parametrize("query", QUERIES)

@@ -1,4 +1,4 @@
-"""Dockerfile and docker-compose.yml name commands, settings and routes that exist.
+"""Dockerfile and the files of Compose name commands, settings and routes that exist.
 
 They are checked as texts: building and starting them takes a container engine.
 """
@@ -16,15 +16,14 @@ from typing import Any
 import check_jsonschema
 import jsonschema
 import pytest
-import yaml
 
 from gaitswarm.settings import Settings
 from tests.examples.api_document import api_document
 from tests.examples.paths import ROOT
 from tests.setup import command_line, settings_classes
+from tests.setup.compose import CLUSTER, OVERLAY, SINGLE
 
-COMPOSE: dict[str, Any] = yaml.safe_load((ROOT / "docker-compose.yml").read_text(encoding="utf-8"))
-SERVICES: dict[str, Any] = COMPOSE["services"]
+SERVICES: dict[str, Any] = CLUSTER["services"]
 OURS = {name: service for name, service in SERVICES.items() if "build" in service}
 DOCKERFILE = (ROOT / "Dockerfile").read_text(encoding="utf-8")
 
@@ -34,20 +33,57 @@ def _words(command: str | list[str]) -> list[str]:
 
 
 def _health_command(service: dict[str, Any]) -> list[str]:
+    if "healthcheck" not in service:
+        (test,) = re.findall(r"^HEALTHCHECK .*\n +CMD (\[.*\])$", DOCKERFILE, re.MULTILINE)
+        return list(json.loads(test))
     kind, *words = service["healthcheck"]["test"]
     return shlex.split(words[0]) if kind == "CMD-SHELL" else words
 
 
-def test_the_file_is_what_the_compose_specification_allows() -> None:
+@pytest.mark.parametrize("document", [SINGLE, OVERLAY, CLUSTER], ids=["single", "over", "cluster"])
+def test_the_compose_specification_allows_the_files(document: dict[str, Any]) -> None:
     folder = Path(check_jsonschema.__file__).parent / "builtin_schemas" / "vendor"
     schema = json.loads((folder / "compose-spec.json").read_text(encoding="utf-8"))
     validator = jsonschema.validators.validator_for(schema)(schema)
-    assert [error.message for error in validator.iter_errors(COMPOSE)] == []
-    assert "version" not in COMPOSE
+    assert [error.message for error in validator.iter_errors(document)] == []
+    assert "version" not in document
+
+
+def test_one_server_needs_no_secrets_and_keeps_its_database() -> None:
+    assert set(SINGLE["services"]) == {"server"}
+    assert "${" not in str(SINGLE)
+    (volume,) = SINGLE["services"]["server"]["volumes"]
+    name, folder = volume.split(":")
+    (database,) = re.findall(r"GAITSWARM_DB=(\S+)", DOCKERFILE)
+    assert name in SINGLE["volumes"] and Path(database).parent == Path(folder)
+
+
+def test_a_cluster_takes_the_server_without_its_runner() -> None:
+    alone, server = SINGLE["services"]["server"], SERVICES["server"]
+    assert {key: server[key] for key in alone} == alone
+    assert "--no-runner" in server["command"]
+
+
+def test_names_of_volumes_networks_and_files_exist() -> None:
+    for service in SERVICES.values():
+        for volume in service.get("volumes", ()):
+            source = volume.partition(":")[0]
+            assert (ROOT / source).is_dir() if "/" in source else source in CLUSTER["volumes"]
+        assert set(service["networks"]) <= set(CLUSTER["networks"])
+        assert {entry["source"] for entry in service.get("configs", ())} <= set(CLUSTER["configs"])
+
+
+def test_only_this_machine_reaches_what_is_published() -> None:
+    for service in SERVICES.values():
+        for port in service.get("ports", ()):
+            assert port.startswith("127.0.0.1:")
+            assert not all(CLUSTER["networks"][n] for n in service["networks"]), "all are internal"
 
 
 def test_there_is_everything_that_a_cluster_needs() -> None:
-    assert set(SERVICES) == {"postgres", "ray-head", "ray-worker", "optimizer", "api"}
+    ours = {"server", "runner", "ray-head", "ray-worker"}
+    assert set(OURS) == ours and set(SERVICES) - ours == {"postgres", "prometheus", "grafana"}
+    assert len({service["image"] for service in OURS.values()}) == 1
 
 
 def test_walks_get_less_of_the_processors_than_waiting_clients() -> None:
@@ -99,8 +135,13 @@ def test_options_given_to_ray_exist(command: str) -> None:
 @pytest.mark.parametrize("name", SERVICES)
 def test_every_service_runs_without_root_and_is_checked(name: str) -> None:
     service = SERVICES[name]
-    assert service["user"] not in ("root", "0")
-    assert service["healthcheck"]["test"][0] in ("CMD", "CMD-SHELL")
+    (user,) = (
+        {service["user"]}
+        if "user" in service
+        else re.findall(r"^USER (\w+)$", DOCKERFILE, re.MULTILINE)
+    )
+    assert user not in ("root", "0")
+    assert _health_command(service)
     assert "privileged" not in service
 
 
@@ -114,7 +155,7 @@ def test_services_wait_for_those_that_they_need_to_be_healthy(name: str) -> None
 
 def test_settings_of_ours_exist() -> None:
     known = settings_classes.variables()
-    given = {variable for service in OURS.values() for variable in service["environment"]}
+    given = {name for service in OURS.values() for name in service.get("environment", ())}
     given |= set(re.findall(r"\b(GAITSWARM_[A-Z_]+)=", DOCKERFILE))
     ours = {variable for variable in given if variable.startswith("GAITSWARM_")}
     assert ours
@@ -123,27 +164,22 @@ def test_settings_of_ours_exist() -> None:
 
 def test_processes_have_time_to_drain_before_they_are_killed() -> None:
     settings = Settings()
-    needed = {
-        "optimizer": settings.drain_seconds,
-        "api": settings.api_shutdown_seconds,
-    }
-    for name, seconds in needed.items():
+    for name in ("server", "runner"):
         given = re.fullmatch(r"(\d+)s", SERVICES[name]["stop_grace_period"])
-        assert given and int(given[1]) > seconds
+        assert given and int(given[1]) > settings.drain_seconds + settings.api_shutdown_seconds
     text = (ROOT / "docs" / "operations.md").read_text(encoding="utf-8")
     (unit,) = re.findall(r"^TimeoutStopSec=(\d+)$", text, re.MULTILINE)
     assert int(unit) > settings.drain_seconds + settings.api_shutdown_seconds
 
 
 def test_every_node_of_the_cluster_has_the_same_token_and_none_is_built_in() -> None:
-    nodes = [s["environment"] for name, s in OURS.items() if name != "api"]
+    nodes = [s["environment"] for name, s in OURS.items() if name != "server"]
     assert len({node["RAY_AUTH_TOKEN"] for node in nodes}) == 1
     assert nodes[0]["RAY_AUTH_TOKEN"].startswith("${RAY_AUTH_TOKEN:?")
 
 
 def test_secrets_that_must_be_given_are_in_the_example() -> None:
-    text = (ROOT / "docker-compose.yml").read_text(encoding="utf-8")
-    needed = set(re.findall(r"\$\{([A-Z_]+):\?", text))
+    needed = set(re.findall(r"\$\{([A-Z_]+):\?", str(OVERLAY)))
     example = (ROOT / ".env.example").read_text(encoding="utf-8")
     assert needed == set(re.findall(r"^([A-Z_]+)=$", example, re.MULTILINE))
     assert re.search(r"^\.env$", (ROOT / ".gitignore").read_text(encoding="utf-8"), re.MULTILINE)
@@ -151,9 +187,8 @@ def test_secrets_that_must_be_given_are_in_the_example() -> None:
 
 def test_the_api_is_asked_for_its_health_where_it_answers() -> None:
     paths = set(api_document()["paths"])
-    asked = re.findall(r"http://127\.0\.0\.1:8000(/[\w/]*)", DOCKERFILE + str(SERVICES["api"]))
-    assert len(asked) == 2
-    assert set(asked) <= paths
+    (asked,) = re.findall(r"http://127\.0\.0\.1:8000(/[\w/]*)", DOCKERFILE)
+    assert asked in paths
 
 
 def test_the_image_ends_without_root_and_starts_a_command_of_ours() -> None:

@@ -1,6 +1,6 @@
 """The manifests in deploy/kubernetes name commands, settings, versions and objects that exist.
 
-They are checked as texts, together with docker-compose.yml: applying them takes a cluster.
+They are checked as texts, together with those of Compose: applying them takes a cluster.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from gaitswarm.settings import Settings, is_loopback
 from tests.examples.api_document import api_document
 from tests.examples.paths import ROOT
 from tests.setup import command_line, settings_classes
+from tests.setup.compose import CLUSTER
 
 FOLDER = ROOT / "deploy" / "kubernetes"
-COMPOSE: dict[str, Any] = yaml.safe_load((ROOT / "docker-compose.yml").read_text(encoding="utf-8"))
 KUSTOMIZATION: dict[str, Any] = yaml.safe_load(
     (FOLDER / "kustomization.yaml").read_text(encoding="utf-8")
 )
@@ -67,7 +67,7 @@ def test_there_is_everything_that_a_cluster_needs() -> None:
 
 
 def test_images_are_those_of_docker_compose() -> None:
-    ours, theirs = COMPOSE["services"]["api"]["image"], COMPOSE["services"]["postgres"]["image"]
+    ours, theirs = CLUSTER["services"]["server"]["image"], CLUSTER["services"]["postgres"]["image"]
     assert {container["image"] for container in OURS.values()} == {ours}
     assert CONTAINERS["gaitswarm-postgres"]["image"] == theirs
     (chosen,) = KUSTOMIZATION["images"]
@@ -83,9 +83,9 @@ def test_the_cluster_has_the_version_of_ray_that_the_image_has() -> None:
 
 
 def test_commands_are_those_of_docker_compose_and_exist() -> None:
-    services = COMPOSE["services"]
-    assert OURS["gaitswarm-api"]["command"] == services["api"]["command"]
-    assert OURS["gaitswarm-runner"]["command"] == services["optimizer"]["command"]
+    services = CLUSTER["services"]
+    assert OURS["gaitswarm-api"]["command"] == services["server"]["command"]
+    assert OURS["gaitswarm-runner"]["command"] == services["runner"]["command"]
     probes = [
         container[kind]["exec"]["command"]
         for container in OURS.values()
@@ -152,7 +152,7 @@ def test_secrets_are_never_written_and_are_in_the_example() -> None:
 def test_all_nodes_and_the_runner_are_given_the_same(variable: str) -> None:
     given = [_variables(container)[variable] for container in RAY_NODES.values()]
     assert given[1:] == given[:-1]
-    nodes = [COMPOSE["services"][n]["environment"] for n in ("ray-head", "ray-worker", "optimizer")]
+    nodes = [CLUSTER["services"][n]["environment"] for n in ("ray-head", "ray-worker", "runner")]
     assert len({node[variable] for node in nodes}) == 1
 
 
@@ -160,7 +160,7 @@ def test_the_runner_is_inside_the_cluster_and_the_head_has_no_slots() -> None:
     (name,) = _of_kind("RayCluster")
     address = _variables(OURS["gaitswarm-runner"])["GAITSWARM_RAY_ADDRESS"]["value"]
     assert address == f"{name}-head-svc:6379"
-    assert not COMPOSE["services"]["optimizer"]["environment"]["GAITSWARM_RAY_ADDRESS"].count("//")
+    assert not CLUSTER["services"]["runner"]["environment"]["GAITSWARM_RAY_ADDRESS"].count("//")
     head = _of_kind("RayCluster")[name]["headGroupSpec"]
     assert head["rayStartParams"]["num-cpus"] == "0"
     for group in (head, *_of_kind("RayCluster")[name]["workerGroupSpecs"]):

@@ -22,11 +22,12 @@ from gaitswarm.api.dependencies import ExistingJob, ServerSettings
 from gaitswarm.api.problems import problem, too_many_requests, unauthorized
 from gaitswarm.services.monitoring.exposition import REFUSAL
 from gaitswarm.services.optimizer.access import Scope as TokenScope
-from gaitswarm.services.optimizer.access import Token, Tokens
+from gaitswarm.services.optimizer.access import Token
 from gaitswarm.services.optimizer.errors import Forbidden, StoreUnavailable, TooManyRequests
 from gaitswarm.services.optimizer.jobs.audit import LOCAL
 from gaitswarm.services.optimizer.jobs.priority import DEFAULT, HIGHEST, LOWEST
 from gaitswarm.services.optimizer.jobs.quota import Quota
+from gaitswarm.services.optimizer.store.tokens import Tokens
 from gaitswarm.views import PREFIX
 
 _log = logging.getLogger("gaitswarm.api")

@@ -22,7 +22,7 @@ from typing import Any
 
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.run.runner import Runner
-from gaitswarm.services.optimizer.store.sql_store import open_store
+from gaitswarm.services.optimizer.store import open_store
 from gaitswarm.services.runtime import open_evaluator, run_embedded
 from tests.examples.jobs import history
 from tests.worker import cluster_host

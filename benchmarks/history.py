@@ -22,8 +22,7 @@ from gaitswarm.services.optimizer.analysis.ranking import rank
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.job import Job, JobOrder
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, judge
-from gaitswarm.services.optimizer.store.port.base import Store
-from gaitswarm.services.optimizer.store.sql_store import open_store
+from gaitswarm.services.optimizer.store import Store, open_store
 
 ROW_BY_ROW = 100
 """Iterations that the slow variants read and judge; their times are scaled to the whole."""

@@ -27,8 +27,7 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.provenance import job_provenance
 from gaitswarm.services.optimizer.jobs.spec import judge_outcomes
 from gaitswarm.services.optimizer.run.coordinator import walk_keys
-from gaitswarm.services.optimizer.store.port.base import Store
-from gaitswarm.services.optimizer.store.sql_store import open_store
+from gaitswarm.services.optimizer.store import Store, open_store
 
 T = TypeVar("T")
 

@@ -21,8 +21,7 @@ from gaitswarm.services.optimizer.jobs.job import Claim, Command, Job
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.spec import judge_outcomes
 from gaitswarm.services.optimizer.search.optimizer import Optimizer
-from gaitswarm.services.optimizer.store.port.base import Store
-from gaitswarm.services.optimizer.store.sql_store import open_store
+from gaitswarm.services.optimizer.store import Store, open_store
 from gaitswarm.sim.outcome import Outcome, Status
 
 PARTICLES: Final = 25

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from gaitswarm.services.optimizer.jobs.job import Claim, Job
     from gaitswarm.services.optimizer.jobs.spec import Spec
     from gaitswarm.services.optimizer.run.evaluator import Evaluator
-    from gaitswarm.services.optimizer.store.port.base import Store
+    from gaitswarm.services.optimizer.store import Store
     from gaitswarm.settings import Settings
     from gaitswarm.views import JobView
 

@@ -7,15 +7,13 @@ import threading
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
 
 from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
 from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.run.embedded import run_embedded
 from gaitswarm.services.optimizer.search.pso import PsoSettings
-from gaitswarm.services.optimizer.store.port.base import Store
-from gaitswarm.services.optimizer.store.sql_store import open_store
+from gaitswarm.services.optimizer.store import Observer, open_store
 from gaitswarm.services.worker import EvaluatorKind
 from gaitswarm.services.worker.in_process import InProcessEvaluator
 from gaitswarm.services.worker.ray_evaluator import RayEvaluator
@@ -81,7 +79,8 @@ def profile_job(
     readings: list[_Reading] = []
     with tempfile.TemporaryDirectory() as folder:
         store = open_store(f"sqlite:///{Path(folder, 'jobs.db')}")
-        timed = _TimedStore(store)
+        timed = _StoreTime()
+        store.observers.append(timed)
 
         def read(done: CompletedIteration, _state: JobState) -> None:
             before = readings[-1].evaluated if readings else 0.0
@@ -90,7 +89,7 @@ def profile_job(
 
         try:
             job, _ = store.create_job(spec)
-            run_embedded(cast("Store", timed), workers, job.id, on_commit=read)
+            run_embedded(store, workers, job.id, on_commit=read)
             slots = workers.slots
         finally:
             workers.close()
@@ -140,24 +139,13 @@ def _open(evaluator: EvaluatorKind, cpus: int | None) -> InProcessEvaluator | Ra
     return cluster
 
 
-class _TimedStore:
-    """Times the operations of the thread that created it, without the heartbeat's."""
+class _StoreTime(Observer):
+    """Time of transactions in the thread that created it, without the heartbeat's."""
 
-    def __init__(self, store: Store) -> None:
-        self._store = store
+    def __init__(self) -> None:
         self._thread = threading.get_ident()
         self.seconds = 0.0
 
-    def __getattr__(self, name: str) -> Any:
-        member = getattr(self._store, name)
-        if not callable(member) or threading.get_ident() != self._thread:
-            return member
-
-        def timed(*arguments: Any, **options: Any) -> Any:
-            begun = time.perf_counter()
-            try:
-                return member(*arguments, **options)
-            finally:
-                self.seconds += time.perf_counter() - begun
-
-        return timed
+    def transaction(self, operation: str, seconds: float, error: BaseException | None) -> None:  # noqa: ARG002
+        if threading.get_ident() == self._thread:
+            self.seconds += seconds

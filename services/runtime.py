@@ -22,8 +22,7 @@ from gaitswarm.services.optimizer.run.embedded import run_embedded
 from gaitswarm.services.optimizer.run.evaluator import Evaluator, Watched
 from gaitswarm.services.optimizer.run.runner import Runner
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.port.base import Store
-from gaitswarm.services.optimizer.store.sql_store import open_store
+from gaitswarm.services.optimizer.store import open_store
 from gaitswarm.services.worker import EvaluatorKind
 
 if TYPE_CHECKING:
@@ -122,16 +121,15 @@ def open_runtime(
 ) -> Iterator[Runtime]:
     """Open a database and run its queued jobs inside the block."""
     with ExitStack() as stack:
-        store: Store = open_store(database)
+        store = open_store(database)
         stack.callback(store.close)
         if metrics is not None:
-            from gaitswarm.services.monitoring.measured_store import measured  # noqa: PLC0415
+            from gaitswarm.services.monitoring.store_metrics import StoreMetrics  # noqa: PLC0415
 
-            store = measured(store, metrics)
-        runners_store = store
+            store.observers.append(StoreMetrics(metrics))
         if tracing is not None:
             stack.callback(tracing.close)
-            runners_store = tracing.traced_store(store)
+            store.observers.append(tracing)
         if webhook_hosts:
             from gaitswarm.services.monitoring.webhooks import Notifier  # noqa: PLC0415
 
@@ -163,13 +161,13 @@ def open_runtime(
             stack.enter_context(activity.recorded_log())
             watched = activity.watched_evaluator(watched)
         runner = Runner(
-            runners_store,
+            store,
             watched if tracing is None else tracing.traced_evaluator(watched),
             concurrency=concurrent_jobs,
             lease_seconds=lease_seconds,
             cache=cache,
             quarantine_after=quarantine_after,
-            on_ended=partial(note_reference, runners_store),
+            on_ended=partial(note_reference, store),
         )
         stack.callback(runner.stop)
         runner.start()

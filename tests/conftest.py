@@ -20,7 +20,7 @@ from hypothesis import settings
 from tests.examples.variants import left_out
 
 if TYPE_CHECKING:
-    from gaitswarm.services.optimizer.store.sql_store import SqlStore
+    from gaitswarm.services.optimizer.store import Store
     from tests.examples.servers import Server
 
 # Machines are noisy: how long an example takes says nothing about the code.
@@ -107,7 +107,7 @@ def user_data(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.Monk
 @pytest.fixture(scope="session")
 def empty_database(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An SQLite file of the newest schema, to be copied: migrating one takes ten times as long."""
-    from gaitswarm.services.optimizer.store.sql_store import open_store
+    from gaitswarm.services.optimizer.store import open_store
 
     path = tmp_path_factory.mktemp("database") / "empty.db"
     open_store(str(path)).close()
@@ -121,9 +121,9 @@ def database(empty_database: Path, tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def store(database: Path) -> Iterator[SqlStore]:
+def store(database: Path) -> Iterator[Store]:
     """The store on `database`."""
-    from gaitswarm.services.optimizer.store.sql_store import open_store
+    from gaitswarm.services.optimizer.store import open_store
 
     opened = open_store(str(database))
     yield opened
@@ -147,7 +147,7 @@ def lasting_server() -> Iterator[Server]:
 def serve_database(lasting_server: Server) -> Iterator[Callable[[Path], str]]:
     """Let the lasting server serve the jobs of a database; its URL."""
     from gaitswarm.services.optimizer.service import JobService
-    from gaitswarm.services.optimizer.store.sql_store import open_store
+    from gaitswarm.services.optimizer.store import open_store
 
     with ExitStack() as stack:
 

@@ -19,7 +19,7 @@ from benchmarks.faults.deployment import Deployment
 from benchmarks.faults.kinds import KINDS
 from benchmarks.faults.plan import Planned
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.store import Store, open_store
 from gaitswarm.services.runtime import run_embedded
 from gaitswarm.services.worker.in_process import InProcessEvaluator
 from tests.examples.jobs import Bits, history
@@ -254,7 +254,7 @@ History = tuple[list[str | None], list[Bits]]
 """Of a job: the digest of every iteration, and every evaluation."""
 
 
-def remembered(store: SqlStore, job_id: str) -> History:
+def remembered(store: Store, job_id: str) -> History:
     """All that a database remembers of a job's search, to the bit."""
     digests: list[str | None] = []
     after: int | None = None

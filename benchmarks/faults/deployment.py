@@ -17,7 +17,7 @@ from typing import Final, Literal, Self
 from benchmarks.faults.machine import Clock, Disk, Network, can, process_group
 from benchmarks.faults.supervisor import Service
 from gaitswarm.services.optimizer.errors import StoreUnavailable
-from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.store import Store, open_store
 from tests.store.postgres_server import postgres_binaries
 
 ROOT: Final = Path(__file__).parents[2]
@@ -82,7 +82,7 @@ class Deployment:
         others = [service for service in (self.cluster, self.server) if service is not None]
         return [*others, self.api, *self.runners]
 
-    def store(self) -> SqlStore:
+    def store(self) -> Store:
         """The database, as soon as it answers; the caller closes it."""
         while True:
             try:

@@ -14,7 +14,8 @@ from gaitswarm.cli.inputs.options import Db, Json, completed
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from gaitswarm.services.optimizer.access import Token, Tokens
+    from gaitswarm.services.optimizer.access import Token
+    from gaitswarm.services.optimizer.store.tokens import Tokens
 
 Force = Annotated[bool, typer.Option("--force", help="Overwrite existing data.")]
 
@@ -39,14 +40,13 @@ def upgrade(db: Db = None) -> None:
     No other command does. The database must not be in use; back it up first.
     """
     from gaitswarm.cli.output import note
-    from gaitswarm.services.optimizer.store.schema import migrate
-    from gaitswarm.services.optimizer.store.schema.revisions import head
+    from gaitswarm.services.optimizer.store import schema
 
-    before = migrate.upgrade(_database(db))
-    if before == head():
+    before = schema.upgrade(_database(db))
+    if before == schema.head():
         note(f"the schema is up to date, revision {before}")
     else:
-        note(f"schema upgraded to revision {head()} from {before or 'none'}")
+        note(f"schema upgraded to revision {schema.head()} from {before or 'none'}")
 
 
 def check(
@@ -66,8 +66,7 @@ def check(
     from gaitswarm.cli.exit_codes import CheckFailed
     from gaitswarm.cli.output import note, print_text
     from gaitswarm.services.optimizer.analysis.verification import check_histories
-    from gaitswarm.services.optimizer.store.schema import maintenance
-    from gaitswarm.services.optimizer.store.sql_store import open_store
+    from gaitswarm.services.optimizer.store import maintenance, open_store
 
     database = _database(db)
     findings = maintenance.check(database)
@@ -93,9 +92,9 @@ def backup(
     The file is an SQLite database, also for PostgreSQL.
     """
     from gaitswarm.cli.output import note
-    from gaitswarm.services.optimizer.store.schema import backup
+    from gaitswarm.services.optimizer.store import maintenance
 
-    backup.backup(_database(db), file, overwrite=force)
+    maintenance.backup(_database(db), file, overwrite=force)
     note(f"database written to {file}")
 
 
@@ -111,10 +110,10 @@ def restore(
     """
     from gaitswarm.cli.output import note
     from gaitswarm.jobs.open import database_to_write
-    from gaitswarm.services.optimizer.store.schema import backup
+    from gaitswarm.services.optimizer.store import maintenance
     from gaitswarm.settings import read_settings
 
-    backup.restore(database_to_write(read_settings(db=db or None)), file, overwrite=force)
+    maintenance.restore(database_to_write(read_settings(db=db or None)), file, overwrite=force)
     note(f"database restored from {file}")
 
 
@@ -142,7 +141,7 @@ def prune(
     from gaitswarm.cli.output import note
     from gaitswarm.services.optimizer.errors import InvalidRequest
     from gaitswarm.services.optimizer.jobs.job import ENDED, JobState
-    from gaitswarm.services.optimizer.store.schema import maintenance
+    from gaitswarm.services.optimizer.store import maintenance
 
     if state is not None and older_than is None:
         raise InvalidRequest("requires --older-than", field="state")

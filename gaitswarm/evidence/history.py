@@ -169,7 +169,7 @@ def _rows(service: JobService, job_id: str, places: Sequence[Place]) -> Evaluati
 def _in_double(service: JobService, job_id: str, best: EvaluationColumns) -> EvaluationColumns:
     """The best evaluation in double precision."""
     iteration = int(best.iteration[0])
-    found = service.store.reevaluations_between(job_id, iteration, iteration + 1)
+    found = service.store.reevaluations(job_id, iteration, iteration + 1)
     reevaluated = next(one for _, one in found)
     return replace(
         best,

@@ -13,7 +13,7 @@ from gaitswarm.services.optimizer.analysis.identifiability import (
     ParameterIdentifiability,
     Trust,
 )
-from gaitswarm.services.optimizer.store.port.recordings import RecordingEntry
+from gaitswarm.services.optimizer.jobs.listing import RecordingEntry
 from gaitswarm.services.optimizer.views import View, finite
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.identification.recorded_walk import RecordedWalk

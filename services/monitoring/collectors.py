@@ -11,7 +11,7 @@ from prometheus_client.registry import Collector
 
 from gaitswarm.services.monitoring.metrics import FAILURE_CAUSES, failure_cause
 from gaitswarm.services.optimizer.errors import StoreUnavailable
-from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.store import Store
 
 
 class QueueCollector(Collector):

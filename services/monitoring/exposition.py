@@ -15,8 +15,9 @@ from wsgiref.simple_server import WSGIRequestHandler, WSGIServer, make_server
 
 from gaitswarm.services.monitoring.hosts import HostNames
 from gaitswarm.services.monitoring.metrics import Metrics
-from gaitswarm.services.optimizer.access import Tokens, secret_digest
+from gaitswarm.services.optimizer.access import secret_digest
 from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, StoreUnavailable
+from gaitswarm.services.optimizer.store.tokens import Tokens
 
 _log = logging.getLogger(__name__)
 

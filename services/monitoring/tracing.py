@@ -10,7 +10,6 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, cast
 
 from opentelemetry.sdk.resources import Resource
 from opentelemetry.sdk.trace import SpanProcessor, TracerProvider
@@ -18,9 +17,9 @@ from opentelemetry.trace import Span, Status, StatusCode, set_span_in_context
 
 from gaitswarm.services.optimizer.errors import LeaseLost
 from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
-from gaitswarm.services.optimizer.jobs.job import Claim, JobState, Renewal
+from gaitswarm.services.optimizer.jobs.job import Claim, JobState
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, Evaluator, TaskReport
-from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.store import Observer
 from gaitswarm.sim.outcome import Outcome
 
 
@@ -34,8 +33,8 @@ def exporting_tracing() -> Tracing:
     return Tracing(BatchSpanProcessor(OTLPSpanExporter()))
 
 
-class Tracing:
-    """Spans of the jobs run by this process. Thread-safe.
+class Tracing(Observer):
+    """Spans of the jobs run by this process, which it observes at the store. Thread-safe.
 
     A job's span is from its claim to its release or end; an iteration's from its evaluation to its
     commit; a task's from dispatch to answer.
@@ -51,10 +50,6 @@ class Tracing:
         self._jobs: dict[str, Span] = {}
         self._iterations: dict[str, tuple[int, Span]] = {}
 
-    def traced_store(self, store: Store) -> Store:
-        """Wrap a store so that claims, commits and releases start and end spans."""
-        return cast(Store, _TracedStore(store, self))
-
     def traced_evaluator(self, evaluator: Evaluator) -> Evaluator:
         """Wrap an evaluator so that evaluations and tasks have spans."""
         return _TracedEvaluator(evaluator, self)
@@ -63,8 +58,7 @@ class Tracing:
         """Export pending spans. Idempotent."""
         self._provider.shutdown()
 
-    def job_begins(self, claim: Claim) -> None:
-        """Start the span of a job's run."""
+    def claimed(self, claim: Claim) -> None:
         job = claim.job
         attributes: dict[str, str | int] = {
             "gaitswarm.job.id": job.id,
@@ -75,7 +69,13 @@ class Tracing:
         with self._lock:
             self._jobs[job.id] = self._tracer.start_span("job", attributes=attributes)
 
-    def job_ends(self, job_id: str, state: str, error: str | None = None) -> None:
+    def released(self, claim: Claim, state: JobState, error: str | None) -> None:
+        self._end_job(claim.job.id, state, error)
+
+    def lost(self, claim: Claim, error: LeaseLost) -> None:
+        self._end_job(claim.job.id, "lost", str(error))
+
+    def _end_job(self, job_id: str, state: str, error: str | None = None) -> None:
         """End the span of a job's run, and of an iteration in progress."""
         with self._lock:
             job = self._jobs.pop(job_id, None)
@@ -107,13 +107,14 @@ class Tracing:
                 self._iterations[request.job_id] = (request.iteration, span)
             return span
 
-    def iteration_ends(self, job_id: str, done: CompletedIteration) -> None:
-        """End the span of a committed iteration."""
+    def committed(self, claim: Claim, done: CompletedIteration, state: JobState) -> None:
         with self._lock:
-            _, span = self._iterations.pop(job_id, (0, None))
+            _, span = self._iterations.pop(claim.job.id, (0, None))
         if span is not None:
             span.set_attribute("gaitswarm.designs.saved", done.saved)
             span.end()
+        if state not in (JobState.RUNNING, JobState.PAUSING):
+            self._end_job(claim.job.id, state)
 
     def task(self, parent: Span, report: TaskReport) -> None:
         """Record the span of a finished task."""
@@ -153,40 +154,3 @@ class _TracedEvaluator:
 
     def close(self) -> None:
         self._inner.close()
-
-
-class _TracedStore:
-    def __init__(self, inner: Store, tracing: Tracing) -> None:
-        self._inner = inner
-        self._tracing = tracing
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._inner, name)
-
-    def claim(self, *args: Any, **kwargs: Any) -> Claim | None:
-        claim = self._inner.claim(*args, **kwargs)
-        if claim is not None:
-            self._tracing.job_begins(claim)
-        return claim
-
-    def renew(self, claim: Claim, **kwargs: Any) -> Renewal:
-        renewal: Renewal = self._held(claim, lambda: self._inner.renew(claim, **kwargs))
-        return renewal
-
-    def commit(self, claim: Claim, done: CompletedIteration, following: Any) -> JobState:
-        state: JobState = self._held(claim, lambda: self._inner.commit(claim, done, following))
-        self._tracing.iteration_ends(claim.job.id, done)
-        if state not in (JobState.RUNNING, JobState.PAUSING):
-            self._tracing.job_ends(claim.job.id, state)
-        return state
-
-    def release(self, claim: Claim, state: JobState, *, error: str | None = None) -> None:
-        self._held(claim, lambda: self._inner.release(claim, state, error=error))
-        self._tracing.job_ends(claim.job.id, state, error)
-
-    def _held(self, claim: Claim, access: Callable[[], Any]) -> Any:
-        try:
-            return access()
-        except LeaseLost as lost:
-            self._tracing.job_ends(claim.job.id, "lost", str(lost))
-            raise

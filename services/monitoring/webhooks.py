@@ -20,7 +20,7 @@ import httpx2
 
 from gaitswarm.services.optimizer.errors import StoreUnavailable
 from gaitswarm.services.optimizer.jobs.notification import Notification, refused_url
-from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.store import Store
 
 _TIMEOUT: Final = 10.0
 """Of a receiver [s]."""

@@ -7,7 +7,7 @@ import secrets
 from dataclasses import dataclass
 from datetime import datetime
 from enum import StrEnum
-from typing import Final, Protocol
+from typing import Final
 
 _PREFIX: Final = "gaitswarm_"
 """Lets people and secret scanners recognize a token."""
@@ -59,20 +59,3 @@ def new_secret() -> str:
 def secret_digest(secret: str) -> str:
     """Return the digest under which a secret is stored."""
     return hashlib.sha256(secret.encode("utf-8", "surrogateescape")).hexdigest()
-
-
-class Tokens(Protocol):
-    """The token store. Thread-safe; every method is one transaction."""
-
-    def create(self, name: str, scope: Scope) -> tuple[Token, str]: ...
-
-    def create_first(self) -> str | None:
-        """Create an admin token `first`, unless any token has ever been created."""
-
-    def all(self) -> tuple[Token, ...]: ...
-
-    def revoke(self, name: str) -> Token:
-        """Revoke a token. Idempotent."""
-
-    def find(self, secret: str) -> Token | None:
-        """Return the valid token of a secret."""

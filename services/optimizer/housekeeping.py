@@ -8,7 +8,7 @@ from datetime import UTC, datetime, timedelta
 from typing import Final
 
 from gaitswarm.services.optimizer.errors import StoreUnavailable
-from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.store import Store
 
 _SECONDS_PER_ROUND: Final = 10.0
 _ROUNDS_PER_RETENTION: Final = 360

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
@@ -72,6 +71,7 @@ from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Iteration, R
 from gaitswarm.services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState, refusal
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.labels import ANY_JOB, FacetCounts, JobFilter, LabelsChange
+from gaitswarm.services.optimizer.jobs.listing import Page, RecordingEntry
 from gaitswarm.services.optimizer.jobs.preference import Preference
 from gaitswarm.services.optimizer.jobs.priority import check_priority
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
@@ -79,20 +79,17 @@ from gaitswarm.services.optimizer.jobs.quota import Quota
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS
 from gaitswarm.services.optimizer.run.runner import runner_name
-from gaitswarm.services.optimizer.store.port.base import Store
-from gaitswarm.services.optimizer.store.port.reading import Page
-from gaitswarm.services.optimizer.store.port.recordings import RecordingEntry
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.identification.recorded_walk import RecordedWalk
 
 _RECENT_JOBS: Final = 50
 """Newest jobs among which the estimate looks for similar ones."""
 
 
-@dataclass(frozen=True, slots=True)
 class JobService:
     """Submit, control, read and analyze jobs. Thread-safe, as the store is.
 
-    Attributes:
+    Args:
         store: closed by its owner.
         provenance: provenance of what this process computes for a spec.
         longest_job: limit on the simulated time of all of a job's simulations [s]; if finite, the
@@ -100,16 +97,19 @@ class JobService:
         longest_fork: limit on the time to restore a search for a fork [s].
     """
 
-    store: Store
-    provenance: Callable[[Spec], JobProvenance] = job_provenance
-    longest_job: float = math.inf
-    longest_fork: float = math.inf
-    _rates: MeasuredRates = field(init=False, repr=False, compare=False)
-    _histories: HistoryCache = field(init=False, repr=False, compare=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "_rates", MeasuredRates())
-        object.__setattr__(self, "_histories", HistoryCache(self.store))
+    def __init__(
+        self,
+        store: Store,
+        provenance: Callable[[Spec], JobProvenance] = job_provenance,
+        longest_job: float = math.inf,
+        longest_fork: float = math.inf,
+    ) -> None:
+        self.store = store
+        self.provenance = provenance
+        self.longest_job = longest_job
+        self.longest_fork = longest_fork
+        self._rates = MeasuredRates()
+        self._histories = HistoryCache(store)
 
     def submit(
         self,

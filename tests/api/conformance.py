@@ -38,7 +38,7 @@ from schemathesis.specs.openapi.checks import (
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.search.pso import PsoSettings
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.store import Store, open_store
 from gaitswarm.services.runtime import open_evaluator, run_embedded
 from gaitswarm.sim.scenario import Scenario
 from tests.certificate.examples import small
@@ -136,7 +136,7 @@ _GOOD_JOB: Final = JobSpec(
 )
 
 
-def _jobs(store: SqlStore, service: JobService) -> list[str]:
+def _jobs(store: Store, service: JobService) -> list[str]:
     found = [service.submit(spec)[0].id for spec in (_GOOD_JOB, small())]
     evaluator = open_evaluator("in-process", cpus=2)
     try:

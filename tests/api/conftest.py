@@ -15,7 +15,7 @@ from gaitswarm.services.optimizer.jobs.job import Claim, Job
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.search.pso import PsoSettings
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.outcome import N_OBJECTIVES, Outcome, Status
 from tests.examples.servers import Server
 
@@ -26,7 +26,7 @@ Commit = Callable[..., Claim]
 
 
 @pytest.fixture
-def service(store: SqlStore) -> JobService:
+def service(store: Store) -> JobService:
     return JobService(store)
 
 
@@ -62,13 +62,13 @@ def spec() -> JobSpec:
 
 
 @pytest.fixture
-def job(store: SqlStore, spec: JobSpec) -> Job:
+def job(store: Store, spec: JobSpec) -> Job:
     """A queued job."""
     return store.create_job(spec)[0]
 
 
 @pytest.fixture
-def commit(store: SqlStore) -> Commit:
+def commit(store: Store) -> Commit:
     """Commit iterations of a job as a runner does, with made-up results."""
 
     def run(

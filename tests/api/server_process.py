@@ -7,7 +7,7 @@ import sys
 from gaitswarm.api.app import create_app
 from gaitswarm.api.server import ApiServer
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.sql_store import open_store
+from gaitswarm.services.optimizer.store import open_store
 from gaitswarm.settings import Settings
 
 

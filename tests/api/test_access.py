@@ -14,7 +14,7 @@ from gaitswarm.services.optimizer.access import Scope
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.settings import Settings
 from tests.api.conftest import Serve
 from tests.examples.servers import Server, operations
@@ -37,7 +37,7 @@ def guarded(serve: Serve) -> httpx2.Client:
 
 
 @pytest.fixture
-def bearer(store: SqlStore) -> Bearer:
+def bearer(store: Store) -> Bearer:
     """Make a token named as its scope; its header."""
 
     def make(scope: Scope) -> dict[str, str]:
@@ -153,7 +153,7 @@ def test_only_a_token_of_all_rights_puts_a_job_before_those_of_others(
 
 
 def test_a_token_of_all_rights_commands_every_job(
-    guarded: httpx2.Client, bearer: Bearer, store: SqlStore, spec: JobSpec
+    guarded: httpx2.Client, bearer: Bearer, store: Store, spec: JobSpec
 ) -> None:
     job, _ = store.create_job(spec, owner="someone")
     answer = guarded.post(f"/v1/jobs/{job.id}/cancel", headers=bearer(Scope.ADMIN))
@@ -207,7 +207,7 @@ def test_the_audit_log_names_tokens_and_is_for_administrators(
 
 
 def test_a_revoked_token_is_refused_within_seconds(
-    guarded: httpx2.Client, bearer: Bearer, store: SqlStore, monkeypatch: pytest.MonkeyPatch
+    guarded: httpx2.Client, bearer: Bearer, store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("gaitswarm.api.access.CACHE_SECONDS", 0.0)
     headers = bearer(Scope.READ)
@@ -345,7 +345,7 @@ def test_ipv6_addresses_of_one_network_count_together(host: str, address: str) -
 
 
 def test_guessed_tokens_are_throttled_before_any_lookup(
-    serve: Serve, store: SqlStore, monkeypatch: pytest.MonkeyPatch
+    serve: Serve, store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("gaitswarm.api.access.GUESS_BURST", 3)
     monkeypatch.setattr("gaitswarm.api.access.GUESSES_PER_SECOND", 0.001)

@@ -14,7 +14,7 @@ from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from tests.api.conftest import PARTICLES, Commit
 from tests.examples.servers import unframed
 
@@ -45,7 +45,7 @@ def particles(
 
 
 def test_the_distribution_leaves_out_designs_that_failed(
-    client: httpx2.Client, store: SqlStore, job: Job, commit: Commit
+    client: httpx2.Client, store: Store, job: Job, commit: Commit
 ) -> None:
     commit(job, 2)
     found = distribution(client, job)
@@ -92,7 +92,7 @@ def test_the_distribution_follows_a_running_job(
 
 
 def test_particles_are_columns_of_floats_with_units_and_bounds(
-    client: httpx2.Client, store: SqlStore, job: Job, commit: Commit
+    client: httpx2.Client, store: Store, job: Job, commit: Commit
 ) -> None:
     commit(job, 3)
     header, columns = particles(client, job)
@@ -130,7 +130,7 @@ def test_particles_are_columns_of_floats_with_units_and_bounds(
 
 
 def test_a_categorical_variable_is_a_column_of_indices_with_the_names_of_its_choices(
-    client: httpx2.Client, store: SqlStore, spec: JobSpec, commit: Commit
+    client: httpx2.Client, store: Store, spec: JobSpec, commit: Commit
 ) -> None:
     names = [variable.name for variable in spec.design_space().variables]
     job, _ = store.create_job(spec.model_copy(update={"variables": (*names, "fir_window")}))
@@ -145,7 +145,7 @@ def test_a_categorical_variable_is_a_column_of_indices_with_the_names_of_its_cho
 
 
 def test_particles_have_the_objectives_of_a_front_where_they_are_asked_for(
-    client: httpx2.Client, store: SqlStore, job: Job, commit: Commit
+    client: httpx2.Client, store: Store, job: Job, commit: Commit
 ) -> None:
     commit(job, 2)
     plain, without = particles(client, job)
@@ -250,7 +250,7 @@ def test_a_ranking_that_makes_no_sense_is_refused(
 
 
 def test_a_job_without_a_preference_cannot_be_ranked(
-    client: httpx2.Client, store: SqlStore, identification: Job
+    client: httpx2.Client, store: Store, identification: Job
 ) -> None:
     answer = client.post(f"/v1/jobs/{identification.id}/ranking", json={"preference": "A"})
     assert answer.status_code == 422
@@ -272,7 +272,7 @@ def test_an_unknown_job_has_nothing_to_look_at(client: httpx2.Client, what: str)
 
 
 @pytest.fixture
-def identification(store: SqlStore) -> Job:
+def identification(store: Store) -> Job:
     spec = IdentificationSpec(
         kind="identification", recordings=("0" * 32,), variables=("battery_voltage",)
     )

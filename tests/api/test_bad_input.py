@@ -9,7 +9,7 @@ from typing import Any
 import httpx2
 import pytest
 
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 
 pytestmark = pytest.mark.slow
 
@@ -32,7 +32,7 @@ def refused(answer: httpx2.Response, status: int) -> dict[str, Any]:
 
 
 @pytest.fixture(autouse=True)
-def nothing_is_written(store: SqlStore) -> Iterator[None]:
+def nothing_is_written(store: Store) -> Iterator[None]:
     yield
     assert store.jobs().items == ()
 

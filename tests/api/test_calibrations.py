@@ -8,7 +8,7 @@ from typing import Any
 
 import httpx2
 
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.services.runtime import open_evaluator, run_embedded
 from tests.calibration.conftest import WALKS
 
@@ -28,7 +28,7 @@ SPEC: dict[str, Any] = {
 }
 
 
-def test_it_is_asked_about_as_any_job(client: httpx2.Client, store: SqlStore) -> None:
+def test_it_is_asked_about_as_any_job(client: httpx2.Client, store: Store) -> None:
     estimate = client.post("/v1/estimates", json=SPEC)
     assert estimate.status_code == 200
     assert estimate.json()["walks"] == 24

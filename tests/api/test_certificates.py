@@ -7,13 +7,13 @@ from typing import Any
 import httpx2
 import pytest
 
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.services.runtime import open_evaluator, run_embedded
 from tests.certificate.examples import DOCUMENT, PI
 from tests.examples.walks import SHORT_WALK
 
 
-def finished(client: httpx2.Client, store: SqlStore, **changes: Any) -> str:
+def finished(client: httpx2.Client, store: Store, **changes: Any) -> str:
     answer = client.post("/v1/jobs", json=DOCUMENT | changes)
     assert answer.status_code == 202, answer.text
     evaluator = open_evaluator("in-process", cpus=2)
@@ -24,7 +24,7 @@ def finished(client: httpx2.Client, store: SqlStore, **changes: Any) -> str:
     return f"/v1/jobs/{answer.json()['id']}"
 
 
-def test_it_is_asked_about_as_any_job(client: httpx2.Client, store: SqlStore) -> None:
+def test_it_is_asked_about_as_any_job(client: httpx2.Client, store: Store) -> None:
     estimate = client.post("/v1/estimates", json=DOCUMENT).json()
     assert (estimate["evaluations"], estimate["walks"]) == (11, 22)
     path = finished(client, store)
@@ -50,7 +50,7 @@ def test_it_is_asked_about_as_any_job(client: httpx2.Client, store: SqlStore) ->
 
 
 @pytest.mark.slow
-def test_other_engines_are_part_of_the_summary(client: httpx2.Client, store: SqlStore) -> None:
+def test_other_engines_are_part_of_the_summary(client: httpx2.Client, store: Store) -> None:
     path = finished(client, store, scenarios=[SHORT_WALK], worlds=3, engines=["mujoco"])
     job = client.get(path).json()
     assert (job["evaluations"], job["spec"]["engines"]) == (5, ["mujoco"])
@@ -65,7 +65,7 @@ def test_other_engines_are_part_of_the_summary(client: httpx2.Client, store: Sql
     assert found["worlds"] == 3 and "engine" not in found["worst"][0]["values"]
 
 
-def test_a_world_is_looked_at_by_its_values(client: httpx2.Client, store: SqlStore) -> None:
+def test_a_world_is_looked_at_by_its_values(client: httpx2.Client, store: Store) -> None:
     path = finished(client, store, scenarios=[SHORT_WALK])
     (worst,) = client.get(f"{path}/certificate", params={"most": 1}).json()["worst"]
     walk: dict[str, Any] = {"controller": "pi", "design": PI, "world": worst["values"]}

@@ -12,14 +12,14 @@ from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.reference import Reference
 from gaitswarm.services.optimizer.search.pso import PsoSettings
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from tests.api.conftest import PARTICLES, Commit
 
 pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
-def other(store: SqlStore, spec: JobSpec) -> Job:
+def other(store: Store, spec: JobSpec) -> Job:
     """As `job`, of another seed, budget and swarm."""
     settings = PsoSettings(particles=PARTICLES, inertia_end=0.3)
     changes = {"seed": 9, "iterations": 2, "optimizer": settings, "name": "other"}
@@ -53,7 +53,7 @@ def test_jobs_are_compared_with_what_their_specs_say_differently(
 
 
 def test_the_published_design_and_the_gain_over_it_are_reported_where_they_are_known(
-    client: httpx2.Client, store: SqlStore, job: Job, other: Job, commit: Commit
+    client: httpx2.Client, store: Store, job: Job, other: Job, commit: Commit
 ) -> None:
     commit(job, 3)
     store.note_reference(job.id, Reference("A", 198.0))
@@ -66,7 +66,7 @@ def test_the_published_design_and_the_gain_over_it_are_reported_where_they_are_k
 
 
 def test_another_measure_is_reported_and_a_job_without_designs_has_no_distribution(
-    client: httpx2.Client, store: SqlStore, job: Job, spec: JobSpec, commit: Commit
+    client: httpx2.Client, store: Store, job: Job, spec: JobSpec, commit: Commit
 ) -> None:
     commit(job, 1)
     changed = store.create_job(spec.model_copy(update={"preference": "B"}))[0]
@@ -77,7 +77,7 @@ def test_another_measure_is_reported_and_a_job_without_designs_has_no_distributi
 
 
 def test_jobs_of_different_controllers_differ_by_a_field_for_every_variable(
-    client: httpx2.Client, store: SqlStore, spec: JobSpec
+    client: httpx2.Client, store: Store, spec: JobSpec
 ) -> None:
     job = store.create_job(spec.resolved())[0]
     searched = ("P", "I", "fir_ms", "curve")
@@ -97,7 +97,7 @@ def test_jobs_of_different_controllers_differ_by_a_field_for_every_variable(
 
 
 def test_a_scenario_that_one_job_lacks_is_a_field_with_what_is_special_of_it(
-    client: httpx2.Client, store: SqlStore, spec: JobSpec
+    client: httpx2.Client, store: Store, spec: JobSpec
 ) -> None:
     job = store.create_job(spec.resolved())[0]
     first, *_ = spec.resolved_scenarios()

@@ -21,7 +21,7 @@ from schemathesis.schemas import APIOperation, BaseSchema
 
 from gaitswarm.api.app import create_app
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.sql_store import open_store
+from gaitswarm.services.optimizer.store import open_store
 from gaitswarm.settings import Settings
 from tests.api.conformance import CHECKS, Found, schema_of, sequences, served
 from tests.examples.api_document import api_document

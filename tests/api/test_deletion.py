@@ -14,7 +14,7 @@ from gaitswarm.services.optimizer.errors import NotFound
 from gaitswarm.services.optimizer.housekeeping import Housekeeping
 from gaitswarm.services.optimizer.jobs.job import Command, Job
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from tests.api.conftest import Commit
 from tests.examples.processes import eventually
 from tests.examples.servers import ServerProcess
@@ -49,7 +49,7 @@ def test_links_say_when_a_job_can_be_deleted(
 
 
 def test_the_stream_of_a_job_that_is_deleted_ends_with_that(
-    client: httpx2.Client, store: SqlStore, job: Job
+    client: httpx2.Client, store: Store, job: Job
 ) -> None:
     store.command(job.id, Command.PAUSE)
     with client.stream("GET", f"/v1/jobs/{job.id}/events") as answer:
@@ -64,7 +64,7 @@ def test_the_stream_of_a_job_that_is_deleted_ends_with_that(
 
 
 def test_housekeeping_deletes_what_ended_longer_ago_than_it_is_kept(
-    store: SqlStore, spec: JobSpec
+    store: Store, spec: JobSpec
 ) -> None:
     old, young = (store.create_job(spec)[0] for _ in range(2))
     store.command(old.id, Command.CANCEL)
@@ -80,7 +80,7 @@ def test_housekeeping_deletes_what_ended_longer_ago_than_it_is_kept(
 
 
 def test_housekeeping_removes_old_entries_of_the_audit_log_only_if_configured(
-    store: SqlStore, spec: JobSpec
+    store: Store, spec: JobSpec
 ) -> None:
     store.create_job(spec)
     Housekeeping(store, retention_days=1.0).round()
@@ -92,7 +92,7 @@ def test_housekeeping_removes_old_entries_of_the_audit_log_only_if_configured(
     assert store.audit().items == ()
 
 
-def test_housekeeping_that_is_started_does_its_rounds(store: SqlStore, spec: JobSpec) -> None:
+def test_housekeeping_that_is_started_does_its_rounds(store: Store, spec: JobSpec) -> None:
     job, _ = store.create_job(spec)
     store.command(job.id, Command.CANCEL)
     keeper = Housekeeping(store, retention_days=1e-9)
@@ -105,7 +105,7 @@ def test_housekeeping_that_is_started_does_its_rounds(store: SqlStore, spec: Job
 
 @pytest.mark.slow
 def test_a_server_keeps_jobs_and_its_audit_log_as_long_as_it_is_set_to(
-    store: SqlStore, spec: JobSpec, database: Path
+    store: Store, spec: JobSpec, database: Path
 ) -> None:
     job, _ = store.create_job(spec)
     store.command(job.id, Command.CANCEL)

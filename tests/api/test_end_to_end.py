@@ -10,13 +10,13 @@ import httpx2
 import pytest
 
 from gaitswarm.services.optimizer.run.runner import Runner
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.services.worker.in_process import InProcessEvaluator
 from tests.examples.jobs import SMALL_SPEC
 
 
 @pytest.fixture
-def runner(store: SqlStore) -> Iterator[Runner]:
+def runner(store: Store) -> Iterator[Runner]:
     evaluator = InProcessEvaluator()
     runner = Runner(store, evaluator, poll_seconds=0.02)
     runner.start()

@@ -7,7 +7,7 @@ import pytest
 
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from tests.api.conftest import Commit
 from tests.examples.jobs import SMALL_SPEC
 from tests.examples.walks import SHORT_WALK
@@ -15,9 +15,7 @@ from tests.examples.walks import SHORT_WALK
 pytestmark = pytest.mark.slow
 
 
-def test_an_estimate_counts_walks_and_stores_nothing(
-    client: httpx2.Client, store: SqlStore
-) -> None:
+def test_an_estimate_counts_walks_and_stores_nothing(client: httpx2.Client, store: Store) -> None:
     answer = client.post("/v1/estimates", json=SMALL_SPEC)
     assert answer.status_code == 200
     found = answer.json()

@@ -16,7 +16,7 @@ import pytest
 
 from gaitswarm.services.optimizer.jobs.job import Command, Job
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from tests.api.conftest import PARTICLES, Commit, Serve
 
 pytestmark = pytest.mark.slow
@@ -93,7 +93,7 @@ def test_iterations_are_streamed_as_they_are_committed(
 
 
 def test_what_a_job_waits_for_is_streamed_once_and_shown_of_the_job(
-    client: httpx2.Client, store: SqlStore, job: Job, commit: Commit
+    client: httpx2.Client, store: Store, job: Job, commit: Commit
 ) -> None:
     claim = commit(job, 1)
     with client.stream("GET", f"/v1/jobs/{job.id}/events", params={"after": 0}) as answer:
@@ -126,7 +126,7 @@ def test_a_broken_stream_continues_without_gap_or_repeat(
 
 
 def test_no_iteration_is_missed_however_the_stream_races_with_the_runner(
-    client: httpx2.Client, store: SqlStore, spec: JobSpec, commit: Commit
+    client: httpx2.Client, store: Store, spec: JobSpec, commit: Commit
 ) -> None:
     job = store.create_job(spec.model_copy(update={"iterations": 40}))[0]
     runner = threading.Thread(target=commit, args=(job, 40))
@@ -153,7 +153,7 @@ def test_resuming_after_the_end_gives_the_final_state_alone(
 
 
 def test_changes_of_state_are_events_and_a_cancellation_ends_the_stream(
-    client: httpx2.Client, store: SqlStore, job: Job
+    client: httpx2.Client, store: Store, job: Job
 ) -> None:
     with client.stream("GET", f"/v1/jobs/{job.id}/events") as answer:
         stream = parsed(answer.iter_lines())

@@ -12,7 +12,7 @@ import pytest
 
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.outcome import OBJECTIVE_NAMES
 from gaitswarm.tables import encoded_table
 from tests.api.conftest import PARTICLES, Commit
@@ -81,7 +81,7 @@ def test_a_job_that_has_committed_nothing_has_a_table_without_rows(
         assert pq.read_table(io.BytesIO(content)).num_rows == 0
 
 
-def test_the_file_is_written_as_it_is_read(store: SqlStore, job: Job, commit: Commit) -> None:
+def test_the_file_is_written_as_it_is_read(store: Store, job: Job, commit: Commit) -> None:
     commit(job, 3)
     committed = store.job(job.id)
     for file_format in ("csv", "parquet"):

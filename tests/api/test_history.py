@@ -8,7 +8,7 @@ import httpx2
 import pytest
 
 from gaitswarm.services.optimizer.jobs.job import Job
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.outcome import OBJECTIVE_NAMES
 from tests.api.conftest import Commit
 
@@ -42,7 +42,7 @@ def test_an_iteration_summarizes_the_swarm(client: httpx2.Client, job: Job, comm
 
 
 def test_evaluations_give_every_particle_in_full_precision(
-    client: httpx2.Client, store: SqlStore, job: Job, commit: Commit
+    client: httpx2.Client, store: Store, job: Job, commit: Commit
 ) -> None:
     commit(job, 1)
 

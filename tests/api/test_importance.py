@@ -13,7 +13,7 @@ from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.search.pso import PsoSettings
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.outcome import N_OBJECTIVES, Outcome, Status
 
 pytestmark = pytest.mark.slow
@@ -22,7 +22,7 @@ DESIGNS = 200
 
 
 @pytest.fixture
-def searched(store: SqlStore) -> Job:
+def searched(store: Store) -> Job:
     """A job whose energy goes with P alone, whose torque with I alone, and which fails for large I.
 
     The best design has the largest P of all: it lies at the upper bound.
@@ -110,7 +110,7 @@ def test_of_few_designs_no_share_is_reported(client: httpx2.Client, job: Job, co
 
 
 def test_a_job_without_designs_or_of_another_kind_is_refused(
-    client: httpx2.Client, store: SqlStore, job: Job
+    client: httpx2.Client, store: Store, job: Job
 ) -> None:
     answer = client.get(f"/v1/jobs/{job.id}/importance")
     assert answer.status_code == 409

@@ -12,7 +12,7 @@ from gaitswarm.services.optimizer.jobs.job import Job, JobState
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
 from gaitswarm.services.optimizer.jobs.provenance import job_provenance
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from tests.api.conftest import Commit
 
 pytestmark = pytest.mark.slow
@@ -39,7 +39,7 @@ def test_presets_are_written_out_when_a_job_is_submitted(client: httpx2.Client) 
     assert spec["preference"]["exponent"] == [0.1, 0.7, 0.3, 0.3, 0.1]
 
 
-def test_the_same_key_and_body_make_one_job(client: httpx2.Client, store: SqlStore) -> None:
+def test_the_same_key_and_body_make_one_job(client: httpx2.Client, store: Store) -> None:
     first = client.post("/v1/jobs", json=SPEC, headers={"Idempotency-Key": "k1"})
     again = client.post("/v1/jobs", json=SPEC, headers={"Idempotency-Key": "k1"})
 
@@ -61,9 +61,7 @@ def test_a_repeated_request_is_the_same_after_its_preference_has_changed(
     assert again.json()["id"] == first.json()["id"]
 
 
-def test_the_same_key_with_another_body_is_a_conflict(
-    client: httpx2.Client, store: SqlStore
-) -> None:
+def test_the_same_key_with_another_body_is_a_conflict(client: httpx2.Client, store: Store) -> None:
     client.post("/v1/jobs", json=SPEC, headers={"Idempotency-Key": "k1"})
     other = client.post("/v1/jobs", json={**SPEC, "seed": 4}, headers={"Idempotency-Key": "k1"})
 
@@ -100,7 +98,7 @@ def test_a_job_that_has_not_begun_has_no_estimate_and_no_best(
     assert view["eta_basis"] == "unknown: the job is queued"
 
 
-def test_a_failed_job_says_why(client: httpx2.Client, store: SqlStore, job: Job) -> None:
+def test_a_failed_job_says_why(client: httpx2.Client, store: Store, job: Job) -> None:
     claim = store.claim("test", lease_seconds=60.0)
     assert claim is not None
     store.release(claim, JobState.FAILED, error="the robot's legs came off")
@@ -122,7 +120,7 @@ def test_an_unknown_job_is_not_found(client: httpx2.Client) -> None:
 
 
 def test_pages_list_every_job_once_newest_first(
-    client: httpx2.Client, store: SqlStore, spec: JobSpec
+    client: httpx2.Client, store: Store, spec: JobSpec
 ) -> None:
     made = [store.create_job(spec)[0].id for _ in range(7)]
 
@@ -138,7 +136,7 @@ def test_pages_list_every_job_once_newest_first(
     assert listed == made[::-1]
 
 
-def test_jobs_are_listed_by_state(client: httpx2.Client, store: SqlStore, spec: JobSpec) -> None:
+def test_jobs_are_listed_by_state(client: httpx2.Client, store: Store, spec: JobSpec) -> None:
     kept, dropped = (store.create_job(spec)[0].id for _ in range(2))
     client.post(f"/v1/jobs/{dropped}/cancel")
 
@@ -165,7 +163,7 @@ def statements() -> Iterator[list[str]]:
 
 
 def test_a_page_of_jobs_takes_one_query(
-    client: httpx2.Client, store: SqlStore, spec: JobSpec, statements: list[str]
+    client: httpx2.Client, store: Store, spec: JobSpec, statements: list[str]
 ) -> None:
     for _ in range(20):
         store.create_job(spec)
@@ -219,7 +217,7 @@ def test_a_job_shows_what_its_numbers_depend_on_since_which_iteration(
 
 @pytest.mark.parametrize("body", [None, {}, {"accept_changes": False}, {"accept_changes": True}])
 def test_changes_are_accepted_only_by_a_body_that_says_so(
-    client: httpx2.Client, store: SqlStore, job: Job, body: dict[str, bool] | None
+    client: httpx2.Client, store: Store, job: Job, body: dict[str, bool] | None
 ) -> None:
     client.post(f"/v1/jobs/{job.id}/pause")
     resumed = client.post(f"/v1/jobs/{job.id}/resume", json=body)

@@ -20,7 +20,7 @@ from gaitswarm.services.optimizer.jobs.job import Job, JobOrder
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.provenance import job_provenance
 from gaitswarm.services.optimizer.jobs.reference import Reference
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.views import JobSummaryView
 from tests.api.conftest import Commit
 from tests.examples.walks import quadruped_files
@@ -35,7 +35,7 @@ def tuning(**changes: object) -> JobSpec:
 
 
 def test_the_published_design_is_judged_as_the_jobs_own_and_kept(
-    client: httpx2.Client, store: SqlStore, commit: Commit, monkeypatch: pytest.MonkeyPatch
+    client: httpx2.Client, store: Store, commit: Commit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     spec = tuning(preference="B")
     job, _ = store.create_job(spec, provenance=job_provenance(spec))
@@ -64,7 +64,7 @@ def test_the_published_design_is_judged_as_the_jobs_own_and_kept(
 
 
 def test_a_robot_of_ones_own_is_measured_against_the_middle_of_the_bounds(
-    client: httpx2.Client, store: SqlStore, commit: Commit
+    client: httpx2.Client, store: Store, commit: Commit
 ) -> None:
     robot, walk = quadruped_files().model_dump(), BRIEF | {"radius": 0.22, "stride": 0.04}
     bounds = [{"name": "P", "low": 0.2, "high": 0.6}, "I"]
@@ -91,7 +91,7 @@ def test_a_robot_of_ones_own_is_measured_against_the_middle_of_the_bounds(
     assert [*gains.cells] == [f"{found['gain']:.1%} over start"]
 
 
-def test_a_reference_that_is_stored_stays(store: SqlStore, commit: Commit) -> None:
+def test_a_reference_that_is_stored_stays(store: Store, commit: Commit) -> None:
     spec = tuning(controller="pi", robot=quadruped_files())
     job, _ = store.create_job(spec, provenance=job_provenance(spec))
     commit(job, 1)
@@ -101,7 +101,7 @@ def test_a_reference_that_is_stored_stays(store: SqlStore, commit: Commit) -> No
 
 
 def test_a_reference_that_an_outage_hinders_is_a_line_of_the_log_and_found_later(
-    store: SqlStore, commit: Commit, caplog: pytest.LogCaptureFixture
+    store: Store, commit: Commit, caplog: pytest.LogCaptureFixture
 ) -> None:
     spec = tuning()
     job, _ = store.create_job(spec, provenance=job_provenance(spec))
@@ -115,7 +115,7 @@ def test_a_reference_that_an_outage_hinders_is_a_line_of_the_log_and_found_later
     assert note_reference(store, ended).reference is not None
 
 
-def test_a_start_that_does_not_walk_says_so(store: SqlStore, commit: Commit) -> None:
+def test_a_start_that_does_not_walk_says_so(store: Store, commit: Commit) -> None:
     walk = BRIEF | {"radius": 0.5}
     spec = tuning(controller="pi", robot=quadruped_files(), scenarios=[walk])
     job, _ = store.create_job(spec, provenance=job_provenance(spec))
@@ -134,7 +134,7 @@ def test_a_start_that_does_not_walk_says_so(store: SqlStore, commit: Commit) -> 
 )
 def test_reason_for_a_missing_reference(
     client: httpx2.Client,
-    store: SqlStore,
+    store: Store,
     commit: Commit,
     changes: dict[str, object],
     digest: str | None,
@@ -151,7 +151,7 @@ def test_reason_for_a_missing_reference(
     assert reason in found["reason"]
 
 
-def test_jobs_are_sorted_by_gain_in_pages_either_way(store: SqlStore, commit: Commit) -> None:
+def test_jobs_are_sorted_by_gain_in_pages_either_way(store: Store, commit: Commit) -> None:
     jobs: list[Job] = []
     for fitness in (200.0, 50.0, None, 400.0):
         job, _ = store.create_job(tuning())
@@ -171,7 +171,7 @@ def test_jobs_are_sorted_by_gain_in_pages_either_way(store: SqlStore, commit: Co
 
 
 def test_a_gain_that_cannot_be_computed_breaks_nothing(
-    store: SqlStore, commit: Commit, monkeypatch: pytest.MonkeyPatch
+    store: Store, commit: Commit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     spec = tuning()
     job, _ = store.create_job(spec, provenance=job_provenance(spec))

@@ -12,7 +12,7 @@ from gaitswarm.api.dependencies import Component
 from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, LeaseLost, StoreUnavailable
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.errors import KernelBuildError
 from tests.api.conftest import Commit, Serve
 
@@ -40,7 +40,7 @@ def test_a_request_id_that_could_forge_log_lines_is_replaced(client: httpx2.Clie
 
 def test_a_bug_is_a_problem_that_shows_nothing_of_the_inside(
     client: httpx2.Client,
-    store: SqlStore,
+    store: Store,
     monkeypatch: pytest.MonkeyPatch,
     caplog: pytest.LogCaptureFixture,
 ) -> None:
@@ -71,7 +71,7 @@ def test_a_bug_is_a_problem_that_shows_nothing_of_the_inside(
 )
 def test_what_cannot_be_done_now_is_distinguished_from_bugs(
     client: httpx2.Client,
-    store: SqlStore,
+    store: Store,
     monkeypatch: pytest.MonkeyPatch,
     error: Exception,
     status: int,
@@ -97,7 +97,7 @@ def test_the_server_is_alive_and_ready(client: httpx2.Client) -> None:
 
 def test_without_a_database_the_server_is_alive_but_not_ready_and_only_the_log_says_why(
     client: httpx2.Client,
-    store: SqlStore,
+    store: Store,
     monkeypatch: pytest.MonkeyPatch,
     caplog: pytest.LogCaptureFixture,
 ) -> None:
@@ -170,7 +170,7 @@ def test_short_paths_lead_to_the_real_ones(client: httpx2.Client, path: str, tar
 
 def test_a_stream_outlives_an_absence_of_the_database(
     client: httpx2.Client,
-    store: SqlStore,
+    store: Store,
     job: Job,
     commit: Commit,
     monkeypatch: pytest.MonkeyPatch,
@@ -179,7 +179,7 @@ def test_a_stream_outlives_an_absence_of_the_database(
     answers = iter([None, StoreUnavailable("away"), StoreUnavailable("away")])
     read = type(store).job
 
-    def sometimes(self: SqlStore, job_id: str) -> Job:
+    def sometimes(self: Store, job_id: str) -> Job:
         error = next(answers, None)
         if error is not None:
             raise error

@@ -14,10 +14,11 @@ import pytest
 
 from gaitswarm.api import access
 from gaitswarm.api.access import TokenCache
-from gaitswarm.services.optimizer.access import Scope, Token, Tokens
+from gaitswarm.services.optimizer.access import Scope, Token
 from gaitswarm.services.optimizer.errors import StoreUnavailable
 from gaitswarm.services.optimizer.jobs.job import Command, Job
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
+from gaitswarm.services.optimizer.store.tokens import Tokens
 from tests.api.conftest import Serve
 
 STREAMS = 40
@@ -29,7 +30,7 @@ def test_lookups_are_cached_as_long_as_documented() -> None:
 
 @pytest.mark.slow
 def test_event_stream_ends_when_its_token_is_revoked(
-    serve: Serve, store: SqlStore, job: Job, monkeypatch: pytest.MonkeyPatch
+    serve: Serve, store: Store, job: Job, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(access, "CACHE_SECONDS", 1.0)
     client = serve(api_access="token").client

@@ -17,7 +17,7 @@ from gaitswarm.api.app import create_app
 from gaitswarm.api.server import ApiServer
 from gaitswarm.services.optimizer.jobs.job import Job, JobState
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.settings import Settings
 from tests.api import server_process
 from tests.api.conftest import Serve
@@ -81,7 +81,7 @@ def test_a_server_that_drains_answers_and_says_that_it_is_not_ready(serve: Serve
 
 @pytest.mark.slow
 def test_a_served_job_commits_its_iteration_under_way_before_the_server_ends(
-    store: SqlStore, database: Path
+    store: Store, database: Path
 ) -> None:
     server = ServerProcess(database, "--evaluator", "in-process", "--cpus", "1")
     try:

@@ -12,14 +12,14 @@ from gaitswarm.api.topics import News, Topic, Topics
 from gaitswarm.services.optimizer.errors import StoreUnavailable
 from gaitswarm.services.optimizer.jobs.job import Command, Job
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from tests.api.conftest import Commit
 
 
 class Counted(JobService):
     """A service that counts how often a job is read, and lets no read end while it is held."""
 
-    def __init__(self, store: SqlStore) -> None:
+    def __init__(self, store: Store) -> None:
         super().__init__(store)
         object.__setattr__(self, "reads", [])
         object.__setattr__(self, "read", threading.Event())
@@ -38,7 +38,7 @@ class Counted(JobService):
 
 
 @pytest.fixture
-def counted(store: SqlStore) -> Counted:
+def counted(store: Store) -> Counted:
     return Counted(store)
 
 
@@ -80,7 +80,7 @@ def test_streams_that_ask_for_the_same_share_the_answer(counted: Counted, job: J
 
 
 def test_an_answer_of_before_a_change_is_not_given_to_who_asks_after_it(
-    counted: Counted, store: SqlStore, job: Job
+    counted: Counted, store: Store, job: Job
 ) -> None:
     async def use(topic: Topic) -> None:
         (before,) = await asked_by(1, topic)
@@ -110,19 +110,19 @@ def test_a_stream_that_leaves_takes_the_answer_from_no_one(counted: Counted, job
 
 
 def test_a_read_that_failed_is_tried_again(
-    store: SqlStore, job: Job, commit: Commit, monkeypatch: pytest.MonkeyPatch
+    store: Store, job: Job, commit: Commit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     commit(job, 1)
     service = JobService(store)
     failures = [StoreUnavailable("away")]
-    read = SqlStore.job
+    read = Store.job
 
-    def job_or_failure(self: SqlStore, job_id: str) -> Job:
+    def job_or_failure(self: Store, job_id: str) -> Job:
         if failures:
             raise failures.pop()
         return read(self, job_id)
 
-    monkeypatch.setattr(SqlStore, "job", job_or_failure)
+    monkeypatch.setattr(Store, "job", job_or_failure)
 
     async def use(topic: Topic) -> None:
         with pytest.raises(StoreUnavailable):
@@ -134,7 +134,7 @@ def test_a_read_that_failed_is_tried_again(
 
 
 def test_a_change_is_read_once_for_all_streams_that_wait_for_it(
-    counted: Counted, store: SqlStore, job: Job
+    counted: Counted, store: Store, job: Job
 ) -> None:
     counted.free.set()
 

@@ -9,7 +9,7 @@ import pytest
 
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from tests.api.conftest import Commit
 
 pytestmark = pytest.mark.slow
@@ -99,7 +99,7 @@ def test_a_job_of_which_every_design_failed_has_no_front(
 
 
 @pytest.mark.parametrize("what", ["front", "preference-for"])
-def test_only_tunings_have_a_front(client: httpx2.Client, store: SqlStore, what: str) -> None:
+def test_only_tunings_have_a_front(client: httpx2.Client, store: Store, what: str) -> None:
     spec = IdentificationSpec(
         kind="identification", recordings=("0" * 32,), variables=("battery_voltage",)
     )

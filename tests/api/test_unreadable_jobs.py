@@ -12,7 +12,7 @@ import pytest
 from gaitswarm.services.optimizer.errors import Unreadable
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.views import JobView
 from tests.api.conftest import Commit
 
@@ -20,7 +20,7 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
-def unreadable(store: SqlStore, database: Path, job: Job, commit: Commit) -> Job:
+def unreadable(store: Store, database: Path, job: Job, commit: Commit) -> Job:
     """A job that has committed two iterations, and was then set aside."""
     commit(job, 2)
     with closing(sqlite3.connect(database)) as connection, connection:
@@ -34,7 +34,7 @@ def unreadable(store: SqlStore, database: Path, job: Job, commit: Commit) -> Job
 
 
 def test_it_is_listed_with_what_is_known_of_it(
-    client: httpx2.Client, unreadable: Job, store: SqlStore, spec: JobSpec
+    client: httpx2.Client, unreadable: Job, store: Store, spec: JobSpec
 ) -> None:
     sound, _ = store.create_job(spec)
     for query in ({}, {"order": "name"}, {"search": "small"}):

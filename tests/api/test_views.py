@@ -12,7 +12,7 @@ import pytest
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Reevaluation
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.services.optimizer.views import StatusName
 from gaitswarm.sim.kernel.observation import WalkLog
 from gaitswarm.sim.outcome import N_MEASUREMENTS, N_OBJECTIVES, OBJECTIVES, Status
@@ -89,7 +89,7 @@ def test_a_design_that_was_never_walked_has_no_log() -> None:
 
 
 def test_a_history_keeps_every_bit_of_designs_and_objectives(
-    store: SqlStore, job: Job, commit: Commit
+    store: Store, job: Job, commit: Commit
 ) -> None:
     commit(job, 1)
     (iteration,) = store.iterations(job.id).items
@@ -106,7 +106,7 @@ def test_a_history_keeps_every_bit_of_designs_and_objectives(
 
 
 def test_a_job_view_is_read_from_json_with_every_bit_of_the_best_design(
-    store: SqlStore, job: Job, commit: Commit
+    store: Store, job: Job, commit: Commit
 ) -> None:
     commit(job, 3)
     stored, best = store.job(job.id), store.best(job.id)
@@ -125,7 +125,7 @@ def test_a_job_view_is_read_from_json_with_every_bit_of_the_best_design(
 
 
 def test_a_best_that_was_found_in_single_is_shown_in_double_with_the_difference(
-    store: SqlStore, job: Job, commit: Commit
+    store: Store, job: Job, commit: Commit
 ) -> None:
     commit(job, 1)
     found = store.best(job.id)

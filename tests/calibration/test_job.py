@@ -9,7 +9,7 @@ import pytest
 from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.services.runtime import open_evaluator, run_embedded
 from gaitswarm.sim.robot import RobotVariant, load_robot
 from tests.calibration.conftest import PI, TRUE_LAW, TRUTH, WALKS, spec, true_targets
@@ -17,7 +17,7 @@ from tests.examples.jobs import history
 from tests.examples.walks import short_walk, walk
 
 
-def finished(store: SqlStore, wanted: CalibrationSpec) -> str:
+def finished(store: Store, wanted: CalibrationSpec) -> str:
     job, _ = JobService(store).submit(wanted)
     evaluator = open_evaluator("in-process", cpus=2)
     try:
@@ -28,7 +28,7 @@ def finished(store: SqlStore, wanted: CalibrationSpec) -> str:
 
 
 @pytest.mark.slow
-def test_it_finds_hidden_parameters_and_the_hidden_law_of_friction(store: SqlStore) -> None:
+def test_it_finds_hidden_parameters_and_the_hidden_law_of_friction(store: Store) -> None:
     wanted = spec(
         targets=true_targets(),
         variables=["battery_voltage", "body_mass", "contact_law"],
@@ -44,7 +44,7 @@ def test_it_finds_hidden_parameters_and_the_hidden_law_of_friction(store: SqlSto
     assert best.fitness < 0.2
 
 
-def test_some_choices_are_searched_and_walk_by_their_names(store: SqlStore) -> None:
+def test_some_choices_are_searched_and_walk_by_their_names(store: Store) -> None:
     laws = ("stick", "linear_zone")
     law = {"name": "contact_law", "kind": "categorical", "choices": laws}
     wanted = spec(walks=WALKS[:1], variables=[law], iterations=1)
@@ -57,7 +57,7 @@ def test_some_choices_are_searched_and_walk_by_their_names(store: SqlStore) -> N
 
 
 @pytest.mark.slow
-def test_a_job_stopped_half_way_ends_with_the_same_bits(store: SqlStore) -> None:
+def test_a_job_stopped_half_way_ends_with_the_same_bits(store: Store) -> None:
     wanted = spec(walks=WALKS[:1])
     whole = finished(store, wanted)
     job, _ = JobService(store).submit(wanted)

@@ -15,7 +15,7 @@ from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 from gaitswarm.services.optimizer.run.evaluator import Evaluator
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.services.runtime import open_evaluator, run_embedded
 from gaitswarm.sim.simulate import simulate
 from gaitswarm.sim.worlds import WorldWalk

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from gaitswarm.cli.exit_codes import ExitCode
 from gaitswarm.services.optimizer.jobs.job import Command
-from gaitswarm.services.optimizer.store.schema.revisions import head
-from gaitswarm.services.optimizer.store.sql_store import open_store
+from gaitswarm.services.optimizer.store import open_store
+from gaitswarm.services.optimizer.store.schema import head
 from tests.cli.conftest import Finished, Gaitswarm
 from tests.store.examples import spec
 from tests.store.test_opening import edit

@@ -11,7 +11,7 @@ import pytest
 from gaitswarm.cli.inputs.design_file import GivenDesign, given_design
 from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.robot import DEFAULT_ROBOT
 from tests.calibration.conftest import spec as calibration
 from tests.cli.conftest import Finished, WriteJson
@@ -71,7 +71,7 @@ def test_an_unknown_design_lists_the_choices(database: Path) -> None:
         given("published:D")
 
 
-def test_a_job_that_tunes_no_drive_has_no_design(store: SqlStore, database: Path) -> None:
+def test_a_job_that_tunes_no_drive_has_no_design(store: Store, database: Path) -> None:
     job, _ = store.create_job(calibration())
     with pytest.raises(InvalidRequest, match="kind calibration, which tunes no drive"):
         given(job.id, database)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from gaitswarm.services.optimizer.store.sql_store import open_store
+from gaitswarm.services.optimizer.store import open_store
 from tests.cli.conftest import Finished, Gaitswarm
 
 pytestmark = pytest.mark.slow

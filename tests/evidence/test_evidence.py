@@ -20,7 +20,7 @@ import gaitswarm
 from gaitswarm.evidence.contents import evidence
 from gaitswarm.services.optimizer.jobs.job import Job, JobState
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.sql_store import open_store
+from gaitswarm.services.optimizer.store import open_store
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.zip_archive import unzipped
 from tests.evidence.conftest import JOB, Proved

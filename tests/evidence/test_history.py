@@ -113,10 +113,9 @@ def test_a_number_that_was_changed_with_its_digests_is_found_by_the_replay(
     copy: Path, proved: Proved
 ) -> None:
     """A writer of the database can recompute the chain, but cannot forge simulations."""
-    from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
-    from gaitswarm.services.optimizer.store.rows.job_rows import chain_documents
-    from gaitswarm.services.optimizer.store.statements.chain import chain_taken
-    from gaitswarm.services.optimizer.store.statements.records import job_row
+    from gaitswarm.services.optimizer.store.engine import Database
+    from gaitswarm.services.optimizer.store.history import chain_iterations
+    from gaitswarm.services.optimizer.store.job_rows import chain_documents, job_row
 
     with closing(sqlite3.connect(copy)) as connection:
         (text,) = connection.execute(
@@ -131,10 +130,10 @@ def test_a_number_that_was_changed_with_its_digests_is_found_by_the_replay(
         )
         connection.commit()
     noted = digests(copy, proved.id)[-1]
-    database = connect(parse_url(str(copy)))
-    with database.transaction(write=True) as transaction:
+    database = Database(str(copy))
+    with database.write() as transaction:
         documents = chain_documents(job_row(transaction, proved.id))
-        head = chain_taken(transaction, proved.id, documents, 3)
+        head = chain_iterations(transaction, proved.id, documents, 3)
     database.close()
     execute(copy, f"UPDATE jobs SET head = '{head}'")  # noqa: S608
 

@@ -23,7 +23,7 @@ for _name in (
     "numpy.random",
     "rich.console",
     "gaitswarm.services.monitoring.collectors",
-    "gaitswarm.services.monitoring.measured_store",
+    "gaitswarm.services.monitoring.store_metrics",
     "gaitswarm.services.monitoring.webhooks",
     "gaitswarm.services.runtime",
     "gaitswarm.sim.simulate",

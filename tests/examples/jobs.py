@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.store import Store
 from tests.examples.walks import SHORT_WALK
 
 SMALL_SPEC: Final[dict[str, Any]] = {

@@ -14,7 +14,7 @@ from gaitswarm.services.optimizer.jobs.judgement import Judgement
 from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
 from gaitswarm.services.optimizer.search.pso import PsoSettings
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.services.runtime import open_evaluator, run_embedded
 from tests.examples.jobs import history
 from tests.identification.conftest import TRUTH, Twin
@@ -51,7 +51,7 @@ def test_fitness_is_the_mean_error_over_walks_and_chosen_links() -> None:
     assert second_link.fitness.tolist() == [3.0, np.inf]
 
 
-def finished(store: SqlStore, wanted: IdentificationSpec) -> str:
+def finished(store: Store, wanted: IdentificationSpec) -> str:
     job, _ = JobService(store).submit(wanted)
     evaluator = open_evaluator("in-process", cpus=2)
     try:
@@ -62,7 +62,7 @@ def finished(store: SqlStore, wanted: IdentificationSpec) -> str:
 
 
 @pytest.mark.slow
-def test_it_recovers_the_twins_battery_mass_and_efficiency(store: SqlStore, twin: Twin) -> None:
+def test_it_recovers_the_twins_battery_mass_and_efficiency(store: Store, twin: Twin) -> None:
     job_id = finished(store, spec(store.add_recording(twin.recording)))
     best = store.best(job_id)
     assert best is not None
@@ -73,7 +73,7 @@ def test_it_recovers_the_twins_battery_mass_and_efficiency(store: SqlStore, twin
 
 
 @pytest.mark.slow
-def test_a_job_stopped_half_way_ends_with_the_same_bits(store: SqlStore, twin: Twin) -> None:
+def test_a_job_stopped_half_way_ends_with_the_same_bits(store: Store, twin: Twin) -> None:
     brief = {"iterations": 4, "optimizer": PsoSettings(particles=5)}
     wanted = spec(store.add_recording(twin.recording), **brief)
     whole = finished(store, wanted)
@@ -90,7 +90,7 @@ def test_a_job_stopped_half_way_ends_with_the_same_bits(store: SqlStore, twin: T
 
 
 @pytest.mark.slow
-def test_runs_of_other_seeds_tell_which_parameters_to_trust(store: SqlStore, twin: Twin) -> None:
+def test_runs_of_other_seeds_tell_which_parameters_to_trust(store: Store, twin: Twin) -> None:
     recording, service = store.add_recording(twin.recording), JobService(store)
     brief = {
         "variables": ("battery_voltage", "damping_left_rear"),
@@ -111,7 +111,7 @@ def test_runs_of_other_seeds_tell_which_parameters_to_trust(store: SqlStore, twi
     assert [p.trust for p in service.identifiability(jobs[:1]).parameters] == [None, None]
 
 
-def test_runs_of_different_problems_are_not_compared(store: SqlStore, twin: Twin) -> None:
+def test_runs_of_different_problems_are_not_compared(store: Store, twin: Twin) -> None:
     recording, service = store.add_recording(twin.recording), JobService(store)
     first, _ = service.submit(spec(recording))
     other, _ = service.submit(spec(recording, links=(1,), seed=2))
@@ -122,7 +122,7 @@ def test_runs_of_different_problems_are_not_compared(store: SqlStore, twin: Twin
         service.identifiability([first])
 
 
-def test_a_run_is_no_evidence_for_itself(store: SqlStore, twin: Twin) -> None:
+def test_a_run_is_no_evidence_for_itself(store: Store, twin: Twin) -> None:
     recording, service = store.add_recording(twin.recording), JobService(store)
     first, _ = service.submit(spec(recording))
     again, _ = service.submit(spec(recording, iterations=20))
@@ -143,7 +143,7 @@ def test_a_run_is_no_evidence_for_itself(store: SqlStore, twin: Twin) -> None:
     ],
 )
 def test_bounds_that_no_robot_has_are_refused(
-    store: SqlStore, twin: Twin, change: dict[str, object], field: str
+    store: Store, twin: Twin, change: dict[str, object], field: str
 ) -> None:
     with pytest.raises(InvalidRequest) as refused:
         JobService(store).submit(spec(store.add_recording(twin.recording), **change))

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import gaitswarm
-from gaitswarm.services.optimizer.store.sql_store import open_store
+from gaitswarm.services.optimizer.store import open_store
 from tests.library.conftest import SMALL, Finished, Reach
 
 pytestmark = pytest.mark.slow

@@ -16,7 +16,7 @@ from gaitswarm.services.optimizer.jobs.provenance import job_provenance
 from gaitswarm.services.optimizer.log_context import log_context
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, TaskReport
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.outcome import Outcome
 from tests.examples.servers import Server
 
@@ -118,7 +118,7 @@ def test_only_messages_of_a_job_are_recorded() -> None:
 
 
 def test_a_server_returns_its_records_or_why_there_are_none(
-    store: SqlStore, request_: EvaluationRequest
+    store: Store, request_: EvaluationRequest
 ) -> None:
     job, _ = store.create_job(JobSpec(iterations=2))
     activity = Activity()

@@ -15,7 +15,7 @@ from gaitswarm.services.monitoring.metrics import Metrics
 from gaitswarm.services.optimizer.access import Scope, Token
 from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, StoreUnavailable
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.settings import Settings
 from tests.examples.forked import ForkedCommand
 from tests.examples.processes import eventually, line_with
@@ -23,7 +23,7 @@ from tests.examples.servers import Server
 from tests.monitoring.scraped import Scrape, parsed, scraped
 
 
-def test_every_token_reads_metrics_where_tokens_are_required(store: SqlStore) -> None:
+def test_every_token_reads_metrics_where_tokens_are_required(store: Store) -> None:
     secret = store.tokens.create("prometheus", Scope.READ)[1]
     server = Server(JobService(store), api_access="token")
     try:
@@ -39,7 +39,7 @@ def test_every_token_reads_metrics_where_tokens_are_required(store: SqlStore) ->
         server.close()
 
 
-def test_without_tokens_every_local_client_reads_metrics(store: SqlStore) -> None:
+def test_without_tokens_every_local_client_reads_metrics(store: Store) -> None:
     server = Server(JobService(store))
     try:
         answer = server.client.get("/metrics")
@@ -154,7 +154,7 @@ def test_a_separate_port_rejects_other_host_names(path: str) -> None:
 
 
 def test_a_cached_token_reads_metrics_of_a_server_without_its_database(
-    store: SqlStore, monkeypatch: pytest.MonkeyPatch
+    store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("gaitswarm.api.access.CACHE_SECONDS", 0.0)
     headers = {"Authorization": f"Bearer {store.tokens.create('prometheus', Scope.READ)[1]}"}

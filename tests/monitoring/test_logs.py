@@ -23,7 +23,7 @@ from gaitswarm.services.optimizer.errors import StoreUnavailable
 from gaitswarm.services.optimizer.log_context import log_context, log_fields
 from gaitswarm.services.optimizer.run.execution import RunContext, run_claim
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from tests.examples.forked import ForkedCommand
 from tests.examples.jobs import SMALL_SPEC
 from tests.examples.processes import eventually
@@ -119,7 +119,7 @@ def written() -> Iterator[Callable[[], list[Entry]]]:
 
 
 def test_a_bug_in_an_evaluation_is_one_line_with_job_iteration_and_traceback(
-    store: SqlStore, written: Callable[[], list[Entry]]
+    store: Store, written: Callable[[], list[Entry]]
 ) -> None:
     job, _ = store.create_job(SPEC)
     claim = store.claim("runner", lease_seconds=30.0)
@@ -140,9 +140,7 @@ def test_a_context_ends_with_its_block() -> None:
     assert log_fields() == {}
 
 
-def test_an_aborted_response_is_one_line(
-    store: SqlStore, written: Callable[[], list[Entry]]
-) -> None:
+def test_an_aborted_response_is_one_line(store: Store, written: Callable[[], list[Entry]]) -> None:
     async def pieces() -> AsyncIterator[bytes]:
         yield b"the first piece"
         raise StoreUnavailable("the database is away")
@@ -164,7 +162,7 @@ def test_an_aborted_response_is_one_line(
     assert not any("traceback" in e for e in written())
 
 
-def test_invalid_request_ids_are_replaced(store: SqlStore) -> None:
+def test_invalid_request_ids_are_replaced(store: Store) -> None:
     server = Server(JobService(store))
     try:
         for bad in ("a b", "x" * 129, 'a"b', "é"):

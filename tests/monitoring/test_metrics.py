@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import re
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 
 from gaitswarm.services.monitoring.collectors import QueueCollector
-from gaitswarm.services.monitoring.measured_store import measured
 from gaitswarm.services.monitoring.metrics import Metrics
+from gaitswarm.services.monitoring.store_metrics import StoreMetrics
 from gaitswarm.services.optimizer.errors import LeaseLost, StoreUnavailable
 from gaitswarm.services.optimizer.jobs.job import Command, JobState
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
 from gaitswarm.services.optimizer.run.execution import RunContext, run_claim
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.store import Store, open_store
 from gaitswarm.services.worker.cutting import Chunk, Part
 from gaitswarm.services.worker.failures import killed_workers
 from gaitswarm.sim.outcome import Status
@@ -93,7 +94,7 @@ def test_a_stream_records_the_lag_of_its_events(
     assert scrape.value("gaitswarm_event_stream_lag_seconds_sum") < 2 * 10.0
 
 
-def test_streams_count_while_they_are_open(service: JobService, store: SqlStore) -> None:
+def test_streams_count_while_they_are_open(service: JobService, store: Store) -> None:
     job, _ = store.create_job(SPEC)
     metrics = Metrics()
     server = Server(service, metrics=metrics)
@@ -111,12 +112,12 @@ def test_streams_count_while_they_are_open(service: JobService, store: SqlStore)
 
 
 @pytest.fixture
-def service(store: SqlStore) -> JobService:
+def service(store: Store) -> JobService:
     return JobService(store)
 
 
 def test_the_queue_is_counted_by_state_and_kind_on_request(
-    service: JobService, store: SqlStore
+    service: JobService, store: Store
 ) -> None:
     paused = store.create_job(SPEC)[0]
     store.create_job(SPEC)
@@ -153,8 +154,9 @@ def test_the_longest_wait_is_that_of_the_job_queued_first(database: Path) -> Non
 
 def test_a_lease_that_is_taken_over_counts_once_on_either_side(database: Path) -> None:
     clock, loser, winner = Clock(), Metrics(), Metrics()
-    with_clock = open_store(str(database), clock=clock)
-    slow, quick = measured(with_clock, loser), measured(with_clock, winner)
+    slow, quick = (open_store(str(database), clock=clock) for _ in range(2))
+    slow.observers.append(StoreMetrics(loser))
+    quick.observers.append(StoreMetrics(winner))
     slow.create_job(SPEC)
     late = slow.claim("late", lease_seconds=30.0)
     assert late is not None
@@ -175,7 +177,8 @@ def test_a_lease_that_is_taken_over_counts_once_on_either_side(database: Path) -
         quick.renew(taken, lease_seconds=30.0)
     assert of(winner).value("gaitswarm_lease_losses_total") == 0
     assert of(winner).value("gaitswarm_jobs_ended_total", state="cancelled", kind="tuning") == 1
-    with_clock.close()
+    slow.close()
+    quick.close()
 
 
 @pytest.mark.parametrize(
@@ -188,7 +191,7 @@ def test_a_lease_that_is_taken_over_counts_once_on_either_side(database: Path) -
     ],
 )
 def test_failed_jobs_are_counted_by_cause(
-    store: SqlStore, cause: str, error: Exception | None, provenance: JobProvenance | None
+    store: Store, cause: str, error: Exception | None, provenance: JobProvenance | None
 ) -> None:
     def computed(_spec: object) -> JobProvenance:
         if provenance is None:
@@ -196,16 +199,16 @@ def test_failed_jobs_are_counted_by_cause(
         return provenance
 
     metrics = Metrics()
-    counted = measured(store, metrics)
-    counted.create_job(SPEC, provenance=HERE)
-    claim = counted.claim("runner", lease_seconds=30.0)
+    store.observers.append(StoreMetrics(metrics))
+    store.create_job(SPEC, provenance=HERE)
+    claim = store.claim("runner", lease_seconds=30.0)
     assert claim is not None
     evaluator = FormulaEvaluator([error])
-    failed = run_claim(claim, RunContext(counted, evaluator, provenance=computed))
+    failed = run_claim(claim, RunContext(store, evaluator, provenance=computed))
     assert failed.state is JobState.FAILED
     assert of(metrics).value("gaitswarm_job_failures_total", cause=cause) == 1
     assert of(metrics).value("gaitswarm_jobs_ended_total", state="failed", kind="tuning") == 1
-    metrics.registry.register(QueueCollector(lambda: counted))
+    metrics.registry.register(QueueCollector(lambda: store))
     assert of(metrics).value("gaitswarm_failed_jobs", cause=cause) == 1
 
 
@@ -223,11 +226,13 @@ def test_quarantined_jobs_are_counted_among_the_failed_ones(database: Path) -> N
 
 
 def test_operations_without_a_database_are_counted(database: Path) -> None:
-    class Away:
-        def job(self, job_id: str) -> None:
-            raise StoreUnavailable("the database is away")
-
     metrics = Metrics()
-    with pytest.raises(StoreUnavailable):
-        measured(Away(), metrics).job("x")  # type: ignore[arg-type]
-    assert of(metrics).value("gaitswarm_database_errors_total", operation="job") == 1
+    with closing(open_store(str(database))) as store:
+        store.observers.append(StoreMetrics(metrics))
+        store.create_job(SPEC)
+        database.unlink()
+        with pytest.raises(StoreUnavailable):
+            store.create_job(SPEC)
+    assert of(metrics).value("gaitswarm_database_errors_total", operation="create_job") == 1
+    seconds = "gaitswarm_database_operation_duration_seconds_count"
+    assert of(metrics).value(seconds, operation="create_job") == 2

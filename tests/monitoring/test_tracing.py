@@ -18,7 +18,7 @@ from gaitswarm.services.optimizer.jobs.documents import SPECS
 from gaitswarm.services.optimizer.jobs.job import Command, JobState
 from gaitswarm.services.optimizer.run.evaluator import TaskReport
 from gaitswarm.services.optimizer.run.execution import RunContext, run_claim
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.services.runtime import open_runtime
 from gaitswarm.services.worker.dispatch import Dispatcher
 from tests.examples.jobs import SMALL_SPEC
@@ -80,14 +80,14 @@ def test_a_job_has_its_iterations_and_these_their_tasks(
 
 
 def test_a_job_that_fails_and_its_iteration_say_why(
-    store: SqlStore, tracing: Tracing, exporter: InMemorySpanExporter
+    store: Store, tracing: Tracing, exporter: InMemorySpanExporter
 ) -> None:
-    traced = tracing.traced_store(store)
-    traced.create_job(SPEC)
-    claim = traced.claim("runner", lease_seconds=30.0)
+    store.observers.append(tracing)
+    store.create_job(SPEC)
+    claim = store.claim("runner", lease_seconds=30.0)
     assert claim is not None
     evaluator = tracing.traced_evaluator(FormulaEvaluator([None, ZeroDivisionError("of the test")]))
-    run_claim(claim, RunContext(traced, evaluator, provenance=lambda _: HERE))
+    run_claim(claim, RunContext(store, evaluator, provenance=lambda _: HERE))
     (job,) = named(exporter, "job")
     first, second = named(exporter, "iteration")
     assert first.status.status_code is StatusCode.UNSET
@@ -97,15 +97,15 @@ def test_a_job_that_fails_and_its_iteration_say_why(
 
 
 def test_a_job_that_is_lost_ends_its_span(
-    store: SqlStore, tracing: Tracing, exporter: InMemorySpanExporter
+    store: Store, tracing: Tracing, exporter: InMemorySpanExporter
 ) -> None:
-    traced = tracing.traced_store(store)
-    job, _ = traced.create_job(SPEC)
-    claim = traced.claim("runner", lease_seconds=30.0)
+    store.observers.append(tracing)
+    job, _ = store.create_job(SPEC)
+    claim = store.claim("runner", lease_seconds=30.0)
     assert claim is not None
     store.command(job.id, Command.CANCEL)
     with pytest.raises(LeaseLost):
-        traced.renew(claim, lease_seconds=30.0)
+        store.renew(claim, lease_seconds=30.0)
     (span,) = named(exporter, "job")
     assert span.status.status_code is StatusCode.ERROR
     assert (span.attributes or {})["gaitswarm.job.state"] == "lost"

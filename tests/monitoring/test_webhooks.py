@@ -18,7 +18,7 @@ from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.job import Command, JobState
 from gaitswarm.services.optimizer.jobs.notification import MOST_ATTEMPTS, check_url, pause_after
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.store import Store, open_store
 from gaitswarm.settings import Settings
 from tests.examples.forked import ForkedCommand
 from tests.examples.jobs import SMALL_SPEC
@@ -39,7 +39,7 @@ def receiver() -> Iterator[Receiver]:
 
 @contextmanager
 def notifying(
-    store: SqlStore, receiver: Receiver, *, hosts: tuple[str, ...] | None = None
+    store: Store, receiver: Receiver, *, hosts: tuple[str, ...] | None = None
 ) -> Iterator[None]:
     notifier = Notifier(store, (receiver.host,) if hosts is None else hosts, SECRET)
     notifier.start()
@@ -49,14 +49,14 @@ def notifying(
         notifier.stop()
 
 
-def cancelled(store: SqlStore, url: str) -> str:
+def cancelled(store: Store, url: str) -> str:
     """A job that has ended, with a URL to notify."""
     job, _ = store.create_job(SPEC, notify_url=url)
     store.command(job.id, Command.CANCEL)
     return job.id
 
 
-def test_the_end_of_a_job_is_notified_once_and_signed(store: SqlStore, receiver: Receiver) -> None:
+def test_the_end_of_a_job_is_notified_once_and_signed(store: Store, receiver: Receiver) -> None:
     job_id = cancelled(store, receiver.url)
     store.create_job(SPEC)
     with notifying(store, receiver):
@@ -76,7 +76,7 @@ def test_the_end_of_a_job_is_notified_once_and_signed(store: SqlStore, receiver:
     assert "authorization" not in headers and "cookie" not in headers
 
 
-def test_failed_and_succeeded_jobs_are_notified_and_pauses_are_not(store: SqlStore) -> None:
+def test_failed_and_succeeded_jobs_are_notified_and_pauses_are_not(store: Store) -> None:
     url = "http://ci.example/"
     job, _ = store.create_job(SPEC, notify_url=url)
     for state in (JobState.QUEUED, JobState.PAUSED, JobState.FAILED):
@@ -207,9 +207,7 @@ def test_without_allowed_hosts_nothing_is_sent() -> None:
         check_url("https://ci.example/", Settings().webhook_hosts, field="Notify-URL")
 
 
-def test_a_host_that_is_no_longer_allowed_is_not_notified(
-    store: SqlStore, receiver: Receiver
-) -> None:
+def test_a_host_that_is_no_longer_allowed_is_not_notified(store: Store, receiver: Receiver) -> None:
     job_id = cancelled(store, receiver.url)
     with notifying(store, receiver, hosts=("ci.example",)):
         eventually(lambda: store.outbox.about(job_id)[0].attempts == 1)
@@ -219,7 +217,7 @@ def test_a_host_that_is_no_longer_allowed_is_not_notified(
 
 
 def test_the_url_is_a_header_and_deliveries_are_listed_at_the_job(
-    store: SqlStore, receiver: Receiver
+    store: Store, receiver: Receiver
 ) -> None:
     server = Server(JobService(store), webhook_hosts=receiver.host)
     try:

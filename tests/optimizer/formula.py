@@ -15,7 +15,7 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, with_record
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped
 from gaitswarm.services.optimizer.run.execution import RunContext, run_claim
-from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.case import Walk
 from gaitswarm.sim.outcome import Outcome, Status
 from gaitswarm.sim.provenance import Provenance

@@ -21,7 +21,7 @@ from gaitswarm.services.optimizer.search.registry import (
 )
 from gaitswarm.services.optimizer.search.space import Axis, Space
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from tests.calibration.conftest import spec as calibration
 
 LINE = Space([Axis(0.0, 1.0)])
@@ -89,7 +89,7 @@ def test_a_job_of_any_kind_is_resolved_to_the_method() -> None:
         assert asked.resolved().optimizer == OPTIMIZERS[DEFAULT_METHOD]
 
 
-def test_a_stored_job_names_the_method(store: SqlStore) -> None:
+def test_a_stored_job_names_the_method(store: Store) -> None:
     job, _ = JobService(store).submit(JobSpec.model_validate({"optimizer": "auto"}))
     assert store.job(job.id).spec.optimizer.name == DEFAULT_METHOD
 

@@ -16,8 +16,7 @@ from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
 from gaitswarm.services.optimizer.run.coordinator import walk_keys
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
 from gaitswarm.services.optimizer.run.execution import RunContext, evaluate_uncached, run_claim
-from gaitswarm.services.optimizer.store.port.base import Store
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.outcome import Outcome
 from tests.examples.jobs import history
 from tests.optimizer.formula import HERE, SPEC, FormulaEvaluator, walk
@@ -68,7 +67,7 @@ def bits(outcomes: tuple[Outcome, ...]) -> list[tuple[bytes, bytes]]:
     return [(outcome.objectives.tobytes(), outcome.statuses.tobytes()) for outcome in outcomes]
 
 
-class Knows(SqlStore):
+class Knows(Store):
     """A store with given cached outcomes."""
 
     def __init__(self, known: dict[bytes, CachedOutcome]) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
@@ -22,8 +22,7 @@ from gaitswarm.services.optimizer.run.evaluator import (
 )
 from gaitswarm.services.optimizer.run.execution import RunContext, run_claim
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.port.base import Store
-from gaitswarm.services.optimizer.store.sql_store import open_store
+from gaitswarm.services.optimizer.store import Store, open_store
 from gaitswarm.sim.outcome import Outcome
 from tests.optimizer.formula import SPEC, FormulaEvaluator
 
@@ -150,7 +149,7 @@ def test_a_job_is_kept_while_its_workers_are_opened_however_long_that_takes(
             assert store.claim("another", lease_seconds=60.0) is None
         return FormulaEvaluator()
 
-    assert run_embedded(Watched(), opened, claim).state is JobState.SUCCEEDED
+    assert run_embedded(cast("Store", Watched()), opened, claim).state is JobState.SUCCEEDED
 
 
 def test_a_job_whose_workers_cannot_be_opened_is_queued(store: Store) -> None:

@@ -26,7 +26,7 @@ from gaitswarm.services.optimizer.run.coordinator import (
     handle,
 )
 from gaitswarm.services.optimizer.run.execution import OnCommit, RunContext, run_claim
-from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.store import Store
 from tests.examples.jobs import Bits, history
 from tests.optimizer.formula import HERE, SPEC, FormulaEvaluator, job, walk
 

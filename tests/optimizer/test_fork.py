@@ -22,7 +22,7 @@ from gaitswarm.services.optimizer.jobs.job import Job, JobState
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.run.embedded import run_embedded
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.outcome import Status
 from tests.examples.jobs import history
 from tests.optimizer.formula import HERE, SINGLE, SPEC, TradeOff
@@ -36,22 +36,22 @@ SPEED = {"bias": [0.0] * 5, "exponent": [0.0, 0.0, 0.0, 0.0, 1.0]}
 """A preference for nothing else."""
 
 
-def service(store: SqlStore) -> JobService:
+def service(store: Store) -> JobService:
     return JobService(store)
 
 
-def run(store: SqlStore, job: Job) -> Job:
+def run(store: Store, job: Job) -> Job:
     done = run_embedded(store, TradeOff(), job.id)
     assert done.state is JobState.SUCCEEDED, done.error
     return done
 
 
-def parent(store: SqlStore, spec: JobSpec = SPEC, **given: Any) -> Job:
+def parent(store: Store, spec: JobSpec = SPEC, **given: Any) -> Job:
     asked = JobSpec.model_validate(spec.model_dump() | given)
     return run(store, service(store).submit(asked)[0])
 
 
-def fork(store: SqlStore, job: Job, iteration: int, **given: Any) -> Job:
+def fork(store: Store, job: Job, iteration: int, **given: Any) -> Job:
     request = ForkRequest.model_validate({"from_iteration": iteration, **given})
     return service(store).fork(job.id, request)[0]
 
@@ -61,7 +61,7 @@ def edit(database: Path, statement: str, *values: str) -> None:
         connection.execute(statement, values)
 
 
-def objectives(store: SqlStore, job: Job, iterations: int) -> list[bytes]:
+def objectives(store: Store, job: Job, iterations: int) -> list[bytes]:
     rows = store.evaluations_between(job.id, 0, iterations)
     return [row.design.tobytes() + row.objectives.tobytes() for row in rows]
 
@@ -70,7 +70,7 @@ def objectives(store: SqlStore, job: Job, iterations: int) -> list[bytes]:
 @pytest.mark.parametrize("method", ["pso", "hype", *REPLAYED])
 @pytest.mark.parametrize("iteration", [1, 3, 6])
 def test_a_fork_with_the_same_settings_continues_bit_for_bit_as_its_parent(
-    store: SqlStore, method: str, iteration: int
+    store: Store, method: str, iteration: int
 ) -> None:
     optimizer = {"name": method, "particles": PARTICLES}
     job = parent(store, optimizer=optimizer)
@@ -87,7 +87,7 @@ def test_a_fork_with_the_same_settings_continues_bit_for_bit_as_its_parent(
 
 
 @pytest.mark.parametrize("method", ["pso", "pso-ps"])
-def test_a_search_that_takes_too_long_to_restore_is_refused(store: SqlStore, method: str) -> None:
+def test_a_search_that_takes_too_long_to_restore_is_refused(store: Store, method: str) -> None:
     job = parent(store, optimizer={"name": method, "particles": PARTICLES})
     hasty = JobService(store, longest_fork=0.0)
     request = ForkRequest(from_iteration=3)
@@ -101,7 +101,7 @@ def test_a_search_that_takes_too_long_to_restore_is_refused(store: SqlStore, met
     assert hasty.fork(job.id, another)[0].lineage is not None
 
 
-def test_a_fork_begins_with_the_iterations_before_the_one_that_is_named(store: SqlStore) -> None:
+def test_a_fork_begins_with_the_iterations_before_the_one_that_is_named(store: Store) -> None:
     job = parent(store)
     forked = fork(store, job, 2)
     assert forked.state is JobState.QUEUED
@@ -119,7 +119,7 @@ def test_a_fork_begins_with_the_iterations_before_the_one_that_is_named(store: S
     assert best.fitness == forked.progress.best_fitness == listed[-1].best_so_far
 
 
-def test_lineage_says_what_was_taken_over(store: SqlStore) -> None:
+def test_lineage_says_what_was_taken_over(store: Store) -> None:
     job = parent(store)
     lineage = fork(store, job, 2).lineage
     assert lineage is not None
@@ -128,7 +128,7 @@ def test_lineage_says_what_was_taken_over(store: SqlStore) -> None:
     assert job.lineage is None
 
 
-def test_forks_are_found_by_their_parent(store: SqlStore) -> None:
+def test_forks_are_found_by_their_parent(store: Store) -> None:
     job = parent(store)
     forks = [fork(store, job, k) for k in (1, 2)]
     fork(store, run(store, forks[0]), 3)
@@ -138,7 +138,7 @@ def test_forks_are_found_by_their_parent(store: SqlStore) -> None:
     assert service(store).jobs(parent="\0").items == ()
 
 
-def test_a_fork_stays_when_its_parent_goes(store: SqlStore, database: Path) -> None:
+def test_a_fork_stays_when_its_parent_goes(store: Store, database: Path) -> None:
     job = parent(store)
     forked, whole = fork(store, job, 3), history(store, job.id)
     for table in ("reevaluations", "evaluations", "iterations"):
@@ -150,7 +150,7 @@ def test_a_fork_stays_when_its_parent_goes(store: SqlStore, database: Path) -> N
 
 
 def test_a_fork_whose_iterations_are_gone_when_it_is_stored_is_not_stored_at_all(
-    store: SqlStore,
+    store: Store,
 ) -> None:
     job = parent(store)
     lineage = Lineage(parent=job.id, from_iteration=7, carried="search")
@@ -160,7 +160,7 @@ def test_a_fork_whose_iterations_are_gone_when_it_is_stored_is_not_stored_at_all
     assert [found.id for found in store.jobs().items] == [job.id]
 
 
-def test_a_fork_of_a_fork_and_of_an_extended_job_go_on_as_the_first_would(store: SqlStore) -> None:
+def test_a_fork_of_a_fork_and_of_an_extended_job_go_on_as_the_first_would(store: Store) -> None:
     job = parent(store)
     store.extend(job.id, 9)
     job = run(store, job)
@@ -171,9 +171,7 @@ def test_a_fork_of_a_fork_and_of_an_extended_job_go_on_as_the_first_would(store:
 
 
 @pytest.mark.parametrize("method", ["pso", "random"])
-def test_another_preference_rejudges_the_history_and_the_search(
-    store: SqlStore, method: str
-) -> None:
+def test_another_preference_rejudges_the_history_and_the_search(store: Store, method: str) -> None:
     job = parent(store, optimizer={"name": method, "particles": PARTICLES})
     forked = fork(store, job, 4, preference=SPEED)
     assert forked.lineage is not None
@@ -191,7 +189,7 @@ def test_another_preference_rejudges_the_history_and_the_search(
 
 
 def test_a_rejudged_swarm_continues_from_its_place_towards_other_bests(
-    store: SqlStore,
+    store: Store,
 ) -> None:
     job = parent(store)
     forked = fork(store, job, 4, preference=SPEED)
@@ -211,7 +209,7 @@ def test_a_rejudged_swarm_continues_from_its_place_towards_other_bests(
 
 @pytest.mark.parametrize("method", ["de", "pso-ps"])
 def test_a_method_that_cannot_be_rejudged_starts_from_the_best_designs_by_the_preference(
-    store: SqlStore, method: str
+    store: Store, method: str
 ) -> None:
     job = parent(store, optimizer={"name": method, "particles": PARTICLES}, iterations=25)
     forked = fork(store, job, job.progress.iterations, preference=SPEED, start_count=3)
@@ -239,7 +237,7 @@ def test_a_method_that_cannot_be_rejudged_starts_from_the_best_designs_by_the_pr
     ids=["scenarios", "robot", "method", "settings", "both"],
 )
 def test_where_outcomes_or_search_do_not_hold_the_fork_starts_from_the_best_designs(
-    store: SqlStore, given: dict[str, Any], reason: str
+    store: Store, given: dict[str, Any], reason: str
 ) -> None:
     job = parent(store)
     forked = fork(store, job, 3, **given)
@@ -255,7 +253,7 @@ def test_where_outcomes_or_search_do_not_hold_the_fork_starts_from_the_best_desi
 
 
 def test_a_search_in_single_precision_is_forked_with_its_designs_in_double(
-    store: SqlStore,
+    store: Store,
 ) -> None:
     job = parent(store, SINGLE)
     same = run(store, fork(store, job, 3))
@@ -280,7 +278,7 @@ def test_a_search_in_single_precision_is_forked_with_its_designs_in_double(
     ],
 )
 def test_an_invalid_fork_is_refused_by_field_and_nothing_is_stored(
-    store: SqlStore, given: dict[str, Any], field: str
+    store: Store, given: dict[str, Any], field: str
 ) -> None:
     job = parent(store)
     with pytest.raises(InvalidRequest) as refused:
@@ -289,7 +287,7 @@ def test_an_invalid_fork_is_refused_by_field_and_nothing_is_stored(
     assert [found.id for found in store.jobs().items] == [job.id]
 
 
-def test_a_fork_of_other_code_is_refused_unless_that_is_accepted(store: SqlStore) -> None:
+def test_a_fork_of_other_code_is_refused_unless_that_is_accepted(store: Store) -> None:
     job = parent(store)
     other = JobService(store, provenance=lambda _: HERE)
     with pytest.raises(ProvenanceChanged, match="other code of search and judgement"):
@@ -299,14 +297,14 @@ def test_a_fork_of_other_code_is_refused_unless_that_is_accepted(store: SqlStore
     assert forked.provenance == job.provenance[:1]
 
 
-def test_a_job_of_failed_designs_has_nothing_to_start_from(store: SqlStore, database: Path) -> None:
+def test_a_job_of_failed_designs_has_nothing_to_start_from(store: Store, database: Path) -> None:
     job = parent(store)
     edit(database, "UPDATE evaluations SET fitness = NULL")
     with pytest.raises(Conflict, match="there is none to start from"):
         fork(store, job, 2, robot="szabadka2")
 
 
-def test_the_same_key_makes_one_fork(store: SqlStore) -> None:
+def test_the_same_key_makes_one_fork(store: Store) -> None:
     job = parent(store)
     request = ForkRequest(from_iteration=2)
     first, new = service(store).fork(job.id, request, idempotency_key="k")
@@ -314,7 +312,7 @@ def test_the_same_key_makes_one_fork(store: SqlStore) -> None:
     assert (new, repeated, again.id) == (True, False, first.id)
 
 
-def test_rates_count_what_the_fork_has_walked_itself(store: SqlStore) -> None:
+def test_rates_count_what_the_fork_has_walked_itself(store: Store) -> None:
     job = parent(store)
     forked = fork(store, job, 5)
     assert (forked.progress.compute_seconds, forked.progress.evaluations_walked) == (0.0, 0)

@@ -22,7 +22,7 @@ from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, judge
 from gaitswarm.services.optimizer.run.embedded import run_embedded
 from gaitswarm.services.optimizer.run.execution import RunContext, run_claim
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.store import Store
 from tests.calibration.conftest import spec as calibration
 from tests.examples.jobs import history
 from tests.optimizer.formula import HERE, SPEC, TradeOff

@@ -29,7 +29,7 @@ from gaitswarm.services.optimizer.run.coordinator import (
     handle,
 )
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
-from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.outcome import Outcome, Status
 from tests.optimizer.formula import HERE, SINGLE, SPEC, FormulaEvaluator, job, queue, walk
 from tests.optimizer.formula import run as run_job

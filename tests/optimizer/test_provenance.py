@@ -39,7 +39,7 @@ from gaitswarm.services.optimizer.run.coordinator import (
 from gaitswarm.services.optimizer.run.execution import OnCommit, RunContext, run_claim
 from gaitswarm.services.optimizer.search.registry import create_search
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.errors import RobotFileError
 from tests.optimizer.formula import HERE, SPEC, FormulaEvaluator, job
 

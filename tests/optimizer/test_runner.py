@@ -25,8 +25,7 @@ from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
 from gaitswarm.services.optimizer.run.execution import RunContext, run_claim
 from gaitswarm.services.optimizer.run.outage import Backoff
 from gaitswarm.services.optimizer.run.runner import Runner
-from gaitswarm.services.optimizer.store.port.base import Store
-from gaitswarm.services.optimizer.store.sql_store import open_store
+from gaitswarm.services.optimizer.store import Store, open_store
 from gaitswarm.sim.errors import KernelBuildError, SimulationInputError
 from gaitswarm.sim.outcome import Outcome
 from tests.examples.jobs import history

@@ -12,7 +12,7 @@ import pytest
 
 from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.services.optimizer.run.runner import STUCK_SECONDS, Runner
-from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.store import Store
 from tests.examples.jobs import history
 from tests.examples.processes import eventually
 from tests.optimizer.formula import SPEC, FormulaEvaluator, queue, run

@@ -13,7 +13,7 @@ from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.provenance import job_provenance
 from gaitswarm.services.optimizer.search.registry import METHODS, OPTIMIZERS
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.store import Store
 from tests.optimizer.formula import SPEC
 
 OPTIONAL = ("pymoo", "PyNomad", "scipy.stats", "sklearn")

@@ -14,7 +14,7 @@ from gaitswarm.services.optimizer.jobs.job import Job, JobState
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.run.embedded import run_embedded
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.specs import chosen_spec
 from gaitswarm.tables import encoded_table
 from tests.examples.jobs import history

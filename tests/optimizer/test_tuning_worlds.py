@@ -19,7 +19,7 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, log_utilities
 from gaitswarm.services.optimizer.run.evaluator import Evaluator
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.services.runtime import open_evaluator, run_embedded
 from gaitswarm.sim.worlds import PERTURBATIONS, WorldWalk, sample_worlds
 from tests.examples.jobs import history

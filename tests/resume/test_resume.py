@@ -19,7 +19,7 @@ from gaitswarm.services.optimizer.run.evaluator import Evaluator
 from gaitswarm.services.optimizer.run.runner import Runner
 from gaitswarm.services.optimizer.search.hype import HypeSettings
 from gaitswarm.services.optimizer.search.registry import METHODS
-from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.services.runtime import open_evaluator, open_store, run_embedded
 from tests.examples.forked import PROCESSES
 from tests.examples.jobs import history

@@ -15,7 +15,7 @@ from gaitswarm.cli.exit_codes import ExitCode
 from gaitswarm.jobs.open import open_jobs
 from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from tests.examples.forked import ForkedCommand
 from tests.examples.jobs import LONG_SPEC, SMALL_SPEC
 from tests.examples.processes import eventually, line_with
@@ -46,7 +46,7 @@ def runner(**settings: str) -> Iterator[ForkedCommand]:
 
 @pytest.mark.parametrize("ending", [signal.SIGTERM, signal.SIGINT])
 def test_runs_queued_jobs_and_returns_unfinished_ones(
-    store: SqlStore, database: Path, ending: signal.Signals
+    store: Store, database: Path, ending: signal.Signals
 ) -> None:
     short, _ = store.create_job(spec(2))
     endless, _ = store.create_job(spec(1_000_000))
@@ -58,15 +58,13 @@ def test_runs_queued_jobs_and_returns_unfinished_ones(
     assert store.job(endless.id).state is JobState.QUEUED
 
 
-def begun(store: SqlStore, job_id: str) -> int:
+def begun(store: Store, job_id: str) -> int:
     """Iterations that a job has committed, once it has committed any and asked for the next."""
     eventually(lambda: store.job(job_id).progress.iterations > 0)
     return store.job(job_id).progress.iterations
 
 
-def test_a_signal_lets_the_iteration_under_way_be_committed(
-    store: SqlStore, database: Path
-) -> None:
+def test_a_signal_lets_the_iteration_under_way_be_committed(store: Store, database: Path) -> None:
     job, _ = store.create_job(LONG)
     with runner(DB=str(database), CPUS="1") as started:
         before = begun(store, job.id)
@@ -83,7 +81,7 @@ def test_a_signal_lets_the_iteration_under_way_be_committed(
     assert claim.ask.iteration == before + 1
 
 
-def test_a_second_signal_drops_the_iteration_under_way(store: SqlStore, database: Path) -> None:
+def test_a_second_signal_drops_the_iteration_under_way(store: Store, database: Path) -> None:
     job, _ = store.create_job(LONG)
     with runner(DB=str(database), CPUS="1") as started:
         before = begun(store, job.id)

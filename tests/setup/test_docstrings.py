@@ -12,9 +12,12 @@ import pytest
 import gaitswarm
 import gaitswarm.plugins
 from gaitswarm.services.optimizer.run import evaluator
-from gaitswarm.services.optimizer.store.port import base, deletions, labelling, reading, running
+from gaitswarm.services.optimizer.store import Store
+from gaitswarm.services.optimizer.store.changes import Changes
+from gaitswarm.services.optimizer.store.outbox import Outbox
+from gaitswarm.services.optimizer.store.tokens import Tokens
 
-MODULES = (gaitswarm, gaitswarm.plugins, evaluator, base, deletions, labelling, reading, running)
+INTERFACES = (gaitswarm, gaitswarm.plugins, evaluator, Store, Changes, Outbox, Tokens)
 """The library, plug-in contracts, and the evaluator and store interfaces."""
 
 
@@ -27,10 +30,14 @@ def defined(module: Any) -> list[str]:
     ]
 
 
-def published(module: Any) -> Iterator[tuple[str, Any]]:
-    """Functions and public methods of the module's public classes, by qualified name."""
-    for name in getattr(module, "__all__", None) or defined(module):
-        value = getattr(module, name)
+def published(interface: Any) -> Iterator[tuple[str, Any]]:
+    """Functions and public methods of a class, or of a module's public classes, by name."""
+    if inspect.isclass(interface):
+        values: dict[str, Any] = {interface.__name__: interface}
+    else:
+        names = getattr(interface, "__all__", None) or defined(interface)
+        values = {name: getattr(interface, name) for name in names}
+    for name, value in values.items():
         if inspect.isclass(value) and value.__module__.startswith("gaitswarm"):
             for method_name, method in inspect.getmembers(value, inspect.isfunction):
                 ours = method.__module__.startswith("gaitswarm")
@@ -47,9 +54,9 @@ def undocumented(function: Any) -> list[str]:
     return [name for name in names if not re.search(rf"\n    \*{{0,2}}{name}: ", text)]
 
 
-@pytest.mark.parametrize("module", MODULES, ids=lambda module: module.__name__)
-def test_published_functions_document_their_arguments(module: Any) -> None:
-    functions = dict(published(module))
+@pytest.mark.parametrize("interface", INTERFACES, ids=lambda interface: interface.__name__)
+def test_published_functions_document_their_arguments(interface: Any) -> None:
+    functions = dict(published(interface))
     assert functions
     missing = {name: undocumented(function) for name, function in functions.items()}
     documented = {name.rpartition(".")[2] for name, arguments in missing.items() if not arguments}

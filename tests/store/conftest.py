@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 from sqlalchemy import text
 
-from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
-from gaitswarm.services.optimizer.store.rows.tables import metadata
-from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.store import Store, open_store
+from gaitswarm.services.optimizer.store.engine import Database
+from gaitswarm.services.optimizer.store.tables import metadata
 from tests.store.examples import Clock
 from tests.store.postgres_server import PostgresServer, postgres_server, server_binaries
 
@@ -41,10 +41,10 @@ def emptied_postgresql(postgresql_server: PostgresServer) -> Iterator[Callable[[
     """
     url = f"{postgresql_server.url}/postgres"
     open_store(url).close()
-    database = connect(parse_url(url))
+    database = Database(url)
 
     def emptied() -> str:
-        with database.transaction(write=True) as connection:
+        with database.write() as connection:
             for table in reversed(metadata.sorted_tables):
                 connection.execute(table.delete())
         return url
@@ -71,7 +71,7 @@ def fresh_url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
         yield f"sqlite:///{tmp_path / 'fresh.db'}"
         return
     server: str = request.getfixturevalue("postgresql_server").url
-    server_engine = connect(parse_url(f"{server}/postgres")).engine
+    server_engine = Database(f"{server}/postgres").engine
     outside = server_engine.execution_options(isolation_level="AUTOCOMMIT")
     with outside.connect() as connection:
         connection.execute(text("CREATE DATABASE fresh"))
@@ -87,7 +87,7 @@ def clock() -> Clock:
 
 
 @pytest.fixture
-def store(database_url: str, clock: Clock) -> Iterator[SqlStore]:
+def store(database_url: str, clock: Clock) -> Iterator[Store]:
     store = open_store(database_url, clock=clock)
     yield store
     store.close()

@@ -10,7 +10,7 @@ import numpy as np
 from gaitswarm.services.optimizer.jobs.iteration import Ask, CompletedIteration
 from gaitswarm.services.optimizer.jobs.job import Claim
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.outcome import Outcome, Status
 
 LEASE = 30.0
@@ -64,7 +64,7 @@ def completed(
     return CompletedIteration(iteration, designs, outcomes, np.array(fitness), seconds)
 
 
-def begun(store: SqlStore, notify_url: str | None = None, **options: object) -> Claim:
+def begun(store: Store, notify_url: str | None = None, **options: object) -> Claim:
     """A new job, claimed by `runner-a`, its first ask stored."""
     store.create_job(spec(**options), notify_url=notify_url)  # type: ignore[arg-type]
     claim = store.claim("runner-a", lease_seconds=LEASE)

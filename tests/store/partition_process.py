@@ -16,9 +16,8 @@ from threading import Thread
 from sqlalchemy import text
 
 from gaitswarm.services.optimizer.errors import LeaseLost, StoreUnavailable
-from gaitswarm.services.optimizer.store.connections import postgresql
-from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
-from gaitswarm.services.optimizer.store.sql_store import open_store
+from gaitswarm.services.optimizer.store import engine, open_store
+from gaitswarm.services.optimizer.store.engine import Database
 from tests.store.examples import ask, completed, spec
 from tests.store.postgres_server import postgres_binaries, postgres_server
 
@@ -33,7 +32,7 @@ def network(state: str) -> None:
 
 
 def main() -> None:
-    postgresql.SILENCE_SECONDS = SILENCE_SECONDS  # type: ignore[misc]
+    engine.SILENCE_SECONDS = SILENCE_SECONDS  # type: ignore[misc]
     network("up")
     binaries = postgres_binaries()
     assert binaries is not None
@@ -64,9 +63,9 @@ def main() -> None:
 
 def hold_the_job(url: str, seconds: dict[str, float]) -> None:
     """Be cut off in the midst of a transaction that has the job locked."""
-    database = connect(parse_url(url))
+    database = Database(url)
     try:
-        with database.transaction(write=True) as connection:
+        with database.write() as connection:
             connection.execute(text("SELECT id FROM jobs FOR UPDATE"))
             network("down")
             seconds["cut"] = time.monotonic()

@@ -12,19 +12,18 @@ from gaitswarm.services.optimizer.access import Scope
 from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, NotFound
 from gaitswarm.services.optimizer.jobs.audit import AuditAction
 from gaitswarm.services.optimizer.jobs.job import Command, JobState
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
-from gaitswarm.services.optimizer.store.transactions import deletion
+from gaitswarm.services.optimizer.store import Store, tokens
 from tests.store.examples import LEASE, Clock, ask, begun, completed, spec
 from tests.store.test_recordings import recording
 
 
-def noted(store: SqlStore, **only: Any) -> list[tuple[str, str, str | None, dict[str, Any]]]:
+def noted(store: Store, **only: Any) -> list[tuple[str, str, str | None, dict[str, Any]]]:
     """Entries, the oldest first."""
     entries = store.audit(**only).items[::-1]
     return [(e.actor, e.action.value, e.job_id, e.details) for e in entries]
 
 
-def test_what_is_done_to_a_job_is_noted_with_who_and_when(store: SqlStore, clock: Clock) -> None:
+def test_what_is_done_to_a_job_is_noted_with_who_and_when(store: Store, clock: Clock) -> None:
     job, _ = store.create_job(spec(), owner="ci")
     begun_at = clock.now
     clock.advance(5.0)
@@ -42,9 +41,7 @@ def test_what_is_done_to_a_job_is_noted_with_who_and_when(store: SqlStore, clock
     assert [e.at for e in store.audit().items[::-1]] == [begun_at] + [clock.now] * 4
 
 
-def test_deletions_are_noted_and_stay_so_when_the_job_is_gone(
-    store: SqlStore, clock: Clock
-) -> None:
+def test_deletions_are_noted_and_stay_so_when_the_job_is_gone(store: Store, clock: Clock) -> None:
     job, old = (store.create_job(spec())[0].id for _ in range(2))
     for one in (job, old):
         store.command(one, Command.CANCEL)
@@ -60,28 +57,26 @@ def test_deletions_are_noted_and_stay_so_when_the_job_is_gone(
     assert store.queue().jobs[JobState.CANCELLED] == 0
 
 
-def test_a_request_that_is_repeated_is_noted_once(store: SqlStore) -> None:
+def test_a_request_that_is_repeated_is_noted_once(store: Store) -> None:
     store.create_job(spec(), idempotency_key="k", owner="ci")
     store.create_job(spec(), idempotency_key="k", owner="ci")
     assert [entry[1] for entry in noted(store)] == ["submit"]
 
 
-def _cancelled_twice(store: SqlStore, job_id: str) -> None:
+def _cancelled_twice(store: Store, job_id: str) -> None:
     store.command(job_id, Command.CANCEL)
 
 
-def _extended_too_little(store: SqlStore, job_id: str) -> None:
+def _extended_too_little(store: Store, job_id: str) -> None:
     store.extend(job_id, 0)
 
 
-def _revoked_nothing(store: SqlStore, job_id: str) -> None:
+def _revoked_nothing(store: Store, job_id: str) -> None:
     store.tokens.revoke("unknown")
 
 
 @pytest.mark.parametrize("change", [_cancelled_twice, _extended_too_little, _revoked_nothing])
-def test_what_is_refused_is_not_noted(
-    store: SqlStore, change: Callable[[SqlStore, str], None]
-) -> None:
+def test_what_is_refused_is_not_noted(store: Store, change: Callable[[Store, str], None]) -> None:
     job, _ = store.create_job(spec())
     store.command(job.id, Command.CANCEL)
     before = noted(store)
@@ -90,7 +85,7 @@ def test_what_is_refused_is_not_noted(
     assert noted(store) == before
 
 
-def test_what_runners_do_is_not_noted(store: SqlStore) -> None:
+def test_what_runners_do_is_not_noted(store: Store) -> None:
     claim = begun(store)
     store.renew(claim, lease_seconds=LEASE)
     store.commit(claim, completed(0), ask(1))
@@ -98,7 +93,7 @@ def test_what_runners_do_is_not_noted(store: SqlStore) -> None:
     assert [entry[1] for entry in noted(store)] == ["submit"]
 
 
-def test_tokens_are_noted_by_name_and_scope_and_never_by_secret(store: SqlStore) -> None:
+def test_tokens_are_noted_by_name_and_scope_and_never_by_secret(store: Store) -> None:
     _, secret = store.tokens.create("ci", Scope.SUBMIT)
     store.tokens.revoke("ci")
     store.tokens.revoke("ci")
@@ -111,16 +106,16 @@ def test_tokens_are_noted_by_name_and_scope_and_never_by_secret(store: SqlStore)
         store.tokens.create("local", Scope.READ)
 
 
-def test_a_recording_is_noted_when_it_is_new(store: SqlStore) -> None:
+def test_a_recording_is_noted_when_it_is_new(store: Store) -> None:
     name = store.add_recording(recording(), actor="ci")
     store.add_recording(recording(), actor="ann")
     assert noted(store) == [("ci", "add_recording", None, {"recording": name})]
 
 
 def test_old_entries_are_removed_and_their_numbers_not_given_again(
-    store: SqlStore, clock: Clock, monkeypatch: pytest.MonkeyPatch
+    store: Store, clock: Clock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(deletion, "_PIECE", 2)
+    monkeypatch.setattr(tokens, "_AT_ONCE", 2)
     for _ in range(5):
         store.create_job(spec())
     clock.advance(60.0)
@@ -135,7 +130,7 @@ def test_old_entries_are_removed_and_their_numbers_not_given_again(
     assert store.audit().items[0].index == last.index + 1
 
 
-def test_the_log_is_read_by_pages_and_by_job(store: SqlStore) -> None:
+def test_the_log_is_read_by_pages_and_by_job(store: Store) -> None:
     jobs = [store.create_job(spec())[0].id for _ in range(3)]
     store.command(jobs[0], Command.CANCEL)
     first = store.audit(limit=3)

@@ -11,11 +11,10 @@ import pytest
 from sqlalchemy import select
 
 from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, NotFound, StoreUnavailable
-from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
-from gaitswarm.services.optimizer.store.rows.tables import metadata
-from gaitswarm.services.optimizer.store.schema.backup import backup, restore
-from gaitswarm.services.optimizer.store.schema.maintenance import check
-from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.store import Store, open_store
+from gaitswarm.services.optimizer.store.engine import Database
+from gaitswarm.services.optimizer.store.maintenance import backup, check, restore
+from gaitswarm.services.optimizer.store.tables import metadata
 from tests.store.examples import ask, begun, completed, spec
 
 Content = dict[str, list[tuple[Any, ...]]]
@@ -24,8 +23,8 @@ Content = dict[str, list[tuple[Any, ...]]]
 def content(url: str) -> Content:
     """All rows of all tables."""
     with (
-        closing(connect(parse_url(url))) as database,
-        database.transaction(write=False) as connection,
+        closing(Database(url)) as database,
+        database.read() as connection,
     ):
         return {
             table.name: sorted(map(tuple, connection.execute(select(table))), key=repr)
@@ -34,7 +33,7 @@ def content(url: str) -> Content:
 
 
 @pytest.fixture
-def filled(store: SqlStore, database_url: str) -> Content:
+def filled(store: Store, database_url: str) -> Content:
     """What a database holds with jobs in several states."""
     claim = begun(store)
     store.commit(claim, completed(0), ask(1))
@@ -64,7 +63,7 @@ def test_a_backup_is_restored_row_by_row_on_either_database(
 
 
 def test_a_backup_is_of_one_moment_while_a_job_runs(
-    store: SqlStore, database_url: str, tmp_path: Path
+    store: Store, database_url: str, tmp_path: Path
 ) -> None:
     claim = begun(store, iterations=200)
     begin, stop = threading.Event(), threading.Event()
@@ -91,7 +90,7 @@ def test_a_backup_is_of_one_moment_while_a_job_runs(
 
 
 def test_nothing_is_replaced_unless_that_is_asked_for(
-    filled: Content, store: SqlStore, database_url: str, tmp_path: Path
+    filled: Content, store: Store, database_url: str, tmp_path: Path
 ) -> None:
     file = tmp_path / "backup.db"
     backup(database_url, file)
@@ -110,8 +109,8 @@ def test_nothing_is_replaced_unless_that_is_asked_for(
 def give_up_leases(url: str) -> None:
     """As time does, after all processes have ended."""
     with (
-        closing(connect(parse_url(url))) as database,
-        database.transaction(write=True) as connection,
+        closing(Database(url)) as database,
+        database.write() as connection,
     ):
         connection.execute(metadata.tables["jobs"].update().values(lease_expires_at=None))
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gaitswarm.services.optimizer.jobs.iteration import Ask, CompletedIteration
 from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.outcome import Outcome
 from tests.store.examples import LEASE, spec
 
@@ -46,7 +46,7 @@ def column(values: list[float], *shape: int) -> NDArray[np.float64]:
     ),
 )
 def test_an_ask_comes_back_exactly(
-    store: SqlStore, positions: list[float], state: dict[str, float]
+    store: Store, positions: list[float], state: dict[str, float]
 ) -> None:
     job, _ = store.create_job(spec())
     claim = store.claim("a", lease_seconds=LEASE, job_id=job.id)
@@ -69,7 +69,7 @@ def test_an_ask_comes_back_exactly(
     fitness=st.one_of(st.floats(min_value=0.0, allow_nan=False), st.just(5e-324)),
 )
 def test_an_evaluation_comes_back_exactly(
-    store: SqlStore, design: list[float], objectives: list[float], fitness: float
+    store: Store, design: list[float], objectives: list[float], fitness: float
 ) -> None:
     job, _ = store.create_job(spec(particles=1))
     claim = store.claim("a", lease_seconds=LEASE, job_id=job.id)
@@ -94,7 +94,7 @@ def test_an_evaluation_comes_back_exactly(
 
 @many
 @given(low=finite.filter(lambda x: abs(x) < 1e300), seed=st.integers(0, 2**63 - 1))
-def test_a_spec_comes_back_exactly(store: SqlStore, low: float, seed: int) -> None:
+def test_a_spec_comes_back_exactly(store: Store, low: float, seed: int) -> None:
     asked = JobSpec.model_validate(
         {
             "controller": "pi",
@@ -111,9 +111,7 @@ def test_a_spec_comes_back_exactly(store: SqlStore, low: float, seed: int) -> No
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
-def test_an_ask_that_is_no_number_is_refused_rather_than_changed(
-    store: SqlStore, bad: float
-) -> None:
+def test_an_ask_that_is_no_number_is_refused_rather_than_changed(store: Store, bad: float) -> None:
     job, _ = store.create_job(spec())
     claim = store.claim("a", lease_seconds=LEASE, job_id=job.id)
     assert claim is not None

@@ -23,20 +23,20 @@ from gaitswarm.services.optimizer.jobs.fork import Fork, Lineage, TakenHistory
 from gaitswarm.services.optimizer.jobs.iteration import Reevaluation
 from gaitswarm.services.optimizer.jobs.job import Claim, Command, JobState
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
-from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
+from gaitswarm.services.optimizer.store.engine import Database
 from tests.store.examples import LEASE, ask, begun, completed, spec
 
 
-def checked(store: SqlStore, job_id: str, head: str | None = None) -> HistoryCheck:
+def checked(store: Store, job_id: str, head: str | None = None) -> HistoryCheck:
     return check_history(store, store.job(job_id), head=head)
 
 
-def digests(store: SqlStore, job_id: str) -> list[str | None]:
+def digests(store: Store, job_id: str) -> list[str | None]:
     return [iteration.digest for iteration in store.iterations(job_id).items]
 
 
-def finished(store: SqlStore) -> str:
+def finished(store: Store) -> str:
     """A job of three iterations, one design of which failed."""
     claim = begun(store)
     store.commit(claim, completed(0), ask(1))
@@ -56,7 +56,7 @@ def expected(documents: ChainDocuments) -> list[str]:
     return found
 
 
-def test_both_databases_store_the_digests_of_what_was_committed(store: SqlStore) -> None:
+def test_both_databases_store_the_digests_of_what_was_committed(store: Store) -> None:
     job_id = finished(store)
     documents = ChainDocuments(spec().resolved().model_dump(mode="json"), None, [])
     assert digests(store, job_id) == expected(documents)
@@ -67,14 +67,14 @@ def test_both_databases_store_the_digests_of_what_was_committed(store: SqlStore)
     )
 
 
-def test_the_same_job_has_the_same_digests_whatever_its_id(store: SqlStore) -> None:
+def test_the_same_job_has_the_same_digests_whatever_its_id(store: Store) -> None:
     assert digests(store, finished(store)) == digests(store, finished(store))
     claim = begun(store, name="another")
     store.commit(claim, completed(0), ask(1))
     assert digests(store, claim.job.id) != digests(store, finished(store))[:1]
 
 
-def test_a_job_under_way_is_checked_as_far_as_it_is(store: SqlStore) -> None:
+def test_a_job_under_way_is_checked_as_far_as_it_is(store: Store) -> None:
     claim = begun(store)
     assert checked(store, claim.job.id) == HistoryCheck(0, None, None)
     store.commit(claim, completed(0), ask(1))
@@ -82,7 +82,7 @@ def test_a_job_under_way_is_checked_as_far_as_it_is(store: SqlStore) -> None:
     assert (found.iterations, found.problem) == (1, "")
 
 
-def test_a_digest_that_was_noted_down_is_found_again(store: SqlStore) -> None:
+def test_a_digest_that_was_noted_down_is_found_again(store: Store) -> None:
     job_id = finished(store)
     noted = digests(store, job_id)
     assert [checked(store, job_id, head).head_found_at for head in noted] == [0, 1, 2]
@@ -147,8 +147,8 @@ TAMPERED: dict[str, tuple[str, int]] = {
 
 def execute(database_url: str, statement: str, **values: object) -> None:
     """values: of names after colons; a colon before a space is JSON's."""
-    database = connect(parse_url(database_url))
-    with database.transaction(write=True) as connection:
+    database = Database(database_url)
+    with database.write() as connection:
         connection.execute(text(statement.replace(": ", "\\: ")), values)
     database.close()
 
@@ -156,7 +156,7 @@ def execute(database_url: str, statement: str, **values: object) -> None:
 @pytest.mark.variants("sqlite-*", "postgresql-an objective")
 @pytest.mark.parametrize(("statement", "index"), TAMPERED.values(), ids=TAMPERED)
 def test_what_was_changed_is_found_and_its_iteration_named(
-    store: SqlStore, database_url: str, statement: str, index: int
+    store: Store, database_url: str, statement: str, index: int
 ) -> None:
     if "postgresql" in database_url and statement.count("'[0.25'"):
         pytest.skip("PostgreSQL stores no text that is no JSON")
@@ -169,7 +169,7 @@ def test_what_was_changed_is_found_and_its_iteration_named(
     assert found.iterations == index
 
 
-def test_an_iteration_that_was_removed_is_missing(store: SqlStore, database_url: str) -> None:
+def test_an_iteration_that_was_removed_is_missing(store: Store, database_url: str) -> None:
     for index in range(3):
         job_id = finished(store)
         of_it = {"job": job_id, "index": index}
@@ -183,7 +183,7 @@ def test_an_iteration_that_was_removed_is_missing(store: SqlStore, database_url:
 
 
 def test_an_end_that_was_cut_off_is_found_by_the_digest_that_was_noted_down(
-    store: SqlStore, database_url: str
+    store: Store, database_url: str
 ) -> None:
     job_id = finished(store)
     noted = store.job(job_id).progress.head
@@ -208,7 +208,7 @@ def test_an_end_that_was_cut_off_is_found_by_the_digest_that_was_noted_down(
     ],
 )
 def test_what_a_job_says_of_its_history_is_checked_too(
-    store: SqlStore, database_url: str, change: str, problem: str
+    store: Store, database_url: str, change: str, problem: str
 ) -> None:
     job_id = finished(store)
     execute(database_url, change)
@@ -217,7 +217,7 @@ def test_what_a_job_says_of_its_history_is_checked_too(
 
 
 def test_what_is_asked_but_not_yet_evaluated_is_checked_too(
-    store: SqlStore, database_url: str
+    store: Store, database_url: str
 ) -> None:
     claim = begun(store)
     store.commit(claim, completed(0), ask(1))
@@ -228,7 +228,7 @@ def test_what_is_asked_but_not_yet_evaluated_is_checked_too(
     assert found.broken_at == 1 and found.problem.startswith("the ask")
 
 
-def test_a_design_that_was_reevaluated_is_chained_too(store: SqlStore, database_url: str) -> None:
+def test_a_design_that_was_reevaluated_is_chained_too(store: Store, database_url: str) -> None:
     store.create_job(spec().model_copy(update={"precision": "single"}))
     claim = store.claim("runner", lease_seconds=LEASE)
     assert claim is not None
@@ -248,7 +248,7 @@ def other(provenance: JobProvenance) -> JobProvenance:
 
 
 def test_a_change_of_provenance_that_was_accepted_is_chained_from_there_on(
-    store: SqlStore,
+    store: Store,
 ) -> None:
     here = job_provenance(spec())
     store.create_job(spec(), provenance=here)
@@ -276,7 +276,7 @@ def test_a_change_of_provenance_that_was_accepted_is_chained_from_there_on(
 
 
 def test_records_of_provenance_stay_as_they_were_written_when_others_follow(
-    store: SqlStore, database_url: str
+    store: Store, database_url: str
 ) -> None:
     here = job_provenance(spec())
     job, _ = store.create_job(spec(), provenance=here)
@@ -295,7 +295,7 @@ def test_records_of_provenance_stay_as_they_were_written_when_others_follow(
     assert stored is not None and stored[0] == record and len(stored) == 2
 
 
-def test_an_extended_job_continues_with_its_chain(store: SqlStore) -> None:
+def test_an_extended_job_continues_with_its_chain(store: Store) -> None:
     job_id = finished(store)
     before = digests(store, job_id)
     store.extend(job_id, 4)
@@ -308,7 +308,7 @@ def test_an_extended_job_continues_with_its_chain(store: SqlStore) -> None:
     assert (found.iterations, found.problem, found.head_found_at) == (4, "", 2)
 
 
-def forked(store: SqlStore, parent: str, fitness: tuple[Any, ...] | None = None) -> Claim:
+def forked(store: Store, parent: str, fitness: tuple[Any, ...] | None = None) -> Claim:
     lineage = Lineage(parent=parent, from_iteration=2, carried="search")
     taken = TakenHistory({"schema_version": 1, "iteration": 1}, fitness, ())
     store.create_job(spec(), fork=Fork(lineage, taken))
@@ -319,7 +319,7 @@ def forked(store: SqlStore, parent: str, fitness: tuple[Any, ...] | None = None)
 
 @pytest.mark.parametrize("fitness", [None, (np.array([4.0, 5.0]), np.array([6.0, math.inf]))])
 def test_a_fork_chains_what_it_takes_over_under_its_own_lineage(
-    store: SqlStore, database_url: str, fitness: tuple[Any, ...] | None
+    store: Store, database_url: str, fitness: tuple[Any, ...] | None
 ) -> None:
     parent = finished(store)
     claim = forked(store, parent, fitness)

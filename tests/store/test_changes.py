@@ -11,8 +11,8 @@ import pytest
 from sqlalchemy import text
 
 from gaitswarm.services.optimizer.jobs.job import Command
-from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
-from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.store import Store, open_store
+from gaitswarm.services.optimizer.store.engine import Database
 from tests.examples.processes import eventually
 from tests.store.examples import LEASE, ask, begun, completed, spec
 from tests.store.postgres_server import postgres_server, server_binaries
@@ -22,7 +22,7 @@ NEVER = 3600.0
 
 
 @pytest.fixture
-def waiting(database_url: str) -> Iterator[SqlStore]:
+def waiting(database_url: str) -> Iterator[Store]:
     """A store of another process, as good as: it shares no connection with `store`."""
     with closing(open_store(database_url)) as store:
         yield store
@@ -38,13 +38,13 @@ def listening(url: str) -> list[int]:
     """Process ids of the server's connections that listen."""
     query = text("SELECT pid FROM pg_stat_activity WHERE query LIKE 'LISTEN%'")
     with (
-        closing(connect(parse_url(url))) as database,
-        database.transaction(write=False) as connection,
+        closing(Database(url)) as database,
+        database.read() as connection,
     ):
         return list(connection.execute(query).scalars())
 
 
-def settle(url: str, waiting: SqlStore, woken: threading.Event) -> None:
+def settle(url: str, waiting: Store, woken: threading.Event) -> None:
     """Wait until the watcher has polled once, which may wake without a change."""
     if url.startswith("postgresql"):
         eventually(lambda: len(listening(url)) == 1)
@@ -54,7 +54,7 @@ def settle(url: str, waiting: SqlStore, woken: threading.Event) -> None:
 
 
 def test_commits_and_commands_of_another_process_are_reported(
-    store: SqlStore, waiting: SqlStore, database_url: str, poll_seconds: float
+    store: Store, waiting: Store, database_url: str, poll_seconds: float
 ) -> None:
     claim = begun(store)
     woken = threading.Event()
@@ -68,7 +68,7 @@ def test_commits_and_commands_of_another_process_are_reported(
 
 
 def test_what_a_job_waits_for_is_reported_once(
-    store: SqlStore, waiting: SqlStore, database_url: str, poll_seconds: float
+    store: Store, waiting: Store, database_url: str, poll_seconds: float
 ) -> None:
     claim = begun(store)
     other, _ = store.create_job(spec())
@@ -89,7 +89,7 @@ def test_what_a_job_waits_for_is_reported_once(
 
 
 def test_neither_heartbeats_nor_other_jobs_are_reported(
-    store: SqlStore, waiting: SqlStore, database_url: str, poll_seconds: float
+    store: Store, waiting: Store, database_url: str, poll_seconds: float
 ) -> None:
     claim = begun(store)
     other, _ = store.create_job(spec())
@@ -106,7 +106,7 @@ def test_neither_heartbeats_nor_other_jobs_are_reported(
 
 
 def test_all_who_wait_in_a_process_share_a_thread_and_a_connection(
-    store: SqlStore, waiting: SqlStore, database_url: str, poll_seconds: float
+    store: Store, waiting: Store, database_url: str, poll_seconds: float
 ) -> None:
     jobs = [store.create_job(spec())[0] for _ in range(20)]
     woken = [threading.Event() for _ in jobs]
@@ -133,7 +133,7 @@ def test_all_who_wait_in_a_process_share_a_thread_and_a_connection(
 @pytest.mark.parametrize("database_url", ["postgresql"], indirect=True)
 @pytest.mark.slow
 def test_what_is_committed_while_the_listener_is_lost_is_reported_as_well(
-    store: SqlStore, waiting: SqlStore, database_url: str
+    store: Store, waiting: Store, database_url: str
 ) -> None:
     claim = begun(store)
     woken = threading.Event()
@@ -141,8 +141,8 @@ def test_what_is_committed_while_the_listener_is_lost_is_reported_as_well(
         settle(database_url, waiting, woken)
         (lost,) = listening(database_url)
         with (
-            closing(connect(parse_url(database_url))) as database,
-            database.transaction(write=True) as connection,
+            closing(Database(database_url)) as database,
+            database.write() as connection,
         ):
             connection.execute(text("SELECT pg_terminate_backend(:pid)"), {"pid": lost})
         store.commit(claim, completed(0), ask(1))
@@ -156,10 +156,10 @@ def test_what_is_committed_while_the_listener_is_lost_is_reported_as_well(
 @pytest.mark.parametrize("database_url", ["postgresql"], indirect=True)
 @pytest.mark.slow
 def test_without_a_listener_changes_are_polled_for(
-    store: SqlStore, waiting: SqlStore, monkeypatch: pytest.MonkeyPatch
+    store: Store, waiting: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        "gaitswarm.services.optimizer.store.connections.changes._CHANNEL", "no name of a channel"
+        "gaitswarm.services.optimizer.store.changes._CHANNEL", "no name of a channel"
     )
     claim = begun(store)
     woken = threading.Event()
@@ -187,7 +187,7 @@ def test_the_listener_is_back_after_a_crash_of_the_server() -> None:
 
 
 def test_a_listener_that_has_left_receives_nothing(
-    store: SqlStore, waiting: SqlStore, database_url: str, poll_seconds: float
+    store: Store, waiting: Store, database_url: str, poll_seconds: float
 ) -> None:
     claim = begun(store)
     left, stays = threading.Event(), threading.Event()
@@ -207,7 +207,7 @@ def test_a_thread_that_has_ended_is_reported_while_a_client_waits(
     with closing(open_store(database_url)) as store:
         assert store.changes.trouble() is None
         monkeypatch.setattr(
-            "gaitswarm.services.optimizer.store.connections.changes.select", lambda *_: sys.exit()
+            "gaitswarm.services.optimizer.store.changes.select", lambda *_: sys.exit()
         )
         with store.changes.watch("nosuchjob123", lambda: None, poll_seconds=0.01):
             eventually(lambda: store.changes.trouble() is not None)

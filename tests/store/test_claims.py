@@ -15,19 +15,19 @@ from gaitswarm.services.optimizer.jobs.job import (
     Command,
     JobState,
 )
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from tests.store.examples import LEASE, Clock, ask, begun, completed, spec
 
 DAY = 86400.0
 
 
-def taken(store: SqlStore, runner: str = "runner-b", job_id: str | None = None) -> Claim:
+def taken(store: Store, runner: str = "runner-b", job_id: str | None = None) -> Claim:
     claim = store.claim(runner, lease_seconds=LEASE, job_id=job_id)
     assert claim is not None
     return claim
 
 
-def test_the_oldest_waiting_job_is_claimed_first(store: SqlStore, clock: Clock) -> None:
+def test_the_oldest_waiting_job_is_claimed_first(store: Store, clock: Clock) -> None:
     made = []
     for _ in range(3):
         made.append(store.create_job(spec())[0].id)
@@ -36,7 +36,7 @@ def test_the_oldest_waiting_job_is_claimed_first(store: SqlStore, clock: Clock) 
     assert store.claim("runner-b", lease_seconds=LEASE) is None
 
 
-def test_a_claimed_job_is_running_since_its_first_claim(store: SqlStore, clock: Clock) -> None:
+def test_a_claimed_job_is_running_since_its_first_claim(store: Store, clock: Clock) -> None:
     job, _ = store.create_job(spec())
     clock.advance(1.0)
     first = taken(store)
@@ -48,7 +48,7 @@ def test_a_claimed_job_is_running_since_its_first_claim(store: SqlStore, clock: 
     assert taken(store).job.started_at == first.job.started_at
 
 
-def test_a_certain_job_can_be_claimed_before_its_turn(store: SqlStore, clock: Clock) -> None:
+def test_a_certain_job_can_be_claimed_before_its_turn(store: Store, clock: Clock) -> None:
     store.create_job(spec())
     clock.advance(1.0)
     wanted, _ = store.create_job(spec())
@@ -57,7 +57,7 @@ def test_a_certain_job_can_be_claimed_before_its_turn(store: SqlStore, clock: Cl
 
 
 def test_a_job_that_is_created_claimed_belongs_to_one_runner_while_its_lease_lives(
-    store: SqlStore, clock: Clock
+    store: Store, clock: Clock
 ) -> None:
     claim = store.create_claimed_job(spec(), "runner-a", lease_seconds=LEASE)
     assert store.job(claim.job.id) == claim.job
@@ -69,20 +69,20 @@ def test_a_job_that_is_created_claimed_belongs_to_one_runner_while_its_lease_liv
     assert taken(store).token > claim.token
 
 
-def test_a_job_that_is_created_claimed_is_run_with_its_claim(store: SqlStore) -> None:
+def test_a_job_that_is_created_claimed_is_run_with_its_claim(store: Store) -> None:
     claim = store.create_claimed_job(spec(iterations=1), "runner-a", lease_seconds=LEASE)
     store.begin(claim, ask(0))
     assert store.renew(claim, lease_seconds=LEASE).state is JobState.RUNNING
     assert store.commit(claim, completed(0), None) is JobState.SUCCEEDED
 
 
-def test_a_job_belongs_to_one_runner_while_its_lease_lives(store: SqlStore, clock: Clock) -> None:
+def test_a_job_belongs_to_one_runner_while_its_lease_lives(store: Store, clock: Clock) -> None:
     begun(store)
     clock.advance(LEASE - 0.001)
     assert store.claim("runner-b", lease_seconds=LEASE) is None
 
 
-def test_the_longest_lease_is_alive_until_its_end(store: SqlStore, clock: Clock) -> None:
+def test_the_longest_lease_is_alive_until_its_end(store: Store, clock: Clock) -> None:
     store.create_job(spec())
     assert store.claim("runner-a", lease_seconds=LONGEST_LEASE_SECONDS) is not None
     assert store.claim("runner-b", lease_seconds=LEASE) is None
@@ -93,7 +93,7 @@ def test_the_longest_lease_is_alive_until_its_end(store: SqlStore, clock: Clock)
 
 
 @pytest.fixture
-def killed_with_its_clock_ahead(store: SqlStore, clock: Clock) -> Claim:
+def killed_with_its_clock_ahead(store: Store, clock: Clock) -> Claim:
     """A claim by a runner whose clock was a day ahead, after which the clock was set right."""
     clock.advance(DAY)
     claim = begun(store)
@@ -102,7 +102,7 @@ def killed_with_its_clock_ahead(store: SqlStore, clock: Clock) -> Claim:
 
 
 def test_a_job_is_claimed_whose_runner_died_with_its_clock_ahead(
-    store: SqlStore, killed_with_its_clock_ahead: Claim
+    store: Store, killed_with_its_clock_ahead: Claim
 ) -> None:
     claim = taken(store, job_id=killed_with_its_clock_ahead.job.id)
     assert claim.taken_from == "runner-a" and claim.ask is not None
@@ -110,7 +110,7 @@ def test_a_job_is_claimed_whose_runner_died_with_its_clock_ahead(
 
 
 def test_a_job_is_paused_and_resumed_whose_runner_died_with_its_clock_ahead(
-    store: SqlStore, killed_with_its_clock_ahead: Claim
+    store: Store, killed_with_its_clock_ahead: Claim
 ) -> None:
     job_id = killed_with_its_clock_ahead.job.id
     assert store.command(job_id, Command.PAUSE).state is JobState.PAUSED
@@ -119,7 +119,7 @@ def test_a_job_is_paused_and_resumed_whose_runner_died_with_its_clock_ahead(
 
 @pytest.mark.parametrize("before", [JobState.RUNNING, JobState.PAUSING])
 def test_a_job_under_way_is_queued_by_resume_once_its_runner_died(
-    store: SqlStore, clock: Clock, before: JobState
+    store: Store, clock: Clock, before: JobState
 ) -> None:
     claim = begun(store)
     if before is JobState.PAUSING:
@@ -130,7 +130,7 @@ def test_a_job_under_way_is_queued_by_resume_once_its_runner_died(
 
 
 def test_resume_takes_a_job_from_a_runner_whose_clock_is_ahead(
-    store: SqlStore, killed_with_its_clock_ahead: Claim
+    store: Store, killed_with_its_clock_ahead: Claim
 ) -> None:
     resumed = store.command(killed_with_its_clock_ahead.job.id, Command.RESUME)
     assert resumed.state is JobState.QUEUED
@@ -138,7 +138,7 @@ def test_resume_takes_a_job_from_a_runner_whose_clock_is_ahead(
         store.renew(killed_with_its_clock_ahead, lease_seconds=LEASE)
 
 
-def test_a_heartbeat_prolongs_the_lease(store: SqlStore, clock: Clock) -> None:
+def test_a_heartbeat_prolongs_the_lease(store: Store, clock: Clock) -> None:
     claim = begun(store)
     clock.advance(LEASE - 1.0)
     assert store.renew(claim, lease_seconds=LEASE).state is JobState.RUNNING
@@ -147,7 +147,7 @@ def test_a_heartbeat_prolongs_the_lease(store: SqlStore, clock: Clock) -> None:
 
 
 def test_a_job_whose_lease_ran_out_continues_with_the_ask_that_was_stored(
-    store: SqlStore, clock: Clock
+    store: Store, clock: Clock
 ) -> None:
     first = begun(store)
     store.commit(first, completed(0), ask(1))
@@ -162,7 +162,7 @@ def test_a_job_whose_lease_ran_out_continues_with_the_ask_that_was_stored(
 
 @pytest.mark.parametrize("ended", [JobState.PAUSED, JobState.FAILED])
 def test_a_resumed_job_continues_with_the_ask_that_was_stored(
-    store: SqlStore, ended: JobState
+    store: Store, ended: JobState
 ) -> None:
     first = begun(store)
     store.release(first, ended)
@@ -173,7 +173,7 @@ def test_a_resumed_job_continues_with_the_ask_that_was_stored(
 
 
 def test_a_pausing_job_whose_runner_died_is_paused_and_not_claimed(
-    store: SqlStore, clock: Clock
+    store: Store, clock: Clock
 ) -> None:
     claim = begun(store)
     store.command(claim.job.id, Command.PAUSE)
@@ -184,28 +184,28 @@ def test_a_pausing_job_whose_runner_died_is_paused_and_not_claimed(
     assert store.job(claim.job.id).state is JobState.PAUSED
 
 
-Lose = Callable[[SqlStore, Clock, Claim], None]
+Lose = Callable[[Store, Clock, Claim], None]
 
 
-def overtaken(store: SqlStore, clock: Clock, claim: Claim) -> None:
+def overtaken(store: Store, clock: Clock, claim: Claim) -> None:
     clock.advance(LEASE)
     taken(store)
 
 
-def overtaken_by_itself(store: SqlStore, clock: Clock, claim: Claim) -> None:
+def overtaken_by_itself(store: Store, clock: Clock, claim: Claim) -> None:
     clock.advance(LEASE)
     taken(store, claim.runner)
 
 
-def cancelled(store: SqlStore, clock: Clock, claim: Claim) -> None:
+def cancelled(store: Store, clock: Clock, claim: Claim) -> None:
     store.command(claim.job.id, Command.CANCEL)
 
 
-def released(store: SqlStore, clock: Clock, claim: Claim) -> None:
+def released(store: Store, clock: Clock, claim: Claim) -> None:
     store.release(claim, JobState.QUEUED)
 
 
-def finished(store: SqlStore, clock: Clock, claim: Claim) -> None:
+def finished(store: Store, clock: Clock, claim: Claim) -> None:
     store.commit(claim, completed(0), None)
 
 
@@ -214,7 +214,7 @@ def finished(store: SqlStore, clock: Clock, claim: Claim) -> None:
     [overtaken, overtaken_by_itself, cancelled, released, finished],
     ids=lambda f: f.__name__,
 )
-def test_a_stale_claim_can_write_nothing(store: SqlStore, clock: Clock, lose: Lose) -> None:
+def test_a_stale_claim_can_write_nothing(store: Store, clock: Clock, lose: Lose) -> None:
     claim = begun(store)
     lose(store, clock, claim)
     before = store.job(claim.job.id), store.iterations(claim.job.id)
@@ -231,15 +231,13 @@ def test_a_stale_claim_can_write_nothing(store: SqlStore, clock: Clock, lose: Lo
     assert (store.job(claim.job.id), store.iterations(claim.job.id)) == before
 
 
-def test_a_lease_that_ran_out_but_was_not_taken_is_still_good(
-    store: SqlStore, clock: Clock
-) -> None:
+def test_a_lease_that_ran_out_but_was_not_taken_is_still_good(store: Store, clock: Clock) -> None:
     claim = begun(store)
     clock.advance(1000 * LEASE)
     assert store.commit(claim, completed(0), ask(1)) is JobState.RUNNING
 
 
-def crash(store: SqlStore, clock: Clock, times: int, runner: str = "") -> list[Claim]:
+def crash(store: Store, clock: Clock, times: int, runner: str = "") -> list[Claim]:
     """Runners that claim the job, and are not heard of any more."""
     claims = []
     for number in range(times):
@@ -249,7 +247,7 @@ def crash(store: SqlStore, clock: Clock, times: int, runner: str = "") -> list[C
 
 
 def test_a_job_that_takes_runner_after_runner_down_is_quarantined_and_others_run(
-    store: SqlStore, clock: Clock
+    store: Store, clock: Clock
 ) -> None:
     poison, _ = store.create_job(spec())
     clock.advance(1.0)
@@ -265,7 +263,7 @@ def test_a_job_that_takes_runner_after_runner_down_is_quarantined_and_others_run
 
 
 def test_a_quarantined_job_that_is_resumed_is_tried_as_often_again(
-    store: SqlStore, clock: Clock
+    store: Store, clock: Clock
 ) -> None:
     job, _ = store.create_job(spec())
     for _ in range(2):
@@ -277,7 +275,7 @@ def test_a_quarantined_job_that_is_resumed_is_tried_as_often_again(
 
 
 def test_a_job_that_commits_between_crashes_is_never_quarantined(
-    store: SqlStore, clock: Clock
+    store: Store, clock: Clock
 ) -> None:
     begun(store, iterations=100)
     for iteration in range(3):
@@ -289,7 +287,7 @@ def test_a_job_that_commits_between_crashes_is_never_quarantined(
 
 
 def test_claims_that_were_given_up_in_order_do_not_count_and_do_not_reset(
-    store: SqlStore, clock: Clock
+    store: Store, clock: Clock
 ) -> None:
     job, _ = store.create_job(spec())
     crash(store, clock, QUARANTINE_AFTER - 1)
@@ -302,14 +300,14 @@ def test_claims_that_were_given_up_in_order_do_not_count_and_do_not_reset(
 
 
 def test_a_runner_that_lives_may_take_up_its_own_job_as_often_as_its_machine_sleeps(
-    store: SqlStore, clock: Clock
+    store: Store, clock: Clock
 ) -> None:
     store.create_job(spec())
     crash(store, clock, 3 * QUARANTINE_AFTER, runner="laptop")
     assert taken(store, "laptop").job.state is JobState.RUNNING
 
 
-def test_how_many_crashes_it_takes_is_a_setting(store: SqlStore, clock: Clock) -> None:
+def test_how_many_crashes_it_takes_is_a_setting(store: Store, clock: Clock) -> None:
     job, _ = store.create_job(spec())
     crash(store, clock, 1)
     assert store.claim("runner-b", lease_seconds=LEASE, quarantine_after=1) is None
@@ -317,7 +315,7 @@ def test_how_many_crashes_it_takes_is_a_setting(store: SqlStore, clock: Clock) -
 
 
 def test_what_a_job_waits_for_is_reported_until_it_waits_no_longer(
-    store: SqlStore, clock: Clock
+    store: Store, clock: Clock
 ) -> None:
     claim = begun(store)
     before = claim.job.updated_at

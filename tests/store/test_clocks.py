@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from gaitswarm.services.optimizer.store.sql_store import open_store
+from gaitswarm.services.optimizer.store import open_store
 from tests.examples.processes import python
 from tests.store.examples import LEASE, spec
 

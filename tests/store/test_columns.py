@@ -16,7 +16,7 @@ from gaitswarm.services.optimizer.errors import Conflict, EvaluatorUnavailable, 
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
 from gaitswarm.services.optimizer.jobs.job import Claim, Job
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.outcome import Outcome, Status
 from tests.store.examples import LEASE, ask, begun, completed, spec
 from tests.store.test_bits import anything, column, finite, many
@@ -24,14 +24,14 @@ from tests.store.test_bits import anything, column, finite, many
 INF = math.inf
 
 
-def go_on(store: SqlStore, claim: Claim, *fitness: tuple[float, ...]) -> None:
+def go_on(store: Store, claim: Claim, *fitness: tuple[float, ...]) -> None:
     """Commit one more iteration for every swarm's fitness."""
     start = store.job(claim.job.id).progress.iterations
     for index, values in enumerate(fitness, start):
         store.commit(claim, completed(index, values), ask(index + 1))
 
 
-def assert_as_row_by_row(store: SqlStore, job_id: str, columns: EvaluationColumns) -> None:
+def assert_as_row_by_row(store: Store, job_id: str, columns: EvaluationColumns) -> None:
     rows = store.evaluations_between(job_id, 0, 1000)
     assert len(columns) == len(rows)
     assert columns.iteration.tolist() == [row.iteration for row in rows]
@@ -44,7 +44,7 @@ def assert_as_row_by_row(store: SqlStore, job_id: str, columns: EvaluationColumn
     assert columns.fitness.tolist() == [row.fitness for row in rows]
 
 
-def test_columns_hold_what_the_rows_hold(store: SqlStore) -> None:
+def test_columns_hold_what_the_rows_hold(store: Store) -> None:
     claim = begun(store)
     go_on(store, claim, (4.0, INF), (INF, INF), (2.0, 3.0))
     columns = store.evaluation_columns(claim.job.id, 0, 3)
@@ -54,7 +54,7 @@ def test_columns_hold_what_the_rows_hold(store: SqlStore) -> None:
     assert_as_row_by_row(store, claim.job.id, columns)
 
 
-def test_only_committed_iterations_have_columns(store: SqlStore) -> None:
+def test_only_committed_iterations_have_columns(store: Store) -> None:
     claim = begun(store)
     assert store.evaluation_columns(claim.job.id, 0, 10) is None
     go_on(store, claim, (4.0, 3.0), (2.0, 1.0))
@@ -70,7 +70,7 @@ def test_only_committed_iterations_have_columns(store: SqlStore) -> None:
     objectives=st.lists(anything, min_size=12, max_size=12),
 )
 def test_every_bit_of_a_number_comes_back(
-    store: SqlStore, designs: list[float], objectives: list[float]
+    store: Store, designs: list[float], objectives: list[float]
 ) -> None:
     job, _ = store.create_job(spec(particles=1))
     claim = store.claim("a", lease_seconds=LEASE, job_id=job.id)
@@ -88,7 +88,7 @@ def test_every_bit_of_a_number_comes_back(
     assert columns.objectives.tobytes() == column(expected, 1, 2, 6).tobytes()
 
 
-def test_the_cache_reads_on_where_it_stopped(store: SqlStore) -> None:
+def test_the_cache_reads_on_where_it_stopped(store: Store) -> None:
     claim = begun(store)
     cache = HistoryCache(store)
     job = store.job(claim.job.id)
@@ -105,19 +105,19 @@ def test_the_cache_reads_on_where_it_stopped(store: SqlStore) -> None:
         nothing = columns
 
 
-def test_what_was_read_is_not_read_again(store: SqlStore, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_was_read_is_not_read_again(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     claim = begun(store)
     go_on(store, claim, (4.0, 3.0), (2.0, 1.0))
     cache = HistoryCache(store)
     first = cache.columns(store.job(claim.job.id))
     asked: list[tuple[int, int]] = []
-    read = SqlStore.evaluation_columns
+    read = Store.evaluation_columns
 
-    def counted(self: SqlStore, job_id: str, first: int, last: int) -> EvaluationColumns | None:
+    def counted(self: Store, job_id: str, first: int, last: int) -> EvaluationColumns | None:
         asked.append((first, last))
         return read(self, job_id, first, last)
 
-    monkeypatch.setattr(SqlStore, "evaluation_columns", counted)
+    monkeypatch.setattr(Store, "evaluation_columns", counted)
     again = cache.columns(store.job(claim.job.id))
     assert asked == [] and np.shares_memory(again.objectives, first.objectives)
     go_on(store, claim, (5.0, 6.0))
@@ -125,7 +125,7 @@ def test_what_was_read_is_not_read_again(store: SqlStore, monkeypatch: pytest.Mo
     assert asked == [(2, 3)]
 
 
-def test_columns_cannot_be_written_to(store: SqlStore) -> None:
+def test_columns_cannot_be_written_to(store: Store) -> None:
     claim = begun(store)
     go_on(store, claim, (4.0, 3.0))
     columns = HistoryCache(store).columns(store.job(claim.job.id))
@@ -134,7 +134,7 @@ def test_columns_cannot_be_written_to(store: SqlStore) -> None:
 
 
 def test_the_job_asked_about_longest_ago_is_dropped_first(
-    store: SqlStore, monkeypatch: pytest.MonkeyPatch
+    store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     jobs = []
     for _ in range(3):
@@ -154,27 +154,27 @@ def test_the_job_asked_about_longest_ago_is_dropped_first(
     cache.columns(jobs[2])
     assert memory.nbytes <= 2 * size
     asked: list[str] = []
-    read = SqlStore.evaluation_columns
+    read = Store.evaluation_columns
 
-    def counted(self: SqlStore, job_id: str, *given: int) -> EvaluationColumns | None:
+    def counted(self: Store, job_id: str, *given: int) -> EvaluationColumns | None:
         asked.append(job_id)
         return read(self, job_id, *given)
 
-    monkeypatch.setattr(SqlStore, "evaluation_columns", counted)
+    monkeypatch.setattr(Store, "evaluation_columns", counted)
     assert np.shares_memory(cache.columns(jobs[0]).fitness, first.fitness)
     del first
     cache.columns(jobs[1])
     assert asked == [jobs[1].id]
 
 
-def test_a_job_that_is_too_large_is_refused_with_the_way_out(store: SqlStore) -> None:
+def test_a_job_that_is_too_large_is_refused_with_the_way_out(store: Store) -> None:
     claim = begun(store)
     go_on(store, claim, (4.0, 3.0))
     with pytest.raises(Conflict, match="export"):
         HistoryCache(store, memory=HistoryMemory(100)).columns(store.job(claim.job.id))
 
 
-def jobs_with_history(store: SqlStore, count: int) -> list[Job]:
+def jobs_with_history(store: Store, count: int) -> list[Job]:
     jobs = []
     for _ in range(count):
         claim = begun(store)
@@ -183,14 +183,14 @@ def jobs_with_history(store: SqlStore, count: int) -> list[Job]:
     return jobs
 
 
-def memory_of_one(store: SqlStore, job: Job) -> int:
+def memory_of_one(store: Store, job: Job) -> int:
     memory = HistoryMemory()
     cache = HistoryCache(store, memory=memory)
     cache.columns(job)
     return memory.nbytes
 
 
-def test_many_jobs_in_many_threads_and_caches_stay_within_one_bound(store: SqlStore) -> None:
+def test_many_jobs_in_many_threads_and_caches_stay_within_one_bound(store: Store) -> None:
     jobs = jobs_with_history(store, 12)
     bound = 3 * memory_of_one(store, jobs[0])
     memory = HistoryMemory(bound)
@@ -217,7 +217,7 @@ def test_many_jobs_in_many_threads_and_caches_stay_within_one_bound(store: SqlSt
     assert memory.nbytes == 0
 
 
-def test_columns_that_are_computed_with_count_until_they_are_let_go(store: SqlStore) -> None:
+def test_columns_that_are_computed_with_count_until_they_are_let_go(store: Store) -> None:
     first, second = jobs_with_history(store, 2)
     memory = HistoryMemory(memory_of_one(store, first), longest_wait=0.05)
     cache = HistoryCache(store, memory=memory)
@@ -230,7 +230,7 @@ def test_columns_that_are_computed_with_count_until_they_are_let_go(store: SqlSt
     assert fitness == [3.0]
 
 
-def test_memory_is_waited_for(store: SqlStore) -> None:
+def test_memory_is_waited_for(store: Store) -> None:
     first, second = jobs_with_history(store, 2)
     memory = HistoryMemory(memory_of_one(store, first), longest_wait=60.0)
     cache = HistoryCache(store, memory=memory)
@@ -239,7 +239,7 @@ def test_memory_is_waited_for(store: SqlStore) -> None:
     assert len(cache.columns(second)) == 20
 
 
-def test_a_history_that_grows_beyond_half_of_the_memory_is_read_again(store: SqlStore) -> None:
+def test_a_history_that_grows_beyond_half_of_the_memory_is_read_again(store: Store) -> None:
     claim = begun(store)
     go_on(store, claim, *[(4.0, 3.0)] * 6)
     job = store.job(claim.job.id)
@@ -251,7 +251,7 @@ def test_a_history_that_grows_beyond_half_of_the_memory_is_read_again(store: Sql
     assert_as_row_by_row(store, job.id, cache.columns(store.job(job.id)))
 
 
-def test_many_threads_read_the_same_history(store: SqlStore) -> None:
+def test_many_threads_read_the_same_history(store: Store) -> None:
     claim = begun(store)
     go_on(store, claim, *[(4.0, INF)] * 30)
     job = store.job(claim.job.id)

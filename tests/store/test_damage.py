@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 
 from gaitswarm.services.optimizer.errors import StoreUnavailable
-from gaitswarm.services.optimizer.store.connections import engine
-from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.store import Store, engine, open_store
 from tests.store.examples import begun, completed, spec
 
 
@@ -25,7 +24,7 @@ def file(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def opened(file: Path) -> Iterator[SqlStore]:
+def opened(file: Path) -> Iterator[Store]:
     """The same, in use: a job has been committed to since."""
     store = open_store(str(file))
     store.commit(begun(store, iterations=1), completed(0), None)
@@ -33,13 +32,13 @@ def opened(file: Path) -> Iterator[SqlStore]:
     store.close()
 
 
-def test_a_sound_database_is_verified(store: SqlStore) -> None:
+def test_a_sound_database_is_verified(store: Store) -> None:
     store.commit(begun(store, iterations=1), completed(0), None)
     store.verify()
 
 
 def test_a_file_overwritten_with_garbage_is_noticed_though_it_can_still_be_read(
-    opened: SqlStore, file: Path
+    opened: Store, file: Path
 ) -> None:
     with file.open("r+b") as raw:
         raw.write(os.urandom(file.stat().st_size))
@@ -48,7 +47,7 @@ def test_a_file_overwritten_with_garbage_is_noticed_though_it_can_still_be_read(
         opened.verify()
 
 
-def test_a_file_that_is_gone_is_noticed_and_not_recreated(opened: SqlStore, file: Path) -> None:
+def test_a_file_that_is_gone_is_noticed_and_not_recreated(opened: Store, file: Path) -> None:
     file.unlink()
     with pytest.raises(StoreUnavailable):
         opened.verify()
@@ -56,7 +55,7 @@ def test_a_file_that_is_gone_is_noticed_and_not_recreated(opened: SqlStore, file
 
 
 def test_a_check_that_takes_too_long_ends_without_a_verdict(
-    opened: SqlStore, monkeypatch: pytest.MonkeyPatch
+    opened: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for _ in range(40):
         opened.create_job(spec())

@@ -13,9 +13,9 @@ from gaitswarm.services.optimizer.errors import Conflict, LeaseLost, NotFound
 from gaitswarm.services.optimizer.jobs.fork import Fork, Lineage, TakenHistory
 from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
 from gaitswarm.services.optimizer.jobs.job import Command, Job, JobState
-from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
-from gaitswarm.services.optimizer.store.rows.tables import metadata
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
+from gaitswarm.services.optimizer.store.engine import Database
+from gaitswarm.services.optimizer.store.tables import metadata
 from tests.store.examples import LEASE, Clock, ask, begun, completed, spec
 
 KEYS = (b"\0" * 16, b"\xff" * 16)
@@ -24,8 +24,8 @@ TABLES = ("jobs", "iterations", "evaluations", "reevaluations", "notifications")
 
 def rows(database_url: str) -> dict[str, int]:
     """How many there are in every table that has rows of jobs."""
-    database = connect(parse_url(database_url))
-    with database.transaction(write=False) as connection:
+    database = Database(database_url)
+    with database.read() as connection:
         found = {
             table: connection.execute(
                 select(func.count()).select_from(metadata.tables[table])
@@ -36,7 +36,7 @@ def rows(database_url: str) -> dict[str, int]:
     return found
 
 
-def ended(store: SqlStore, done: CompletedIteration | None = None) -> Job:
+def ended(store: Store, done: CompletedIteration | None = None) -> Job:
     """A job that has succeeded, of one iteration."""
     claim = begun(store, notify_url="http://127.0.0.1:9/ended", iterations=1)
     store.commit(claim, done or completed(0), None)
@@ -51,7 +51,7 @@ def large(particles: int = 6000) -> CompletedIteration:
 @pytest.mark.variants("*-2")
 @pytest.mark.parametrize("particles", [2, 6000])
 def test_all_of_a_job_goes_and_nothing_of_another(
-    store: SqlStore, database_url: str, particles: int
+    store: Store, database_url: str, particles: int
 ) -> None:
     other = ended(store)
     before = rows(database_url)
@@ -64,7 +64,7 @@ def test_all_of_a_job_goes_and_nothing_of_another(
 
 
 def test_rows_of_a_long_job_go_by_pieces_that_can_be_gone_on_with(
-    store: SqlStore, database_url: str
+    store: Store, database_url: str
 ) -> None:
     claim = begun(store, iterations=3, particles=4000)
     for index in range(3):
@@ -88,7 +88,7 @@ def test_rows_of_a_long_job_go_by_pieces_that_can_be_gone_on_with(
     assert set(rows(database_url).values()) == {0}
 
 
-def test_a_deleted_job_is_not_found(store: SqlStore) -> None:
+def test_a_deleted_job_is_not_found(store: Store) -> None:
     job = ended(store, large())
     store.delete_job(job.id)
     for ask_for in (
@@ -107,9 +107,7 @@ def test_a_deleted_job_is_not_found(store: SqlStore) -> None:
 
 
 @pytest.mark.parametrize("state", ["queued", "running", "pausing"])
-def test_a_job_under_way_is_not_deleted_and_the_way_out_is_named(
-    store: SqlStore, state: str
-) -> None:
+def test_a_job_under_way_is_not_deleted_and_the_way_out_is_named(store: Store, state: str) -> None:
     if state == "queued":
         job, _ = store.create_job(spec())
     else:
@@ -121,16 +119,14 @@ def test_a_job_under_way_is_not_deleted_and_the_way_out_is_named(
     assert store.job(job.id).state == state
 
 
-def test_a_paused_job_is_deleted_with_its_outstanding_ask(
-    store: SqlStore, database_url: str
-) -> None:
+def test_a_paused_job_is_deleted_with_its_outstanding_ask(store: Store, database_url: str) -> None:
     claim = begun(store)
     store.release(claim, JobState.PAUSED)
     store.delete_job(claim.job.id)
     assert set(rows(database_url).values()) == {0}
 
 
-def test_an_idempotency_key_is_free_again(store: SqlStore) -> None:
+def test_an_idempotency_key_is_free_again(store: Store) -> None:
     job, _ = store.create_job(spec(), idempotency_key="mine")
     store.command(job.id, Command.CANCEL)
     store.delete_job(job.id)
@@ -138,7 +134,7 @@ def test_an_idempotency_key_is_free_again(store: SqlStore) -> None:
     assert new and again.id != job.id
 
 
-def test_designs_that_other_jobs_walked_stay_known(store: SqlStore) -> None:
+def test_designs_that_other_jobs_walked_stay_known(store: Store) -> None:
     gone = ended(store, replace(completed(0), keys=(KEYS[0], None)))
     ended(store, replace(completed(0), keys=(None, KEYS[1])))
     assert set(store.known(KEYS)) == set(KEYS)
@@ -147,7 +143,7 @@ def test_designs_that_other_jobs_walked_stay_known(store: SqlStore) -> None:
 
 
 def test_a_runner_that_still_holds_a_cancelled_job_learns_that_it_was_deleted(
-    store: SqlStore,
+    store: Store,
 ) -> None:
     claim = begun(store)
     store.command(claim.job.id, Command.CANCEL)
@@ -161,13 +157,13 @@ def test_a_runner_that_still_holds_a_cancelled_job_learns_that_it_was_deleted(
             write()
 
 
-def fork_of(store: SqlStore, parent: Job) -> Job:
+def fork_of(store: Store, parent: Job) -> Job:
     lineage = Lineage(parent=parent.id, from_iteration=1, carried="search", evaluations=2)
     taken = TakenHistory(state={}, fitness=None, provenance=(), accepts_changes=False)
     return store.create_job(spec(iterations=3), fork=Fork(lineage, taken))[0]
 
 
-def test_a_fork_outlives_its_parent_and_none_is_made_of_one_that_is_gone(store: SqlStore) -> None:
+def test_a_fork_outlives_its_parent_and_none_is_made_of_one_that_is_gone(store: Store) -> None:
     parent = ended(store)
     fork = fork_of(store, parent)
     store.delete_job(parent.id)
@@ -176,7 +172,7 @@ def test_a_fork_outlives_its_parent_and_none_is_made_of_one_that_is_gone(store: 
         fork_of(store, parent)
 
 
-def test_jobs_that_ended_long_ago_are_deleted_and_no_others(store: SqlStore, clock: Clock) -> None:
+def test_jobs_that_ended_long_ago_are_deleted_and_no_others(store: Store, clock: Clock) -> None:
     old = ended(store)
     claim = begun(store)
     store.renew(claim, lease_seconds=1000.0)
@@ -189,7 +185,7 @@ def test_jobs_that_ended_long_ago_are_deleted_and_no_others(store: SqlStore, clo
 
 
 def test_old_jobs_that_are_kept_or_whose_forks_have_not_ended_stay(
-    store: SqlStore, clock: Clock
+    store: Store, clock: Clock
 ) -> None:
     kept, parent = ended(store), ended(store)
     assert store.keep(kept.id, kept=True).kept
@@ -205,7 +201,7 @@ def test_old_jobs_that_are_kept_or_whose_forks_have_not_ended_stay(
 
 
 def test_only_jobs_that_ended_in_the_states_asked_for_are_deleted(
-    store: SqlStore, clock: Clock
+    store: Store, clock: Clock
 ) -> None:
     succeeded = ended(store)
     cancelled, _ = store.create_job(spec())
@@ -216,9 +212,7 @@ def test_only_jobs_that_ended_in_the_states_asked_for_are_deleted(
     assert store.job(succeeded.id).state is JobState.SUCCEEDED
 
 
-def test_two_processes_that_remove_the_same_job_do_no_harm(
-    store: SqlStore, database_url: str
-) -> None:
+def test_two_processes_that_remove_the_same_job_do_no_harm(store: Store, database_url: str) -> None:
     claim = begun(store, iterations=3, particles=4000)
     for index in range(3):
         following = None if index == 2 else ask(index + 1, particles=4000)

@@ -12,7 +12,7 @@ from gaitswarm.services.optimizer.errors import BudgetChanged, Conflict, Invalid
 from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.search.registry import OPTIMIZERS
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from tests.certificate.examples import small
 from tests.store.examples import LEASE, Clock, ask, begun, completed, spec
 from tests.store.test_job_states import in_state
@@ -20,7 +20,7 @@ from tests.store.test_job_states import in_state
 
 @pytest.mark.parametrize("state", [s for s in JobState if s is not JobState.CANCELLED])
 def test_the_store_keeps_the_budget_and_the_state_that_follows(
-    store: SqlStore, state: JobState
+    store: Store, state: JobState
 ) -> None:
     job_id = in_state(store, state)
     before = store.job(job_id)
@@ -31,7 +31,7 @@ def test_the_store_keeps_the_budget_and_the_state_that_follows(
     assert after.progress == before.progress
 
 
-def test_a_refused_extension_changes_nothing(store: SqlStore) -> None:
+def test_a_refused_extension_changes_nothing(store: Store) -> None:
     cancelled, succeeded = (in_state(store, s) for s in (JobState.CANCELLED, JobState.SUCCEEDED))
     before = store.job(cancelled), store.job(succeeded)
     with pytest.raises(Conflict):
@@ -52,7 +52,7 @@ def test_a_refused_extension_changes_nothing(store: SqlStore) -> None:
     ids=["certificate", "replayed"],
 )
 def test_no_job_gets_a_budget_that_it_could_not_be_submitted_with(
-    store: SqlStore, asked: Spec, iterations: int, words: str
+    store: Store, asked: Spec, iterations: int, words: str
 ) -> None:
     job, _ = store.create_job(asked)
     with pytest.raises(InvalidRequest, match=words) as refused:
@@ -62,7 +62,7 @@ def test_no_job_gets_a_budget_that_it_could_not_be_submitted_with(
 
 
 def test_a_runner_under_an_older_budget_learns_it_before_anything_is_stored(
-    store: SqlStore,
+    store: Store,
 ) -> None:
     claim = begun(store)
     store.extend(claim.job.id, 40)
@@ -71,7 +71,7 @@ def test_a_runner_under_an_older_budget_learns_it_before_anything_is_stored(
     assert store.job(claim.job.id).progress.iterations == 0
 
 
-def test_a_runner_that_begins_under_an_older_budget_learns_it_too(store: SqlStore) -> None:
+def test_a_runner_that_begins_under_an_older_budget_learns_it_too(store: Store) -> None:
     store.create_job(spec())
     claim = store.claim("runner-a", lease_seconds=LEASE)
     assert claim is not None
@@ -87,7 +87,7 @@ def test_a_runner_that_begins_under_an_older_budget_learns_it_too(store: SqlStor
 
 
 def test_who_claims_an_extended_job_gets_the_last_ask_with_its_evaluations(
-    store: SqlStore, clock: Clock
+    store: Store, clock: Clock
 ) -> None:
     claim = begun(store)
     store.commit(claim, completed(0, (4.0, math.inf)), None)
@@ -100,7 +100,7 @@ def test_who_claims_an_extended_job_gets_the_last_ask_with_its_evaluations(
     assert again.answered.columns.fitness.tolist() == [4.0, math.inf]
 
 
-def test_the_same_key_still_means_the_job_as_it_was_submitted(store: SqlStore) -> None:
+def test_the_same_key_still_means_the_job_as_it_was_submitted(store: Store) -> None:
     job, _ = store.create_job(spec(), idempotency_key="k1")
     store.extend(job.id, 40)
     again, new = store.create_job(spec(), idempotency_key="k1")

@@ -7,9 +7,8 @@ from pathlib import Path, PurePosixPath
 import pytest
 
 from gaitswarm.services.optimizer.errors import StoreUnavailable
-from gaitswarm.services.optimizer.store.connections import file_system
-from gaitswarm.services.optimizer.store.connections.file_system import mount_of
-from gaitswarm.services.optimizer.store.sql_store import open_store
+from gaitswarm.services.optimizer.store import engine, open_store
+from gaitswarm.services.optimizer.store.engine import is_network, mount_of
 
 MOUNTS = r"""22 27 0:21 / /proc rw,relatime - proc proc rw
 27 1 254:0 / / rw,relatime - ext4 /dev/vda rw,discard
@@ -40,13 +39,13 @@ MOUNTS = r"""22 27 0:21 / /proc rw,relatime - proc proc rw
 )
 def test_the_innermost_and_latest_mount_decides(path: str, kind: str, refused: bool) -> None:
     mount = mount_of(PurePosixPath(path), MOUNTS)
-    assert mount is not None
-    assert (mount.kind, mount.of_a_network) == (kind, refused)
+    assert mount[1] == kind
+    assert is_network(*mount) == refused
 
 
 def test_the_root_of_a_sandbox_is_local() -> None:
     mount = mount_of(PurePosixPath("/jobs.db"), "20 1 0:9 / / rw - 9p none rw,trans=fd\n")
-    assert mount is not None and not mount.of_a_network
+    assert mount == (PurePosixPath("/"), "9p") and not is_network(*mount)
 
 
 def test_a_refused_file_is_not_made_and_the_message_names_the_way_out(
@@ -54,7 +53,7 @@ def test_a_refused_file_is_not_made_and_the_message_names_the_way_out(
 ) -> None:
     mounts = tmp_path / "mountinfo"
     mounts.write_text(f"1 0 0:1 / {tmp_path.resolve()} rw - nfs4 server:/export rw\n")
-    monkeypatch.setattr(file_system, "MOUNTS", mounts)
+    monkeypatch.setattr(engine, "MOUNTS", mounts)
     (tmp_path / "link").symlink_to(tmp_path)
     path = tmp_path / "link" / "jobs.db"
     with pytest.raises(StoreUnavailable, match=r"nfs4.*local disk.*postgresql://"):
@@ -65,5 +64,5 @@ def test_a_refused_file_is_not_made_and_the_message_names_the_way_out(
 def test_where_mounts_are_not_listed_nothing_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(file_system, "MOUNTS", tmp_path / "none")
+    monkeypatch.setattr(engine, "MOUNTS", tmp_path / "none")
     open_store(str(tmp_path / "jobs.db")).close()

@@ -12,16 +12,16 @@ from sqlalchemy import select
 from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, LeaseLost, NotFound
 from gaitswarm.services.optimizer.jobs.job import Claim, Command, JobState
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
-from gaitswarm.services.optimizer.store.rows.tables import iterations
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
+from gaitswarm.services.optimizer.store.engine import Database
+from gaitswarm.services.optimizer.store.tables import iterations
 from gaitswarm.sim.outcome import Status
 from tests.store.examples import Clock, ask, begun, completed
 
 INF = math.inf
 
 
-def run(store: SqlStore, *fitness: tuple[float, ...]) -> Claim:
+def run(store: Store, *fitness: tuple[float, ...]) -> Claim:
     """A job with one committed iteration for every swarm's fitness, and one more asked."""
     claim = begun(store)
     for index, values in enumerate(fitness):
@@ -29,7 +29,7 @@ def run(store: SqlStore, *fitness: tuple[float, ...]) -> Claim:
     return claim
 
 
-def test_an_asked_iteration_is_no_history_until_it_is_committed(store: SqlStore) -> None:
+def test_an_asked_iteration_is_no_history_until_it_is_committed(store: Store) -> None:
     job_id = begun(store).job.id
     assert store.iterations(job_id).items == ()
     assert store.best(job_id) is None
@@ -37,7 +37,7 @@ def test_an_asked_iteration_is_no_history_until_it_is_committed(store: SqlStore)
         store.evaluations(job_id, 0)
 
 
-def test_every_particle_is_kept_with_its_raw_objectives(store: SqlStore) -> None:
+def test_every_particle_is_kept_with_its_raw_objectives(store: Store) -> None:
     job_id = run(store, (4.0, INF)).job.id
     done = completed(0, (4.0, INF))
     found = store.evaluations(job_id, 0)
@@ -53,7 +53,7 @@ def test_every_particle_is_kept_with_its_raw_objectives(store: SqlStore) -> None
     assert found[1].statuses.dtype == np.uint8
 
 
-def test_an_iteration_is_summed_up_over_its_finite_fitnesses(store: SqlStore, clock: Clock) -> None:
+def test_an_iteration_is_summed_up_over_its_finite_fitnesses(store: Store, clock: Clock) -> None:
     job_id = run(store, (5.0, INF, 2.0, 3.5)).job.id
     (iteration,) = store.iterations(job_id).items
     assert (iteration.best, iteration.mean, iteration.median, iteration.worst) == (2, 3.5, 3.5, 5)
@@ -61,7 +61,7 @@ def test_an_iteration_is_summed_up_over_its_finite_fitnesses(store: SqlStore, cl
     assert iteration.committed_at == clock.now
 
 
-def test_a_swarm_that_failed_wholly_has_no_best(store: SqlStore) -> None:
+def test_a_swarm_that_failed_wholly_has_no_best(store: Store) -> None:
     job_id = run(store, (INF, INF)).job.id
     (iteration,) = store.iterations(job_id).items
     assert iteration.best is iteration.mean is iteration.worst is iteration.best_so_far is None
@@ -69,26 +69,26 @@ def test_a_swarm_that_failed_wholly_has_no_best(store: SqlStore) -> None:
     assert store.best(job_id) is None
 
 
-def test_the_best_so_far_never_rises(store: SqlStore) -> None:
+def test_the_best_so_far_never_rises(store: Store) -> None:
     job_id = run(store, (INF, INF), (4.0, 6.0), (5.0, 7.0), (3.0, 9.0)).job.id
     found = [iteration.best_so_far for iteration in store.iterations(job_id).items]
     assert found == [None, 4.0, 4.0, 3.0]
 
 
-def test_of_equal_designs_the_earliest_is_the_best(store: SqlStore) -> None:
+def test_of_equal_designs_the_earliest_is_the_best(store: Store) -> None:
     job_id = run(store, (4.0, 3.0, 3.0), (3.0, 3.0, 3.0)).job.id
     best = store.best(job_id)
     assert best is not None and (best.iteration, best.particle, best.fitness) == (0, 1, 3.0)
 
 
-def test_progress_counts_what_is_committed(store: SqlStore) -> None:
+def test_progress_counts_what_is_committed(store: Store) -> None:
     progress = store.job(run(store, (4.0, 3.0), (2.0, INF)).job.id).progress
     assert (progress.iterations, progress.evaluations, progress.compute_seconds) == (2, 4, 1.0)
     assert progress.recent_seconds == 0.25
     assert (progress.best_fitness, progress.best_iteration, progress.best_particle) == (2.0, 1, 0)
 
 
-def test_a_repeated_commit_changes_nothing(store: SqlStore) -> None:
+def test_a_repeated_commit_changes_nothing(store: Store) -> None:
     claim = run(store, (4.0, 3.0))
     before = store.job(claim.job.id), store.iterations(claim.job.id)
     assert store.commit(claim, completed(0, (1.0, 1.0)), ask(1)) is JobState.RUNNING
@@ -98,7 +98,7 @@ def test_a_repeated_commit_changes_nothing(store: SqlStore) -> None:
 
 @pytest.mark.parametrize("command", [None, Command.PAUSE])
 def test_a_repeated_commit_that_ended_or_paused_the_job_changes_nothing(
-    store: SqlStore, command: Command | None
+    store: Store, command: Command | None
 ) -> None:
     claim = begun(store, iterations=2)
     if command is not None:
@@ -110,7 +110,7 @@ def test_a_repeated_commit_that_ended_or_paused_the_job_changes_nothing(
     assert store.job(claim.job.id) == before
 
 
-def test_a_commit_is_not_taken_for_a_repeated_one_after_another_claim(store: SqlStore) -> None:
+def test_a_commit_is_not_taken_for_a_repeated_one_after_another_claim(store: Store) -> None:
     claim = run(store, (4.0, 3.0))
     store.release(claim, JobState.QUEUED)
     assert store.claim("another", lease_seconds=60.0) is not None
@@ -118,7 +118,7 @@ def test_a_commit_is_not_taken_for_a_repeated_one_after_another_claim(store: Sql
         store.commit(claim, completed(0), ask(1))
 
 
-def test_a_repeated_begin_keeps_the_ask_that_is_there(store: SqlStore) -> None:
+def test_a_repeated_begin_keeps_the_ask_that_is_there(store: Store) -> None:
     claim = begun(store)
     store.begin(claim, ask(0, particles=7))
     store.release(claim, JobState.QUEUED)
@@ -127,7 +127,7 @@ def test_a_repeated_begin_keeps_the_ask_that_is_there(store: SqlStore) -> None:
     np.testing.assert_array_equal(again.ask.positions, ask(0).positions)
 
 
-def test_an_iteration_that_was_not_asked_cannot_be_committed(store: SqlStore) -> None:
+def test_an_iteration_that_was_not_asked_cannot_be_committed(store: Store) -> None:
     claim = run(store, (4.0, 3.0))
     before = store.job(claim.job.id)
     with pytest.raises(Conflict, match="its next is 1"):
@@ -138,7 +138,7 @@ def test_an_iteration_that_was_not_asked_cannot_be_committed(store: SqlStore) ->
 
 
 def test_the_next_ask_and_the_iteration_are_stored_together_or_not_at_all(
-    store: SqlStore,
+    store: Store,
 ) -> None:
     claim = begun(store)
     following = ask(1)
@@ -150,7 +150,7 @@ def test_the_next_ask_and_the_iteration_are_stored_together_or_not_at_all(
     assert store.job(claim.job.id).progress.iterations == 0
 
 
-def test_iterations_are_paged_by_index(store: SqlStore) -> None:
+def test_iterations_are_paged_by_index(store: Store) -> None:
     job_id = run(store, *[(1.0, 2.0)] * 5).job.id
     first = store.iterations(job_id, limit=2)
     second = store.iterations(job_id, after=int(first.next or 0), limit=2)
@@ -162,25 +162,25 @@ def test_iterations_are_paged_by_index(store: SqlStore) -> None:
 
 
 @pytest.mark.parametrize("index", [-(2**70), -1, 1, 2**31, 2**70])
-def test_an_index_beyond_any_iteration_finds_nothing(store: SqlStore, index: int) -> None:
+def test_an_index_beyond_any_iteration_finds_nothing(store: Store, index: int) -> None:
     job_id = run(store, (1.0, 2.0)).job.id
     with pytest.raises(NotFound):
         store.evaluations(job_id, index)
     assert len(store.iterations(job_id, after=index).items) == (1 if index < 0 else 0)
 
 
-def test_a_page_of_no_iterations_is_refused(store: SqlStore) -> None:
+def test_a_page_of_no_iterations_is_refused(store: Store) -> None:
     with pytest.raises(InvalidRequest, match="limit"):
         store.iterations(begun(store).job.id, limit=0)
 
 
-def test_evaluations_of_several_iterations_come_in_order(store: SqlStore) -> None:
+def test_evaluations_of_several_iterations_come_in_order(store: Store) -> None:
     job_id = run(store, *[(1.0, 2.0)] * 4).job.id
     found = store.evaluations_between(job_id, 1, 3)
     assert [(e.iteration, e.particle) for e in found] == [(1, 0), (1, 1), (2, 0), (2, 1)]
 
 
-def test_the_whole_history_is_read_piece_by_piece(store: SqlStore) -> None:
+def test_the_whole_history_is_read_piece_by_piece(store: Store) -> None:
     claim = run(store, *[(1.0, 2.0)] * 20)
     history = JobService(store).history(claim.job.id)
     head = next(history)
@@ -192,18 +192,18 @@ def test_the_whole_history_is_read_piece_by_piece(store: SqlStore) -> None:
     assert all(e.iteration == iteration.index for iteration, found in rest for e in found)
 
 
-def test_history_after_an_iteration_leaves_out_the_earlier_ones(store: SqlStore) -> None:
+def test_history_after_an_iteration_leaves_out_the_earlier_ones(store: Store) -> None:
     job_id = run(store, *[(1.0, 2.0)] * 4).job.id
     assert [i.index for i, _ in JobService(store).history(job_id, after=1)] == [2, 3]
 
 
 def test_states_are_kept_of_the_last_commit_and_the_next_ask_alone(
-    store: SqlStore, database_url: str
+    store: Store, database_url: str
 ) -> None:
     job_id = run(store, (4.0, 1.0), (3.0, 1.0), (2.0, 1.0)).job.id
     with (
-        closing(connect(parse_url(database_url))) as database,
-        database.transaction(write=False) as reading,
+        closing(Database(database_url)) as database,
+        database.read() as reading,
     ):
         query = select(iterations.c.optimizer_state).where(iterations.c.job_id == job_id)
         kept = reading.execute(query.order_by(iterations.c.iteration)).scalars().all()

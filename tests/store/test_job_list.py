@@ -9,7 +9,7 @@ import pytest
 from gaitswarm.services.optimizer.errors import IdempotencyConflict, InvalidRequest, NotFound
 from gaitswarm.services.optimizer.jobs.job import Command, Job, JobOrder, JobState
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from tests.store.examples import LEASE, Clock, ask, completed, spec
 
 
@@ -18,9 +18,7 @@ def certificate(name: str) -> CertificateSpec:
     return CertificateSpec(kind="certificate", name=name, design=design, controller="pi")
 
 
-def test_a_new_job_is_queued_and_reads_back_as_it_was_returned(
-    store: SqlStore, clock: Clock
-) -> None:
+def test_a_new_job_is_queued_and_reads_back_as_it_was_returned(store: Store, clock: Clock) -> None:
     job, new = store.create_job(spec(name="größer, and 'quoted'"))
     assert new
     assert job.state is JobState.QUEUED
@@ -30,13 +28,13 @@ def test_a_new_job_is_queued_and_reads_back_as_it_was_returned(
     assert store.job(job.id) == job
 
 
-def test_times_come_back_in_utc_to_the_microsecond(store: SqlStore, clock: Clock) -> None:
+def test_times_come_back_in_utc_to_the_microsecond(store: Store, clock: Clock) -> None:
     job, _ = store.create_job(spec())
     assert store.job(job.id).created_at.tzinfo is UTC
     assert store.job(job.id).created_at.microsecond == clock.now.microsecond == 678901
 
 
-def test_the_same_key_and_spec_give_the_same_job(store: SqlStore) -> None:
+def test_the_same_key_and_spec_give_the_same_job(store: Store) -> None:
     first, _ = store.create_job(spec(), idempotency_key="k1")
     # Presets by name and presets written out are the same request.
     again, new = store.create_job(spec().resolved(), idempotency_key="k1")
@@ -45,26 +43,26 @@ def test_the_same_key_and_spec_give_the_same_job(store: SqlStore) -> None:
     assert len(store.jobs().items) == 1
 
 
-def test_the_same_key_for_another_spec_is_refused_and_names_the_job(store: SqlStore) -> None:
+def test_the_same_key_for_another_spec_is_refused_and_names_the_job(store: Store) -> None:
     first, _ = store.create_job(spec(), idempotency_key="k1")
     with pytest.raises(IdempotencyConflict, match=first.id):
         store.create_job(spec(iterations=4), idempotency_key="k1")
     assert len(store.jobs().items) == 1
 
 
-def test_without_a_key_every_submission_is_a_job(store: SqlStore) -> None:
+def test_without_a_key_every_submission_is_a_job(store: Store) -> None:
     assert store.create_job(spec())[0].id != store.create_job(spec())[0].id
 
 
 @pytest.mark.parametrize("key", ["", "x" * 201, "nul\0", "line\n"])
-def test_a_key_that_cannot_be_stored_is_refused(store: SqlStore, key: str) -> None:
+def test_a_key_that_cannot_be_stored_is_refused(store: Store, key: str) -> None:
     with pytest.raises(InvalidRequest, match="idempotency_key"):
         store.create_job(spec(), idempotency_key=key)
     assert store.jobs().items == ()
 
 
 @pytest.mark.parametrize("job_id", ["", "nothing", "b" * 12, "nul\0", "\ud800", "x" * 10_000])
-def test_an_unknown_id_is_not_found_by_any_method(store: SqlStore, job_id: str) -> None:
+def test_an_unknown_id_is_not_found_by_any_method(store: Store, job_id: str) -> None:
     for ask_for_it in (
         lambda: store.job(job_id),
         lambda: store.command(job_id, Command.PAUSE),
@@ -78,7 +76,7 @@ def test_an_unknown_id_is_not_found_by_any_method(store: SqlStore, job_id: str) 
             ask_for_it()
 
 
-def test_pages_go_from_the_newest_to_the_oldest_and_then_end(store: SqlStore, clock: Clock) -> None:
+def test_pages_go_from_the_newest_to_the_oldest_and_then_end(store: Store, clock: Clock) -> None:
     made = []
     for _ in range(5):
         made.append(store.create_job(spec())[0].id)
@@ -91,13 +89,13 @@ def test_pages_go_from_the_newest_to_the_oldest_and_then_end(store: SqlStore, cl
     assert third.next is None
 
 
-def test_a_full_last_page_has_no_next(store: SqlStore) -> None:
+def test_a_full_last_page_has_no_next(store: Store) -> None:
     store.create_job(spec())
     store.create_job(spec())
     assert store.jobs(limit=2).next is None
 
 
-def test_pages_are_whole_when_all_jobs_were_made_in_the_same_instant(store: SqlStore) -> None:
+def test_pages_are_whole_when_all_jobs_were_made_in_the_same_instant(store: Store) -> None:
     made = {store.create_job(spec())[0].id for _ in range(7)}
     listed, after = [], None
     while True:
@@ -109,9 +107,7 @@ def test_pages_are_whole_when_all_jobs_were_made_in_the_same_instant(store: SqlS
     assert len(listed) == 7 and set(listed) == made
 
 
-def test_a_job_made_between_two_pages_does_not_shift_the_second(
-    store: SqlStore, clock: Clock
-) -> None:
+def test_a_job_made_between_two_pages_does_not_shift_the_second(store: Store, clock: Clock) -> None:
     made = []
     for _ in range(4):
         made.append(store.create_job(spec())[0].id)
@@ -121,7 +117,7 @@ def test_a_job_made_between_two_pages_does_not_shift_the_second(
     assert [job.id for job in store.jobs(limit=2, after=first.next).items] == [made[1], made[0]]
 
 
-def test_the_list_can_be_filtered_by_state(store: SqlStore, clock: Clock) -> None:
+def test_the_list_can_be_filtered_by_state(store: Store, clock: Clock) -> None:
     kept, _ = store.create_job(spec())
     clock.advance(1.0)
     paused, _ = store.create_job(spec())
@@ -130,7 +126,7 @@ def test_the_list_can_be_filtered_by_state(store: SqlStore, clock: Clock) -> Non
     assert [job.id for job in store.jobs(state=JobState.PAUSED).items] == [paused.id]
 
 
-def listed(store: SqlStore, **question: object) -> list[str]:
+def listed(store: Store, **question: object) -> list[str]:
     """Names of all jobs that are asked for, read in pages of two."""
     names, after = [], None
     while True:
@@ -141,7 +137,7 @@ def listed(store: SqlStore, **question: object) -> list[str]:
             return names
 
 
-def named(store: SqlStore, clock: Clock, *names: str) -> list[Job]:
+def named(store: Store, clock: Clock, *names: str) -> list[Job]:
     made = []
     for name in names:
         made.append(store.create_job(spec(name=name))[0])
@@ -149,7 +145,7 @@ def named(store: SqlStore, clock: Clock, *names: str) -> list[Job]:
     return made
 
 
-def with_fitness(store: SqlStore, job: Job, fitness: float) -> None:
+def with_fitness(store: Store, job: Job, fitness: float) -> None:
     claim = store.claim("runner", lease_seconds=LEASE, job_id=job.id)
     assert claim is not None
     store.begin(claim, ask(0))
@@ -168,14 +164,14 @@ def with_fitness(store: SqlStore, job: Job, fitness: float) -> None:
     ],
 )
 def test_the_list_can_be_searched_by_name_whatever_its_case(
-    store: SqlStore, clock: Clock, text: str, found: list[str]
+    store: Store, clock: Clock, text: str, found: list[str]
 ) -> None:
     named(store, clock, "a SLOW one", "Slow walk", "größe", "100%")
     assert listed(store, search=text) == found
 
 
 def test_a_name_of_any_characters_keeps_no_other_job_from_the_list(
-    store: SqlStore, clock: Clock
+    store: Store, clock: Clock
 ) -> None:
     made = named(store, clock, "zero\0byte", '"\\ü\U0001f916', "plain")
     listed = store.jobs(order=JobOrder.NAME).items
@@ -183,13 +179,13 @@ def test_a_name_of_any_characters_keeps_no_other_job_from_the_list(
     assert [job.id for job in store.jobs(search="ü").items] == [made[1].id]
 
 
-def test_the_list_can_be_searched_by_a_part_of_the_id(store: SqlStore, clock: Clock) -> None:
+def test_the_list_can_be_searched_by_a_part_of_the_id(store: Store, clock: Clock) -> None:
     wanted, _ = named(store, clock, "one", "two")
     assert [job.id for job in store.jobs(search=wanted.id[2:].upper()).items] == [wanted.id]
 
 
 def test_the_list_can_be_sorted_by_name_and_those_without_come_last(
-    store: SqlStore, clock: Clock
+    store: Store, clock: Clock
 ) -> None:
     named(store, clock, "b", "", "A", "ç" * 200, "a")
     names = listed(store, order=JobOrder.NAME)
@@ -198,7 +194,7 @@ def test_the_list_can_be_sorted_by_name_and_those_without_come_last(
 
 
 def test_the_list_can_be_sorted_by_fitness_and_those_without_come_last(
-    store: SqlStore, clock: Clock
+    store: Store, clock: Clock
 ) -> None:
     third, _, first, second, _ = named(store, clock, "third", "none", "first", "second", "none")
     with_fitness(store, third, 1e22)
@@ -207,7 +203,7 @@ def test_the_list_can_be_sorted_by_fitness_and_those_without_come_last(
     assert listed(store, order=JobOrder.FITNESS) == ["first", "second", "third", "none", "none"]
 
 
-def test_search_order_and_state_go_together(store: SqlStore, clock: Clock) -> None:
+def test_search_order_and_state_go_together(store: Store, clock: Clock) -> None:
     jobs = named(store, clock, "walk b", "walk a", "other", "walk c")
     store.command(jobs[0].id, Command.PAUSE)
     found = listed(store, order=JobOrder.NAME, search="walk", state=JobState.QUEUED)
@@ -217,7 +213,7 @@ def test_search_order_and_state_go_together(store: SqlStore, clock: Clock) -> No
 @pytest.mark.variants("sqlite-*", "postgresql-created")
 @pytest.mark.parametrize("order", list(JobOrder))
 def test_jobs_made_between_two_pages_repeat_nothing(
-    store: SqlStore, clock: Clock, order: JobOrder
+    store: Store, clock: Clock, order: JobOrder
 ) -> None:
     made = {job.id for job in named(store, clock, "m", "n", "", "m")}
     first = store.jobs(limit=2, order=order, search="")
@@ -229,7 +225,7 @@ def test_jobs_made_between_two_pages_repeat_nothing(
 
 @pytest.mark.variants("sqlite-*", "postgresql-created")
 @pytest.mark.parametrize("order", list(JobOrder))
-def test_a_cursor_belongs_to_its_order(store: SqlStore, clock: Clock, order: JobOrder) -> None:
+def test_a_cursor_belongs_to_its_order(store: Store, clock: Clock, order: JobOrder) -> None:
     named(store, clock, "a", "b", "c")
     for other in set(JobOrder) - {order}:
         cursor = store.jobs(limit=1, order=other).next
@@ -249,7 +245,7 @@ def test_a_cursor_belongs_to_its_order(store: SqlStore, clock: Clock, order: Job
     ],
 )
 def test_what_is_not_a_cursor_of_another_order_is_refused_by_name(
-    store: SqlStore, order: JobOrder, after: str
+    store: Store, order: JobOrder, after: str
 ) -> None:
     with pytest.raises(InvalidRequest) as refused:
         store.jobs(order=order, after=after)
@@ -260,19 +256,19 @@ def test_what_is_not_a_cursor_of_another_order_is_refused_by_name(
     "after",
     ["", "x", "1.", "12.bbb", "999999999999999999.bbbbbbbbbbbb", "1.BBBBBBBBBBBB", "-1.b", "\0"],
 )
-def test_what_is_not_a_cursor_is_refused_by_name(store: SqlStore, after: str) -> None:
+def test_what_is_not_a_cursor_is_refused_by_name(store: Store, after: str) -> None:
     with pytest.raises(InvalidRequest) as refused:
         store.jobs(after=after)
     assert refused.value.field == "after"
 
 
-def test_a_page_of_nothing_is_refused(store: SqlStore) -> None:
+def test_a_page_of_nothing_is_refused(store: Store) -> None:
     with pytest.raises(InvalidRequest, match="limit"):
         store.jobs(limit=0)
 
 
 def test_jobs_of_one_kind_are_found_among_all_others_in_every_order(
-    store: SqlStore, clock: Clock
+    store: Store, clock: Clock
 ) -> None:
     wanted: list[str] = []
     for number in range(3):

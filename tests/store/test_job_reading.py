@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from typing import Any
 
 import pytest
-from sqlalchemy import Connection, Engine, create_engine, event, text
+from sqlalchemy import Engine, create_engine, event, text
 
-from gaitswarm.services.optimizer.jobs.job import Command, Job, JobOrder, JobState
+from gaitswarm.services.optimizer.jobs.job import Command, JobOrder, JobState
 from gaitswarm.services.optimizer.jobs.labels import LabelsChange
-from gaitswarm.services.optimizer.store import sql_store
-from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
-from gaitswarm.services.optimizer.store.rows.job_rows import JobDocuments
-from gaitswarm.services.optimizer.store.rows.job_views import RowMemory
-from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
-from gaitswarm.services.optimizer.store.statements.job_list import jobs_of
+from gaitswarm.services.optimizer.store import Store, job_list, open_store
+from gaitswarm.services.optimizer.store.engine import Database, parse_url
 from tests.store.examples import completed, spec
 from tests.store.test_job_list import with_fitness
 
@@ -55,17 +51,17 @@ def test_sqlite_reads_a_page_of_the_list_from_an_index_and_sorts_nothing(
 ) -> None:
     url = f"sqlite:///{migrated_sqlite}"
     store = open_store(url)
-    cursors = [None, "1767268800000000." + "b" * 12]
+    cursors = [None, "created:1767268800000000:" + "b" * 12]
     if "order" in question:
-        cursors = [None, "fitness:1.5:" + "b" * 12, "fitness::" + "b" * 12]
+        cursors = [None, "fitness:1.5:" + "b" * 12, "fitness:null:" + "b" * 12]
     with statements() as sent:
         for after in cursors:
             store.jobs(after=after, limit=5, **question)
     store.close()
     selected = [(s, p) for s, p in sent if s.startswith("SELECT")]
     assert len(selected) >= len(cursors)
-    database = connect(parse_url(url))
-    with database.transaction(write=False) as connection:
+    database = Database(url)
+    with database.read() as connection:
         for statement, parameters in selected:
             plan = connection.exec_driver_sql(f"EXPLAIN QUERY PLAN {statement}", parameters).all()
             steps = [str(row[-1]) for row in plan]
@@ -74,14 +70,14 @@ def test_sqlite_reads_a_page_of_the_list_from_an_index_and_sorts_nothing(
 
 
 def test_a_spec_is_read_once_and_again_when_its_text_is_another(
-    store: SqlStore, database_url: str
+    store: Store, database_url: str
 ) -> None:
     made, _ = store.create_job(spec(name="first"))
     first = store.job(made.id)
     assert store.job(made.id).spec is first.spec
     assert store.jobs().items[0].spec is first.spec
-    database = connect(parse_url(database_url))
-    with database.transaction(write=True) as connection:
+    database = Database(database_url)
+    with database.write() as connection:
         connection.execute(text(_RENAMED[connection.dialect.name]))
     database.close()
     assert store.job(made.id).spec == spec(name="other").resolved()
@@ -89,7 +85,7 @@ def test_a_spec_is_read_once_and_again_when_its_text_is_another(
 
 
 def test_what_is_remembered_of_a_job_has_its_current_state_budget_and_progress(
-    store: SqlStore,
+    store: Store,
 ) -> None:
     job, _ = store.create_job(spec())
     before = store.job(job.id)
@@ -102,20 +98,8 @@ def test_what_is_remembered_of_a_job_has_its_current_state_budget_and_progress(
     assert after.progress.evaluations == len(completed(0, (2.0, 3.0)).fitness)
 
 
-def test_rows_that_were_asked_for_longest_ago_are_forgotten_first() -> None:
-    documents = JobDocuments(spec().resolved(), (), None)
-    memory = RowMemory[JobDocuments](500)
-    for name in "abcd":
-        memory.add((name * 100, None, None), documents)
-        assert memory.find(("a" * 100, None, None)) is documents
-    known = [name for name in "abcd" if memory.find((name * 100, None, None))]
-    assert known == ["a", "d"]
-    memory.add(("e" * 1000, None, None), documents)
-    assert memory.find(("e" * 1000, None, None)) is None
-
-
 def test_the_list_is_sorted_again_once_another_process_or_this_one_has_changed_a_job(
-    store: SqlStore, database_url: str
+    store: Store, database_url: str
 ) -> None:
     jobs = [store.create_job(spec(name=name))[0].id for name in "ab"]
 
@@ -137,7 +121,7 @@ def test_the_list_is_sorted_again_once_another_process_or_this_one_has_changed_a
 
 
 def test_a_change_is_seen_that_was_begun_before_another_and_committed_after_it(
-    store: SqlStore, database_url: str
+    store: Store, database_url: str
 ) -> None:
     if "postgresql" not in database_url:
         pytest.skip("SQLite has one writer at a time")
@@ -162,7 +146,7 @@ def test_a_change_is_seen_that_was_begun_before_another_and_committed_after_it(
 
 
 def test_a_job_that_is_removed_after_it_was_sorted_is_not_on_the_page(
-    store: SqlStore, database_url: str, monkeypatch: pytest.MonkeyPatch
+    store: Store, database_url: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if "postgresql" not in database_url:
         pytest.skip("SQLite reads a page from one snapshot")
@@ -170,13 +154,16 @@ def test_a_job_that_is_removed_after_it_was_sorted_is_not_on_the_page(
     store.command(jobs[1], Command.CANCEL)
     assert len(store.jobs(order=JobOrder.NAME).items) == 3
 
-    def removed_first(connection: Connection, ids: Sequence[str]) -> tuple[Job, ...]:
-        if jobs[1] in ids:
-            with closing(open_store(database_url)) as other:
-                other.delete_job(jobs[1])
-        return jobs_of(connection, ids)
+    def removed_first(*arguments: Any) -> Iterator[tuple[str, Any]]:
+        found = list(matches(*arguments))
+        with closing(open_store(database_url)) as other:
+            other.delete_job(jobs[1])
+        return iter(found)
 
-    monkeypatch.setattr(sql_store, "jobs_of", removed_first)
-    page = store.jobs(order=JobOrder.NAME, limit=2)
-    assert [job.id for job in page.items] == [jobs[0], jobs[2]]
-    assert page.next is None
+    matches = job_list._matches  # noqa: SLF001
+    with monkeypatch.context() as patched:
+        patched.setattr(job_list, "_matches", removed_first)
+        page = store.jobs(order=JobOrder.NAME, limit=2)
+    assert [job.id for job in page.items] == [jobs[0]]
+    rest = store.jobs(order=JobOrder.NAME, limit=2, after=page.next)
+    assert [job.id for job in rest.items] == [jobs[2]]

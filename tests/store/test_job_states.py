@@ -8,7 +8,7 @@ import pytest
 
 from gaitswarm.services.optimizer.errors import Conflict
 from gaitswarm.services.optimizer.jobs.job import TRANSITIONS, Command, JobState, commanded
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from tests.store.examples import LEASE, Clock, ask, begun, completed, spec
 
 ALLOWED = {
@@ -26,7 +26,7 @@ ALLOWED = {
 EVERY_PAIR = list(product(JobState, Command))
 
 
-def in_state(store: SqlStore, state: JobState) -> str:
+def in_state(store: Store, state: JobState) -> str:
     """Id of a job that has come into a state as jobs do."""
     if state in (JobState.QUEUED, JobState.PAUSED, JobState.CANCELLED):
         job, _ = store.create_job(spec())
@@ -70,7 +70,7 @@ def test_a_refusal_says_what_is_possible_instead() -> None:
 @pytest.mark.variants("sqlite-*", "postgresql-running-*")
 @pytest.mark.parametrize(("state", "command"), EVERY_PAIR)
 def test_the_store_applies_a_command_or_changes_nothing(
-    store: SqlStore, state: JobState, command: Command
+    store: Store, state: JobState, command: Command
 ) -> None:
     job_id = in_state(store, state)
     before = store.job(job_id)
@@ -85,7 +85,7 @@ def test_the_store_applies_a_command_or_changes_nothing(
         assert store.job(job_id) == before
 
 
-def test_an_ended_job_has_an_end_and_a_resumed_one_has_none(store: SqlStore, clock: Clock) -> None:
+def test_an_ended_job_has_an_end_and_a_resumed_one_has_none(store: Store, clock: Clock) -> None:
     job_id = in_state(store, JobState.FAILED)
     assert store.job(job_id).finished_at == clock.now
     assert store.job(job_id).error == "the evaluator is broken"
@@ -95,20 +95,18 @@ def test_an_ended_job_has_an_end_and_a_resumed_one_has_none(store: SqlStore, clo
     assert resumed.updated_at == clock.now
 
 
-def test_a_cancelled_failure_still_says_why_it_failed(store: SqlStore) -> None:
+def test_a_cancelled_failure_still_says_why_it_failed(store: Store) -> None:
     job_id = in_state(store, JobState.FAILED)
     assert store.command(job_id, Command.CANCEL).error == "the evaluator is broken"
 
 
-def test_pausing_a_job_whose_runner_has_gone_completes_at_once(
-    store: SqlStore, clock: Clock
-) -> None:
+def test_pausing_a_job_whose_runner_has_gone_completes_at_once(store: Store, clock: Clock) -> None:
     claim = begun(store)
     clock.advance(LEASE + 1.0)
     assert store.command(claim.job.id, Command.PAUSE).state is JobState.PAUSED
 
 
-def test_a_pause_takes_effect_when_the_iteration_is_committed(store: SqlStore) -> None:
+def test_a_pause_takes_effect_when_the_iteration_is_committed(store: Store) -> None:
     claim = begun(store)
     store.command(claim.job.id, Command.PAUSE)
     assert store.renew(claim, lease_seconds=LEASE).state is JobState.PAUSING
@@ -116,13 +114,13 @@ def test_a_pause_takes_effect_when_the_iteration_is_committed(store: SqlStore) -
     assert store.claim("runner-b", lease_seconds=LEASE) is None
 
 
-def test_a_pause_in_the_last_iteration_comes_too_late(store: SqlStore) -> None:
+def test_a_pause_in_the_last_iteration_comes_too_late(store: Store) -> None:
     claim = begun(store)
     store.command(claim.job.id, Command.PAUSE)
     assert store.commit(claim, completed(0), None) is JobState.SUCCEEDED
 
 
-def test_a_pause_that_was_taken_back_changes_nothing_for_the_runner(store: SqlStore) -> None:
+def test_a_pause_that_was_taken_back_changes_nothing_for_the_runner(store: Store) -> None:
     claim = begun(store)
     store.command(claim.job.id, Command.PAUSE)
     store.command(claim.job.id, Command.RESUME)
@@ -139,7 +137,7 @@ def test_a_pause_that_was_taken_back_changes_nothing_for_the_runner(store: SqlSt
     ],
 )
 def test_a_runner_that_stops_leaves_the_job_in_the_state_asked_for(
-    store: SqlStore, asked_to_pause: bool, released_as: JobState, state: JobState
+    store: Store, asked_to_pause: bool, released_as: JobState, state: JobState
 ) -> None:
     claim = begun(store)
     if asked_to_pause:
@@ -150,6 +148,6 @@ def test_a_runner_that_stops_leaves_the_job_in_the_state_asked_for(
     assert job.error == ("why" if state is JobState.FAILED else None)
 
 
-def test_a_runner_cannot_release_a_job_as_succeeded(store: SqlStore) -> None:
+def test_a_runner_cannot_release_a_job_as_succeeded(store: Store) -> None:
     with pytest.raises(ValueError, match="succeeded"):
         store.release(begun(store), JobState.SUCCEEDED)

@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 from sqlalchemy import text
 
-from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
+from gaitswarm.services.optimizer.store.engine import Database
 from gaitswarm.sim.outcome import Status
 from tests.store.examples import begun, completed
 
 KEYS = (b"\0" * 16, b"\xff" * 16)
 
 
-def test_an_outcome_is_found_by_its_key_to_the_bit(store: SqlStore) -> None:
+def test_an_outcome_is_found_by_its_key_to_the_bit(store: Store) -> None:
     done = replace(completed(0, (2.0, np.inf)), keys=KEYS)
     store.commit(begun(store, iterations=1), done, None)
     found = store.known([*KEYS, b"another key yet"])
@@ -27,7 +27,7 @@ def test_an_outcome_is_found_by_its_key_to_the_bit(store: SqlStore) -> None:
     assert found[KEYS[1]].statuses.tolist() == [Status.OK, Status.FELL]
 
 
-def test_what_was_not_walked_has_no_key_and_is_counted(store: SqlStore) -> None:
+def test_what_was_not_walked_has_no_key_and_is_counted(store: Store) -> None:
     claim = begun(store, iterations=1)
     store.commit(claim, replace(completed(0), keys=(KEYS[0], None)), None)
     assert set(store.known(KEYS)) == {KEYS[0]}
@@ -36,23 +36,23 @@ def test_what_was_not_walked_has_no_key_and_is_counted(store: SqlStore) -> None:
     assert progress.evaluations_walked == 1
 
 
-def test_an_iteration_without_keys_is_not_found_and_saves_nothing(store: SqlStore) -> None:
+def test_an_iteration_without_keys_is_not_found_and_saves_nothing(store: Store) -> None:
     claim = begun(store, iterations=1)
     store.commit(claim, completed(0), None)
     assert store.known(KEYS) == {}
     assert store.job(claim.job.id).progress.evaluations_saved == 0
 
 
-def test_many_keys_are_asked_for_at_once(store: SqlStore) -> None:
+def test_many_keys_are_asked_for_at_once(store: Store) -> None:
     store.commit(begun(store, iterations=1), replace(completed(0), keys=KEYS), None)
     others = [number.to_bytes(16, "big") for number in range(1, 3000)]
     assert set(store.known([*others, KEYS[1], *others])) == {KEYS[1]}
 
 
-def test_a_damaged_outcome_is_not_known(store: SqlStore, database_url: str) -> None:
+def test_a_damaged_outcome_is_not_known(store: Store, database_url: str) -> None:
     store.commit(begun(store, iterations=1), replace(completed(0), keys=KEYS), None)
-    database = connect(parse_url(database_url))
-    with database.transaction(write=True) as connection:
+    database = Database(database_url)
+    with database.write() as connection:
         labels = "UPDATE evaluations SET statuses = '[\"flew\"]' WHERE particle = 0"
         connection.execute(text(labels))
     database.close()

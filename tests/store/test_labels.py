@@ -8,20 +8,20 @@ from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
 from gaitswarm.services.optimizer.jobs.job import Command, Job, JobOrder
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.labels import JobFilter, LabelsChange, robot_name
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from tests.examples.walks import quadruped_files
 from tests.store.examples import Clock
 
 
-def submitted(store: SqlStore, **changes: object) -> Job:
+def submitted(store: Store, **changes: object) -> Job:
     return store.create_job(JobSpec.model_validate({"iterations": 2} | changes))[0]
 
 
-def ids(store: SqlStore, **asked: object) -> list[str]:
+def ids(store: Store, **asked: object) -> list[str]:
     return [job.id for job in store.jobs(**asked).items]  # type: ignore[arg-type]
 
 
-def test_a_job_is_labelled_bit_by_bit_and_its_spec_stays(store: SqlStore) -> None:
+def test_a_job_is_labelled_bit_by_bit_and_its_spec_stays(store: Store) -> None:
     job = submitted(store, name="first")
     labelled = store.label(job.id, LabelsChange(name="better", tags=("b", "a", "b")))
     assert (labelled.name, labelled.labels.tags, labelled.archived) == ("better", ("b", "a"), False)
@@ -35,7 +35,7 @@ def test_a_job_is_labelled_bit_by_bit_and_its_spec_stays(store: SqlStore) -> Non
         store.label("nowhere", LabelsChange(note="x"))
 
 
-def test_what_is_written_is_searched_and_sorted_by(store: SqlStore, clock: Clock) -> None:
+def test_what_is_written_is_searched_and_sorted_by(store: Store, clock: Clock) -> None:
     jobs = [submitted(store, name=name) for name in ("alpha", "beta", "gamma")]
     store.label(jobs[0].id, LabelsChange(name="Zeta"))
     store.label(jobs[1].id, LabelsChange(note="see GAMMA"))
@@ -47,7 +47,7 @@ def test_what_is_written_is_searched_and_sorted_by(store: SqlStore, clock: Clock
     assert ids(store, order=JobOrder.NAME) == [jobs[k].id for k in (1, 2, 0)]
 
 
-def test_jobs_are_found_by_what_they_are(store: SqlStore) -> None:
+def test_jobs_are_found_by_what_they_are(store: Store) -> None:
     plain = submitted(store)
     other = submitted(store, controller="pi", preference="B", robot="szabadka2")
     own = submitted(store, preference={"bias": [0.1] * 5, "exponent": [1.0] * 5})
@@ -72,7 +72,7 @@ def test_jobs_are_found_by_what_they_are(store: SqlStore) -> None:
     assert store.facets(archived=True).total == 1
 
 
-def test_a_robot_of_ones_own_is_found_by_its_name_and_as_one_of_all(store: SqlStore) -> None:
+def test_a_robot_of_ones_own_is_found_by_its_name_and_as_one_of_all(store: Store) -> None:
     files = quadruped_files()
     shipped = submitted(store, robot="szabadka2")
     dog = submitted(store, robot=files)
@@ -94,7 +94,7 @@ def test_a_robot_without_a_name_is_called_own(name: str) -> None:
 
 @pytest.mark.variants("sqlite-*", "postgresql-created")
 @pytest.mark.parametrize("order", list(JobOrder))
-def test_every_job_is_reached_page_by_page_in_every_order(store: SqlStore, order: JobOrder) -> None:
+def test_every_job_is_reached_page_by_page_in_every_order(store: Store, order: JobOrder) -> None:
     jobs = [submitted(store, name=f"job {k % 3}") for k in range(7)]
     store.command(jobs[3].id, Command.CANCEL)
     store.label(jobs[5].id, LabelsChange(archived=True))
@@ -111,7 +111,7 @@ def test_every_job_is_reached_page_by_page_in_every_order(store: SqlStore, order
 
 
 @pytest.mark.parametrize("order", [JobOrder.NAME, JobOrder.STATE, JobOrder.EVALUATIONS])
-def test_a_cursor_is_one_of_its_order_alone(store: SqlStore, order: JobOrder) -> None:
+def test_a_cursor_is_one_of_its_order_alone(store: Store, order: JobOrder) -> None:
     for _ in range(3):
         submitted(store)
     cursor = store.jobs(order=order, limit=1).next

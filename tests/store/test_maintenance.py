@@ -13,8 +13,8 @@ import pytest
 from gaitswarm.services.optimizer.analysis.verification import check_histories
 from gaitswarm.services.optimizer.errors import NotFound, StoreUnavailable
 from gaitswarm.services.optimizer.jobs.job import Command, JobState
-from gaitswarm.services.optimizer.store.schema.maintenance import Pruned, check, prune
-from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.store import Store, open_store
+from gaitswarm.services.optimizer.store.maintenance import Pruned, check, prune
 from tests.store.examples import ask, begun, completed
 from tests.store.examples import spec as walks
 from tests.store.test_opening import edit
@@ -23,7 +23,7 @@ from tests.store.test_recordings import spec as fit_to
 
 
 @pytest.fixture
-def job_id(store: SqlStore) -> str:
+def job_id(store: Store) -> str:
     """A job with two iterations, and a third one under way."""
     claim = begun(store, iterations=5)
     store.commit(claim, completed(0), ask(1))
@@ -59,7 +59,7 @@ def test_what_contradicts_itself_is_found(
 
 
 def test_histories_are_compared_with_their_digests_and_a_deleted_one_is_left_out(
-    job_id: str, store: SqlStore, database_url: str
+    job_id: str, store: Store, database_url: str
 ) -> None:
     assert check_histories(store) == []
     edit(database_url, "UPDATE iterations SET evaluate_seconds = 9")
@@ -95,7 +95,7 @@ def test_damaged_pages_are_found(database: Path) -> None:
 
 
 def test_recordings_that_nothing_refers_to_are_removed_a_day_after_they_came(
-    store: SqlStore, database_url: str
+    store: Store, database_url: str
 ) -> None:
     wanted, unused = (store.add_recording(recording(first_tick=tick)) for tick in (20, 21))
     store.create_job(fit_to(wanted))
@@ -123,7 +123,7 @@ def test_space_that_rows_have_left_is_given_back(database: Path) -> None:
 
 
 def test_jobs_that_ended_long_ago_are_removed_by_state_and_kept_ones_stay(
-    store: SqlStore, database_url: str
+    store: Store, database_url: str
 ) -> None:
     cancelled, kept, waiting = (store.create_job(walks())[0].id for _ in range(3))
     succeeded = store.create_job(walks(), idempotency_key="succeeded")[0].id

@@ -7,7 +7,7 @@ import pytest
 from gaitswarm.jobs.database.jobs import DatabaseJobs
 from gaitswarm.services.optimizer.masking import masked_url
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.settings import Settings
 
 SECRET = "postgresql://u:secret@h/d?sslpassword=secret"
@@ -37,7 +37,7 @@ def test_only_harmless_parts_of_a_url_are_shown(url: str, shown: str) -> None:
     assert masked_url(url) == shown
 
 
-def test_the_options_that_find_a_job_again_hide_the_password(store: SqlStore) -> None:
+def test_the_options_that_find_a_job_again_hide_the_password(store: Store) -> None:
     place = DatabaseJobs(JobService(store), SECRET).place
     assert place == " --db 'postgresql://u:***@h/d?***'"
 

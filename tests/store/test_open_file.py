@@ -13,17 +13,17 @@ from sqlalchemy import update
 
 from gaitswarm.services.optimizer.errors import StoreReplaced
 from gaitswarm.services.optimizer.jobs.job import Command
-from gaitswarm.services.optimizer.store.connections.engine import Database, connect, parse_url
-from gaitswarm.services.optimizer.store.rows.tables import jobs, metadata
-from gaitswarm.services.optimizer.store.schema.backup import backup
-from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.store import Store, open_store
+from gaitswarm.services.optimizer.store.engine import Database
+from gaitswarm.services.optimizer.store.maintenance import backup
+from gaitswarm.services.optimizer.store.tables import jobs, metadata
 from tests.store.examples import begun, completed, spec
 
 REPLACED = "removed or replaced while it was open; restart"
 
 
 @pytest.fixture
-def opened(database: Path) -> Iterator[SqlStore]:
+def opened(database: Path) -> Iterator[Store]:
     with closing(open_store(str(database))) as store:
         store.create_job(spec())
         yield store
@@ -62,7 +62,7 @@ def replace_log(file: Path) -> None:
     ids=lambda f: f.__name__,
 )
 def test_writes_are_refused_once_the_file_is_another(
-    opened: SqlStore, database: Path, change: Callable[[Path], None]
+    opened: Store, database: Path, change: Callable[[Path], None]
 ) -> None:
     claim = begun(opened)
     opened.ping()
@@ -81,16 +81,16 @@ def test_writes_are_refused_once_the_file_is_another(
 
 
 def test_no_empty_file_is_made_in_place_of_one_that_was_removed(database: Path) -> None:
-    with closing(connect(parse_url(str(database)))) as engine:
-        with engine.transaction(write=False):
+    with closing(Database(str(database))) as engine:
+        with engine.read():
             remove(database)
-            with pytest.raises(StoreReplaced, match=REPLACED), engine.transaction(write=False):
+            with pytest.raises(StoreReplaced, match=REPLACED), engine.read():
                 pass
         assert not database.exists()
 
 
 def test_a_store_that_is_opened_again_uses_the_file_that_is_there(
-    opened: SqlStore, database: Path
+    opened: Store, database: Path
 ) -> None:
     remove_all(database)
     with closing(open_store(str(database))) as again:
@@ -99,7 +99,7 @@ def test_a_store_that_is_opened_again_uses_the_file_that_is_there(
         again.ping()
 
 
-def test_a_file_that_is_moved_back_is_written_again(opened: SqlStore, database: Path) -> None:
+def test_a_file_that_is_moved_back_is_written_again(opened: Store, database: Path) -> None:
     away = database.rename(database.with_suffix(".away"))
     with pytest.raises(StoreReplaced):
         opened.create_job(spec())
@@ -129,7 +129,7 @@ def back_up(file: Path) -> None:
 
 @pytest.mark.parametrize("use", [vacuum, checkpoint, write_elsewhere, back_up])
 def test_what_others_do_with_a_database_is_no_replacement(
-    opened: SqlStore, database: Path, use: Callable[[Path], None]
+    opened: Store, database: Path, use: Callable[[Path], None]
 ) -> None:
     use(database)
     opened.create_job(spec())
@@ -138,13 +138,13 @@ def test_what_others_do_with_a_database_is_no_replacement(
 
 
 def write(database: Database) -> None:
-    with database.transaction(write=True) as connection:
+    with database.write() as connection:
         connection.execute(update(jobs).values(priority=0))
 
 
 def test_a_log_that_is_made_again_between_connections_is_no_replacement(database: Path) -> None:
     log = log_of(database)
-    with closing(connect(parse_url(str(database)))) as engine:
+    with closing(Database(str(database))) as engine:
         write(engine)
         before = log.stat().st_ino
         # As when a user interrupts a statement: its connection, the only one, is closed.
@@ -158,11 +158,10 @@ def test_a_log_that_is_made_again_between_connections_is_no_replacement(database
 
 def test_a_log_that_is_made_by_the_first_transaction_is_no_replacement(tmp_path: Path) -> None:
     with (
-        closing(connect(parse_url(str(tmp_path / "new.db")))) as engine,
-        engine.transaction(write=True) as connection,
+        closing(Database(str(tmp_path / "new.db"))) as engine,
+        engine.write() as connection,
     ):
-        assert engine.file is not None
-        engine.file.check()
+        engine.check_in_place()
         metadata.create_all(connection)
 
 

@@ -13,11 +13,10 @@ from alembic.script import ScriptDirectory
 from sqlalchemy import text
 
 from gaitswarm.services.optimizer.errors import StoreUnavailable
-from gaitswarm.services.optimizer.store.connections import engine as engine_module
-from gaitswarm.services.optimizer.store.connections.engine import Database, connect, parse_url
-from gaitswarm.services.optimizer.store.schema.migrate import lock_for_migration
-from gaitswarm.services.optimizer.store.schema.revisions import MIGRATIONS, head
-from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.store import Store, open_store
+from gaitswarm.services.optimizer.store import engine as engine_module
+from gaitswarm.services.optimizer.store.engine import Database, parse_url
+from gaitswarm.services.optimizer.store.schema import MIGRATIONS, head, lock_for_migration
 from tests.examples.forked import ForkedCommand
 from tests.examples.processes import loaded_by, output
 from tests.store import worker_process
@@ -25,8 +24,8 @@ from tests.store.examples import LEASE, spec
 
 
 def edit(url: str, statement: str) -> None:
-    database = connect(parse_url(url))
-    with database.transaction(write=True) as connection:
+    database = Database(url)
+    with database.write() as connection:
         connection.execute(text(statement))
     database.close()
 
@@ -150,10 +149,10 @@ def test_different_databases_can_be_opened_by_several_threads_at_once(tmp_path: 
 
 
 def test_a_migration_under_way_elsewhere_is_waited_for(fresh_url: str) -> None:
-    database = connect(parse_url(fresh_url), for_migration=True)
-    opened: list[SqlStore] = []
+    database = Database(fresh_url, for_migration=True)
+    opened: list[Store] = []
     thread = threading.Thread(target=lambda: opened.append(open_store(fresh_url)))
-    with database.transaction(write=True) as connection:
+    with database.write() as connection:
         lock_for_migration(connection)
         thread.start()
         thread.join(timeout=0.3)
@@ -180,7 +179,7 @@ def test_a_database_can_be_opened_by_several_processes_at_once(fresh_url: str) -
         assert [process.wait(timeout=60) for process in processes] == [0, 0, 0]
 
 
-def test_a_closed_store_can_be_closed_again(store: SqlStore) -> None:
+def test_a_closed_store_can_be_closed_again(store: Store) -> None:
     store.close()
     store.close()
 
@@ -220,14 +219,14 @@ def test_a_server_that_does_not_answer_is_named_without_its_password(url: str) -
 
 
 def test_what_a_driver_says_is_shown_without_passwords() -> None:
-    database = connect(parse_url("postgresql://u:one@127.0.0.1:1/d?user=v&sslpassword=two"))
+    database = Database("postgresql://u:one@127.0.0.1:1/d?user=v&sslpassword=two")
     assert database.without_secrets("no v, one, two") == "no v, ***, ***"
     database.close()
 
 
 def test_a_committed_iteration_survives_a_power_cut(tmp_path: Path) -> None:
-    database = connect(parse_url(str(tmp_path / "runs.db")))
-    with database.transaction(write=False) as connection:
+    database = Database(str(tmp_path / "runs.db"))
+    with database.read() as connection:
 
         def pragma(name: str) -> object:
             return connection.exec_driver_sql(f"PRAGMA {name}").scalar_one()
@@ -258,27 +257,27 @@ def test_a_database_that_stays_locked_is_unavailable_to_writers_but_not_to_reade
 
 
 def test_an_exception_rolls_back_and_keeps_its_type(database_url: str) -> None:
-    database: Database = connect(parse_url(database_url))
+    database: Database = Database(database_url)
 
     def delete_and_fail() -> None:
-        with database.transaction(write=True) as connection:
+        with database.write() as connection:
             connection.execute(text("DELETE FROM alembic_version"))
             raise KeyError
 
     with pytest.raises(KeyError):
         delete_and_fail()
-    with database.transaction(write=False) as connection:
+    with database.read() as connection:
         found = connection.execute(text("SELECT version_num FROM alembic_version")).scalar_one()
     assert found == head()
     database.close()
 
 
 def test_what_a_reading_transaction_sees_of_others_depends_on_the_database(
-    database_url: str, store: SqlStore
+    database_url: str, store: Store
 ) -> None:
-    database = connect(parse_url(database_url))
+    database = Database(database_url)
     count = text("SELECT count(*) FROM jobs")
-    with database.transaction(write=False) as connection:
+    with database.read() as connection:
         assert connection.execute(count).scalar_one() == 0
         store.create_job(spec())
         seen = connection.execute(count).scalar_one()

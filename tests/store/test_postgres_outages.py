@@ -19,9 +19,8 @@ from sqlalchemy import text
 from gaitswarm.services.optimizer.errors import StoreUnavailable
 from gaitswarm.services.optimizer.jobs.job import Job, JobState
 from gaitswarm.services.optimizer.run.runner import Runner
-from gaitswarm.services.optimizer.store.connections import postgresql
-from gaitswarm.services.optimizer.store.connections.engine import Database, connect, parse_url
-from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.store import Store, engine, open_store
+from gaitswarm.services.optimizer.store.engine import Database
 from tests.examples import requirements
 from tests.examples.jobs import Bits, history
 from tests.examples.paths import ROOT
@@ -57,12 +56,12 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> list[Bits]:
 @pytest.fixture
 def database(postgresql_server: PostgresServer) -> Iterator[Database]:
     """Connections as the store has them, to a server that lasts."""
-    database = connect(parse_url(f"{postgresql_server.url}/postgres"))
+    database = Database(f"{postgresql_server.url}/postgres")
     yield database
     database.close()
 
 
-def run_to_its_end(store: SqlStore, lease_seconds: float, disturb: threading.Event) -> Job:
+def run_to_its_end(store: Store, lease_seconds: float, disturb: threading.Event) -> Job:
     """Run a long job; `disturb` is set in its midst."""
     job, _ = store.create_job(LONG)
     runner = Runner(store, FormulaEvaluator(), lease_seconds=lease_seconds, poll_seconds=0.05)
@@ -131,13 +130,13 @@ def test_a_connection_that_was_cut_is_replaced_before_it_is_used_and_others_are_
     monkeypatch.setattr(database.engine.dialect, "do_ping", noted)
 
     def backend() -> int:
-        with database.transaction(write=False) as connection:
+        with database.read() as connection:
             return int(connection.execute(text("SELECT pg_backend_pid()")).scalar_one())
 
     first = backend()
     assert backend() == first and not pings
-    other = connect(parse_url(f"{postgresql_server.url}/postgres"))
-    with other.transaction(write=True) as connection:
+    other = Database(f"{postgresql_server.url}/postgres")
+    with other.write() as connection:
         connection.execute(text("SELECT pg_terminate_backend(:pid, 5000)"), {"pid": first})
     other.close()
     assert backend() != first
@@ -145,27 +144,27 @@ def test_a_connection_that_was_cut_is_replaced_before_it_is_used_and_others_are_
 
 
 def test_what_is_only_read_holds_no_transaction(database: Database) -> None:
-    with database.transaction(write=False) as connection:
+    with database.read() as connection:
         started = text("SELECT now()")
         first = connection.execute(started).scalar_one()
         assert connection.execute(started).scalar_one() > first
-    with database.transaction(write=True) as connection:
+    with database.write() as connection:
         first = connection.execute(started).scalar_one()
         assert connection.execute(started).scalar_one() == first
 
 
 def test_both_ends_notice_within_a_lease_that_the_other_has_gone(database: Database) -> None:
-    with database.transaction(write=False) as connection:
+    with database.read() as connection:
 
         def setting(name: str) -> int:
             milliseconds = text("SELECT setting FROM pg_settings WHERE name = :name")
             return int(connection.execute(milliseconds, {"name": name}).scalar_one())
 
         probes = setting("tcp_keepalives_count") * setting("tcp_keepalives_interval")
-        assert setting("tcp_keepalives_idle") + probes == postgresql.SILENCE_SECONDS
-        assert setting("tcp_user_timeout") == postgresql.SILENCE_SECONDS * 1000
-        assert setting("idle_in_transaction_session_timeout") == postgresql.IDLE_SECONDS * 1000
-        assert setting("statement_timeout") == postgresql.STATEMENT_SECONDS * 1000
+        assert setting("tcp_keepalives_idle") + probes == engine.SILENCE_SECONDS
+        assert setting("tcp_user_timeout") == engine.SILENCE_SECONDS * 1000
+        assert setting("idle_in_transaction_session_timeout") == engine.IDLE_SECONDS * 1000
+        assert setting("statement_timeout") == engine.STATEMENT_SECONDS * 1000
 
         driver = connection.connection.driver_connection
         assert driver is not None
@@ -173,9 +172,9 @@ def test_both_ends_notice_within_a_lease_that_the_other_has_gone(database: Datab
             idle = ours.getsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPIDLE)
             interval = ours.getsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPINTVL)
             count = ours.getsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPCNT)
-            assert idle + interval * count == postgresql.SILENCE_SECONDS
+            assert idle + interval * count == engine.SILENCE_SECONDS
             unanswered = ours.getsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT)
-            assert unanswered == postgresql.SILENCE_SECONDS * 1000
+            assert unanswered == engine.SILENCE_SECONDS * 1000
 
 
 @pytest.mark.skipif(
@@ -200,8 +199,8 @@ def test_a_runner_that_the_network_cuts_off_lets_go_of_its_job() -> None:
 
 def test_the_url_goes_before_what_is_set_by_default(postgresql_server: PostgresServer) -> None:
     options = "options=-c%20statement_timeout%3D7000&application_name=mine"
-    database = connect(parse_url(f"{postgresql_server.url}/postgres?{options}"))
-    with database.transaction(write=False) as connection:
+    database = Database(f"{postgresql_server.url}/postgres?{options}")
+    with database.read() as connection:
         shown = [
             connection.execute(text(f"SHOW {name}")).scalar_one()
             for name in ("statement_timeout", "application_name", "tcp_keepalives_count")
@@ -216,11 +215,11 @@ def test_a_client_that_stops_within_a_transaction_loses_its_locks(
 ) -> None:
     with closing(open_store(database_url)) as store:
         job, _ = store.create_job(spec())
-        monkeypatch.setattr(postgresql, "IDLE_SECONDS", 1)
-        stopped = connect(parse_url(database_url))
+        monkeypatch.setattr(engine, "IDLE_SECONDS", 1)
+        stopped = Database(database_url)
 
         def lock_and_stop() -> None:
-            with stopped.transaction(write=True) as connection:
+            with stopped.write() as connection:
                 connection.execute(text("SELECT id FROM jobs FOR UPDATE"))
                 assert store.claim("passes over it", lease_seconds=LEASE) is None
                 assert store.claim("waits", lease_seconds=LEASE, job_id=job.id) is not None
@@ -234,11 +233,11 @@ def test_a_client_that_stops_within_a_transaction_loses_its_locks(
 def test_a_statement_that_takes_too_long_counts_as_an_outage(
     postgresql_server: PostgresServer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(postgresql, "STATEMENT_SECONDS", 1)
-    database = connect(parse_url(f"{postgresql_server.url}/postgres"))
+    monkeypatch.setattr(engine, "STATEMENT_SECONDS", 1)
+    database = Database(f"{postgresql_server.url}/postgres")
     with (
         pytest.raises(StoreUnavailable, match="statement timeout"),
-        database.transaction(write=False) as connection,
+        database.read() as connection,
     ):
         connection.execute(text("SELECT pg_sleep(60)"))
     database.close()

@@ -6,17 +6,17 @@ import pytest
 
 from gaitswarm.services.optimizer.errors import Conflict, NotFound
 from gaitswarm.services.optimizer.jobs.job import Command, JobState
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from tests.store.examples import LEASE, Clock, ask, begun, completed, spec
 
 
-def claimed(store: SqlStore) -> str | None:
+def claimed(store: Store) -> str | None:
     claim = store.claim("runner-b", lease_seconds=LEASE)
     return None if claim is None else claim.job.id
 
 
 def test_of_waiting_jobs_the_highest_is_claimed_first_and_the_oldest_among_equals(
-    store: SqlStore, clock: Clock
+    store: Store, clock: Clock
 ) -> None:
     ids: dict[str, str] = {}
     for name, priority in {"low": -10, "usual": 0, "later": 0, "high": 10, "as high": 10}.items():
@@ -26,14 +26,14 @@ def test_of_waiting_jobs_the_highest_is_claimed_first_and_the_oldest_among_equal
     assert order == [ids[n] for n in ("high", "as high", "usual", "later", "low")]
 
 
-def test_a_job_whose_runner_has_gone_waits_like_any_other(store: SqlStore, clock: Clock) -> None:
+def test_a_job_whose_runner_has_gone_waits_like_any_other(store: Store, clock: Clock) -> None:
     abandoned = begun(store)
     clock.advance(LEASE)
     urgent, _ = store.create_job(spec(), priority=1)
     assert [claimed(store), claimed(store)] == [urgent.id, abandoned.job.id]
 
 
-def test_a_waiting_job_gets_another_place_in_the_queue(store: SqlStore, clock: Clock) -> None:
+def test_a_waiting_job_gets_another_place_in_the_queue(store: Store, clock: Clock) -> None:
     first = store.create_job(spec())[0].id
     clock.advance(1.0)
     second, _ = store.create_job(spec())
@@ -43,14 +43,14 @@ def test_a_waiting_job_gets_another_place_in_the_queue(store: SqlStore, clock: C
     assert [claimed(store), claimed(store)] == [second.id, first]
 
 
-def test_the_runner_of_a_job_learns_its_priority_with_the_next_heartbeat(store: SqlStore) -> None:
+def test_the_runner_of_a_job_learns_its_priority_with_the_next_heartbeat(store: Store) -> None:
     claim = begun(store)
     assert store.renew(claim, lease_seconds=LEASE).priority == 0
     store.prioritize(claim.job.id, -4)
     assert store.renew(claim, lease_seconds=LEASE).priority == -4
 
 
-def test_a_job_that_has_ended_keeps_its_priority(store: SqlStore) -> None:
+def test_a_job_that_has_ended_keeps_its_priority(store: Store) -> None:
     job, _ = store.create_job(spec(), priority=2)
     store.command(job.id, Command.CANCEL)
     with pytest.raises(Conflict, match="cannot prioritize a job that is cancelled"):
@@ -60,7 +60,7 @@ def test_a_job_that_has_ended_keeps_its_priority(store: SqlStore) -> None:
         store.prioritize("nosuchjob123", 5)
 
 
-def test_a_change_is_in_the_audit_log(store: SqlStore) -> None:
+def test_a_change_is_in_the_audit_log(store: Store) -> None:
     job, _ = store.create_job(spec())
     store.prioritize(job.id, 5, actor="ann")
     entry = store.audit(job_id=job.id).items[0]
@@ -71,13 +71,13 @@ def test_a_change_is_in_the_audit_log(store: SqlStore) -> None:
     )
 
 
-def test_a_request_that_is_repeated_finds_its_job_whatever_its_priority(store: SqlStore) -> None:
+def test_a_request_that_is_repeated_finds_its_job_whatever_its_priority(store: Store) -> None:
     job, _ = store.create_job(spec(), idempotency_key="k", priority=1)
     again, new = store.create_job(spec(), idempotency_key="k", priority=9)
     assert (again.id, again.priority, new) == (job.id, 1, False)
 
 
-def test_the_chain_of_a_job_is_the_same_under_any_priority(store: SqlStore) -> None:
+def test_the_chain_of_a_job_is_the_same_under_any_priority(store: Store) -> None:
     heads = []
     for priority in (0, 7):
         job, _ = store.create_job(spec(), priority=priority)

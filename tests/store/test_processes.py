@@ -15,8 +15,8 @@ from sqlalchemy import text
 
 from gaitswarm.services.optimizer.errors import Conflict
 from gaitswarm.services.optimizer.jobs.job import Claim, Command, Job, JobState
-from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
-from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.store import Store, open_store
+from gaitswarm.services.optimizer.store.engine import Database
 from tests.examples.forked import ForkedCommand
 from tests.examples.processes import output
 from tests.store import worker_process
@@ -64,7 +64,7 @@ def say_go(process: ForkedCommand) -> None:
 
 
 def test_every_job_is_claimed_by_exactly_one_of_many_threads(
-    store: SqlStore, database_url: str, clock: Clock
+    store: Store, database_url: str, clock: Clock
 ) -> None:
     made = {store.create_job(spec())[0].id for _ in range(24)}
     claimed: list[str] = []
@@ -83,7 +83,7 @@ def test_every_job_is_claimed_by_exactly_one_of_many_threads(
 
 @pytest.mark.slow
 def test_every_job_is_claimed_by_exactly_one_of_several_processes(
-    store: SqlStore, database_url: str, pytestconfig: pytest.Config
+    store: Store, database_url: str, pytestconfig: pytest.Config
 ) -> None:
     made = {store.create_job(spec())[0].id for _ in range(40)}
     with (
@@ -100,14 +100,14 @@ def test_every_job_is_claimed_by_exactly_one_of_several_processes(
     assert set(claimed) == made
 
 
-def test_of_equal_submissions_at_once_exactly_one_makes_the_job(store: SqlStore) -> None:
+def test_of_equal_submissions_at_once_exactly_one_makes_the_job(store: Store) -> None:
     answers: list[tuple[Job, bool]] = []
     at_once(6, lambda _: answers.append(store.create_job(spec(), idempotency_key="k")))
     assert len({job.id for job, _ in answers}) == 1
     assert sorted(new for _, new in answers) == [False] * 5 + [True]
 
 
-def test_of_equal_commands_at_once_exactly_one_succeeds(store: SqlStore) -> None:
+def test_of_equal_commands_at_once_exactly_one_succeeds(store: Store) -> None:
     job, _ = store.create_job(spec())
     answers: list[object] = []
 
@@ -146,7 +146,7 @@ def test_a_runner_killed_in_the_midst_of_commits_loses_nothing_that_was_acknowle
     store.close()
 
 
-def assert_consistent(store: SqlStore, claim: Claim) -> None:
+def assert_consistent(store: Store, claim: Claim) -> None:
     """Progress, iterations, evaluations, best and the outstanding ask tell one story."""
     job_id, progress = claim.job.id, claim.job.progress
     history = store.iterations(job_id, limit=10_000).items
@@ -163,9 +163,9 @@ def assert_consistent(store: SqlStore, claim: Claim) -> None:
 
 
 def assert_sound(database_url: str) -> None:
-    database = connect(parse_url(database_url))
+    database = Database(database_url)
     if database.engine.dialect.name == "sqlite":
-        with database.transaction(write=False) as connection:
+        with database.read() as connection:
             assert connection.execute(text("PRAGMA integrity_check")).scalar_one() == "ok"
             assert connection.execute(text("PRAGMA foreign_key_check")).all() == []
     database.close()

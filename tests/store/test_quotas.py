@@ -10,18 +10,18 @@ from gaitswarm.services.optimizer.errors import QuotaExceeded
 from gaitswarm.services.optimizer.jobs.job import Command, JobState
 from gaitswarm.services.optimizer.jobs.quota import Quota
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from tests.store.examples import spec
 
 TWO = Quota(jobs=2, seconds=1e9)
 
 
-def submit(store: SqlStore, owner: str | None, quota: Quota | None = TWO, **options: float) -> str:
+def submit(store: Store, owner: str | None, quota: Quota | None = TWO, **options: float) -> str:
     return store.create_job(spec(), owner=owner, quota=quota, **options)[0].id  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("owner", ["ci", None])
-def test_an_owner_has_only_so_many_unfinished_jobs(store: SqlStore, owner: str | None) -> None:
+def test_an_owner_has_only_so_many_unfinished_jobs(store: Store, owner: str | None) -> None:
     first = submit(store, owner)
     store.command(submit(store, owner), Command.PAUSE)
     submit(store, "another")
@@ -33,7 +33,7 @@ def test_an_owner_has_only_so_many_unfinished_jobs(store: SqlStore, owner: str |
         submit(store, owner)
 
 
-def test_unfinished_jobs_walk_only_so_long_together(store: SqlStore) -> None:
+def test_unfinished_jobs_walk_only_so_long_together(store: Store) -> None:
     quota = Quota(jobs=100, seconds=100.0)
     submit(store, "ci", quota, seconds=60.0)
     with pytest.raises(QuotaExceeded, match="with this one 120 s; the limit is 100 s") as refused:
@@ -42,13 +42,13 @@ def test_unfinished_jobs_walk_only_so_long_together(store: SqlStore) -> None:
     submit(store, "ci", quota, seconds=40.0)
 
 
-def test_a_repeated_request_is_no_further_job(store: SqlStore) -> None:
+def test_a_repeated_request_is_no_further_job(store: Store) -> None:
     one = Quota(jobs=1, seconds=1e9)
     made = store.create_job(spec(), owner="ci", quota=one, idempotency_key="k")
     assert store.create_job(spec(), owner="ci", quota=one, idempotency_key="k") == (made[0], False)
 
 
-def test_a_job_that_is_taken_up_again_counts_again(store: SqlStore) -> None:
+def test_a_job_that_is_taken_up_again_counts_again(store: Store) -> None:
     job_id = submit(store, "ci", seconds=60.0)
     claim = store.claim("runner", lease_seconds=60.0, job_id=job_id)
     assert claim is not None
@@ -63,7 +63,7 @@ def test_a_job_that_is_taken_up_again_counts_again(store: SqlStore) -> None:
     assert store.command(job_id, Command.RESUME).state is JobState.QUEUED
 
 
-def test_a_longer_budget_counts_by_what_it_adds(store: SqlStore) -> None:
+def test_a_longer_budget_counts_by_what_it_adds(store: Store) -> None:
     service = JobService(store, longest_job=1e9)
     job = service.submit(spec(), owner="ci")[0]
     planned = service.estimate(spec()).simulated_seconds
@@ -74,7 +74,7 @@ def test_a_longer_budget_counts_by_what_it_adds(store: SqlStore) -> None:
     assert store.job(job.id).spec.iterations == twice
 
 
-def test_of_those_who_ask_at_once_no_more_than_the_quota_get_a_job(store: SqlStore) -> None:
+def test_of_those_who_ask_at_once_no_more_than_the_quota_get_a_job(store: Store) -> None:
     def ask(_: int) -> bool:
         try:
             submit(store, "ci")

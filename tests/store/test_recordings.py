@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import pytest
-from sqlalchemy import Connection
 
 from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
 from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
-from gaitswarm.services.optimizer.store.statements import recordings as statements
-from gaitswarm.services.optimizer.store.statements.recordings import _words
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.identification.recorded_walk import RecordedWalk
 from gaitswarm.sim.robot import load_robot
 from tests.examples.walks import PUBLISHED_A, SHORT_WALK
@@ -39,24 +34,24 @@ def spec(*recordings: str) -> IdentificationSpec:
     )
 
 
-def test_a_recording_comes_back_to_the_last_bit(store: SqlStore) -> None:
+def test_a_recording_comes_back_to_the_last_bit(store: Store) -> None:
     walk = recording()
     name = store.add_recording(walk)
     assert store.recordings([name])[name] == walk
 
 
-def test_the_same_walk_is_the_same_recording_and_another_is_another(store: SqlStore) -> None:
+def test_the_same_walk_is_the_same_recording_and_another_is_another(store: Store) -> None:
     first = store.add_recording(recording())
     assert store.add_recording(recording()) == first
     assert store.add_recording(recording(first_tick=21)) != first
 
 
-def test_an_unknown_recording_is_not_found(store: SqlStore) -> None:
+def test_an_unknown_recording_is_not_found(store: Store) -> None:
     with pytest.raises(NotFound, match="there is no recording '0000"):
         store.recordings(["0" * 32])
 
 
-def test_recordings_are_listed_by_pages_and_searched(store: SqlStore, clock: Clock) -> None:
+def test_recordings_are_listed_by_pages_and_searched(store: Store, clock: Clock) -> None:
     walks = [recording(first_tick=20 + k) for k in range(3)]
     walks.append(recording(scenario=SHORT_WALK | {"name": "Slope_4"}, synthetic=True))
     ids = []
@@ -86,28 +81,7 @@ def test_recordings_are_listed_by_pages_and_searched(store: SqlStore, clock: Clo
     assert refused.value.field == "after"
 
 
-@pytest.mark.parametrize("most", [1, 100])
-def test_a_document_is_looked_into_once_however_often_it_is_searched(
-    store: SqlStore, monkeypatch: pytest.MonkeyPatch, most: int
-) -> None:
-    ids = {store.add_recording(recording(first_tick=20 + k)) for k in range(3)}
-    looked: list[str] = []
-
-    def look(connection: Connection, wanted: Sequence[str]) -> dict[str, str]:
-        looked.extend(wanted)
-        return _words(connection, wanted)
-
-    monkeypatch.setattr(statements, "_words", look)
-    monkeypatch.setattr(statements, "_MOST_KNOWN", most)
-    for _ in range(2):
-        assert {entry.id for entry in store.recording_list(search="FUZZY").items} == ids
-    ids.add(store.add_recording(recording(first_tick=30)))
-    assert {entry.id for entry in store.recording_list(search="fuzzy").items} == ids
-    assert sorted(looked) == sorted(ids)
-    assert {entry.id for entry in store.recording_list(search="fuzzy").items} == ids
-
-
-def test_a_claim_brings_the_recordings_that_the_job_names(store: SqlStore) -> None:
+def test_a_claim_brings_the_recordings_that_the_job_names(store: Store) -> None:
     wanted, other = store.add_recording(recording()), store.add_recording(recording(first_tick=21))
     store.create_job(spec(wanted))
     claim = store.claim("runner", lease_seconds=10.0)
@@ -116,20 +90,20 @@ def test_a_claim_brings_the_recordings_that_the_job_names(store: SqlStore) -> No
     assert other not in claim.recordings
 
 
-def test_a_job_keeps_its_kind(store: SqlStore) -> None:
+def test_a_job_keeps_its_kind(store: Store) -> None:
     wanted = store.add_recording(recording())
     job, _ = store.create_job(spec(wanted))
     assert store.job(job.id).spec == spec(wanted).resolved()
 
 
-def test_a_job_for_a_recording_that_is_missing_is_refused(store: SqlStore) -> None:
+def test_a_job_for_a_recording_that_is_missing_is_refused(store: Store) -> None:
     with pytest.raises(InvalidRequest, match="there is no recording") as refused:
         JobService(store).submit(spec("0" * 32))
     assert refused.value.field == "recordings.0"
     assert store.jobs().items == ()
 
 
-def test_a_job_for_a_recording_of_other_joints_is_refused(store: SqlStore) -> None:
+def test_a_job_for_a_recording_of_other_joints_is_refused(store: Store) -> None:
     other = recording(joints=load_robot("szabadka2").joint_names[::-1])
     with pytest.raises(InvalidRequest, match="joints differ from the robot") as refused:
         JobService(store).submit(spec(store.add_recording(other)))

@@ -9,14 +9,14 @@ import numpy as np
 
 from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration, Reevaluation
 from gaitswarm.services.optimizer.jobs.job import Claim
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.outcome import Status
 from tests.store.examples import LEASE, ask, completed, spec
 
 NAN = math.nan
 
 
-def begun(store: SqlStore) -> Claim:
+def begun(store: Store) -> Claim:
     store.create_job(spec().model_copy(update={"precision": "single"}))
     claim = store.claim("runner", lease_seconds=LEASE)
     assert claim is not None
@@ -37,7 +37,7 @@ def searched(index: int, fitness: tuple[float, ...], double: float | None) -> Co
     )
 
 
-def test_both_precisions_of_the_best_design_are_kept_with_every_bit(store: SqlStore) -> None:
+def test_both_precisions_of_the_best_design_are_kept_with_every_bit(store: Store) -> None:
     claim = begun(store)
     done = searched(0, (4.0, 3.0), 3.0 + 1e-7)
     store.commit(claim, done, ask(1))
@@ -49,7 +49,7 @@ def test_both_precisions_of_the_best_design_are_kept_with_every_bit(store: SqlSt
     assert best.reevaluation.statuses.tolist() == [Status.OK, Status.OK]
 
 
-def test_the_best_is_the_least_in_double_precision(store: SqlStore) -> None:
+def test_the_best_is_the_least_in_double_precision(store: Store) -> None:
     claim = begun(store)
     job_id = claim.job.id
     store.commit(claim, searched(0, (4.0, 3.0), 3.5), ask(1))
@@ -65,14 +65,14 @@ def test_the_best_is_the_least_in_double_precision(store: SqlStore) -> None:
     assert [i.best for i in listed] == [3.0, 3.4, 3.3], "statistics of the swarm, in single"
 
 
-def test_a_swarm_that_was_not_reevaluated_in_double_adds_no_best(store: SqlStore) -> None:
+def test_a_swarm_that_was_not_reevaluated_in_double_adds_no_best(store: Store) -> None:
     claim = begun(store)
     store.commit(claim, searched(0, (4.0, 3.0), 3.5), ask(1))
     store.commit(claim, searched(1, (1.0, 2.0), None), ask(2))
     assert store.job(claim.job.id).progress.best_fitness == 3.5
 
 
-def test_a_design_that_falls_in_double_is_no_best(store: SqlStore) -> None:
+def test_a_design_that_falls_in_double_is_no_best(store: Store) -> None:
     claim = begun(store)
     store.commit(claim, searched(0, (4.0, 3.0), math.inf), ask(1))
     assert store.best(claim.job.id) is None
@@ -80,7 +80,7 @@ def test_a_design_that_falls_in_double_is_no_best(store: SqlStore) -> None:
     assert [e.fitness for e in store.evaluations(claim.job.id, 0)] == [4.0, 3.0]
 
 
-def test_a_repeated_commit_changes_nothing(store: SqlStore) -> None:
+def test_a_repeated_commit_changes_nothing(store: Store) -> None:
     claim = begun(store)
     store.commit(claim, searched(0, (4.0, 3.0), 3.5), ask(1))
     before = store.job(claim.job.id)

@@ -11,8 +11,8 @@ from gaitswarm.services.optimizer.errors import IdempotencyConflict
 from gaitswarm.services.optimizer.jobs.kinds import walks
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
-from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
+from gaitswarm.services.optimizer.store.engine import Database
 from gaitswarm.sim.scenario import Scenario, find_scenario
 
 REQUEST = {"controller": "pi", "scenarios": ["1", "2"], "preference": "A"}
@@ -35,7 +35,7 @@ def another_scenario(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("change", [another_preference, another_scenario], ids=lambda f: f.__name__)
 def test_a_request_is_the_same_when_the_presets_that_it_names_have_changed(
-    store: SqlStore, monkeypatch: pytest.MonkeyPatch, change: Callable[[pytest.MonkeyPatch], None]
+    store: Store, monkeypatch: pytest.MonkeyPatch, change: Callable[[pytest.MonkeyPatch], None]
 ) -> None:
     first, _ = store.create_job(asked(), idempotency_key="k")
     change(monkeypatch)
@@ -46,7 +46,7 @@ def test_a_request_is_the_same_when_the_presets_that_it_names_have_changed(
 
 
 def test_a_request_is_recognized_by_the_document_that_was_sent_whatever_its_layout(
-    store: SqlStore, monkeypatch: pytest.MonkeyPatch
+    store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     first, _ = store.create_job(asked(), idempotency_key="k", request={"a": 1, "b": [2.5]})
     another_preference(monkeypatch)
@@ -56,18 +56,18 @@ def test_a_request_is_recognized_by_the_document_that_was_sent_whatever_its_layo
         store.create_job(asked(), idempotency_key="k", request={"a": 1, "b": [2.6]})
 
 
-def test_a_request_that_spells_the_same_job_differently_is_the_same(store: SqlStore) -> None:
+def test_a_request_that_spells_the_same_job_differently_is_the_same(store: Store) -> None:
     first, _ = store.create_job(asked(), idempotency_key="k")
     spelled_out = asked(scenarios=["normal-fast", "normal-slow"], seed=1)
     assert store.create_job(spelled_out, idempotency_key="k") == (first, False)
 
 
 def test_a_job_whose_request_was_not_stored_is_recognized_by_its_spec(
-    store: SqlStore, database_url: str
+    store: Store, database_url: str
 ) -> None:
     first, _ = store.create_job(asked(), idempotency_key="k")
-    database = connect(parse_url(database_url))
-    with database.transaction(write=True) as connection:
+    database = Database(database_url)
+    with database.write() as connection:
         connection.execute(text("UPDATE jobs SET request_digest = NULL"))
     database.close()
     assert store.create_job(asked(), idempotency_key="k") == (first, False)

@@ -14,7 +14,7 @@ from gaitswarm.services.optimizer.jobs.estimate import TimeLeft, recent_pace, ti
 from gaitswarm.services.optimizer.jobs.job import Job, JobState, Progress
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.store import Store, open_store
 from gaitswarm.settings import Settings
 from tests.examples.walks import SHORT_WALK
 from tests.store.examples import spec
@@ -142,7 +142,7 @@ def test_a_scenario_is_fine_if_a_searched_gait_can_stay_within_reach(tmp_path: P
     store.close()
 
 
-def test_a_job_longer_than_is_taken_is_refused_however_it_is_asked_for(store: SqlStore) -> None:
+def test_a_job_longer_than_is_taken_is_refused_however_it_is_asked_for(store: Store) -> None:
     asked = JobSpec(scenarios=("1", "2"), iterations=4)
     # Three cycles of 1.5 s and of 2.2 s, of 25 designs in each of four iterations.
     taken = JobService(store, longest_job=1111.0)
@@ -161,7 +161,7 @@ def test_a_job_longer_than_is_taken_is_refused_however_it_is_asked_for(store: Sq
     assert [listed.id for listed in store.jobs().items] == [job.id]
 
 
-def test_a_cycle_time_that_is_searched_counts_by_the_middle_of_its_bounds(store: SqlStore) -> None:
+def test_a_cycle_time_that_is_searched_counts_by_the_middle_of_its_bounds(store: Store) -> None:
     searched = JobSpec(scenarios=("1",), iterations=4).with_gait_searched()
     seconds = 100 * 3 * 1.3
     JobService(store, longest_job=seconds + 1.0).submit(searched)
@@ -169,7 +169,7 @@ def test_a_cycle_time_that_is_searched_counts_by_the_middle_of_its_bounds(store:
         JobService(store, longest_job=seconds - 1.0).submit(searched)
 
 
-def test_an_iteration_of_more_walks_than_are_kept_at_once_is_refused(store: SqlStore) -> None:
+def test_an_iteration_of_more_walks_than_are_kept_at_once_is_refused(store: Store) -> None:
     asked = JobSpec.model_validate(
         {"worlds": {"count": 100}, "optimizer": {"name": "pso", "particles": 2000}, "iterations": 1}
     )
@@ -177,7 +177,7 @@ def test_an_iteration_of_more_walks_than_are_kept_at_once_is_refused(store: SqlS
         JobService(store, longest_job=1e10).submit(asked)
 
 
-def test_a_weeks_work_of_a_cluster_is_taken_by_default(store: SqlStore) -> None:
+def test_a_weeks_work_of_a_cluster_is_taken_by_default(store: Store) -> None:
     limit = Settings().api_max_job_seconds
     asked = JobSpec.model_validate(
         {"worlds": {"count": 32}, "optimizer": {"particles": 200}, "iterations": 10_000}

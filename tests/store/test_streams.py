@@ -14,7 +14,7 @@ import pytest
 from gaitswarm.services.optimizer.errors import StoreUnavailable
 from gaitswarm.services.optimizer.jobs.job import Claim
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.store import Store, open_store
 from tests.examples.processes import within
 from tests.examples.servers import Server
 from tests.store.examples import ask, begun, completed
@@ -44,7 +44,7 @@ def iterations(url: str, job_id: str, opened: threading.Semaphore) -> Iterator[i
                 yield data["index"]
 
 
-def commit(store: SqlStore, claim: Claim, index: int) -> None:
+def commit(store: Store, claim: Claim, index: int) -> None:
     """As a runner does, which tries again where the database is away."""
     following = ask(index + 1) if index + 1 < ITERATIONS else None
 
@@ -59,7 +59,7 @@ def commit(store: SqlStore, claim: Claim, index: int) -> None:
 
 
 def test_many_streams_of_a_job_have_every_iteration_once_and_in_order(
-    store: SqlStore, database_url: str
+    store: Store, database_url: str
 ) -> None:
     claim = begun(store, iterations=ITERATIONS)
     # On PostgreSQL nothing polls that often: the event comes from a notification.

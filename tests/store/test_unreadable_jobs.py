@@ -13,9 +13,9 @@ from gaitswarm.services.optimizer.errors import Conflict, IdempotencyConflict, U
 from gaitswarm.services.optimizer.jobs.job import Command, Job, JobOrder, JobState
 from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
-from gaitswarm.services.optimizer.store.rows.tables import jobs
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
+from gaitswarm.services.optimizer.store.engine import Database
+from gaitswarm.services.optimizer.store.tables import jobs
 from tests.examples.hostile import TOML, URDF, chain
 from tests.store.examples import LEASE, Clock, begun, completed, spec
 from tests.store.test_recordings import recording
@@ -32,19 +32,19 @@ def write_spec(database_url: str) -> Write:
 
 
 def execute(url: str, statement: str, document: str, job_id: str) -> None:
-    database = connect(parse_url(url))
+    database = Database(url)
     if database.engine.dialect.name == "postgresql":
         statement = statement.replace(":document", "CAST(:document AS json)")
-    with database.transaction(write=True) as connection:
+    with database.write() as connection:
         connection.execute(text(statement), {"document": document, "id": job_id})
     database.close()
 
 
 def stored(url: str, job_id: str) -> Mapping[str, Any]:
     """A job's row as the database holds it, its spec as text."""
-    database = connect(parse_url(url))
+    database = Database(url)
     columns = [c if c.name != "spec" else cast(c, Text).label("spec") for c in jobs.c]
-    with database.transaction(write=False) as connection:
+    with database.read() as connection:
         row = connection.execute(select(*columns).where(jobs.c.id == job_id)).mappings().one()
     database.close()
     return dict(row)
@@ -72,7 +72,7 @@ def unreadable(request: pytest.FixtureRequest) -> str:
 
 
 @pytest.fixture
-def damaged(store: SqlStore, write_spec: Write, unreadable: str) -> Job:
+def damaged(store: Store, write_spec: Write, unreadable: str) -> Job:
     """A queued job, older than all others of a test, whose spec cannot be read."""
     job, _ = store.create_job(spec(), idempotency_key="damaged")
     write_spec(job.id, unreadable)
@@ -81,7 +81,7 @@ def damaged(store: SqlStore, write_spec: Write, unreadable: str) -> Job:
 
 @pytest.mark.variants("sqlite-*", "postgresql-newer")
 def test_the_next_job_is_claimed_and_the_unreadable_one_has_failed_with_its_reason(
-    store: SqlStore, clock: Clock, damaged: Job
+    store: Store, clock: Clock, damaged: Job
 ) -> None:
     clock.advance(1.0)
     sound, _ = store.create_job(spec())
@@ -96,7 +96,7 @@ def test_the_next_job_is_claimed_and_the_unreadable_one_has_failed_with_its_reas
 
 @pytest.mark.variants("sqlite-*", "postgresql-newer")
 def test_nothing_else_of_its_row_is_touched(
-    store: SqlStore, clock: Clock, damaged: Job, database_url: str, unreadable: str
+    store: Store, clock: Clock, damaged: Job, database_url: str, unreadable: str
 ) -> None:
     before = stored(database_url, damaged.id)
     clock.advance(1.0)
@@ -108,7 +108,7 @@ def test_nothing_else_of_its_row_is_touched(
 
 
 @pytest.mark.variants("sqlite-*", "postgresql-newer")
-def test_lists_show_it_among_the_others(store: SqlStore, clock: Clock, damaged: Job) -> None:
+def test_lists_show_it_among_the_others(store: Store, clock: Clock, damaged: Job) -> None:
     clock.advance(1.0)
     sound, _ = store.create_job(spec(name="sound"))
     assert [job.id for job in store.jobs().items] == [sound.id, damaged.id]
@@ -124,7 +124,7 @@ def test_lists_show_it_among_the_others(store: SqlStore, clock: Clock, damaged: 
 
 
 @pytest.mark.variants("sqlite-*", "postgresql-newer")
-def test_its_spec_is_refused_with_the_reason_to_its_users(store: SqlStore, damaged: Job) -> None:
+def test_its_spec_is_refused_with_the_reason_to_its_users(store: Store, damaged: Job) -> None:
     assert not damaged.readable
     with pytest.raises(Conflict, match=rf"{damaged.id}: its spec cannot be read"):
         _ = damaged.spec
@@ -134,7 +134,7 @@ def test_its_spec_is_refused_with_the_reason_to_its_users(store: SqlStore, damag
 
 @pytest.mark.variants("sqlite-*", "postgresql-newer")
 def test_it_can_be_resumed_by_a_version_that_can_read_it_and_by_no_other(
-    store: SqlStore, damaged: Job, write_spec: Write
+    store: Store, damaged: Job, write_spec: Write
 ) -> None:
     claim = store.claim("runner", lease_seconds=LEASE)
     assert claim is None
@@ -151,18 +151,18 @@ def test_it_can_be_resumed_by_a_version_that_can_read_it_and_by_no_other(
 
 
 @pytest.mark.variants("sqlite-*", "postgresql-newer")
-def test_it_can_be_cancelled(store: SqlStore, damaged: Job) -> None:
+def test_it_can_be_cancelled(store: Store, damaged: Job) -> None:
     assert store.command(damaged.id, Command.CANCEL).state is JobState.CANCELLED
 
 
 @pytest.mark.variants("sqlite-*", "postgresql-newer")
-def test_its_key_still_means_it(store: SqlStore, damaged: Job) -> None:
+def test_its_key_still_means_it(store: Store, damaged: Job) -> None:
     assert store.create_job(spec(), idempotency_key="damaged") == (damaged, False)
     with pytest.raises(IdempotencyConflict, match="cannot be read"):
         store.create_job(spec(iterations=9), idempotency_key="damaged")
 
 
-def test_what_is_committed_stays_to_be_read(store: SqlStore, write_spec: Write) -> None:
+def test_what_is_committed_stays_to_be_read(store: Store, write_spec: Write) -> None:
     claim = begun(store)
     store.commit(claim, completed(0, (2.0, 3.0)), None)
     before = store.iterations(claim.job.id)
@@ -173,7 +173,7 @@ def test_what_is_committed_stays_to_be_read(store: SqlStore, write_spec: Write) 
 
 
 def test_a_job_under_way_that_cannot_be_read_any_more_is_claimed_by_no_runner(
-    store: SqlStore, clock: Clock, write_spec: Write
+    store: Store, clock: Clock, write_spec: Write
 ) -> None:
     claim = begun(store)
     write_spec(claim.job.id, UNREADABLE["newer"])
@@ -182,7 +182,7 @@ def test_a_job_under_way_that_cannot_be_read_any_more_is_claimed_by_no_runner(
     assert store.job(claim.job.id).state is JobState.FAILED
 
 
-def test_a_name_that_can_be_read_is_shown(store: SqlStore, write_spec: Write) -> None:
+def test_a_name_that_can_be_read_is_shown(store: Store, write_spec: Write) -> None:
     job, _ = store.create_job(spec(name="mine"))
     write_spec(job.id, UNREADABLE["newer"])
     (found,) = store.jobs(search="min").items
@@ -192,7 +192,7 @@ def test_a_name_that_can_be_read_is_shown(store: SqlStore, write_spec: Write) ->
 @pytest.mark.parametrize("document", ['{"name": "cut o', "[" * 100_000], ids=["cut", "deep"])
 @pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
 def test_a_spec_that_is_no_json_at_all_fails_alone_too(
-    store: SqlStore, clock: Clock, write_spec: Write, database_url: str, document: str
+    store: Store, clock: Clock, write_spec: Write, database_url: str, document: str
 ) -> None:
     job, _ = store.create_job(spec())
     write_spec(job.id, document)
@@ -209,7 +209,7 @@ def test_a_spec_that_is_no_json_at_all_fails_alone_too(
 
 @pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
 def test_a_spec_that_is_not_even_text_fails_alone_too(
-    store: SqlStore, clock: Clock, database_url: str
+    store: Store, clock: Clock, database_url: str
 ) -> None:
     job, _ = store.create_job(spec())
     # SQLite keeps bytes that are no UTF-8, as a damaged disk leaves them.
@@ -227,7 +227,7 @@ def test_a_spec_that_is_not_even_text_fails_alone_too(
 
 @pytest.mark.parametrize("recorded", ["{}", "0", "false", '""'])
 def test_a_provenance_that_is_no_list_is_not_taken_for_none(
-    store: SqlStore, database_url: str, recorded: str
+    store: Store, database_url: str, recorded: str
 ) -> None:
     job, _ = store.create_job(spec())
     execute(database_url, "UPDATE jobs SET provenance = :document WHERE id = :id", recorded, job.id)
@@ -240,7 +240,7 @@ def test_a_provenance_that_is_no_list_is_not_taken_for_none(
     "recorded", ['{"first_tick": "noon"}', None], ids=["that cannot be read", "that is gone"]
 )
 def test_a_job_with_a_recording_is_set_aside_too(
-    store: SqlStore, clock: Clock, database_url: str, recorded: str | None
+    store: Store, clock: Clock, database_url: str, recorded: str | None
 ) -> None:
     name = store.add_recording(recording())
     job, _ = store.create_job(
@@ -263,7 +263,7 @@ def test_a_job_with_a_recording_is_set_aside_too(
 
 
 def test_a_recording_that_cannot_be_read_hides_no_other_in_the_list(
-    store: SqlStore, database_url: str
+    store: Store, database_url: str
 ) -> None:
     whole, broken = (store.add_recording(recording(first_tick=k)) for k in (20, 21))
     statement = "UPDATE recordings SET document = :document WHERE id = :id"
@@ -278,7 +278,7 @@ def test_a_recording_that_cannot_be_read_hides_no_other_in_the_list(
 
 
 def test_a_job_whose_ask_cannot_be_read_is_set_aside_too(
-    store: SqlStore, clock: Clock, database_url: str
+    store: Store, clock: Clock, database_url: str
 ) -> None:
     first = begun(store)
     store.release(first, JobState.QUEUED)
@@ -294,7 +294,7 @@ def test_a_job_whose_ask_cannot_be_read_is_set_aside_too(
 
 
 def test_a_job_whose_provenance_cannot_be_read_is_set_aside_too(
-    store: SqlStore, clock: Clock, database_url: str
+    store: Store, clock: Clock, database_url: str
 ) -> None:
     job, _ = store.create_job(spec(name="mine"))
     statement = "UPDATE jobs SET provenance = :document WHERE id = :id"
@@ -310,7 +310,7 @@ def test_a_job_whose_provenance_cannot_be_read_is_set_aside_too(
 
 @pytest.mark.variants("sqlite-*", "postgresql-newer")
 def test_what_a_new_job_costs_is_not_asked_of_one_that_cannot_be_read(
-    store: SqlStore, damaged: Job
+    store: Store, damaged: Job
 ) -> None:
     # Two designs in two scenarios, three times.
     assert JobService(store).estimate(spec()).walks == 12

@@ -17,13 +17,18 @@ from sqlalchemy import Connection, text
 from gaitswarm.services.optimizer.errors import Conflict, StoreUnavailable
 from gaitswarm.services.optimizer.jobs.job import LONGEST_LEASE_SECONDS, JobOrder
 from gaitswarm.services.optimizer.jobs.labels import LabelsChange
-from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
-from gaitswarm.services.optimizer.store.rows.tables import metadata
-from gaitswarm.services.optimizer.store.schema import migrate, revisions
-from gaitswarm.services.optimizer.store.schema.in_use import exclusive
-from gaitswarm.services.optimizer.store.schema.migrate import create, upgrade
-from gaitswarm.services.optimizer.store.schema.revisions import MIGRATIONS, head, read_revision
-from gaitswarm.services.optimizer.store.sql_store import open_store
+from gaitswarm.services.optimizer.store import open_store
+from gaitswarm.services.optimizer.store import schema as schema_module
+from gaitswarm.services.optimizer.store.engine import Database, parse_url
+from gaitswarm.services.optimizer.store.schema import (
+    MIGRATIONS,
+    create,
+    exclusive,
+    head,
+    read_revision,
+    upgrade,
+)
+from gaitswarm.services.optimizer.store.tables import metadata
 from tests.examples.forked import ForkedCommand
 from tests.examples.processes import output
 from tests.store import worker_process
@@ -76,8 +81,7 @@ def release_next(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[]
         folder = tmp_path / "migrations"
         shutil.copytree(MIGRATIONS, folder)
         (folder / "versions" / f"r{NEXT}_next.py").write_text(_NEXT_MIGRATION)
-        for module in (revisions, migrate):
-            monkeypatch.setattr(module, "MIGRATIONS", folder)
+        monkeypatch.setattr(schema_module, "MIGRATIONS", folder)
 
     return release
 
@@ -99,22 +103,22 @@ def upgrade():
 
 def revision(url: str) -> str | None:
     with (
-        closing(connect(parse_url(url))) as database,
-        database.transaction(write=False) as connection,
+        closing(Database(url)) as database,
+        database.read() as connection,
     ):
         return read_revision(connection)
 
 
 def test_a_new_database_is_as_all_migrations_make_one(fresh_url: str) -> None:
-    with closing(connect(parse_url(fresh_url), for_migration=True)) as database:
-        with database.transaction(write=True) as connection:
+    with closing(Database(fresh_url, for_migration=True)) as database:
+        with database.write() as connection:
             command.upgrade(alembic(connection), "head")
             migrated, revision = schema(connection), read_revision(connection)
             metadata.drop_all(connection)
             connection.execute(text("DROP TABLE alembic_version"))
             assert schema(connection) == []
         create(parse_url(fresh_url))
-        with database.transaction(write=False) as connection:
+        with database.read() as connection:
             assert len(migrated) > len(metadata.tables)
             assert schema(connection) == migrated
             assert read_revision(connection) == revision == head()
@@ -122,8 +126,8 @@ def test_a_new_database_is_as_all_migrations_make_one(fresh_url: str) -> None:
 
 def test_a_database_of_the_first_revision_is_adopted(fresh_url: str) -> None:
     with (
-        closing(connect(parse_url(fresh_url), for_migration=True)) as database,
-        database.transaction(write=True) as connection,
+        closing(Database(fresh_url, for_migration=True)) as database,
+        database.write() as connection,
     ):
         command.upgrade(alembic(connection), FIRST)
     assert upgrade(fresh_url) == FIRST
@@ -142,8 +146,8 @@ def test_a_database_of_the_first_revision_is_upgraded_with_what_jobs_are_searche
         store.label(job.id, LabelsChange(note="Look HERE", tags=("thesis",)))
     # The first revision has neither these columns nor an index with them.
     with (
-        closing(connect(parse_url(fresh_url), for_migration=True)) as database,
-        database.transaction(write=True) as connection,
+        closing(Database(fresh_url, for_migration=True)) as database,
+        database.write() as connection,
     ):
         if connection.dialect.name == "sqlite":
             connection.execute(text("DROP INDEX ix_jobs_entries"))
@@ -254,10 +258,10 @@ def test_a_process_that_outlived_an_upgrade_is_refused_when_it_connects_again(
 def test_no_process_opens_the_database_during_an_upgrade(
     fresh_url: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gaitswarm.services.optimizer.store.connections.engine.BUSY_SECONDS", 0.2)
+    monkeypatch.setattr("gaitswarm.services.optimizer.store.engine.BUSY_SECONDS", 0.2)
     open_store(fresh_url).close()
     with (
-        closing(connect(parse_url(fresh_url), for_migration=True)) as database,
+        closing(Database(fresh_url, for_migration=True)) as database,
         exclusive(database),
         pytest.raises(StoreUnavailable, match=r"being upgraded|locked"),
     ):

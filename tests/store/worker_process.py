@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import sys
 
-from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
-from gaitswarm.services.optimizer.store.schema.in_use import admit
-from gaitswarm.services.optimizer.store.sql_store import SqlStore, open_store
+from gaitswarm.services.optimizer.store import Store, open_store
+from gaitswarm.services.optimizer.store.engine import Database
+from gaitswarm.services.optimizer.store.schema import admit
 from tests.store.examples import ask, completed
 
 PARTICLES = 25
@@ -21,13 +21,13 @@ def say(word: object) -> None:
     sys.stdout.flush()
 
 
-def claim_all(store: SqlStore) -> None:
+def claim_all(store: Store) -> None:
     """Claim until there is nothing left; prints the ids."""
     while (claim := store.claim("process", lease_seconds=600.0)) is not None:
         say(claim.job.id)
 
 
-def commit_for_ever(store: SqlStore) -> None:
+def commit_for_ever(store: Store) -> None:
     """Claim a job and commit iteration after iteration; prints the index of each."""
     # A lease of no time: after this process's death others need not wait.
     claim = store.claim("process", lease_seconds=0.0)
@@ -60,9 +60,9 @@ def open_when_told() -> None:
 
 def stay_open() -> None:
     """Have a database open, and do nothing, until a line comes."""
-    database = connect(parse_url(sys.argv[1]))
+    database = Database(sys.argv[1])
     admit(database)
-    with database.transaction(write=False):
+    with database.read():
         pass
     say("ready")
     sys.stdin.readline()

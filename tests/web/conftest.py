@@ -13,7 +13,7 @@ from playwright.sync_api import sync_playwright
 
 from gaitswarm.api.page import PAGE_FOLDER, is_built
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from tests.examples import requirements
 from tests.examples.jobs import SMALL_SPEC
 from tests.examples.servers import QUICK_EVENTS, Server, ServerProcess
@@ -122,7 +122,7 @@ def idle_server(_chromium: str) -> Iterator[Server]:
 
 @pytest.fixture
 def start_server(
-    store: SqlStore, idle_server: Server, _chromium: str
+    store: Store, idle_server: Server, _chromium: str
 ) -> Iterator[Callable[..., Server]]:
     """Start a server for the test's store, without a runner.
 

@@ -30,9 +30,9 @@ from benchmarks.large_store import PARTICLES, fill
 from benchmarks.page import measure
 from gaitswarm.api.page import PAGE_FOLDER
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.connections.engine import connect, parse_url
-from gaitswarm.services.optimizer.store.rows.tables import evaluations, iterations, jobs
-from gaitswarm.services.optimizer.store.statements.records import ID_ALPHABET
+from gaitswarm.services.optimizer.store.engine import Database
+from gaitswarm.services.optimizer.store.job_rows import ID_ALPHABET
+from gaitswarm.services.optimizer.store.tables import evaluations, iterations, jobs
 from gaitswarm.services.runtime import open_store
 from tests.examples.servers import Server
 from tests.web.job_page import wait_for_iteration
@@ -60,8 +60,8 @@ def long_job(database: Path) -> str:
     with closing(open_store(str(database))) as store:
         job_id = fill(store, jobs=WRITTEN_SHORT + 1, iterations=WRITTEN_ITERATIONS)
     with (
-        closing(connect(parse_url(str(database)))) as opened,
-        opened.transaction(write=True) as connection,
+        closing(Database(str(database))) as opened,
+        opened.write() as connection,
     ):
         multiply_others(connection, job_id)
         lengthen(connection, job_id)

@@ -8,7 +8,7 @@ import pytest
 from playwright.sync_api import expect
 
 from gaitswarm.services.optimizer.access import Scope
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from tests.examples.servers import Server
 from tests.web.visit import Visit
 
@@ -16,7 +16,7 @@ REFUSED = r"401 \(Unauthorized\)"
 
 
 @pytest.fixture
-def secret(store: SqlStore) -> str:
+def secret(store: Store) -> str:
     """Secret of a token in the database of `start_server`."""
     return store.tokens.create("reader", Scope.READ)[1]
 

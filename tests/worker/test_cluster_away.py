@@ -14,7 +14,7 @@ from typing import Any, Final
 import pytest
 
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.store.sql_store import open_store
+from gaitswarm.services.optimizer.store import open_store
 from gaitswarm.services.runtime import run_embedded
 from gaitswarm.services.worker.in_process import InProcessEvaluator
 from tests.examples.jobs import LONG_SPEC, SMALL_SPEC

@@ -10,7 +10,7 @@ import pytest
 from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.run.runner import Runner
-from gaitswarm.services.optimizer.store.sql_store import SqlStore
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.services.worker.in_process import InProcessEvaluator
 from gaitswarm.sim.errors import ProcessEnded
 from gaitswarm.sim.kernel import derivation
@@ -34,7 +34,7 @@ def spec(robot: RobotFiles | str) -> JobSpec:
 
 
 def test_a_robot_without_a_kernel_fails_its_job_and_the_runner_takes_the_next(
-    store: SqlStore, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def ended(_: object) -> dict[str, object]:
         raise ProcessEnded("took more than 4096 MiB of memory")

@@ -21,10 +21,10 @@ from gaitswarm.requests import arguments, design_arguments
 from gaitswarm.requests.firmware import FirmwareOptions
 from gaitswarm.services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState
 from gaitswarm.services.optimizer.jobs.labels import ANY_JOB, JobFilter
+from gaitswarm.services.optimizer.jobs.listing import Page
 from gaitswarm.services.optimizer.masking import masked_url
 from gaitswarm.services.optimizer.run.evaluator import Evaluator
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.optimizer.store.port.reading import Page
 from gaitswarm.services.runtime import EvaluatorKind
 from gaitswarm.settings import default_database
 from gaitswarm.sim.identification.recorded_walk import RecordedWalk

@@ -18,7 +18,7 @@ from gaitswarm.services.optimizer.errors import Conflict, EvaluatorUnavailable
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Iteration
 from gaitswarm.services.optimizer.jobs.job import Job
-from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.store import Store
 
 PIECE: Final = 2000
 """Evaluations per transaction."""

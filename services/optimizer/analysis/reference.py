@@ -16,7 +16,7 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.provenance import changes_since, job_provenance
 from gaitswarm.services.optimizer.jobs.reference import START, Reference, reference_design
 from gaitswarm.services.optimizer.jobs.spec import Spec
-from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.case import Walk, run_together
 from gaitswarm.sim.errors import SimulationError
 from gaitswarm.sim.outcome import Status

@@ -23,9 +23,8 @@ from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.iteration import Reevaluation, best_particle
 from gaitswarm.services.optimizer.jobs.job import Job
-from gaitswarm.services.optimizer.store.port.base import Store
-from gaitswarm.services.optimizer.store.port.reading import StoredLink
-from gaitswarm.services.optimizer.store.rows.evaluation_rows import fitness_summary
+from gaitswarm.services.optimizer.store import Store
+from gaitswarm.services.optimizer.store.history import StoredLink, fitness_summary
 
 _PIECE: Final = 2000
 """Evaluations per transaction."""
@@ -157,7 +156,7 @@ class _Piece:
         return cls(
             {stored.link.iteration: stored for stored in store.links(job_id, first, last)},
             store.evaluation_columns(job_id, first, last),
-            store.reevaluations_between(job_id, first, last),
+            store.reevaluations(job_id, first, last),
         )
 
     def iteration(self, index: int) -> Stored:

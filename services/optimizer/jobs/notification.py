@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any, Final, Protocol
+from typing import Any, Final
 from urllib.parse import urlsplit
 
 from gaitswarm.services.optimizer.errors import InvalidRequest
@@ -40,22 +40,6 @@ class Notification:
     next_attempt_at: datetime | None = None
     delivered_at: datetime | None = None
     error: str | None = None
-
-
-class Outbox(Protocol):
-    """The notification store. Thread-safe; every method is one transaction.
-
-    The transaction that ends a job with a URL adds its notification.
-    """
-
-    def take(self, *, lease_seconds: float) -> Notification | None:
-        """Lease the notification that has been due for longest, for one attempt."""
-
-    def settle(self, taken: Notification, error: str | None, *, final: bool = False) -> None:
-        """Record the result of an attempt: delivered, due again later, or given up."""
-
-    def about(self, job_id: str) -> tuple[Notification, ...]:
-        """Return the notifications about a job."""
 
 
 def pause_after(attempts: int) -> float | None:

@@ -16,7 +16,7 @@ from gaitswarm.services.optimizer.run.evaluator import EvaluationStopped, Evalua
 from gaitswarm.services.optimizer.run.execution import OnCommit, OnRetry, RunContext, run_claim
 from gaitswarm.services.optimizer.run.heartbeat import Heartbeat
 from gaitswarm.services.optimizer.run.runner import runner_name
-from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.store import Store
 
 EMBEDDED_LEASE_SECONDS: Final = 5.0
 """Short, because a user waits for its end when the previous process was killed."""

@@ -63,7 +63,7 @@ from gaitswarm.services.optimizer.run.evaluator import (
 )
 from gaitswarm.services.optimizer.run.heartbeat import Heartbeat
 from gaitswarm.services.optimizer.run.outage import Backoff, Outage, is_infrastructure
-from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.outcome import Outcome, Status
 
 _CACHED: Final = -1

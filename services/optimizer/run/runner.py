@@ -23,7 +23,7 @@ from gaitswarm.services.optimizer.log_context import log_context
 from gaitswarm.services.optimizer.run.evaluator import Evaluator
 from gaitswarm.services.optimizer.run.execution import RunContext, run_claim
 from gaitswarm.services.optimizer.run.outage import Backoff, Outage, is_infrastructure
-from gaitswarm.services.optimizer.store.port.base import Store
+from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.provenance import simulator_digest
 
 _PAUSES: Final = Backoff(first=0.5, longest=10.0)

@@ -1,0 +1,181 @@
+"""Notification of changed jobs, whichever process commits them"""
+
+from __future__ import annotations
+
+import logging
+import math
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager, suppress
+from dataclasses import dataclass
+from typing import Any, Final
+
+from sqlalchemy import Connection, func, select
+
+from gaitswarm.services.optimizer.errors import StoreUnavailable
+from gaitswarm.services.optimizer.store.engine import Database
+from gaitswarm.services.optimizer.store.tables import EXISTING, jobs
+
+_CHANNEL: Final = "gaitswarm_jobs"
+
+_ANNOUNCED: Final = frozenset({"state", "iterations", "waiting"})
+"""Columns of jobs whose changes wake watchers."""
+
+_NOTIFY_SECONDS: Final = 0.5
+"""Longest wait for notifications before the listener checks whether to stop."""
+
+_LISTEN_SECONDS: Final = 15.0
+"""Interval of polls while listening."""
+
+_STUCK_SECONDS: Final = 120.0
+"""Silence after which the thread counts as stuck; polls may be 60 s apart."""
+
+_log = logging.getLogger(__name__)
+
+
+def announce(connection: Connection, job_id: str, columns: frozenset[str]) -> None:
+    """Notify PostgreSQL's listeners of changed columns when the transaction is committed."""
+    if connection.dialect.name == "postgresql" and not _ANNOUNCED.isdisjoint(columns):
+        connection.execute(select(func.pg_notify(_CHANNEL, job_id)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Watcher:
+    job_id: str
+    wake: Callable[[], None]
+    poll_seconds: float
+
+
+class Changes:
+    """Changes of jobs. Thread-safe; one thread and one connection for all watchers of a process.
+
+    On PostgreSQL the connection listens for announcements; while it is lost, and on SQLite, one
+    query polls all watched jobs.
+    """
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+        self._condition = threading.Condition()
+        self._watchers: set[_Watcher] = set()
+        self._seen: dict[str, Any] = {}
+        self._thread: threading.Thread | None = None
+        self._stop = threading.Event()
+        self._looked = time.monotonic()
+
+    @contextmanager
+    def watch(
+        self, job_id: str, wake: Callable[[], None], *, poll_seconds: float
+    ) -> Iterator[None]:
+        """Call a function on each change of a job's state or iterations, inside the block.
+
+        A commit before the block may be reported or not, so read the job inside the block first.
+        Several changes may be reported as one, and one that is none may be reported.
+
+        Args:
+            job_id: of a job, which need not exist.
+            wake: called in another thread; must return at once.
+            poll_seconds: longest delay where the database does not notify [s].
+        """
+        watcher = _Watcher(job_id, wake, poll_seconds)
+        with self._condition:
+            self._watchers.add(watcher)
+            if self._thread is None:
+                self._stop = threading.Event()
+                self._looked = time.monotonic()
+                arguments = (self._stop,)
+                self._thread = threading.Thread(
+                    target=self._run, args=arguments, name="changes", daemon=True
+                )
+                self._thread.start()
+            self._condition.notify_all()
+        try:
+            yield
+        finally:
+            with self._condition:
+                self._watchers.discard(watcher)
+
+    def trouble(self) -> str | None:
+        """Return why changes are no longer reported; None if they are."""
+        with self._condition:
+            if self._thread is None or not self._watchers:
+                return None
+            if not self._thread.is_alive():
+                return "event streams get no news of jobs; restart this process"
+            silent = time.monotonic() - self._looked
+        if silent < _STUCK_SECONDS:
+            return None
+        return f"changes of jobs have not been checked for {silent:.0f} s"
+
+    def close(self) -> None:
+        """End the thread. Idempotent."""
+        with self._condition:
+            thread, self._thread = self._thread, None
+            self._stop.set()
+            self._condition.notify_all()
+        if thread is not None:
+            thread.join()
+
+    def _run(self, stop: threading.Event) -> None:
+        listens = self._database.path is None
+        failing = False
+        while True:
+            with self._condition:
+                self._condition.wait_for(lambda: self._watchers or stop.is_set())
+                self._looked = time.monotonic()
+            if stop.is_set():
+                return
+            try:
+                if listens:
+                    self._listen(stop)
+                self._poll()
+                failing = False
+            except Exception as error:  # noqa: BLE001 - watchers depend on this thread
+                if not failing:
+                    cause = self._database.without_secrets(str(error))
+                    _log.warning("polling for changes of jobs: %s", cause)
+                failing = True
+                with suppress(StoreUnavailable):
+                    self._poll()
+            with self._condition:
+                if not stop.is_set():
+                    intervals = [watcher.poll_seconds for watcher in self._watchers]
+                    self._condition.wait(min(intervals, default=None))
+
+    def _listen(self, stop: threading.Event) -> None:
+        """Report announcements until stopped. Raises when the connection is lost."""
+        engine = self._database.engine.execution_options(isolation_level="AUTOCOMMIT")
+        with engine.connect() as connection:
+            driver: Any = connection.connection.driver_connection
+            # It listens until it is closed, so it must not return to the pool.
+            connection.detach()
+            connection.exec_driver_sql(f"LISTEN {_CHANNEL}")
+            polled = -math.inf
+            while not stop.is_set():
+                self._looked = time.monotonic()
+                if self._looked - polled > _LISTEN_SECONDS:
+                    # Also for commits before the first LISTEN.
+                    self._poll()
+                    polled = self._looked
+                with closing(driver.notifies(timeout=_NOTIFY_SECONDS)) as announcements:
+                    for announcement in announcements:
+                        self._wake({announcement.payload})
+
+    def _poll(self) -> None:
+        """Wake watchers of jobs that changed since the last poll."""
+        with self._condition:
+            watched = {watcher.job_id for watcher in self._watchers}
+        columns = (jobs.c.id, jobs.c.state, jobs.c.iterations, jobs.c.waiting)
+        with self._database.read() as connection:
+            query = select(*columns).where(jobs.c.id.in_(watched), EXISTING)
+            rows = connection.execute(query).all()
+        found = dict.fromkeys(watched) | {row.id: tuple(row) for row in rows}
+        changed = {job for job in watched if job not in self._seen or self._seen[job] != found[job]}
+        self._seen = found
+        self._wake(changed)
+
+    def _wake(self, changed: set[str]) -> None:
+        with self._condition:
+            watchers = [watcher for watcher in self._watchers if watcher.job_id in changed]
+        for watcher in watchers:
+            watcher.wake()

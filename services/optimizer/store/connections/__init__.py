@@ -1,1 +1,0 @@
-"""Connections to SQLite and PostgreSQL, their transactions, and news of commits."""

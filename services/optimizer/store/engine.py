@@ -1,0 +1,500 @@
+"""Connections and transactions of SQLite and PostgreSQL"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import selectors
+import socket
+import sqlite3
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, closing, contextmanager
+from datetime import UTC, datetime
+from functools import partial
+from pathlib import Path, PurePosixPath
+from typing import Any, Final
+
+from sqlalchemy import (
+    URL,
+    Connection,
+    Engine,
+    NullPool,
+    create_engine,
+    event,
+    func,
+    make_url,
+    select,
+)
+from sqlalchemy.exc import (
+    ArgumentError,
+    DatabaseError,
+    InterfaceError,
+    InternalError,
+    InvalidatePoolError,
+    OperationalError,
+)
+from sqlalchemy.exc import TimeoutError as PoolTimeout
+
+from gaitswarm.services.optimizer.errors import LeaseLost, StoreReplaced, StoreUnavailable
+from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
+from gaitswarm.services.optimizer.jobs.job import Claim, Job, JobState
+from gaitswarm.services.optimizer.masking import HARMLESS, masked_url
+
+BUSY_SECONDS: Final = 15.0
+"""Longest wait of a transaction for another's lock."""
+
+CHECK_SECONDS: Final = 5.0
+"""Longest check of a file; a gigabyte takes 2 s."""
+
+SILENCE_SECONDS: Final = 15
+"""Silence after which the other end of a connection to a server counts as lost."""
+
+IDLE_SECONDS: Final = 20
+"""Longest pause between statements of a transaction, so that a stopped client holds no lock."""
+
+STATEMENT_SECONDS: Final = 120
+"""Longest statement; none takes as long on histories of any length."""
+
+MOUNTS: Final = Path("/proc/self/mountinfo")
+
+_PROBES: Final = 2
+_CACHE_KIB: Final = 8192
+_WRITE: Final = "gaitswarm_write"
+
+_NETWORK: Final = re.compile(
+    r"nfs4?|cifs|smb3|smbfs|afs|ncpfs|9p|ceph|lustre|gpfs|beegfs|glusterfs|orangefs|pvfs2|davfs"
+    r"|fuse\.(sshfs|.*nfs|.*smb.*|.*ceph.*|gluster.*|.*s3.*|gcsfuse|blobfuse2?|rclone|davfs2?"
+    r"|juicefs)"
+)
+"""File systems of other machines, as the kernel calls them; 9p: a virtual machine's host."""
+
+Clock = Callable[[Connection], datetime]
+"""Returns the aware time inside a transaction."""
+
+
+def database_time(connection: Connection) -> datetime:
+    """Return the time of the clock that all users of a database share.
+
+    A lease is written by one process and judged by another, whose own clock may be hours off.
+    """
+    if connection.dialect.name == "postgresql":
+        # CURRENT_TIMESTAMP is the transaction's start, before any wait for a lock.
+        now: datetime = connection.execute(select(func.clock_timestamp())).scalar_one()
+        return now
+    return datetime.now(UTC)
+
+
+def parse_url(text: str) -> URL:
+    """Parse `sqlite:///path`, a bare path, or `postgresql://...`. Raises StoreUnavailable."""
+    forms = "use a file name, sqlite:///FILE or postgresql://USER:PASSWORD@HOST/DATABASE"
+    if not text.strip():
+        raise StoreUnavailable(f"the database URL is empty; {forms}")
+    try:
+        url = make_url(text) if "://" in text else URL.create("sqlite", database=text)
+    except (ArgumentError, ValueError) as error:
+        raise StoreUnavailable(f"the database URL cannot be understood; {forms}") from error
+    if url.drivername in ("postgresql", "postgres", "postgresql+psycopg"):
+        return url.set(drivername="postgresql+psycopg")
+    if url.drivername not in ("sqlite", "sqlite+pysqlite"):
+        raise StoreUnavailable(f"{url.drivername} databases are not supported; {forms}")
+    if url.database in (None, "", ":memory:"):
+        raise StoreUnavailable(f"a database in memory forgets every job; {forms}")
+    return URL.create("sqlite+pysqlite", database=str(Path(str(url.database)).expanduser()))
+
+
+class Observer:
+    """Receives what a process does with a database, for metrics and traces.
+
+    Methods are called after the transaction, in its thread; they return at once.
+    """
+
+    def transaction(self, operation: str, seconds: float, error: BaseException | None) -> None:
+        """A transaction has ended after some time [s], rolled back if there is an error."""
+
+    def claimed(self, claim: Claim) -> None: ...
+
+    def committed(self, claim: Claim, done: CompletedIteration, state: JobState) -> None: ...
+
+    def released(self, claim: Claim, state: JobState, error: str | None) -> None: ...
+
+    def lost(self, claim: Claim, error: LeaseLost) -> None:
+        """An operation was refused as its lease is lost; reported by every such operation."""
+
+    def cancelled(self, job: Job) -> None: ...
+
+
+class Database:
+    """Connections to a database and their transactions. Thread-safe; connects when first used.
+
+    Attributes:
+        url: parsed.
+        name: in messages, without password.
+        path: of an SQLite file; None for a server.
+        observers: of this process's use of the database.
+    """
+
+    def __init__(self, url: str | URL, *, for_migration: bool = False) -> None:
+        """Prepare connections.
+
+        For a migration there is no pool, no limit on the time of statements, and on SQLite no
+        check of foreign keys, as batch migrations drop and rename tables that others refer to.
+        """
+        self.url = parse_url(url) if isinstance(url, str) else url
+        self.observers: list[Observer] = []
+        self._file: _OpenFile | None = None
+        options: dict[str, Any] = {"json_serializer": _strict_json}
+        if for_migration:
+            options |= {"poolclass": NullPool}
+        else:
+            # The connection used last has most of the database in its cache.
+            options |= {"pool_size": 8, "max_overflow": 24, "pool_timeout": BUSY_SECONDS}
+            options |= {"pool_use_lifo": True}
+        if self.url.get_backend_name() == "sqlite":
+            self.name = str(self.url.database)
+            self.path: Path | None = Path(self.name)
+            self.engine = _sqlite_engine(self.url, options, foreign_keys=not for_migration)
+            if not for_migration:
+                self._file = _OpenFile(self.path, self.engine)
+        else:
+            self.name = masked_url(self.url.render_as_string(hide_password=False))
+            self.path = None
+            self.engine = _postgresql_engine(self.url, options, unlimited=for_migration)
+
+    def read(self, operation: str = "") -> AbstractContextManager[Connection]:
+        """Open a transaction that reads.
+
+        On SQLite it never waits for a writer and sees one state of the database. On PostgreSQL
+        each statement is its own transaction, which saves round trips.
+        """
+        return self.transaction(operation, write=False)
+
+    def write(self, operation: str = "") -> AbstractContextManager[Connection]:
+        """Open a transaction that writes: committed at the end, rolled back on any exception."""
+        return self.transaction(operation, write=True)
+
+    @contextmanager
+    def transaction(
+        self,
+        operation: str = "",
+        *,
+        write: bool,
+        before: Callable[[Connection], None] | None = None,
+    ) -> Iterator[Connection]:
+        """Open a transaction.
+
+        Args:
+            operation: name for observers; "" to hide the transaction from them.
+            write: whether anything is written.
+            before: called with the connection before the transaction begins.
+
+        Raises:
+            StoreUnavailable: the database is unreachable, or locked for `BUSY_SECONDS`.
+            StoreReplaced: its file was removed or replaced; writes are rolled back.
+        """
+        begun, failure = time.perf_counter(), None
+        try:
+            with self.translated_errors(), self.engine.connect() as connection:
+                connection.execution_options(**{_WRITE: write})
+                if before is not None:
+                    before(connection)
+                elif not write and connection.dialect.name == "postgresql":
+                    connection.execution_options(isolation_level="AUTOCOMMIT")
+                with connection.begin():
+                    yield connection
+                    if write:
+                        self.check_in_place()
+        except BaseException as error:
+            failure = error
+            raise
+        finally:
+            for observer in self.observers if operation else ():
+                observer.transaction(operation, time.perf_counter() - begun, failure)
+
+    def check_in_place(self) -> None:
+        """Raise StoreReplaced if the SQLite file was removed or replaced while open."""
+        if self._file is not None:
+            self._file.check()
+
+    def check_pages(self) -> None:
+        """Read an SQLite file again, for `CHECK_SECONDS` at most; a server checks its own.
+
+        Open connections may hold pages that the file has lost. Raises StoreUnavailable.
+        """
+        self.check_in_place()
+        if self.path is None:
+            return
+        deadline = time.monotonic() + CHECK_SECONDS
+        uri = f"{self.path.absolute().as_uri()}?mode=rw"
+        try:
+            with closing(sqlite3.connect(uri, uri=True)) as connection:
+                connection.execute(f"PRAGMA busy_timeout = {round(BUSY_SECONDS * 1000)}")
+                connection.set_progress_handler(lambda: time.monotonic() > deadline, 1000)
+                (result,) = connection.execute("PRAGMA quick_check(1)").fetchone()
+        except sqlite3.DatabaseError as error:
+            if "interrupted" in str(error):
+                return
+            result = str(error)
+        if result != "ok":
+            raise StoreUnavailable(
+                f"database {self.name} was damaged while it was in use:"
+                f" {' '.join(result.split())}; jobs may be lost: put a copy of it in its place"
+            )
+
+    @contextmanager
+    def translated_errors(self) -> Iterator[None]:
+        """Raise StoreUnavailable for faults of the database."""
+        try:
+            yield
+        except (DatabaseError, InterfaceError, PoolTimeout) as error:
+            # InternalError: a PostgreSQL server that became read-only or ended the session. A bare
+            # DatabaseError: a file or an answer that is not a database's.
+            faults = (OperationalError, InterfaceError, InternalError, PoolTimeout)
+            if not isinstance(error, faults) and type(error) is not DatabaseError:
+                raise
+            cause = self.without_secrets(_cause(error))
+            raise StoreUnavailable(f"database {self.name}: {cause}") from error
+
+    def without_secrets(self, text: str) -> str:
+        """Return a driver's message without the passwords of the URL."""
+        secrets = {str(self.url.password or "")}
+        for name, values in self.url.query.items():
+            if name not in HARMLESS:
+                secrets |= {values} if isinstance(values, str) else {*values}
+        for secret in sorted(secrets - {""}, key=len, reverse=True):
+            text = text.replace(secret, "***")
+        return text
+
+    def close(self) -> None:
+        """Close pooled connections. Idempotent."""
+        self.engine.dispose()
+
+
+class Aggregate:
+    """A part of the store. Thread-safe; every method is one transaction unless it says otherwise.
+
+    Args:
+        database: of the newest schema.
+        clock: time of all that is stored.
+    """
+
+    def __init__(self, database: Database, clock: Clock = database_time) -> None:
+        self._database = database
+        self._clock = clock
+
+
+def _cause(error: DatabaseError | InterfaceError | PoolTimeout) -> str:
+    """Return the driver's message, without the statement and its parameters."""
+    origin = getattr(error, "orig", None)
+    text = " ".join(str(error if origin is None else origin).split())
+    if "locked" in text:
+        return f"{text}: another process has been writing for {BUSY_SECONDS:g} s; try again"
+    if "unable to open" in text:
+        return f"{text}: check that its directory exists and that you may write there"
+    return text
+
+
+def _strict_json(value: object) -> str:
+    """Serialize without NaN and infinity, which PostgreSQL refuses; floats keep every bit."""
+    return json.dumps(value, allow_nan=False, separators=(",", ":"))
+
+
+def _sqlite_engine(url: URL, options: dict[str, Any], *, foreign_keys: bool) -> Engine:
+    # Without an isolation level the driver begins no transaction of its own.
+    connect_args = {"isolation_level": None, "timeout": BUSY_SECONDS}
+    engine = create_engine(url, connect_args=connect_args, **options)
+
+    @event.listens_for(engine, "connect")
+    def _configure(connection: sqlite3.Connection, _record: object) -> None:
+        _enable_write_ahead_log(connection)
+        # A text that is not UTF-8 must not hide the other rows of a query.
+        connection.text_factory = partial(str, encoding="utf-8", errors="replace")
+        # A committed iteration survives a power cut.
+        connection.execute("PRAGMA synchronous = FULL")
+        connection.execute(f"PRAGMA cache_size = {-_CACHE_KIB}")
+        connection.execute(f"PRAGMA foreign_keys = {'ON' if foreign_keys else 'OFF'}")
+
+    @event.listens_for(engine, "begin")
+    def _begin(connection: Connection) -> None:
+        options = connection.get_execution_options()
+        if options.get("isolation_level") == "AUTOCOMMIT":
+            return
+        # A deferred transaction that starts to write fails if another has written since.
+        write = options.get(_WRITE, False)
+        connection.exec_driver_sql("BEGIN IMMEDIATE" if write else "BEGIN DEFERRED")
+
+    return engine
+
+
+def _enable_write_ahead_log(connection: sqlite3.Connection) -> None:
+    """Let readers and the writer work concurrently. A property of the file, set once."""
+    deadline = time.monotonic() + BUSY_SECONDS
+    while True:
+        try:
+            connection.execute("PRAGMA journal_mode = WAL")
+            return
+        except sqlite3.OperationalError as error:
+            # The busy timeout does not cover a switch by two processes at once.
+            if "locked" not in str(error) or time.monotonic() > deadline:
+                raise
+            time.sleep(0.01)
+
+
+class _OpenFile:
+    """Device and inode of an SQLite file and of its write-ahead log while connections are open.
+
+    SQLite removes the log with the last connection of all processes. As long as one is open both
+    files stay, also through checkpoints, VACUUM and a restored backup: another inode is another
+    file, in which nothing that is written here will be found.
+    """
+
+    def __init__(self, path: Path, engine: Engine) -> None:
+        self._name = str(path)
+        self._file = self._log = path.absolute()
+        self._lock = threading.Lock()
+        self._connections = 0
+        self._identity: tuple[object, object] = (None, None)
+        event.listen(engine, "do_connect", self._before_connection)
+        event.listen(engine, "checkout", self._opened)
+        event.listen(engine, "close", self._closed)
+
+    def check(self) -> None:
+        with self._lock:
+            file, log = _identity(self._file), _identity(self._log)
+            if not self._connections:
+                return
+            if self._identity[1] is None:
+                # The first transaction creates the log.
+                self._identity = self._identity[0], log
+            if (file, log) == self._identity:
+                return
+        raise StoreReplaced(
+            f"database {self._name}: the database file was removed or replaced while it was open;"
+            " restart the server or command that uses it, and restore a backup if jobs are missing"
+        )
+
+    def _before_connection(self, *_: object) -> None:
+        # SQLite would create an empty file in place of a removed one.
+        self.check()
+
+    def _opened(self, _connection: object, record: Any, _proxy: object) -> None:
+        if record.info.get("counted"):
+            return
+        record.info["counted"] = True
+        with self._lock:
+            self._connections += 1
+            if self._connections == 1:
+                # SQLite follows links, and keeps its log next to the target.
+                real = self._file.resolve()
+                self._log = real.with_name(f"{real.name}-wal")
+                self._identity = _identity(self._file), _identity(self._log)
+
+    def _closed(self, _connection: object, record: Any) -> None:
+        if record.info.pop("counted", False):
+            with self._lock:
+                self._connections -= 1
+
+
+def _identity(path: Path) -> tuple[int, int] | None:
+    try:
+        status = path.stat()
+    except OSError:
+        return None
+    return status.st_dev, status.st_ino
+
+
+def check_file_system(url: URL) -> None:
+    """Refuse an SQLite file on a network file system, where SQLite loses writes.
+
+    The write-ahead log is memory shared between processes, and locks are those of the file system,
+    which network file systems lack. Only Linux lists mounts. Raises StoreUnavailable.
+    """
+    if url.get_backend_name() != "sqlite":
+        return
+    file = Path(str(url.database))
+    try:
+        mounts = MOUNTS.read_text(encoding="utf-8", errors="surrogateescape")
+        path = file.resolve()
+    except (OSError, RuntimeError):
+        return
+    point, kind = mount_of(PurePosixPath(path), mounts)
+    if is_network(point, kind):
+        raise StoreUnavailable(
+            f"database {file} is on {point}, a {kind} file system, on which SQLite can lose what is"
+            " written; name a file on a local disk with --db or GAITSWARM_DB, or for several"
+            " machines a postgresql:// database"
+        )
+
+
+def mount_of(path: PurePosixPath, mounts: str) -> tuple[PurePosixPath, str]:
+    """Return mount point and kind of the innermost, latest mount of /proc/self/mountinfo."""
+    innermost, innermost_kind = PurePosixPath(), ""
+    for line in mounts.splitlines():
+        fields, separator, rest = line.partition(" - ")
+        if separator:
+            # The kernel writes spaces and the like as octal numbers.
+            name = re.sub(r"\\([0-7]{3})", lambda code: chr(int(code[1], 8)), fields.split()[4])
+            point = PurePosixPath(name)
+            if path.is_relative_to(point) and len(point.parts) >= len(innermost.parts):
+                innermost, innermost_kind = point, rest.split()[0]
+    return innermost, innermost_kind
+
+
+def is_network(point: PurePosixPath, kind: str) -> bool:
+    # The root of a sandbox such as gVisor is local.
+    sandbox = kind == "9p" and point == PurePosixPath("/")
+    return not sandbox and _NETWORK.fullmatch(kind) is not None
+
+
+def _postgresql_engine(url: URL, options: dict[str, Any], *, unlimited: bool) -> Engine:
+    """Create an engine on psycopg whose connections end within `SILENCE_SECONDS` of a partition.
+
+    Both ends probe a silent connection: the client detects a lost server, and the server ends the
+    transaction of a lost client, with its locks. Parameters in the URL take precedence.
+    """
+    probe = SILENCE_SECONDS // (_PROBES + 1)
+    connect_args: dict[str, Any] = {
+        # The server cuts longer names.
+        "application_name": f"gaitswarm {socket.gethostname()[:40]}:{os.getpid()}",
+        "connect_timeout": SILENCE_SECONDS,
+        "keepalives_idle": probe,
+        "keepalives_interval": probe,
+        "keepalives_count": _PROBES,
+        "tcp_user_timeout": SILENCE_SECONDS * 1000,
+    }
+    connect_args = {name: value for name, value in connect_args.items() if name not in url.query}
+    settings = {
+        "lock_timeout": round(BUSY_SECONDS * 1000),
+        "tcp_keepalives_idle": probe,
+        "tcp_keepalives_interval": probe,
+        "tcp_keepalives_count": _PROBES,
+        "tcp_user_timeout": SILENCE_SECONDS * 1000,
+    }
+    if not unlimited:
+        settings["statement_timeout"] = STATEMENT_SECONDS * 1000
+        settings["idle_in_transaction_session_timeout"] = IDLE_SECONDS * 1000
+    given = url.query.get("options", "")
+    given = given if isinstance(given, str) else " ".join(given)
+    # The last of several equal settings counts.
+    connect_args["options"] = " ".join([*(f"-c {k}={v}" for k, v in settings.items()), given])
+    try:
+        engine = create_engine(url, connect_args=connect_args, **options)
+    except ModuleNotFoundError as error:
+        raise StoreUnavailable(
+            f"PostgreSQL needs {error.name}: install gaitswarm[postgres]"
+        ) from error
+
+    @event.listens_for(engine, "checkout")
+    def _replace_cut_connection(connection: Any, _record: object, _proxy: object) -> None:
+        # Ping only if something, such as an end, has arrived on the idle connection.
+        try:
+            with selectors.DefaultSelector() as selector:
+                selector.register(connection, selectors.EVENT_READ)
+                if selector.select(0):
+                    engine.dialect.do_ping(connection)
+        except engine.dialect.loaded_dbapi.Error as error:
+            raise InvalidatePoolError from error
+
+    return engine

@@ -1,0 +1,676 @@
+"""Committed iterations: writing, reading, and taking over in a fork
+
+Floats keep every bit. JSON has neither NaN nor infinity: a missing objective is null, and a fitness
+of +inf is NULL.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import datetime
+from functools import cache
+from itertools import pairwise
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import TypeAdapter
+from sqlalchemy import (
+    ColumnElement,
+    Connection,
+    Table,
+    Text,
+    bindparam,
+    cast,
+    func,
+    insert,
+    literal,
+    select,
+    update,
+)
+
+from gaitswarm.services.optimizer.errors import Conflict, NotFound
+from gaitswarm.services.optimizer.jobs.chain import (
+    ChainDocuments,
+    Link,
+    Outcomes,
+    ask_digest,
+    iteration_digest,
+)
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.fork import Lineage, TakenHistory
+from gaitswarm.services.optimizer.jobs.iteration import (
+    Answered,
+    Ask,
+    CachedOutcome,
+    CompletedIteration,
+    Evaluation,
+    Iteration,
+    Reevaluation,
+    best_particle,
+)
+from gaitswarm.services.optimizer.jobs.listing import Page, checked_limit
+from gaitswarm.services.optimizer.store.engine import Aggregate
+from gaitswarm.services.optimizer.store.job_rows import (
+    chain_documents,
+    job_row,
+    provenance_document,
+    require_job,
+)
+from gaitswarm.services.optimizer.store.tables import (
+    Row,
+    evaluations,
+    iterations,
+    jobs,
+    reevaluations,
+)
+from gaitswarm.sim.outcome import Status
+
+SUMMARY: Final = ("best", "mean", "median", "worst", "best_so_far", "failed")
+"""Columns of an iteration computed from its fitness."""
+
+_LARGEST_INDEX: Final = 2**31 - 1
+
+_KEYS_AT_ONCE: Final = 1000
+_TEXTS_AT_ONCE: Final = 200
+"""Texts parsed at once; meanwhile no other Python thread runs."""
+_ITERATIONS_AT_ONCE: Final = 64
+
+_JSON: Final = TypeAdapter(Any)
+"""A faster parser than the standard library's, and as exact."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StoredLink:
+    """A stored iteration without its evaluations.
+
+    Attributes:
+        link: the content of its digest.
+        state: the optimizer's, empty once cleared.
+        summary: by name of `SUMMARY`.
+    """
+
+    link: Link
+    committed: bool
+    state: Any
+    summary: Mapping[str, Any]
+
+
+class History(Aggregate):
+    """Committed iterations, which never change.
+
+    A long history is read in pieces, each a transaction of its own, that fit together.
+    """
+
+    def iterations(
+        self, job_id: str, *, after: int | None = None, limit: int = 100
+    ) -> Page[Iteration]:
+        """Return a page of committed iterations, in order.
+
+        Args:
+            job_id: of the job.
+            after: return only later iterations than this index.
+            limit: maximum number of iterations.
+
+        Raises:
+            NotFound: no such job.
+            InvalidRequest: the limit is less than 1.
+        """
+        limit = checked_limit(limit)
+        table = iterations.c
+        # Particles are counted from 0, and the primary key finds the last.
+        designs = select(func.max(evaluations.c.particle) + 1).where(
+            evaluations.c.job_id == table.job_id, evaluations.c.iteration == table.iteration
+        )
+        summary = (table[name] for name in SUMMARY)
+        query = (
+            select(
+                table.iteration.label("index"),
+                designs.scalar_subquery().label("designs"),
+                *(*summary, table.evaluate_seconds, table.committed_at, table.digest),
+            )
+            .where(
+                table.job_id == job_id,
+                table.iteration > (-1 if after is None else _bounded(after)),
+                table.committed_at.is_not(None),
+            )
+            .order_by(table.iteration)
+            .limit(limit + 1)
+        )
+        with self._database.read("iterations") as connection:
+            require_job(connection, job_id)
+            rows = connection.execute(query).mappings().all()
+        items = tuple(Iteration(**row) for row in rows[:limit])
+        return Page(items, str(items[-1].index) if len(rows) > limit else None)
+
+    def evaluations(self, job_id: str, iteration: int) -> tuple[Evaluation, ...]:
+        """Return all designs of a committed iteration, by particle.
+
+        Args:
+            job_id: of the job.
+            iteration: index of the iteration, from 0.
+
+        Raises:
+            NotFound: no such job, or the iteration is not committed.
+        """
+        found = self.evaluations_between(job_id, iteration, iteration + 1)
+        if not found:
+            raise NotFound(f"job {job_id} has no committed iteration {iteration}")
+        return found
+
+    def evaluations_between(self, job_id: str, first: int, last: int) -> tuple[Evaluation, ...]:
+        """Return all designs of a range of iterations, by iteration and particle.
+
+        Args:
+            job_id: of the job.
+            first: index of the first iteration.
+            last: index after the last iteration.
+
+        Raises:
+            NotFound: no such job.
+        """
+        query = select(evaluations).where(*_between(evaluations, job_id, first, last))
+        query = query.order_by(evaluations.c.iteration, evaluations.c.particle)
+        with self._database.read("evaluations_between") as connection:
+            require_job(connection, job_id)
+            rows = connection.execute(query).mappings().all()
+        return tuple(_evaluation(row) for row in rows)
+
+    def evaluation_columns(self, job_id: str, first: int, last: int) -> EvaluationColumns | None:
+        """Return the designs of `evaluations_between` as columns; None if there are none.
+
+        Args:
+            job_id: of the job.
+            first: index of the first iteration.
+            last: index after the last iteration.
+
+        Raises:
+            NotFound: no such job.
+        """
+        with self._database.read("evaluation_columns") as connection:
+            require_job(connection, job_id)
+            return _select_columns(connection, job_id, first, last)
+
+    def best(self, job_id: str) -> Evaluation | None:
+        """Return the design of least fitness in double precision, the earliest of equals.
+
+        Args:
+            job_id: of the job.
+
+        Returns:
+            The evaluation, with its reevaluation if the job searches in single precision; None if
+            every design has failed.
+
+        Raises:
+            NotFound: no such job.
+        """
+        with self._database.read("best") as connection:
+            require_job(connection, job_id)
+            place = select(jobs.c.best_iteration, jobs.c.best_particle).where(jobs.c.id == job_id)
+            iteration, particle = connection.execute(place).one()
+            if iteration is None:
+                return None
+            row, again = (
+                connection.execute(
+                    select(table).where(
+                        table.c.job_id == job_id,
+                        table.c.iteration == iteration,
+                        table.c.particle == particle,
+                    )
+                )
+                .mappings()
+                .first()
+                for table in (evaluations, reevaluations)
+            )
+        return None if row is None else _evaluation(row, again)
+
+    def asked(self, job_id: str, first: int, last: int) -> tuple[NDArray[np.float64], ...]:
+        """Return the (n, d) positions asked for in a range of committed iterations, by iteration.
+
+        Args:
+            job_id: of the job.
+            first: index of the first iteration.
+            last: index after the last iteration.
+
+        Raises:
+            NotFound: no such job.
+        """
+        query = (
+            select(iterations.c.positions)
+            .where(*_between(iterations, job_id, first, last))
+            .where(iterations.c.committed_at.is_not(None))
+            .order_by(iterations.c.iteration)
+        )
+        with self._database.read("asked") as connection:
+            require_job(connection, job_id)
+            rows = connection.execute(query).scalars().all()
+        return tuple(np.array(positions, dtype=np.float64) for positions in rows)
+
+    def reevaluations(
+        self, job_id: str, first: int = 0, last: int = _LARGEST_INDEX
+    ) -> tuple[tuple[int, Reevaluation], ...]:
+        """Return the reevaluations in double precision of a range of iterations.
+
+        Args:
+            job_id: of the job.
+            first: index of the first iteration.
+            last: index after the last iteration.
+
+        Returns:
+            Index of the iteration and its reevaluation, in order; empty for a job that searches in
+            double precision.
+
+        Raises:
+            NotFound: no such job.
+        """
+        with self._database.read("reevaluations") as connection:
+            require_job(connection, job_id)
+            return _select_reevaluations(connection, job_id, first, last)
+
+    def known(self, keys: Sequence[bytes]) -> dict[bytes, CachedOutcome]:
+        """Return the outcomes of designs that any job has simulated, by key.
+
+        Args:
+            keys: from `walk_keys`.
+        """
+        table, outcomes = evaluations.c, dict[bytes, CachedOutcome]()
+        columns = (table.walk_key, cast(table.objectives, Text), cast(table.statuses, Text))
+        with self._database.read("known") as connection:
+            for first in range(0, len(keys), _KEYS_AT_ONCE):
+                some = table.walk_key.in_(keys[first : first + _KEYS_AT_ONCE])
+                for key, objectives, statuses in connection.execute(select(*columns).where(some)):
+                    # A damaged outcome is simulated again.
+                    with suppress(ValueError, TypeError, KeyError):
+                        numbers = np.array(_JSON.validate_json(objectives), dtype=np.float64)
+                        values = np.array(_statuses(statuses), dtype=np.uint8)
+                        outcomes[key] = CachedOutcome(numbers, values)
+        return outcomes
+
+    def chain_documents(self, job_id: str) -> ChainDocuments:
+        """Return the documents other than iterations that a job's chain depends on, as stored.
+
+        Args:
+            job_id: of the job.
+
+        Raises:
+            NotFound: no such job.
+        """
+        with self._database.read("chain_documents") as connection:
+            return chain_documents(job_row(connection, job_id))
+
+    def links(self, job_id: str, first: int, last: int) -> tuple[StoredLink, ...]:
+        """Return a range of iterations, including the current one, without evaluations.
+
+        Args:
+            job_id: of the job.
+            first: index of the first iteration.
+            last: index after the last iteration.
+
+        Raises:
+            ValueError: one is damaged.
+        """
+        with self._database.read("links") as connection:
+            return _select_links(connection, job_id, first, last)
+
+
+def _bounded(index: int) -> int:
+    """Return an index that both databases can compare."""
+    return max(-1, min(index, _LARGEST_INDEX))
+
+
+def _between(table: Table, job_id: str, first: int, last: int) -> tuple[ColumnElement[bool], ...]:
+    iteration = table.c.iteration
+    return table.c.job_id == job_id, iteration >= _bounded(first), iteration < _bounded(last)
+
+
+def _select_columns(
+    connection: Connection, job_id: str, first: int, last: int
+) -> EvaluationColumns | None:
+    """Parse the JSON of many rows at once, which is faster than row by row."""
+    table = evaluations.c
+    documents = (table.design, table.objectives, table.statuses)
+    query = (
+        select(
+            *(table.iteration, table.particle, table.fitness),
+            # Both databases keep JSON as it was written.
+            *(cast(column, Text) for column in documents),
+        )
+        .where(*_between(evaluations, job_id, first, last))
+        .order_by(table.iteration, table.particle)
+    )
+    rows = connection.execute(query).all()
+    if not rows:
+        return None
+    iteration, particle, fitness, designs, objectives, statuses = zip(*rows, strict=True)
+    values = cache(_statuses)
+    return EvaluationColumns(
+        iteration=np.array(iteration, dtype=np.int64),
+        particle=np.array(particle, dtype=np.int64),
+        designs=_parsed_numbers(designs),
+        objectives=_parsed_numbers(objectives),
+        statuses=np.array([values(text) for text in statuses], dtype=np.uint8),
+        fitness=np.array([math.inf if f is None else f for f in fitness], dtype=np.float64),
+    )
+
+
+def _parsed_numbers(texts: Sequence[str]) -> NDArray[np.float64]:
+    """Parse nested arrays, one per row; null is NaN."""
+    pieces = (texts[k : k + _TEXTS_AT_ONCE] for k in range(0, len(texts), _TEXTS_AT_ONCE))
+    parsed = (_JSON.validate_json(f"[{','.join(piece)}]") for piece in pieces)
+    return np.concatenate([np.array(numbers, dtype=np.float64) for numbers in parsed])
+
+
+def _statuses(text: str) -> list[int]:
+    return [Status.from_label(label) for label in _JSON.validate_json(text)]
+
+
+def _select_reevaluations(
+    connection: Connection, job_id: str, first: int, last: int
+) -> tuple[tuple[int, Reevaluation], ...]:
+    query = select(reevaluations).where(*_between(reevaluations, job_id, first, last))
+    query = query.order_by(reevaluations.c.iteration, reevaluations.c.particle)
+    rows = connection.execute(query).mappings()
+    return tuple((row["iteration"], _reevaluation(row)) for row in rows)
+
+
+def _select_links(
+    connection: Connection, job_id: str, first: int, last: int
+) -> tuple[StoredLink, ...]:
+    query = select(iterations).where(*_between(iterations, job_id, first, last))
+    rows = connection.execute(query.order_by(iterations.c.iteration)).mappings()
+    return tuple(
+        StoredLink(
+            Link(
+                row["iteration"],
+                np.array(row["positions"], dtype=np.float64),
+                row["ask_digest"],
+                row["digest"],
+            ),
+            row["committed_at"] is not None,
+            row["optimizer_state"],
+            {name: row[name] for name in SUMMARY},
+        )
+        for row in rows
+    )
+
+
+def _evaluation(row: Row, reevaluation: Row | None = None) -> Evaluation:
+    return Evaluation(
+        iteration=row["iteration"],
+        particle=row["particle"],
+        design=np.array(row["design"], dtype=np.float64),
+        **_results(row),
+        reevaluation=None if reevaluation is None else _reevaluation(reevaluation),
+    )
+
+
+def _reevaluation(row: Row) -> Reevaluation:
+    return Reevaluation(particle=row["particle"], **_results(row))
+
+
+def _results(row: Row) -> dict[str, Any]:
+    return {
+        "objectives": np.array(row["objectives"], dtype=np.float64),
+        "statuses": np.array([Status.from_label(s) for s in row["statuses"]], dtype=np.uint8),
+        "fitness": math.inf if row["fitness"] is None else row["fitness"],
+    }
+
+
+def _result_columns(
+    objectives: Iterable[Iterable[float]], statuses: Iterable[int], fitness: float
+) -> dict[str, Any]:
+    return {
+        "objectives": [[_number(value) for value in case] for case in objectives],
+        "statuses": [Status(status).label for status in statuses],
+        "fitness": _number(fitness),
+    }
+
+
+def _number(value: float | np.floating[Any]) -> float | None:
+    """Return None for a value that JSON and SQL cannot hold."""
+    return float(value) if math.isfinite(value) else None
+
+
+def fitness_summary(
+    fitness: NDArray[np.float64], best: float | None, best_before: float | None
+) -> dict[str, Any]:
+    """Return the columns `SUMMARY`: statistics over finite fitness, None if there is none.
+
+    Args:
+        fitness: (n,) of the designs, +inf for a failed one.
+        best: least fitness in double precision; None if every design failed.
+        best_before: the same of all earlier iterations.
+    """
+    finite = fitness[np.isfinite(fitness)]
+    summary: dict[str, Any] = dict.fromkeys(SUMMARY)
+    summary["failed"] = len(fitness) - len(finite)
+    bests = [value for value in (best, best_before) if value is not None]
+    summary["best_so_far"] = min(bests, default=None)
+    if len(finite):
+        # The sum of huge values may overflow; such a mean is stored as none.
+        with np.errstate(over="ignore"):
+            summary |= {"mean": _number(np.mean(finite)), "median": _number(np.median(finite))}
+        summary |= {"best": float(np.min(finite)), "worst": float(np.max(finite))}
+    return summary
+
+
+def open_ask(connection: Connection, job: Row) -> Ask | None:
+    """Return the ask that is not committed yet; None before the first or after the last."""
+    return _ask(connection, job["id"], job["iterations"])
+
+
+def answered_ask(connection: Connection, job: Row) -> Answered | None:
+    """Return the last committed ask with its evaluations; None before the first commit."""
+    last = job["iterations"] - 1
+    ask = _ask(connection, job["id"], last)
+    columns = None if ask is None else _select_columns(connection, job["id"], last, last + 1)
+    return None if ask is None or columns is None else Answered(ask, columns)
+
+
+def _ask(connection: Connection, job_id: str, iteration: int) -> Ask | None:
+    query = select(iterations).where(_at(job_id, iteration))
+    row = connection.execute(query).mappings().first()
+    if row is None:
+        return None
+    positions = np.array(row["positions"], dtype=np.float64)
+    return Ask(row["iteration"], positions, row["optimizer_state"])
+
+
+def _at(job_id: str, iteration: int) -> ColumnElement[bool]:
+    return (iterations.c.job_id == job_id) & (iterations.c.iteration == iteration)
+
+
+def insert_ask(connection: Connection, job: Row, ask: Ask, *, expected: int, now: datetime) -> None:
+    """Store an ask before it is evaluated. Raises Conflict for another than the next iteration."""
+    if ask.iteration != expected:
+        raise Conflict(
+            f"job {job['id']} asks for iteration {ask.iteration}, but its next is {expected}"
+        )
+    connection.execute(
+        insert(iterations).values(
+            job_id=job["id"],
+            iteration=ask.iteration,
+            positions=ask.positions.tolist(),
+            optimizer_state=ask.state,
+            ask_digest=ask_digest(ask.positions, ask.state),
+            asked_at=now,
+        )
+    )
+
+
+def complete_iteration(
+    connection: Connection, job: Row, done: CompletedIteration, now: datetime
+) -> str:
+    """Store the results of the open ask, and return their digest. Raises Conflict if not asked.
+
+    Clears the optimizer's state of the iteration before: a job continues from its open ask or, if
+    extended, from its last committed one, and states may grow with every iteration.
+    """
+    asked = select(iterations.c.positions, iterations.c.ask_digest)
+    open_iteration = _at(job["id"], done.iteration) & iterations.c.committed_at.is_(None)
+    row = connection.execute(asked.where(open_iteration)).first()
+    if row is None:
+        raise Conflict(
+            f"iteration {done.iteration} of job {job['id']} was not asked; its next is"
+            f" {job['iterations']}"
+        )
+    documents = chain_documents(job)
+    link = Link(done.iteration, np.array(row.positions, dtype=np.float64), row.ask_digest)
+    before = job["head"] or documents.digest
+    digest = iteration_digest(before, documents, link, Outcomes.of(done))
+    best = None if done.best is None else done.best[1]
+    connection.execute(
+        update(iterations)
+        .where(_at(job["id"], done.iteration))
+        .values(
+            committed_at=now,
+            evaluate_seconds=done.evaluate_seconds,
+            digest=digest,
+            **fitness_summary(done.fitness, best, job["best_fitness"]),
+        )
+    )
+    previous = _at(job["id"], done.iteration - 1)
+    connection.execute(update(iterations).where(previous).values(optimizer_state={}))
+    connection.execute(insert(evaluations), _evaluation_rows(job["id"], done))
+    if done.reevaluation is not None:
+        again = done.reevaluation
+        results = _result_columns(again.objectives.tolist(), again.statuses.tolist(), again.fitness)
+        place = {"job_id": job["id"], "iteration": done.iteration, "particle": again.particle}
+        connection.execute(insert(reevaluations).values(**place, **results))
+    return digest
+
+
+def _evaluation_rows(job_id: str, done: CompletedIteration) -> list[dict[str, Any]]:
+    # (K, n, m) and (K, n), by case, become (n, K, m) and (n, K).
+    objectives = np.stack([outcome.objectives for outcome in done.outcomes], axis=1)
+    statuses = np.stack([outcome.statuses for outcome in done.outcomes], axis=1)
+    columns = (done.designs, objectives, statuses, done.fitness)
+    rows = zip(*(c.tolist() for c in columns), done.keys or [None] * len(objectives), strict=True)
+    return [
+        {
+            "job_id": job_id,
+            "iteration": done.iteration,
+            "particle": particle,
+            "design": design,
+            "walk_key": key,
+            **_result_columns(by_case, labels, fitness),
+        }
+        for particle, (design, by_case, labels, fitness, key) in enumerate(rows)
+    ]
+
+
+def take_history(
+    connection: Connection, job: Row, lineage: Lineage, taken: TakenHistory, now: datetime
+) -> dict[str, Any]:
+    """Copy the parent's iterations to a fork, which then no longer depends on the parent.
+
+    Returns columns of the fork's row. Raises Conflict if the parent is gone.
+    """
+    job_id, end = job["id"], lineage.from_iteration
+    committed = {"optimizer_state": {}, "asked_at": now, "committed_at": now}
+    copied = _copy(connection, iterations, job_id, lineage, committed | {"evaluate_seconds": 0.0})
+    if copied != end:
+        raise Conflict(
+            f"job {lineage.parent} has not the {end} iterations any more that were to be forked"
+        )
+    count = _copy(connection, evaluations, job_id, lineage, {"walk_key": None})
+    _copy(connection, reevaluations, job_id, lineage, {})
+    last = _at(job_id, end - 1)
+    positions = connection.execute(select(iterations.c.positions).where(last)).scalar_one()
+    digest = ask_digest(np.array(positions, dtype=np.float64), taken.state)
+    state = {"optimizer_state": taken.state, "ask_digest": digest}
+    connection.execute(update(iterations).where(last).values(**state))
+    if taken.fitness is not None:
+        _rejudge(connection, job_id, taken.fitness)
+    provenance = provenance_document(taken.provenance)
+    documents = chain_documents({**job, "provenance": provenance})
+    return {
+        "iterations": end,
+        "evaluations": count,
+        "evaluations_saved": count,
+        "provenance": provenance,
+        "head": chain_iterations(connection, job_id, documents, end),
+        "accepts_changes": taken.accepts_changes,
+        **_best_columns(connection, job_id, job["spec"]["precision"]),
+    }
+
+
+def _copy(
+    connection: Connection, table: Table, job_id: str, lineage: Lineage, values: Mapping[str, Any]
+) -> int:
+    """Copy rows of the parent, some columns with other values, and return their number."""
+    given = {"job_id": job_id, **values}
+    columns = [literal(given[c.name], c.type) if c.name in given else c for c in table.c]
+    rows = select(*columns).where(*_between(table, lineage.parent, 0, lineage.from_iteration))
+    if table is iterations:
+        rows = rows.where(table.c.committed_at.is_not(None))
+    copied = insert(table).from_select([column.name for column in table.c], rows)
+    # Drivers know the number only while the cursor is open.
+    return connection.execute(copied.execution_options(preserve_rowcount=True)).rowcount
+
+
+def _rejudge(connection: Connection, job_id: str, fitness: Sequence[NDArray[np.float64]]) -> None:
+    """Replace the fitness of copied evaluations, and the summaries of their iterations."""
+    table = evaluations.c
+    judged = (
+        update(evaluations)
+        .where(
+            table.job_id == job_id,
+            table.iteration == bindparam("at"),
+            table.particle == bindparam("of"),
+        )
+        .values(fitness=bindparam("value"))
+    )
+    best_so_far: float | None = None
+    for index, values in enumerate(fitness):
+        rows = [
+            {"at": index, "of": particle, "value": _number(value)}
+            for particle, value in enumerate(values.tolist())
+        ]
+        connection.execute(judged, rows)
+        best = best_particle(values)
+        best_fitness = None if best is None else float(values[best])
+        summary = fitness_summary(values, best_fitness, best_so_far)
+        best_so_far = summary["best_so_far"]
+        connection.execute(update(iterations).where(_at(job_id, index)).values(**summary))
+
+
+def chain_iterations(
+    connection: Connection, job_id: str, documents: ChainDocuments, count: int
+) -> str:
+    """Store the digests of the copied iterations of a fork, and return the last."""
+    chained = (
+        update(iterations)
+        .where(_at(job_id, bindparam("at")))  # type: ignore[arg-type]
+        .values(digest=bindparam("chained"))
+    )
+    digest = documents.digest
+    for first, last in pairwise([*range(0, count, _ITERATIONS_AT_ONCE), count]):
+        rows = []
+        columns = _select_columns(connection, job_id, first, last)
+        reevaluated = dict(_select_reevaluations(connection, job_id, first, last))
+        for stored in _select_links(connection, job_id, first, last):
+            index = stored.link.iteration
+            assert columns is not None  # noqa: S101 - every iteration has designs
+            outcomes = Outcomes.read(columns.of_iteration(index), reevaluated.get(index))
+            digest = iteration_digest(digest, documents, stored.link, outcomes)
+            rows.append({"at": index, "chained": digest})
+        connection.execute(chained, rows)
+    return digest
+
+
+def _best_columns(connection: Connection, job_id: str, precision: str) -> dict[str, Any]:
+    """Return the place of the best evaluation in double precision, the earliest of equals."""
+    table = evaluations.c if precision == "double" else reevaluations.c
+    query = (
+        select(table.fitness, table.iteration, table.particle)
+        .where(table.job_id == job_id, table.fitness.is_not(None))
+        .order_by(table.fitness, table.iteration, table.particle)
+        .limit(1)
+    )
+    row = connection.execute(query).first()
+    names = ("best_fitness", "best_iteration", "best_particle")
+    return {} if row is None else dict(zip(names, row, strict=True))

@@ -1,0 +1,235 @@
+"""Lists of jobs: filters, search, sort orders and counts"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from typing import Any, Final
+
+from sqlalchemy import (
+    ColumnElement,
+    Connection,
+    Double,
+    and_,
+    case,
+    false,
+    func,
+    literal,
+    select,
+    tuple_,
+)
+
+from gaitswarm.services.optimizer.jobs.estimate import time_left
+from gaitswarm.services.optimizer.jobs.job import ENDED, Job, JobOrder, JobState
+from gaitswarm.services.optimizer.jobs.labels import (
+    ANY_JOB,
+    FacetCounts,
+    Facets,
+    JobFilter,
+    is_own_robot,
+    preference_name,
+    robot_name,
+)
+from gaitswarm.services.optimizer.jobs.listing import Page, Queue, checked_limit
+from gaitswarm.services.optimizer.store.engine import Aggregate
+from gaitswarm.services.optimizer.store.job_rows import SHOWN, is_job_id, shown_job
+from gaitswarm.services.optimizer.store.queries import (
+    folded,
+    from_cursor,
+    number_at,
+    text_at,
+    to_cursor,
+)
+from gaitswarm.services.optimizer.store.tables import EXISTING, jobs
+
+_KINDS: Final = ("tuning", "certificate", "identification", "calibration")
+
+_ERROR_LENGTH: Final = 300
+
+
+class JobList(Aggregate):
+    """Lists and numbers of jobs."""
+
+    def jobs(
+        self,
+        *,
+        state: JobState | None = None,
+        kind: str | None = None,
+        parent: str | None = None,
+        search: str = "",
+        where: JobFilter = ANY_JOB,
+        order: JobOrder = JobOrder.CREATED,
+        after: str | None = None,
+        limit: int = 50,
+        reverse: bool = False,
+    ) -> Page[Job]:
+        """Return a page of jobs. Jobs submitted meanwhile do not shift later pages.
+
+        Args:
+            state: only jobs in this state.
+            kind: only jobs of this kind.
+            parent: only forks of the job of this id.
+            search: part of a name, id, note or tag, in any case.
+            where: further criteria.
+            order: sort order; jobs without a value are last, also in the reverse order.
+            after: `next` of the page before.
+            limit: maximum number of jobs.
+            reverse: whether to reverse the order.
+
+        Raises:
+            InvalidRequest: the cursor is invalid or of another order, or the limit less than 1.
+        """
+        limit = checked_limit(limit)
+        cursor = f"-{order}" if reverse else str(order)
+        kinds: dict[JobOrder, type] = {JobOrder.CREATED: datetime, JobOrder.NAME: str}
+        last = None if after is None else from_cursor(cursor, after, kinds.get(order, float))
+        conditions = _existing(where.archived)
+        if state is not None:
+            conditions.append(jobs.c.state == state)
+        if parent is not None:
+            conditions.append(jobs.c.parent_id == parent if is_job_id(parent) else false())
+        if search:
+            conditions.append(jobs.c.search_text.contains(folded(search), autoescape=True))
+        with self._database.read("jobs") as connection:
+            if kind is not None:
+                conditions.append(text_at(connection, jobs.c.spec, "kind") == kind)
+            descending = reverse is not (order is JobOrder.CREATED)
+            key = _key(connection, order)
+            matches = _matches(connection, conditions, where, key, last, limit + 1, descending)
+            found = [match for match, _ in zip(matches, range(limit + 1), strict=False)]
+            ids = [job_id for job_id, _ in found[:limit]]
+            shown = select(*SHOWN).where(jobs.c.id.in_(ids), EXISTING)
+            rows = connection.execute(shown) if ids else ()
+            # A job may have been removed meanwhile.
+            by_id = {row.id: shown_job(row) for row in rows}
+        items = tuple(by_id[job_id] for job_id in ids if job_id in by_id)
+        if len(found) <= limit:
+            return Page(items, None)
+        job_id, value = found[limit - 1]
+        return Page(items, to_cursor(cursor, value, job_id))
+
+    def facets(self, *, archived: bool | None = None) -> FacetCounts:
+        """Count jobs by facet.
+
+        Args:
+            archived: only jobs that are archived, or that are not; None for both.
+        """
+        counts = FacetCounts()
+        with self._database.read("facets") as connection:
+            query = select(*_facet_columns(connection)).where(*_existing(archived))
+            for row in connection.execute(query):
+                counts.add(_facets(*row))
+        return counts
+
+    def queue(self) -> Queue:
+        """Count jobs by state and kind. Ended jobs are not read, as there may be very many."""
+        with self._database.read("queue") as connection:
+            now = self._clock(connection)
+            numbers = select(jobs.c.state, func.count()).where(EXISTING).group_by(jobs.c.state)
+            by_state = dict.fromkeys(JobState, 0)
+            by_state |= {JobState(state): count for state, count in connection.execute(numbers)}
+            kind = text_at(connection, jobs.c.spec, "kind").label("kind")
+            unfinished = select(jobs.c.state, kind, func.count()).group_by(jobs.c.state, kind)
+            under_way: dict[tuple[JobState, str], int] = {}
+            query = unfinished.where(jobs.c.state.not_in(ENDED), EXISTING)
+            for state, name, count in connection.execute(query):
+                key = (JobState(state), name if name in _KINDS else "unknown")
+                under_way[key] = under_way.get(key, 0) + count
+            queued = (jobs.c.state == JobState.QUEUED, EXISTING)
+            since = connection.execute(select(func.min(jobs.c.updated_at)).where(*queued)).scalar()
+            beginning = func.substr(func.coalesce(jobs.c.error, ""), 1, _ERROR_LENGTH)
+            failed = select(beginning).where(jobs.c.state == JobState.FAILED, EXISTING)
+            errors = tuple(connection.execute(failed).scalars())
+        wait = 0.0 if since is None else max(0.0, (now - since).total_seconds())
+        return Queue(by_state, under_way, wait, errors)
+
+
+def _existing(archived: bool | None) -> list[ColumnElement[bool]]:
+    if archived is None:
+        return [EXISTING]
+    return [EXISTING, func.coalesce(jobs.c.archived, False).is_(archived)]
+
+
+def _matches(
+    connection: Connection,
+    conditions: list[ColumnElement[bool]],
+    where: JobFilter,
+    key: ColumnElement[Any],
+    last: tuple[Any, str] | None,
+    limit: int,
+    descending: bool,
+) -> Iterator[tuple[str, Any]]:
+    """Yield id and sort value of jobs after the last one, those without a value last."""
+    facets = _facet_columns(connection) if where.needs_specs else []
+    listed = select(jobs.c.id, key, *facets).where(*conditions)
+    queries = []
+    if last is None or last[0] is not None:
+        place = (key, jobs.c.id)
+        valued = listed.where(key.is_not(None))
+        valued = valued.order_by(*(c.desc() if descending else c for c in place))
+        if last is not None:
+            value = literal(last[0], Double if isinstance(last[0], float) else None)
+            end = tuple_(value, literal(last[1]))
+            valued = valued.where(tuple_(*place) < end if descending else tuple_(*place) > end)
+        queries.append(valued)
+    if key is not jobs.c.created_at:
+        unvalued = listed.where(key.is_(None)).order_by(jobs.c.id)
+        if last is not None and last[0] is None:
+            unvalued = unvalued.where(jobs.c.id > last[1])
+        queries.append(unvalued)
+    for query in queries:
+        # Custom robots and preferences have no columns, so facets are compared here.
+        for row in connection.execute(query if facets else query.limit(limit)):
+            if not facets or where.admits(_facets(*row[2:])):
+                yield row[0], row[1]
+
+
+def _facet_columns(connection: Connection) -> list[ColumnElement[Any]]:
+    names = ("robot", "controller", "preference")
+    return [jobs.c.state, jobs.c.labels, *(text_at(connection, jobs.c.spec, n) for n in names)]
+
+
+def _facets(state: str, labels: Any, robot: str, controller: str, preference: str) -> Facets:
+    return Facets(
+        state,
+        robot_name(robot),
+        controller or None,
+        preference_name(preference),
+        tuple(labels.get("tags", ()) if isinstance(labels, dict) else ()),
+        own_robot=is_own_robot(robot),
+    )
+
+
+def _key(connection: Connection, order: JobOrder) -> ColumnElement[Any]:
+    """Return the value to sort by; NULL if a job has none."""
+    if order is JobOrder.TIME_LEFT:
+        return _time_left(connection)
+    if order is JobOrder.GAIN:
+        # The negative of `Job.gain`.
+        reference = number_at(connection, jobs.c.reference, "fitness")
+        return jobs.c.best_fitness / case((reference > 0.0, reference)) - 1.0
+    if order is JobOrder.RATE:
+        taken_over = func.coalesce(number_at(connection, jobs.c.lineage, "evaluations"), 0.0)
+        own, seconds = jobs.c.evaluations - taken_over, jobs.c.compute_seconds
+        return -case((and_(own > 0.0, seconds > 0.0), own / case((seconds > 0.0, seconds))))
+    if order is JobOrder.STATE:
+        return case({str(state): k for k, state in enumerate(JobState)}, value=jobs.c.state)
+    keys: dict[JobOrder, ColumnElement[Any]] = {
+        JobOrder.CREATED: jobs.c.created_at,
+        JobOrder.FITNESS: jobs.c.best_fitness,
+        JobOrder.NAME: jobs.c.sort_name,
+        JobOrder.EVALUATIONS: -jobs.c.evaluations,
+        JobOrder.PRIORITY: -jobs.c.priority,
+        JobOrder.ITERATIONS: -jobs.c.iterations,
+    }
+    return keys[order]
+
+
+def _time_left(connection: Connection) -> ColumnElement[Any]:
+    """Return the estimates of the few running jobs; they depend on the time."""
+    running = select(*SHOWN).where(EXISTING, jobs.c.state == JobState.RUNNING)
+    now = datetime.now(UTC)
+    shown = (shown_job(row) for row in connection.execute(running))
+    times = {job.id: time_left(job, now).eta_seconds for job in shown}
+    known = {job_id: literal(s, Double) for job_id, s in times.items() if s is not None}
+    return case(known, value=jobs.c.id) if known else func.nullif(literal(0.0, Double), 0.0)

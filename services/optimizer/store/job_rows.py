@@ -1,0 +1,310 @@
+"""Rows of jobs: reading, locking and changing them"""
+
+from __future__ import annotations
+
+import json
+import re
+import secrets
+from collections.abc import Mapping
+from dataclasses import replace
+from datetime import datetime
+from functools import lru_cache
+from typing import Any, Final
+
+from pydantic import TypeAdapter, ValidationError
+from sqlalchemy import Connection, Select, Text, cast, insert, select, update
+from sqlalchemy import Row as SqlRow
+
+from gaitswarm.services.optimizer.errors import NotFound, Unreadable
+from gaitswarm.services.optimizer.jobs.chain import ChainDocuments
+from gaitswarm.services.optimizer.jobs.documents import SPECS, AnySpec
+from gaitswarm.services.optimizer.jobs.fork import Lineage
+from gaitswarm.services.optimizer.jobs.job import Job, JobState, Progress, UnreadableSpec
+from gaitswarm.services.optimizer.jobs.labels import Labels
+from gaitswarm.services.optimizer.jobs.provenance import RECORDS, ProvenanceRecords
+from gaitswarm.services.optimizer.jobs.reference import Reference
+from gaitswarm.services.optimizer.store.changes import announce
+from gaitswarm.services.optimizer.store.tables import (
+    EXISTING,
+    Row,
+    UnparsedText,
+    jobs,
+    notifications,
+)
+from gaitswarm.sim.input import message_of
+
+ID_ALPHABET: Final = "23456789bcdfghjkmnpqrstvwxz"
+"""No vowels and no look-alikes, as ids are read aloud."""
+
+_ID: Final = re.compile(rf"[{ID_ALPHABET}]{{12}}")
+
+_REMEDY: Final = (
+    "what is stored stays as it is: run the gaitswarm that wrote it, or a newer one, and resume the"
+    " job there; or submit a new one"
+)
+
+_DOCUMENTS: Final = ("spec", "provenance", "lineage")
+
+_UNSHOWN: Final = frozenset(
+    {
+        *("idempotency_key", "request_digest", "lease_owner", "lease_token", "lease_expires_at"),
+        *("parent_id", "crashes", "notify_url", "deleted_at", "simulated_seconds"),
+        *("sort_name", "search_text"),
+    }
+)
+
+SHOWN: Final = tuple(
+    cast(column, Text).label(column.name) if column.name in _DOCUMENTS else column
+    for column in jobs.c
+    if column.name not in _UNSHOWN
+)
+"""Columns of `shown_job`."""
+
+_LINEAGE: Final[TypeAdapter[Lineage | None]] = TypeAdapter(Lineage | None)
+
+_Documents = tuple[AnySpec, ProvenanceRecords, Lineage | None]
+
+
+def new_job_id() -> str:
+    """Return twelve characters, 57 random bits."""
+    return "".join(secrets.choice(ID_ALPHABET) for _ in range(12))
+
+
+def is_job_id(text: str) -> bool:
+    """Return whether a text can be an id; databases refuse some other texts."""
+    return _ID.fullmatch(text) is not None
+
+
+def job_row(connection: Connection, job_id: str, *, lock: bool = False) -> Row:
+    """Return all columns of a job. Raises NotFound.
+
+    Every transaction that changes a job locks it first, so that two commands, or a command and a
+    commit, never act on the same state.
+    """
+    query = select(jobs)
+    return _row(connection, job_id, query.with_for_update() if lock else query)._mapping  # noqa: SLF001
+
+
+def read_job(connection: Connection, job_id: str) -> Job:
+    """Return a job. Raises NotFound."""
+    return shown_job(_row(connection, job_id, select(*SHOWN)))
+
+
+def require_job(connection: Connection, job_id: str) -> None:
+    """Raise NotFound for an unknown job."""
+    _row(connection, job_id, select(jobs.c.id))
+
+
+def _row(connection: Connection, job_id: str, query: Select[Any]) -> SqlRow[Any]:
+    if is_job_id(job_id):
+        row = connection.execute(query.where(jobs.c.id == job_id, EXISTING)).first()
+        if row is not None:
+            return row
+    raise NotFound(f"there is no job {job_id!r}")
+
+
+def update_job(connection: Connection, row: Row, columns: Mapping[str, Any]) -> Row:
+    """Change a locked job and return its row; a job that ends leaves a notification."""
+    connection.execute(update(jobs).where(jobs.c.id == row["id"]).values(**columns))
+    announce(connection, row["id"], frozenset(columns))
+    after = {**row, **columns}
+    if after["notify_url"] is not None and "state" in columns and after["finished_at"] is not None:
+        _add_notification(connection, after)
+    return after
+
+
+def _add_notification(connection: Connection, job: Row) -> None:
+    spec, ended_at = job["spec"], job["finished_at"]
+    document = {
+        "type": f"job.{job['state']}",
+        "timestamp": ended_at.isoformat(),
+        "data": {
+            "id": job["id"],
+            "name": spec.get("name", "") if isinstance(spec, dict) else "",
+            "state": str(job["state"]),
+            "iterations": job["iterations"],
+            "evaluations": job["evaluations"],
+            "best_fitness": job["best_fitness"],
+            "error": job["error"],
+        },
+    }
+    connection.execute(
+        insert(notifications).values(
+            id=f"msg_{secrets.token_hex(12)}",
+            job_id=job["id"],
+            url=job["notify_url"],
+            document=document,
+            created_at=ended_at,
+            attempts=0,
+            next_attempt_at=ended_at,
+        )
+    )
+
+
+def entering(state: JobState, now: datetime) -> dict[str, Any]:
+    """Return the columns that change with the state; the fencing token stays."""
+    columns = {
+        "state": state,
+        "updated_at": now,
+        "finished_at": now if state.terminal else None,
+        "waiting": None,
+    }
+    if state not in (JobState.RUNNING, JobState.PAUSING):
+        columns |= {"lease_owner": None, "lease_expires_at": None}
+    return columns
+
+
+def to_job(row: Row, documents: _Documents | None = None) -> Job:
+    """Build a job from its columns, and from its documents if they have been read."""
+    spec: AnySpec | UnreadableSpec
+    try:
+        spec, provenance, lineage = documents or _read_documents(*(row[n] for n in _DOCUMENTS))
+    except Unreadable as error:
+        # Results must not be added to those of unknown provenance.
+        spec, provenance, lineage = _described(row["spec"], str(error)), (), None
+    submitted_iterations = spec.iterations
+    if row["budget"] is not None:
+        if isinstance(spec, UnreadableSpec):
+            spec = replace(spec, iterations=row["budget"])
+        else:
+            spec = spec.with_budget(row["budget"])
+    return Job(
+        id=row["id"],
+        stored_spec=spec,
+        state=JobState(row["state"]),
+        created_at=row["created_at"],
+        updated_at=row["updated_at"],
+        started_at=row["started_at"],
+        finished_at=row["finished_at"],
+        error=row["error"],
+        progress=Progress(
+            iterations=row["iterations"],
+            evaluations=row["evaluations"],
+            evaluations_saved=row["evaluations_saved"] or 0,
+            best_fitness=row["best_fitness"],
+            best_iteration=row["best_iteration"],
+            best_particle=row["best_particle"],
+            compute_seconds=row["compute_seconds"],
+            recent_seconds=row["recent_seconds"],
+            head=row["head"],
+        ),
+        provenance=provenance,
+        accepts_changes=bool(row["accepts_changes"]),
+        lineage=lineage,
+        owner=row["owner"],
+        kept=bool(row["kept"]),
+        submitted_iterations=submitted_iterations,
+        waiting=row["waiting"],
+        priority=row["priority"],
+        labels=labels_of(row),
+        archived=bool(row["archived"]),
+        reference=_reference(row["reference"]),
+    )
+
+
+def shown_job(row: SqlRow[Any]) -> Job:
+    """Build a job from the columns `SHOWN`. Equal documents are parsed once."""
+    columns = dict(row._mapping)  # noqa: SLF001
+    texts = [columns[name] for name in _DOCUMENTS]
+    try:
+        return to_job(columns, _documents_from_text(*texts))
+    except Unreadable:
+        return to_job(columns | dict(zip(_DOCUMENTS, map(_parsed, texts), strict=True)))
+
+
+@lru_cache(maxsize=1024)
+def _documents_from_text(*texts: str | None) -> _Documents:
+    return _read_documents(*map(_parsed, texts))
+
+
+def _parsed(text: str | None) -> Any:
+    try:
+        return None if text is None else json.loads(text)
+    except (ValueError, RecursionError):
+        return UnparsedText(text)
+
+
+def _read_documents(spec: Any, provenance: Any, lineage: Any) -> _Documents:
+    """Raise Unreadable for documents of another version, or damaged ones."""
+    if isinstance(spec, UnparsedText):
+        raise unreadable("its spec is not JSON")
+    what = "spec"
+    try:
+        read_spec = SPECS.validate_python(spec)
+        what = "provenance"
+        records = provenance_records(provenance)
+        what = "lineage"
+        return read_spec, records, _LINEAGE.validate_python(lineage)
+    except ValidationError as error:
+        problem = first_problems(error)
+    except Exception as error:  # noqa: BLE001 - one damaged job must not hide the others
+        problem = f"{type(error).__name__}: {error}"
+    raise unreadable(f"its {what} cannot be read by this gaitswarm ({problem})")
+
+
+def provenance_records(document: Any) -> ProvenanceRecords:
+    """Raise ValidationError for a document that is not provenance."""
+    return RECORDS.validate_python(() if document is None else document)
+
+
+def _described(document: Any, reason: str) -> UnreadableSpec:
+    """Return what can be understood of an unreadable spec."""
+    spec = document if isinstance(document, dict) else {}
+    name, settings = spec.get("name"), spec.get("optimizer")
+    return UnreadableSpec(
+        reason,
+        name=name if isinstance(name, str) else "",
+        iterations=_count(spec.get("iterations")),
+        particles=_count(settings.get("particles")) if isinstance(settings, dict) else 0,
+    )
+
+
+def _count(value: object) -> int:
+    return value if isinstance(value, int) and value > 0 else 0
+
+
+def unreadable(problem: str) -> Unreadable:
+    """Return the error for a stored document that this version cannot read."""
+    return Unreadable(f"{problem}; {_REMEDY}")
+
+
+def first_problems(error: ValidationError) -> str:
+    """Return the first three problems of a document in a line."""
+    problems = error.errors(include_url=False, include_input=False)
+    lines = [f"{'.'.join(map(str, p['loc']))}: {message_of(p)}" for p in problems[:3]]
+    if len(problems) > len(lines):
+        lines.append(f"{len(problems) - len(lines)} more")
+    return "; ".join(lines)
+
+
+def labels_of(row: Row) -> Labels:
+    """Return a job's labels; none if they are unreadable, as nothing depends on them."""
+    try:
+        return Labels() if row["labels"] is None else Labels.model_validate(row["labels"])
+    except ValidationError:
+        return Labels()
+
+
+def _reference(document: Any) -> Reference | None:
+    if not isinstance(document, dict):
+        return None
+    name, fitness = document.get("name"), document.get("fitness")
+    return Reference(
+        name if isinstance(name, str) else None,
+        float(fitness) if isinstance(fitness, int | float) else None,
+        "start" if document.get("kind") == "start" else "published",
+    )
+
+
+def chain_documents(row: Row) -> ChainDocuments:
+    """Return the documents of a job's chain as stored, readable or not."""
+    return ChainDocuments(row["spec"], row["lineage"], row["provenance"])
+
+
+def provenance_document(records: ProvenanceRecords) -> list[dict[str, Any]]:
+    return [record.model_dump(mode="json") for record in records]
+
+
+def storable(text: str) -> str:
+    """Return a text without zero bytes, which PostgreSQL refuses."""
+    return text.replace("\0", "")

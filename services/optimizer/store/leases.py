@@ -1,0 +1,369 @@
+"""Claims, leases and fencing: how runners hold jobs and commit iterations"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import datetime, timedelta
+from typing import Any
+
+from sqlalchemy import ColumnElement, Connection, and_, not_, or_, select
+
+from gaitswarm.services.optimizer.errors import BudgetChanged, LeaseLost, NotFound, Unreadable
+from gaitswarm.services.optimizer.jobs.estimate import recent_pace
+from gaitswarm.services.optimizer.jobs.iteration import Ask, CompletedIteration
+from gaitswarm.services.optimizer.jobs.job import (
+    LONGEST_LEASE_SECONDS,
+    QUARANTINE_AFTER,
+    Claim,
+    JobState,
+    Renewal,
+    UnreadableSpec,
+)
+from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, with_record
+from gaitswarm.services.optimizer.store.engine import Aggregate
+from gaitswarm.services.optimizer.store.history import (
+    answered_ask,
+    complete_iteration,
+    insert_ask,
+    open_ask,
+)
+from gaitswarm.services.optimizer.store.job_rows import (
+    entering,
+    job_row,
+    provenance_document,
+    provenance_records,
+    require_job,
+    storable,
+    to_job,
+    unreadable,
+    update_job,
+)
+from gaitswarm.services.optimizer.store.recordings import load_recordings
+from gaitswarm.services.optimizer.store.tables import Row, jobs
+
+_log = logging.getLogger(__name__)
+
+
+class Leases(Aggregate):
+    """Operations of runners.
+
+    Methods that take a claim raise LeaseLost, and change nothing, unless the claim's token is the
+    job's: a lease that has expired but was not taken over is still valid.
+    """
+
+    def claim(
+        self,
+        runner: str,
+        *,
+        lease_seconds: float,
+        job_id: str | None = None,
+        quarantine_after: int = QUARANTINE_AFTER,
+    ) -> Claim | None:
+        """Lease the oldest job of highest priority that is queued or whose lease has expired.
+
+        A lease that ends more than `LONGEST_LEASE_SECONDS` ahead, as a wrong clock wrote it, has
+        expired. The claimed job is running, under a token higher than any before. A pausing job
+        without a lease becomes paused, an unreadable one fails, and so does one whose runners have
+        crashed too often; none of them keeps others from being claimed. A lease that expires
+        without release counts as a crash until the next commit or resumption.
+
+        Args:
+            runner: name of the runner.
+            lease_seconds: duration of the lease, at most `LONGEST_LEASE_SECONDS` [s].
+            job_id: the only job to claim; None for any.
+            quarantine_after: consecutive crashes after which a job fails.
+
+        Returns:
+            The claim; None if there is no job to claim.
+
+        Raises:
+            NotFound: no such job.
+        """
+        claim = None
+        with self._database.write("claim") as connection:
+            if job_id is not None:
+                require_job(connection, job_id)
+            now = self._clock(connection)
+            abandoned = and_(
+                jobs.c.state.in_((JobState.RUNNING, JobState.PAUSING)), not_(has_live_lease(now))
+            )
+            query = (
+                select(jobs)
+                .where(or_(jobs.c.state == JobState.QUEUED, abandoned))
+                .order_by(jobs.c.priority.desc(), jobs.c.created_at, jobs.c.id)
+                .limit(1)
+                # Concurrent runners skip each other's candidates, but wait for a given job.
+                .with_for_update(skip_locked=job_id is None)
+            )
+            if job_id is not None:
+                query = query.where(jobs.c.id == job_id)
+            while (row := connection.execute(query).mappings().first()) is not None:
+                # Again, as there may have been a wait for a lock.
+                now = self._clock(connection)
+                claim = _take_or_end(
+                    connection, row, runner, lease_seconds, now, quarantine_after=quarantine_after
+                )
+                if claim is not None:
+                    break
+        if claim is not None:
+            for observer in self._database.observers:
+                observer.claimed(claim)
+        return claim
+
+    def renew(self, claim: Claim, *, lease_seconds: float, waiting: str | None = None) -> Renewal:
+        """Prolong a lease.
+
+        Args:
+            claim: on the job.
+            lease_seconds: duration from now on [s].
+            waiting: reason for waiting, shown to users; None if the job does not wait.
+
+        Returns:
+            The job's state and priority, which users may have changed.
+
+        Raises:
+            LeaseLost: see the class.
+        """
+        with self._held("renew", claim) as (connection, row):
+            expires = self._clock(connection) + timedelta(seconds=lease_seconds)
+            changes: dict[str, Any] = {"lease_expires_at": expires}
+            reason = None if waiting is None else storable(waiting)
+            if reason != row["waiting"]:
+                changes["waiting"] = reason
+            update_job(connection, row, changes)
+            return Renewal(JobState(row["state"]), row["priority"])
+
+    def record_provenance(self, claim: Claim, provenance: JobProvenance) -> None:
+        """Record the provenance from the next iteration on, unless it is unchanged.
+
+        Clears the user's acceptance of changes.
+
+        Args:
+            claim: on the job.
+            provenance: of the runner.
+
+        Raises:
+            LeaseLost: see the class.
+        """
+        with self._held("record_provenance", claim) as (connection, row):
+            before = provenance_records(row["provenance"])
+            added = with_record(before, row["iterations"], provenance)[len(before) :]
+            # Earlier records stay as written, as digests depend on them.
+            document = [*(row["provenance"] or ()), *provenance_document(added)]
+            update_job(connection, row, {"provenance": document, "accepts_changes": False})
+
+    def begin(self, claim: Claim, ask: Ask) -> None:
+        """Store the ask of a new job, or of one that continues after an extension. Idempotent.
+
+        Args:
+            claim: on the job.
+            ask: designs to evaluate next.
+
+        Raises:
+            BudgetChanged: the job's budget is not the claim's, on which the ask depends.
+            Conflict: the ask is not of the next iteration.
+            LeaseLost: see the class.
+        """
+        with self._held("begin", claim) as (connection, row):
+            if open_ask(connection, row) is None:
+                _require_budget(claim, row)
+                now = self._clock(connection)
+                insert_ask(connection, row, ask, expected=row["iterations"], now=now)
+
+    def commit(self, claim: Claim, done: CompletedIteration, following: Ask | None) -> JobState:
+        """Store a completed iteration and the next ask. A repeated commit changes nothing.
+
+        Args:
+            claim: on the job.
+            done: the iteration.
+            following: the next ask; None at the end of the budget.
+
+        Returns:
+            The job's state afterwards: succeeded at the end of the budget; paused, without a
+            lease, if it was pausing; otherwise unchanged.
+
+        Raises:
+            BudgetChanged: the job's budget is not the claim's, on which `following` depends.
+            Conflict: the iteration was not asked.
+            LeaseLost: see the class.
+        """
+        with self._held("commit", claim, committed=done.iteration) as (connection, row):
+            if done.iteration < row["iterations"]:
+                return JobState(row["state"])
+            now = self._clock(connection)
+            _require_budget(claim, row)
+            head = complete_iteration(connection, row, done, now)
+            if following is not None:
+                insert_ask(connection, row, following, expected=done.iteration + 1, now=now)
+            state = JobState(row["state"])
+            if following is None:
+                state = JobState.SUCCEEDED
+            elif state is JobState.PAUSING:
+                state = JobState.PAUSED
+            progress = _progress(row, done) | {"head": head}
+            update_job(connection, row, entering(state, now) | progress)
+        for observer in self._database.observers:
+            observer.committed(claim, done, state)
+        return state
+
+    def release(self, claim: Claim, state: JobState, *, error: str | None = None) -> None:
+        """Give up a lease.
+
+        Args:
+            claim: on the job.
+            state: failed, paused, or queued; a pausing job becomes paused instead of queued.
+            error: why it failed.
+
+        Raises:
+            LeaseLost: see the class.
+        """
+        if state not in (JobState.FAILED, JobState.PAUSED, JobState.QUEUED):
+            raise ValueError(f"a runner cannot release a job as {state}")
+        with self._held("release", claim) as (connection, row):
+            pausing = row["state"] == JobState.PAUSING and state is JobState.QUEUED
+            text = storable(error) if error is not None else row["error"]
+            after = JobState.PAUSED if pausing else state
+            changes = entering(after, self._clock(connection)) | {"error": text}
+            update_job(connection, row, changes)
+        for observer in self._database.observers:
+            observer.released(claim, state, error)
+
+    @contextmanager
+    def _held(
+        self, operation: str, claim: Claim, *, committed: int | None = None
+    ) -> Iterator[tuple[Connection, Row]]:
+        """Open a transaction with the locked row of a claimed job. Raises LeaseLost.
+
+        committed: iteration whose commit may be repeated after it ended or paused the job, which
+        gives up the lease but not the token.
+        """
+        try:
+            with self._database.write(operation) as connection:
+                row = _claimed_row(connection, claim, committed)
+                yield connection, row
+        except LeaseLost as error:
+            for observer in self._database.observers:
+                observer.lost(claim, error)
+            raise
+
+
+def _claimed_row(connection: Connection, claim: Claim, committed: int | None) -> Row:
+    try:
+        row = job_row(connection, claim.job.id, lock=True)
+    except NotFound:
+        lost = f"{claim.runner} has lost job {claim.job.id}: it was deleted"
+        raise LeaseLost(lost) from None
+    taken_over, owner = row["lease_token"] != claim.token, row["lease_owner"]
+    repeated = committed is not None and committed < row["iterations"]
+    if not taken_over and (repeated or owner == claim.runner):
+        return row
+    holder = f"held by {owner}" if owner else f"{row['state']} and held by nobody"
+    lost = f"{claim.runner} has lost job {claim.job.id}: it is {holder}"
+    raise LeaseLost(lost, taken_over=taken_over)
+
+
+def has_live_lease(now: datetime) -> ColumnElement[bool]:
+    """Match jobs with a lease that has not expired; see `Leases.claim`. Never NULL."""
+    expires = jobs.c.lease_expires_at
+    latest = now + timedelta(seconds=LONGEST_LEASE_SECONDS)
+    return and_(expires.is_not(None), expires > now, expires <= latest)
+
+
+def _take_or_end(
+    connection: Connection,
+    row: Row,
+    runner: str,
+    lease_seconds: float,
+    now: datetime,
+    *,
+    quarantine_after: int,
+) -> Claim | None:
+    """Take a locked job that can be claimed, or pause or fail it."""
+    if row["state"] == JobState.PAUSING:
+        update_job(connection, row, entering(JobState.PAUSED, now))
+        return None
+    owner = row["lease_owner"]
+    crashes = (row["crashes"] or 0) + (owner is not None and owner != runner)
+    if crashes >= quarantine_after:
+        error = (
+            f"quarantined: {crashes} runner processes in a row were killed or not heard of while"
+            f" they ran its iteration {row['iterations']}, the last of them {owner}. See there"
+            " what ended it, such as a lack of memory; resume the job to try again"
+        )
+        columns = entering(JobState.FAILED, now) | {"error": error, "crashes": crashes}
+        update_job(connection, row, columns)
+        return None
+    try:
+        return take_job(connection, row, runner, lease_seconds, now, crashes=crashes)
+    except Unreadable as error:
+        _log.warning("job %s is set aside: %s", row["id"], error)
+        columns = entering(JobState.FAILED, now) | {"error": storable(str(error))}
+        update_job(connection, row, columns)
+        return None
+
+
+def take_job(
+    connection: Connection,
+    row: Row,
+    runner: str,
+    lease_seconds: float,
+    now: datetime,
+    *,
+    crashes: int = 0,
+) -> Claim:
+    """Lease a locked job under a higher token. Raises Unreadable, and changes nothing."""
+    spec = to_job(row).stored_spec
+    if isinstance(spec, UnreadableSpec):
+        raise Unreadable(spec.reason)
+    try:
+        walks = load_recordings(connection, spec.recording_ids)
+        ask = open_ask(connection, row)
+        answered = answered_ask(connection, row) if ask is None else None
+    except NotFound as error:
+        raise unreadable(str(error)) from error
+    except (ValueError, TypeError, LookupError) as error:
+        raise unreadable(f"its iteration {row['iterations']} cannot be read ({error})") from error
+    owner, token = row["lease_owner"], row["lease_token"] + 1
+    changes = entering(JobState.RUNNING, now) | {
+        "started_at": row["started_at"] or now,
+        "lease_owner": runner,
+        "lease_token": token,
+        "lease_expires_at": now + timedelta(seconds=lease_seconds),
+        "crashes": crashes or None,
+    }
+    job = to_job(update_job(connection, row, changes))
+    taken_from = None if owner == runner else owner
+    return Claim(job, runner, token, ask, walks, answered, taken_from)
+
+
+def _require_budget(claim: Claim, row: Row) -> None:
+    try:
+        budget = int(row["spec"]["iterations"] if row["budget"] is None else row["budget"])
+    except (TypeError, LookupError, ValueError):
+        raise unreadable("its budget cannot be read") from None
+    if budget != claim.job.spec.iterations:
+        raise BudgetChanged(f"job {row['id']} is to run {budget} iterations now")
+
+
+def _progress(job: Row, done: CompletedIteration) -> dict[str, Any]:
+    """Return the columns of progress after one more iteration."""
+    pace = done.evaluate_seconds / max(1, len(done.fitness))
+    columns: dict[str, Any] = {
+        "crashes": None,
+        "iterations": done.iteration + 1,
+        "evaluations": job["evaluations"] + len(done.fitness),
+        "evaluations_saved": (job["evaluations_saved"] or 0) + done.saved,
+        "compute_seconds": job["compute_seconds"] + done.evaluate_seconds,
+        "recent_seconds": recent_pace(job["recent_seconds"], pace),
+    }
+    if done.best is not None:
+        particle, fitness = done.best
+        if job["best_fitness"] is None or fitness < job["best_fitness"]:
+            columns |= {
+                "best_fitness": fitness,
+                "best_iteration": done.iteration,
+                "best_particle": particle,
+            }
+    return columns

@@ -1,0 +1,360 @@
+"""Backup, check and pruning of whole databases"""
+
+from __future__ import annotations
+
+import os
+import re
+import sqlite3
+import tempfile
+from collections.abc import Collection, Iterator
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from datetime import timedelta
+from pathlib import Path
+from typing import Any, Final
+
+from sqlalchemy import (
+    JSON,
+    URL,
+    Connection,
+    Select,
+    Table,
+    Text,
+    bindparam,
+    cast,
+    delete,
+    exists,
+    func,
+    insert,
+    or_,
+    select,
+)
+
+from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, NotFound, StoreUnavailable
+from gaitswarm.services.optimizer.jobs.job import ENDED, JobState
+from gaitswarm.services.optimizer.store import Store
+from gaitswarm.services.optimizer.store.engine import (
+    Database,
+    check_file_system,
+    database_time,
+    parse_url,
+)
+from gaitswarm.services.optimizer.store.schema import (
+    check_revision,
+    create,
+    exclusive,
+    lock_file,
+    upgrade,
+)
+from gaitswarm.services.optimizer.store.tables import (
+    EXISTING,
+    Document,
+    evaluations,
+    iterations,
+    jobs,
+    metadata,
+    recordings,
+)
+
+_ROWS_AT_ONCE: Final = 1000
+
+_MOST_FINDINGS: Final = 20
+"""Of one kind."""
+
+_GRACE: Final = timedelta(days=1)
+"""Age from which an unreferenced recording is removed."""
+
+_RECORDING_ID: Final = re.compile(r"\b[0-9a-f]{32}\b")
+
+
+def backup(url: str, file: Path, *, overwrite: bool = False) -> None:
+    """Write a snapshot of a database, which may be in use, to an SQLite file.
+
+    Raises:
+        Conflict: the file exists and must not be replaced.
+        StoreUnavailable: the database cannot be read, or the file not be written.
+    """
+    if file.exists() and not overwrite:
+        raise Conflict(f"{file} exists already; name another file, or replace it with --force")
+    parsed = parse_url(url)
+    with _temporary_file(file.parent, f"backup {file}") as copy:
+        if parsed.get_backend_name() == "sqlite":
+            _copy_file(Path(str(parsed.database)), copy)
+        else:
+            _copy_server(parsed, copy)
+        copy.replace(file)
+
+
+def restore(url: str, file: Path, *, overwrite: bool = False) -> None:
+    """Fill an unused database from a backup of this or an older version, in the newest schema.
+
+    Raises:
+        NotFound: no such file.
+        InvalidRequest: the file is not a backup.
+        Conflict: the database is in use, or holds data that must not be replaced.
+        StoreUnavailable: the database cannot be written, or a newer gaitswarm made the backup.
+    """
+    if not file.is_file():
+        raise NotFound(f"there is no backup {file}")
+    parsed = parse_url(url)
+    check_file_system(parsed)
+    target = Path(str(parsed.database)) if parsed.get_backend_name() == "sqlite" else None
+    if target is not None and target.exists() and not overwrite:
+        raise Conflict(f"database {target} exists already; --force replaces all that it holds")
+    folder = Path(tempfile.gettempdir()) if target is None else target.parent
+    with _temporary_file(folder, f"backup {file}") as copy:
+        _copy_file(file, copy)
+        if upgrade(str(copy)) is None:
+            raise InvalidRequest(f"{file} is no backup of gaitswarm", field="FILE")
+        if target is None:
+            _fill_server(parsed, copy, overwrite=overwrite)
+        else:
+            _fill_file(parsed, target, copy)
+
+
+@contextmanager
+def _temporary_file(folder: Path, what: str) -> Iterator[Path]:
+    try:
+        handle, name = tempfile.mkstemp(dir=folder, prefix=".gaitswarm-", suffix=".db")
+    except OSError as error:
+        raise StoreUnavailable(f"{what}: cannot write to {folder}: {error.strerror}") from error
+    os.close(handle)
+    path = Path(name)
+    try:
+        yield path
+    except sqlite3.Error as error:
+        raise StoreUnavailable(f"{what}: {error}") from error
+    finally:
+        for end in ("", "-wal", "-shm", "-journal"):
+            path.with_name(path.name + end).unlink(missing_ok=True)
+
+
+def _copy_file(source: Path, target: Path) -> None:
+    mode = "rw" if os.access(source, os.W_OK) else "ro"
+    uri = f"{source.absolute().as_uri()}?mode={mode}"
+    with closing(sqlite3.connect(uri, uri=True)) as from_, closing(sqlite3.connect(target)) as to:
+        from_.backup(to)
+        _finish_copy(to)
+
+
+def _finish_copy(connection: sqlite3.Connection) -> None:
+    """Leave the write-ahead log, so that the file is complete, and read it once."""
+    connection.execute("PRAGMA journal_mode = DELETE")
+    (result,) = connection.execute("PRAGMA quick_check(1)").fetchone()
+    if result != "ok":
+        raise StoreUnavailable(f"the database is damaged, and its copy with it: {result}")
+
+
+def _copy_server(url: URL, target: Path) -> None:
+    create(parse_url(str(target)))
+
+    def snapshot(connection: Connection) -> None:
+        connection.execution_options(isolation_level="REPEATABLE READ")
+
+    with (
+        closing(Database(url, for_migration=True)) as source,
+        closing(Database(str(target), for_migration=True)) as copy,
+    ):
+        check_revision(source)
+        with source.transaction(write=False, before=snapshot) as rows, copy.write() as to:
+            _copy_rows(rows, to)
+    with closing(sqlite3.connect(target)) as connection:
+        _finish_copy(connection)
+
+
+def _fill_server(url: URL, copy: Path, *, overwrite: bool) -> None:
+    create(url)
+    with (
+        closing(Database(str(copy), for_migration=True)) as source,
+        closing(Database(url, for_migration=True)) as target,
+        source.read() as rows,
+        exclusive(target) as to,
+    ):
+        tables = metadata.sorted_tables
+        filled = [table.name for table in tables if to.execute(select(table).limit(1)).first()]
+        if filled and not overwrite:
+            raise Conflict(
+                f"database {target.name} holds {', '.join(filled)}; --force replaces all of it"
+            )
+        for table in reversed(tables):
+            to.execute(delete(table))
+        _copy_rows(rows, to)
+
+
+def _fill_file(url: URL, target: Path, copy: Path) -> None:
+    if target.exists():
+        try:
+            with closing(Database(url, for_migration=True)) as database, exclusive(database):
+                pass
+        except StoreUnavailable as error:
+            raise StoreUnavailable(
+                f"{error}; to restore all the same, move {target} away, and with it -wal and -shm"
+            ) from error
+    with (
+        closing(sqlite3.connect(copy)) as from_,
+        closing(sqlite3.connect(target, isolation_level=None)) as to,
+    ):
+        with closing(to.cursor()) as cursor:
+            lock_file(cursor, str(target))
+        # One transaction into the same file: a process that waits for it opens the restored one.
+        from_.backup(to)
+
+
+def _copy_rows(source: Connection, target: Connection) -> None:
+    for table in metadata.sorted_tables:
+        parameters = {
+            # A missing document stays SQL's NULL.
+            column.name: bindparam(column.name, type_=JSON(none_as_null=True))
+            if isinstance(column.type, (JSON, Document))
+            else bindparam(column.name)
+            for column in table.c
+        }
+        statement = insert(table).values(parameters)
+        options = {"yield_per": _ROWS_AT_ONCE}
+        rows = source.execute(select(table), execution_options=options).mappings()
+        for batch in rows.partitions():
+            target.execute(statement, [dict(row) for row in batch])
+        _advance_sequence(target, table)
+
+
+def _advance_sequence(connection: Connection, table: Table) -> None:
+    """Continue a server's numbering after the copied rows."""
+    column = table.autoincrement_column
+    if column is None or connection.dialect.name != "postgresql":
+        return
+    sequence = func.pg_get_serial_sequence(table.name, column.name)
+    last = func.coalesce(func.max(column), 0)
+    connection.execute(select(func.setval(sequence, last + 1, False)).select_from(table))
+
+
+def check(url: str) -> list[str]:
+    """Return contradictions in a database, which may be in use; at most 20 of each kind.
+
+    Raises StoreUnavailable if it cannot be read or lacks the newest schema.
+    """
+    findings: list[str] = []
+    with closing(Database(url, for_migration=True)) as database:
+        check_revision(database)
+        with database.read() as connection:
+            if database.path is not None:
+                pages = connection.exec_driver_sql(f"PRAGMA integrity_check({_MOST_FINDINGS})")
+                findings += [f"the file is damaged: {page}" for (page,) in pages if page != "ok"]
+                orphans = connection.exec_driver_sql("PRAGMA foreign_key_check")
+                findings += [
+                    f"row {row} of {table} refers to a row of {parent} that is not there"
+                    for table, row, parent, _ in orphans.fetchmany(_MOST_FINDINGS)
+                ]
+            for query, message in _contradictions():
+                rows = connection.execute(query.limit(_MOST_FINDINGS))
+                findings += [message.format(*row) for row in rows]
+    return findings
+
+
+def _contradictions() -> Iterator[tuple[Select[Any], str]]:
+    count, last = func.count(iterations.c.iteration), func.max(iterations.c.iteration)
+    committed = (iterations.c.job_id == jobs.c.id) & iterations.c.committed_at.is_not(None)
+    yield (
+        select(jobs.c.id, jobs.c.iterations, count)
+        .select_from(jobs.outerjoin(iterations, committed))
+        .where(EXISTING)
+        .group_by(jobs.c.id, jobs.c.iterations)
+        .having(or_(count != jobs.c.iterations, func.coalesce(last, -1) != jobs.c.iterations - 1)),
+        "job {} counts {} iterations, but has {} that are committed",
+    )
+    count = func.count(evaluations.c.particle)
+    yield (
+        select(jobs.c.id, jobs.c.evaluations, count)
+        .select_from(jobs.outerjoin(evaluations, evaluations.c.job_id == jobs.c.id))
+        .where(EXISTING)
+        .group_by(jobs.c.id, jobs.c.evaluations)
+        .having(count != jobs.c.evaluations),
+        "job {} counts {} evaluations, but has {}",
+    )
+    evaluated = exists().where(
+        evaluations.c.job_id == iterations.c.job_id,
+        evaluations.c.iteration == iterations.c.iteration,
+    )
+    # Rows of deleted jobs are removed piece by piece.
+    existing = iterations.c.job_id.in_(select(jobs.c.id).where(EXISTING))
+    iteration = select(iterations.c.iteration, iterations.c.job_id).where(existing)
+    yield (
+        iteration.where(iterations.c.committed_at.is_not(None), ~evaluated),
+        "iteration {} of job {} is committed without evaluations",
+    )
+    yield (
+        iteration.where(iterations.c.committed_at.is_(None), evaluated),
+        "iteration {} of job {} has evaluations, but is not committed",
+    )
+    best = exists().where(
+        evaluations.c.job_id == jobs.c.id,
+        evaluations.c.iteration == jobs.c.best_iteration,
+        evaluations.c.particle == jobs.c.best_particle,
+    )
+    yield (
+        select(jobs.c.id).where(jobs.c.best_iteration.is_not(None), ~best, EXISTING),
+        "the best design of job {} is not among its evaluations",
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Pruned:
+    """Result of pruning: ids of removed jobs, numbers of removed recordings and audit entries."""
+
+    jobs: tuple[str, ...]
+    recordings: int
+    audit: int = 0
+
+
+def prune(
+    url: str,
+    *,
+    older_than: timedelta | None = None,
+    states: Collection[JobState] = ENDED,
+    audit_older_than: timedelta | None = None,
+) -> Pruned:
+    """Remove old jobs, as `Store.delete_ended_before`, old audit entries and unused recordings.
+
+    Free space is returned to the file system. An age of None removes none of its kind. Raises
+    StoreUnavailable if the database cannot be written or lacks the newest schema.
+    """
+    with closing(Database(url, for_migration=True)) as database:
+        check_revision(database)
+        store = Store(database)
+        with database.read() as connection:
+            now = database_time(connection)
+        removed: tuple[str, ...] = ()
+        if older_than is not None:
+            removed = store.delete_ended_before(now - older_than, states)
+        forgotten = 0
+        if audit_older_than is not None:
+            forgotten = store.forget_audit_before(now - audit_older_than)
+        store.purge_deleted()
+        with database.write() as connection:
+            unused = _remove_unused_recordings(connection)
+        _vacuum(database)
+    return Pruned(removed, unused, forgotten)
+
+
+def _remove_unused_recordings(connection: Connection) -> int:
+    before = database_time(connection) - _GRACE
+    query = select(recordings.c.id).where(recordings.c.created_at < before)
+    unused = set(connection.execute(query).scalars())
+    # As text: an unreadable spec keeps its recordings, too.
+    specs = connection.execute(
+        select(cast(jobs.c.spec, Text)), execution_options={"yield_per": 500}
+    )
+    for spec in specs.scalars():
+        unused -= set(_RECORDING_ID.findall(spec))
+    for recording in unused:
+        connection.execute(delete(recordings).where(recordings.c.id == recording))
+    return len(unused)
+
+
+def _vacuum(database: Database) -> None:
+    engine = database.engine.execution_options(isolation_level="AUTOCOMMIT")
+    statements = ["VACUUM", "PRAGMA wal_checkpoint(TRUNCATE)", "PRAGMA optimize"]
+    if database.path is None:
+        statements = [f"VACUUM (ANALYZE) {table.name}" for table in metadata.sorted_tables]
+    with database.translated_errors(), engine.connect() as connection:
+        for statement in statements:
+            connection.exec_driver_sql(statement)

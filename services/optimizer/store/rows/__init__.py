@@ -1,1 +1,0 @@
-"""Tables, and rows to objects of the domain and back."""

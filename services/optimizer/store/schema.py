@@ -1,0 +1,287 @@
+"""Schema revisions, creation and migration of databases, and exclusive use of one"""
+
+from __future__ import annotations
+
+import sqlite3
+import threading
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+from sqlalchemy import (
+    URL,
+    Column,
+    Connection,
+    MetaData,
+    PrimaryKeyConstraint,
+    String,
+    Table,
+    event,
+    inspect,
+    select,
+    text,
+)
+from sqlalchemy.exc import DBAPIError
+
+from gaitswarm.services.optimizer.errors import Conflict, StoreUnavailable
+from gaitswarm.services.optimizer.store.engine import (
+    Database,
+    check_file_system,
+    database_time,
+    parse_url,
+)
+from gaitswarm.services.optimizer.store.leases import has_live_lease
+from gaitswarm.services.optimizer.store.tables import jobs, metadata
+
+MIGRATIONS: Final = Path(__file__).with_name("migrations")
+"""Alembic's folder."""
+
+# Numbers of advisory locks: "gaitsw" and the kind.
+_MIGRATING: Final = 0x6761_6974_7377_6D01
+_IN_USE: Final = 0x6761_6974_7377_6D02
+
+_alembic_version: Final = Table(
+    "alembic_version",
+    MetaData(),
+    Column("version_num", String(32), nullable=False),
+    PrimaryKeyConstraint("version_num", name="alembic_version_pkc"),
+)
+"""Alembic's own table."""
+
+_alembic_lock: Final = threading.Lock()
+"""Alembic keeps the migration in progress in module globals."""
+
+
+def head() -> str:
+    """Return the newest revision."""
+    return _known_revisions()[-1]
+
+
+def _known_revisions() -> list[str]:
+    files = (MIGRATIONS / "versions").glob("r*_*.py")
+    known = sorted(file.name[1:].partition("_")[0] for file in files)
+    if not known:
+        raise StoreUnavailable(f"gaitswarm is not wholly installed: no migrations in {MIGRATIONS}")
+    return known
+
+
+def read_revision(connection: Connection) -> str | None:
+    """Return the revision of a database; None if it has none."""
+    if not inspect(connection).has_table("alembic_version"):
+        return None
+    row = connection.exec_driver_sql("SELECT version_num FROM alembic_version").first()
+    return None if row is None else str(row[0])
+
+
+def check_revision(database: Database, operation: str = "") -> None:
+    """Raise StoreUnavailable unless the database answers and has the newest revision."""
+    with database.read(operation) as connection:
+        revision = read_revision(connection)
+    _require_newest(revision, database.name)
+
+
+def _require_newest(revision: str | None, name: str) -> None:
+    if revision == head():
+        return
+    if revision is None:
+        way_out = "it was emptied while it was in use: restart, and restore a backup"
+    else:
+        _require_known(revision, name)
+        way_out = "end all processes that use it, make a backup, then run `gaitswarm db upgrade`"
+    raise StoreUnavailable(
+        f"database {name} has schema revision {revision or 'none'}, this gaitswarm needs"
+        f" {head()}; {way_out}"
+    )
+
+
+def _require_known(revision: str, name: str) -> None:
+    known = _known_revisions()
+    if revision in known:
+        return
+    if revision < known[0]:
+        raise StoreUnavailable(
+            f"database {name} has schema revision {revision} of a version before 0.1.0, which this"
+            f" gaitswarm cannot read; name another database, or run `gaitswarm db upgrade` of a"
+            f" version whose schema revision is {known[0]} first"
+        )
+    raise StoreUnavailable(
+        f"database {name} has schema revision {revision}, which this gaitswarm (up to {known[-1]})"
+        " does not know; upgrade gaitswarm, or name another database"
+    )
+
+
+def create(url: URL) -> None:
+    """Create the tables of an empty database, by one of several processes at once.
+
+    Raises StoreUnavailable for a database that cannot be opened or has an older schema.
+    """
+    with closing(Database(url, for_migration=True)) as database:
+        # An existing database needs no write lock.
+        with database.read() as connection:
+            revision = read_revision(connection)
+        if revision is not None:
+            _require_newest(revision, database.name)
+            return
+        with _explained_errors(database), database.write() as connection:
+            lock_for_migration(connection)
+            if read_revision(connection) is None:
+                # Migrating, and importing Alembic, takes ten times as long.
+                metadata.create_all(connection, checkfirst=False)
+                _alembic_version.create(connection)
+                connection.execute(_alembic_version.insert().values(version_num=head()))
+
+
+def upgrade(url: str) -> str | None:
+    """Migrate an unused database to the newest revision.
+
+    Returns:
+        Its revision before; None if it was empty.
+
+    Raises:
+        Conflict: it is in use.
+        StoreUnavailable: it cannot be opened or migrated, or a newer gaitswarm made it.
+    """
+    parsed = parse_url(url)
+    check_file_system(parsed)
+    with closing(Database(parsed, for_migration=True)) as database:
+        with database.read() as connection:
+            before = read_revision(connection)
+        if before is None:
+            create(parsed)
+        elif before != head():
+            _require_known(before, database.name)
+            with _explained_errors(database), exclusive(database) as connection:
+                _migrate(connection, database.name)
+        return before
+
+
+def lock_for_migration(connection: Connection) -> None:
+    """Migrate in one process at a time; on SQLite the write transaction is lock enough."""
+    if connection.dialect.name == "postgresql":
+        connection.exec_driver_sql(f"SELECT pg_advisory_xact_lock({_MIGRATING})")
+
+
+@contextmanager
+def _explained_errors(database: Database) -> Iterator[None]:
+    try:
+        yield
+    except DBAPIError as error:
+        cause = database.without_secrets(str(error.orig))
+        raise StoreUnavailable(
+            f"database {database.name} cannot be migrated: {cause}; it needs a user who may"
+            " create tables in it, and no other program's tables of the same names"
+        ) from error
+
+
+def _migrate(connection: Connection, name: str) -> None:
+    # Slow to import, and most databases are up to date.
+    from alembic import command  # noqa: PLC0415
+    from alembic.config import Config  # noqa: PLC0415
+
+    config = Config()
+    # A percent sign in a path would be an interpolation.
+    config.set_main_option("script_location", str(MIGRATIONS).replace("%", "%%"))
+    config.attributes["connection"] = connection
+    with _alembic_lock:
+        command.upgrade(config, "head")
+    if connection.dialect.name == "sqlite":
+        broken = connection.exec_driver_sql("PRAGMA foreign_key_check").first()
+        if broken is not None:
+            raise StoreUnavailable(f"database {name} has rows that refer to nothing: {broken}")
+
+
+@contextmanager
+def exclusive(database: Database) -> Iterator[Connection]:
+    """Open a write transaction in a database that no other process has open or can open.
+
+    Raises Conflict if it is in use: another process has it open, or a job has a live lease.
+    """
+    prepare = None if database.path is None else _lock_file
+    with database.transaction(write=True, before=prepare) as connection:
+        if database.path is None:
+            _lock_server(connection, database.name)
+        if inspect(connection).has_table("jobs"):
+            # A runner may be cut off from the server.
+            columns = (jobs.c.id, jobs.c.lease_owner)
+            leased = select(*columns).where(has_live_lease(database_time(connection)))
+            row = connection.execute(leased.limit(1)).first()
+            if row is not None:
+                raise Conflict(
+                    f"database {database.name} is in use: job {row.id} is run by"
+                    f" {row.lease_owner}; end that process, or wait until the lease of one that"
+                    " has died is over"
+                )
+        yield connection
+
+
+def _lock_file(connection: Connection) -> None:
+    with closing(connection.connection.cursor()) as cursor:
+        lock_file(cursor, str(connection.engine.url.database))
+
+
+def lock_file(cursor: Any, name: str) -> None:
+    """Lock an SQLite file by leaving its write-ahead log, which needs exclusive use.
+
+    The cursor's connection must be outside a transaction; the lock ends with it. Raises Conflict.
+    """
+    cursor.execute("PRAGMA busy_timeout = 1000")
+    cursor.execute("PRAGMA locking_mode = EXCLUSIVE")
+    try:
+        cursor.execute("PRAGMA journal_mode = DELETE")
+    except sqlite3.OperationalError as error:
+        raise Conflict(
+            f"database {name} is in use by another process: end all that use it first"
+        ) from error
+
+
+def _lock_server(connection: Connection, name: str) -> None:
+    locked = text("SELECT pg_try_advisory_xact_lock(:key)")
+    if connection.execute(locked, {"key": _IN_USE}).scalar_one():
+        return
+    query = text(
+        "SELECT DISTINCT coalesce(nullif(application_name, ''), 'process ' || pid)"
+        " FROM pg_locks JOIN pg_stat_activity USING (pid)"
+        " WHERE locktype = 'advisory' AND objid = :low AND granted AND pid <> pg_backend_pid()"
+        " AND database = (SELECT oid FROM pg_database WHERE datname = current_database())"
+    )
+    holders = connection.execute(query, {"low": _IN_USE & 0xFFFF_FFFF}).scalars()
+    raise Conflict(
+        f"database {name} is in use by {', '.join(sorted(holders))}: end all that use it first"
+    )
+
+
+def admit(database: Database) -> None:
+    """Require the newest revision of each new connection, and exclude migrations while it lasts.
+
+    So a process that was cut off from its server during an upgrade is refused afterwards.
+    """
+
+    @event.listens_for(database.engine, "connect")
+    def _admit(connection: Any, _record: object) -> None:
+        try:
+            _require_newest(_revision_in_use(database, connection), database.name)
+        except BaseException:
+            connection.close()
+            raise
+
+
+def _revision_in_use(database: Database, connection: Any) -> str | None:
+    """Mark the database as used while a driver's connection lasts, and read its revision."""
+    # An open cursor would keep an SQLite file open after its connection is closed.
+    with closing(connection.cursor()) as cursor:
+        if database.path is None:
+            cursor.execute(f"SELECT pg_try_advisory_lock_shared({_IN_USE})")
+            if not cursor.fetchone()[0]:
+                raise StoreUnavailable(
+                    f"database {database.name} is being upgraded or restored; try again then"
+                )
+        try:
+            cursor.execute("SELECT version_num FROM alembic_version")
+            row = cursor.fetchone()
+        except database.engine.dialect.loaded_dbapi.Error as error:
+            if "alembic_version" not in str(error):
+                raise
+            row = None
+    connection.commit()
+    return None if row is None else str(row[0])

@@ -1,1 +1,0 @@
-"""The schema's revisions, and what is done to a whole database: upgrade, check, backup."""

@@ -1,1 +1,0 @@
-"""Statements inside a transaction that someone else began."""

@@ -1,1 +1,0 @@
-"""What is done in transactions of its own: runs, history, deletion, tokens, notifications."""

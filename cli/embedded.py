@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 from gaitswarm.cli.exit_codes import JobEnded
 from gaitswarm.cli.output import note, print_json, stdout_console
 from gaitswarm.cli.progress import show_progress
-from gaitswarm.jobs.database.embedded import check_same, earlier_job, taken_up
-from gaitswarm.jobs.database.jobs import DatabaseJobs
+from gaitswarm.jobs.database import DatabaseJobs
+from gaitswarm.jobs.embedded import check_same, earlier_job, taken_up
 from gaitswarm.jobs.open import database_to_write
 from gaitswarm.services.optimizer.analysis.reference import note_reference
 from gaitswarm.services.optimizer.jobs.job import JobState

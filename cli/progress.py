@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rich.progress import Progress as Bar
     from rich.progress import TaskID
 
-    from gaitswarm.jobs.port import Jobs
+    from gaitswarm.jobs.base import Jobs
     from gaitswarm.views import StateView
     from gaitswarm.views.job import Spent
 

@@ -41,13 +41,11 @@ if TYPE_CHECKING:
     )
     from gaitswarm.evidence.verify import verify
     from gaitswarm.firmware import write_firmware
-    from gaitswarm.jobs.async_port import AsyncJobs
-    from gaitswarm.jobs.database.async_jobs import AsyncDatabaseJobs
-    from gaitswarm.jobs.database.jobs import DatabaseJobs
+    from gaitswarm.jobs.asynchronous import AsyncDatabaseJobs, AsyncJobs
+    from gaitswarm.jobs.base import JobEvent, Jobs
+    from gaitswarm.jobs.database import DatabaseJobs
     from gaitswarm.jobs.open import connect, connect_async, open, open_async  # noqa: A004
-    from gaitswarm.jobs.port import JobEvent, Jobs
-    from gaitswarm.jobs.server.async_jobs import AsyncServerJobs
-    from gaitswarm.jobs.server.jobs import ServerJobs
+    from gaitswarm.jobs.server import ServerJobs
     from gaitswarm.optimization import OptimizationResult, optimize, optimizers
     from gaitswarm.preferences import robust_preferences
     from gaitswarm.requests.firmware import FirmwareOptions
@@ -116,7 +114,6 @@ __all__ = [
     "SCENARIOS",
     "AsyncDatabaseJobs",
     "AsyncJobs",
-    "AsyncServerJobs",
     "AutoSettings",
     "Backoff",
     "BayesianSettings",
@@ -217,13 +214,11 @@ _MODULES: Final = {
     ),
     "gaitswarm.evidence.verify": ("verify",),
     "gaitswarm.firmware": ("write_firmware",),
-    "gaitswarm.jobs.database.async_jobs": ("AsyncDatabaseJobs",),
-    "gaitswarm.jobs.async_port": ("AsyncJobs",),
-    "gaitswarm.jobs.server.async_jobs": ("AsyncServerJobs",),
-    "gaitswarm.jobs.database.jobs": ("DatabaseJobs",),
+    "gaitswarm.jobs.asynchronous": ("AsyncDatabaseJobs", "AsyncJobs"),
+    "gaitswarm.jobs.base": ("JobEvent", "Jobs"),
+    "gaitswarm.jobs.database": ("DatabaseJobs",),
     "gaitswarm.jobs.open": ("connect", "connect_async", "open", "open_async"),
-    "gaitswarm.jobs.port": ("JobEvent", "Jobs"),
-    "gaitswarm.jobs.server.jobs": ("ServerJobs",),
+    "gaitswarm.jobs.server": ("ServerJobs",),
     "gaitswarm.optimization": ("OptimizationResult", "optimize", "optimizers"),
     "gaitswarm.preferences": ("robust_preferences",),
     "gaitswarm.requests.firmware": ("FirmwareOptions",),

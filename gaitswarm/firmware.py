@@ -11,13 +11,12 @@ from pathlib import Path
 from typing import Final
 
 from gaitswarm.errors import InvalidRequest
-from gaitswarm.requests import design_arguments
 from gaitswarm.requests.firmware import FirmwareRequest, firmware_view, run_firmware
 from gaitswarm.sim.controllers import ControllerName
 from gaitswarm.sim.firmware import FORMAT, MANIFEST
 from gaitswarm.sim.robot import DEFAULT_ROBOT
 from gaitswarm.simulation import ALL_SCENARIOS
-from gaitswarm.specs import RobotInput, ScenarioInput
+from gaitswarm.specs import RobotInput, ScenarioInput, checked
 from gaitswarm.views.firmware import FirmwareView
 
 _BUILT: Final = "build"
@@ -60,21 +59,15 @@ def write_firmware(
             holds anything but firmware or cannot be written; names the argument.
         EvaluatorUnavailable: The compiler does not compile the robot's kernel.
     """
-    request = design_arguments.firmware(
-        design,
-        {
-            "scenarios": scenarios,
-            "controller": controller,
-            "robot": robot,
-            "label": label,
-            "table_bits": table_bits,
-        },
-    )
-    return written_firmware(request, output)
-
-
-def written_firmware(request: FirmwareRequest, output: str | os.PathLike[str]) -> FirmwareView:
-    """Write requested firmware into a folder."""
+    arguments = {
+        "design": design,
+        "scenarios": scenarios,
+        "controller": controller,
+        "robot": robot,
+        "label": label,
+        "table_bits": table_bits,
+    }
+    request = checked(FirmwareRequest, arguments)
     check_replaceable(output)
     firmware = run_firmware(request)
     write_folder(output, firmware.files)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaitswarm.errors import InvalidRequest, JobEnded, NotFound
-from gaitswarm.jobs.database.embedded import Workers, check_same
+from gaitswarm.jobs.embedded import Workers, check_same
 from gaitswarm.jobs.open import open as open_database
 from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.services.optimizer.run.evaluator import Evaluator

@@ -6,8 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from gaitswarm.jobs.port import Jobs
-from gaitswarm.requests.arguments import checked
+from gaitswarm.jobs.base import Jobs
 from gaitswarm.requests.robustness import Progress, sampled_indices
 from gaitswarm.services.optimizer.analysis.preferences import (
     PreferencesRequest,
@@ -19,6 +18,7 @@ from gaitswarm.services.optimizer.analysis.preferences import (
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.outcome import Status
+from gaitswarm.specs import checked
 
 
 def robust_preferences(

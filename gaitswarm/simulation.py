@@ -10,8 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gaitswarm.errors import InvalidRequest, simulation_errors
-from gaitswarm.requests import design_arguments
-from gaitswarm.requests.robustness import Progress, RobustnessOptions, run_robustness
+from gaitswarm.requests.robustness import (
+    Progress,
+    RobustnessOptions,
+    RobustnessRequest,
+    run_robustness,
+)
 from gaitswarm.requests.simulations import SimulationRequest
 from gaitswarm.services.optimizer.jobs.preference import judge
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
@@ -34,6 +38,7 @@ from gaitswarm.specs import (
     PreferenceInput,
     RobotInput,
     ScenarioInput,
+    checked,
 )
 from gaitswarm.views.robustness import RobustnessView
 
@@ -104,16 +109,17 @@ def simulate(
     columns = _columns(designs, controller)
     variables = tuple(columns)
     rows = np.stack(list(columns.values()), axis=1)
-    request = design_arguments.simulation(
-        dict(zip(variables, rows[0].tolist(), strict=True)),
-        scenarios=scenarios,
-        controller=controller,
-        robot=robot,
-        preference=preference,
-        precision=precision,
-        world=world,
-        log=log,
-    )
+    arguments = {
+        "design": dict(zip(variables, rows[0].tolist(), strict=True)),
+        "scenarios": scenarios,
+        "controller": controller,
+        "robot": robot,
+        "preference": preference,
+        "precision": precision,
+        "world": world,
+        "log": log,
+    }
+    request = checked(SimulationRequest, arguments)
     if not np.isfinite(rows).all():
         row, column = np.argwhere(~np.isfinite(rows))[0]
         raise InvalidRequest(
@@ -159,17 +165,9 @@ def robustness(
         InvalidRequest: An argument is invalid; names it.
         EvaluatorUnavailable: The compiler does not compile the robot's kernel.
     """
-    request = design_arguments.robustness(design, options)
+    request = checked(RobustnessRequest, {"design": design, **options})
     with simulation_errors("design"):
         return run_robustness(request, cpus=cpus, progress=progress)
-
-
-def simulate_request(request: SimulationRequest) -> SimulationResult:
-    """Simulate one design, as a server does."""
-    request.check_walks()
-    design = np.array([tuple(request.numbers.values())], dtype=np.float64)
-    with simulation_errors("design"):
-        return _simulated(request, tuple(request.design), design, "auto", None)
 
 
 def _columns(designs: DesignInput, controller: ControllerName) -> dict[str, Floats]:

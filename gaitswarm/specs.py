@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeAlias, TypedDict, Unpack, cast, overload
+from typing import Any, TypeAlias, TypedDict, TypeVar, Unpack, cast, overload
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
 from gaitswarm.errors import InvalidRequest, invalid_request, simulation_errors
 from gaitswarm.robots import robot_defaults
@@ -27,6 +27,8 @@ from gaitswarm.sim.robot.variant import SHIPPED
 from gaitswarm.sim.scenario import Scenario
 from gaitswarm.sim.variables import Variable
 from gaitswarm.start import StartFile, start_from
+
+M = TypeVar("M", bound=BaseModel)
 
 Document: TypeAlias = Mapping[str, Any]
 """A mapping as read from JSON."""
@@ -124,7 +126,7 @@ class ForkOptions(TypedDict, total=False):
     accept_changes: bool
 
 
-def laid_options(options: SpecOptions | ForkOptions) -> dict[str, Any]:
+def laid_options(options: Mapping[str, Any]) -> dict[str, Any]:
     """Convert keyword options to a document that includes a custom robot's files."""
     given: dict[str, Any] = dict(options)
     if "robot" in given:
@@ -132,6 +134,18 @@ def laid_options(options: SpecOptions | ForkOptions) -> dict[str, Any]:
     if "scenarios" in given:
         given["scenarios"] = scenario_entries(given["scenarios"])
     return given
+
+
+def checked(kind: type[M], arguments: Mapping[str, Any]) -> M:
+    """Validate keyword arguments as a request; None leaves a field at its default.
+
+    Raises InvalidRequest that names the argument.
+    """
+    given = {name: value for name, value in arguments.items() if value is not None}
+    try:
+        return kind.model_validate(laid_options(given))
+    except ValidationError as error:
+        raise invalid_request(error, kind) from error
 
 
 @overload

@@ -13,7 +13,7 @@ from gaitswarm.cli.inputs.options import Db, JobId, Json, Precision, Server
 
 if TYPE_CHECKING:
     from gaitswarm.cli.front import Placed
-    from gaitswarm.jobs.port import Jobs
+    from gaitswarm.jobs.base import Jobs
     from gaitswarm.services.optimizer.analysis.preferences import RobustPreferencesView
     from gaitswarm.sim.kernel.walk import Precision as PhysicsPrecision
     from gaitswarm.views import RankingRequest, RankingView

@@ -21,7 +21,7 @@ from gaitswarm.cli.inputs.options import (
 from gaitswarm.sim.near_names import instead_of
 
 if TYPE_CHECKING:
-    from gaitswarm.jobs.port import Jobs
+    from gaitswarm.jobs.base import Jobs
 
 LeaveOneOut = Annotated[
     str | None,
@@ -85,9 +85,10 @@ def calibrate(
     from gaitswarm.cli.calibration import read_targets
     from gaitswarm.cli.embedded import run_seeds
     from gaitswarm.cli.inputs.spec_file import parse_spec
-    from gaitswarm.requests.arguments import leave_out
+    from gaitswarm.operations import TargetsQuery
+    from gaitswarm.specs import checked
 
-    leave_out(leave_one_out)
+    checked(TargetsQuery, {"leave_out": leave_one_out})
     document: dict[str, Any] = {
         "kind": "calibration",
         "name": name or f"calibration to {table.name}",
@@ -137,9 +138,11 @@ def _show(jobs: Jobs, job_ids: list[str], leave_one_out: str | None, *, as_json:
 
     from gaitswarm.cli.calibration import show_targets
     from gaitswarm.cli.output import print_text
-    from gaitswarm.requests.arguments import leave_out
+    from gaitswarm.operations import TargetsQuery
+    from gaitswarm.specs import checked
 
-    reached = jobs.targets(job_ids, leave_out=leave_out(leave_one_out))
+    query = checked(TargetsQuery, {"leave_out": leave_one_out})
+    reached = jobs.targets(job_ids, leave_out=query.leave_out)
     parameters = jobs.parameters(job_ids)
     if as_json:
         views = {"targets": reached, "parameters": parameters}

@@ -125,7 +125,7 @@ def certify(
     from gaitswarm.cli.certificate import certificate_spec, show_certificate, show_world
     from gaitswarm.cli.embedded import Embedded, job_run
     from gaitswarm.cli.output import print_json
-    from gaitswarm.jobs.database.jobs import DatabaseJobs
+    from gaitswarm.jobs.database import DatabaseJobs
     from gaitswarm.jobs.open import database_to_write
     from gaitswarm.services.optimizer.errors import InvalidRequest
     from gaitswarm.services.optimizer.service import JobService

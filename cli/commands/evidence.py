@@ -10,7 +10,7 @@ import typer
 from gaitswarm.cli.inputs.options import Db, JobId, Json, Server
 
 if TYPE_CHECKING:
-    from gaitswarm.jobs.port import Jobs
+    from gaitswarm.jobs.base import Jobs
     from gaitswarm.tables import TableFormat
     from gaitswarm.views.verification import HistoryVerificationView, VerificationView
 

@@ -25,7 +25,7 @@ from gaitswarm.cli.inputs.options import (
 )
 
 if TYPE_CHECKING:
-    from gaitswarm.jobs.port import Jobs
+    from gaitswarm.jobs.base import Jobs
     from gaitswarm.specs import ForkOptions
     from gaitswarm.views import HistoryIterationView, JobView
     from gaitswarm.views.comparison import JobComparisonView

@@ -58,7 +58,7 @@ def optimize(
     from gaitswarm.cli.embedded import Embedded, finish, job_run, resumed_job
     from gaitswarm.cli.inputs.spec_file import build_spec, by_other_optimizer, check_optimizer_name
     from gaitswarm.cli.output import note
-    from gaitswarm.jobs.database.jobs import DatabaseJobs
+    from gaitswarm.jobs.database import DatabaseJobs
     from gaitswarm.jobs.open import database_to_write
     from gaitswarm.services.optimizer.errors import InvalidRequest
     from gaitswarm.services.optimizer.masking import masked_url

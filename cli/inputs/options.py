@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar, get_type_hints
 import typer
 
 if TYPE_CHECKING:
-    from gaitswarm.jobs.port import Jobs
+    from gaitswarm.jobs.base import Jobs
 
 C = TypeVar("C", bound=str)
 

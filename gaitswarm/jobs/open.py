@@ -1,22 +1,25 @@
-"""The way to jobs: in a database, behind a server, or wherever options and environment say."""
+"""Connections to jobs: a database, a server, or the one that options and environment name."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
+from urllib.parse import SplitResult, urlsplit
 
 from gaitswarm.errors import InvalidRequest, NotFound, StoreUnavailable
+from gaitswarm.services.optimizer.masking import masked_url
 from gaitswarm.services.optimizer.run.outage import Backoff
 
 if TYPE_CHECKING:
-    from gaitswarm.jobs.database.async_jobs import AsyncDatabaseJobs
-    from gaitswarm.jobs.database.jobs import DatabaseJobs
-    from gaitswarm.jobs.port import Jobs
-    from gaitswarm.jobs.server.async_jobs import AsyncServerJobs
-    from gaitswarm.jobs.server.jobs import ServerJobs
+    from gaitswarm.jobs.asynchronous import AsyncDatabaseJobs, AsyncJobs
+    from gaitswarm.jobs.base import Jobs
+    from gaitswarm.jobs.database import DatabaseJobs
+    from gaitswarm.jobs.server import ServerJobs
     from gaitswarm.settings import Settings
+
+_PORTS: Final = {"http": 80, "https": 443}
 
 
 def open(  # noqa: A001 - `gaitswarm.open`, as `gzip.open`
@@ -27,16 +30,16 @@ def open(  # noqa: A001 - `gaitswarm.open`, as `gzip.open`
     Args:
         db: A file name, sqlite:///FILE, or postgresql://USER:PASSWORD@HOST/DATABASE. None: that of
             the environment (GAITSWARM_DB), else the user's own, which `gaitswarm` uses as well.
-        create: Whether an SQLite file that is not there is made.
+        create: Whether to create an SQLite file that does not exist.
 
     Returns:
-        The jobs in it, as a context manager; `run` runs them here.
+        The jobs in it, as a context manager; `run` runs them in this process.
 
     Raises:
-        NotFound: There is no such file, and none is to be made.
+        NotFound: The file does not exist, and is not to be created.
         StoreUnavailable: The database cannot be opened, or is of a later version.
     """
-    from gaitswarm.jobs.database.jobs import DatabaseJobs
+    from gaitswarm.jobs.database import DatabaseJobs
     from gaitswarm.services.optimizer.service import JobService
     from gaitswarm.services.runtime import open_store
     from gaitswarm.settings import read_settings
@@ -53,17 +56,17 @@ def open_async(
 
     Args:
         db: As for `open`.
-        create: Whether an SQLite file that is not there is made.
+        create: Whether to create an SQLite file that does not exist.
 
     Returns:
-        The jobs in it, as an asynchronous context manager, which opens the database and raises
-        what `open` raises.
+        The jobs in it, as an asynchronous context manager, which opens the database on entering and
+        raises the errors of `open`.
     """
-    from gaitswarm.jobs.database.async_jobs import AsyncDatabaseJobs
+    from gaitswarm.jobs.asynchronous import AsyncDatabaseJobs
     from gaitswarm.settings import read_settings
 
     url = read_settings(db=None if db is None else os.fspath(db)).database
-    return AsyncDatabaseJobs(url, lambda: open(db, create=create))
+    return AsyncDatabaseJobs(lambda: open(db, create=create), url)
 
 
 def connect(
@@ -74,26 +77,24 @@ def connect(
     headers: Mapping[str, str] | None = None,
     token: str | None = None,
 ) -> ServerJobs:
-    """Reach the jobs of a server, such as `gaitswarm serve`.
+    """Connect to a server, such as `gaitswarm serve`.
 
     Args:
         url: Of the server, such as http://127.0.0.1:8000. Nothing is sent yet.
         timeout: Longest silence of the server [s]; default 30.
-        backoff: How long to wait before which of the further attempts, where a connection breaks
-            or the server is busy, and the request may safely be repeated.
-        headers: Sent with every request, such as what a proxy asks for.
-        token: Of the server, where it asks for one. Default: that of the environment
+        backoff: Waits before a request is repeated, if the connection breaks or the server is busy
+            and repeating it is safe.
+        headers: Sent with every request, such as a proxy requires.
+        token: Token of the server, if it requires one. Default: that of the environment
             (GAITSWARM_TOKEN), unless the environment names another server (GAITSWARM_SERVER).
 
     Returns:
         The server's jobs, as a context manager.
 
     Raises:
-        InvalidRequest: It is not a URL, or the token would go beyond this machine as plain text.
+        InvalidRequest: It is not a URL, or the token would leave this machine as plain text.
     """
-    from gaitswarm.jobs.server.attempts import BACKOFF
-    from gaitswarm.jobs.server.credentials import with_token
-    from gaitswarm.jobs.server.jobs import TIMEOUT, ServerJobs
+    from gaitswarm.jobs.server import BACKOFF, TIMEOUT, ServerJobs
     from gaitswarm.settings import read_settings
 
     sent = with_token(url, headers, token, read_settings())
@@ -107,47 +108,65 @@ def connect_async(
     backoff: Backoff | None = None,
     headers: Mapping[str, str] | None = None,
     token: str | None = None,
-) -> AsyncServerJobs:
-    """Reach the jobs of a server, for a program with an event loop.
+) -> AsyncJobs:
+    """Connect to a server, for a program with an event loop.
 
     Args:
         url: Of the server, such as http://127.0.0.1:8000. Nothing is sent yet.
         timeout: Longest silence of the server [s]; default 30.
         backoff: As for `connect`.
         headers: Sent with every request.
-        token: Of the server, where it asks for one. Default: that of the environment
-            (GAITSWARM_TOKEN), unless the environment names another server (GAITSWARM_SERVER).
+        token: As for `connect`.
 
     Returns:
         The server's jobs, as an asynchronous context manager.
 
     Raises:
-        InvalidRequest: It is not a URL, or the token would go beyond this machine as plain text.
+        InvalidRequest: It is not a URL, or the token would leave this machine as plain text.
     """
-    from gaitswarm.jobs.server.async_jobs import AsyncServerJobs
-    from gaitswarm.jobs.server.attempts import BACKOFF
-    from gaitswarm.jobs.server.credentials import with_token
-    from gaitswarm.jobs.server.jobs import TIMEOUT
-    from gaitswarm.settings import read_settings
+    from gaitswarm.jobs.asynchronous import AsyncJobs
 
-    sent = with_token(url, headers, token, read_settings())
-    return AsyncServerJobs(
-        url, timeout=timeout or TIMEOUT, backoff=backoff or BACKOFF, headers=sent
-    )
+    jobs = connect(url, timeout=timeout, backoff=backoff, headers=headers, token=token)
+    return AsyncJobs(lambda: jobs, jobs.url)
+
+
+def with_token(
+    url: str, headers: Mapping[str, str] | None, token: str | None, settings: Settings
+) -> dict[str, str]:
+    """Add a token to headers that have no Authorization.
+
+    The environment's token is sent only to the environment's server, if that is named. No token is
+    sent beyond this machine over plain HTTP, unless the settings allow it.
+    """
+    from gaitswarm.jobs.server import server_url
+    from gaitswarm.settings import is_loopback
+
+    parts, sent = urlsplit(server_url(url)), dict(headers or {})
+    if any(name.lower() == "authorization" for name in sent):
+        return sent
+    own = settings.server
+    if token is None and (own is None or _origin(parts) == _origin(urlsplit(server_url(own)))):
+        token = settings.token
+    if not token:
+        return sent
+    guarded = parts.scheme == "https" or is_loopback(parts.hostname or "")
+    if not guarded and not settings.token_over_http:
+        raise InvalidRequest(
+            f"a token would go to {masked_url(url)} as plain text, which anybody on the way can"
+            " read; use an https:// URL (docs/security.md has a proxy for it) or a tunnel, or set"
+            " GAITSWARM_TOKEN_OVER_HTTP=true where the network is trusted",
+            field="server",
+        )
+    sent["Authorization"] = f"Bearer {token}"
+    return sent
+
+
+def _origin(url: SplitResult) -> tuple[str, str | None, int | None]:
+    return url.scheme, url.hostname, url.port or _PORTS.get(url.scheme)
 
 
 def database_to_write(settings: Settings) -> str:
-    """The database of the settings, ready for a process that may have to make it.
-
-    Args:
-        settings: Of this process.
-
-    Returns:
-        Its URL. The directory of the user's own database is made, and only that.
-
-    Raises:
-        StoreUnavailable: That directory cannot be made.
-    """
+    """Return the URL of the settings' database, and create the directory of the default one."""
     if settings.db is None:
         folder = Path(settings.database).parent
         try:
@@ -161,17 +180,7 @@ def database_to_write(settings: Settings) -> str:
 
 
 def database_to_read(settings: Settings) -> str:
-    """The database of the settings, for a process that makes none.
-
-    Args:
-        settings: Of this process.
-
-    Returns:
-        Its URL.
-
-    Raises:
-        NotFound: It is an SQLite file, and there is none.
-    """
+    """Return the URL of the settings' database; raise NotFound for a missing SQLite file."""
     file = _sqlite_file(settings.database)
     if file is not None and not file.exists():
         raise NotFound(
@@ -182,29 +191,14 @@ def database_to_read(settings: Settings) -> str:
 
 
 def open_jobs(server: str | None, db: str | None, *, create: bool = False) -> Jobs:
-    """Open the jobs that a command is about. An option goes before the environment, a server
-    before a database.
-
-    Args:
-        server: URL of a server, as an option named it.
-        db: A database, as an option named it.
-        create: Whether an SQLite file that is not there is made.
-
-    Returns:
-        The jobs there, to be closed by the caller.
-
-    Raises:
-        InvalidRequest: Both are named, or a setting makes no sense.
-        NotFound: There is no such file, and `create` is false.
-        StoreUnavailable: The database cannot be opened.
-    """
+    """Open the jobs of a command. Options precede the environment, servers precede databases."""
     from gaitswarm.settings import read_settings
 
     if server and db:
         raise InvalidRequest("jobs are either on a server or in a database", field="--server, --db")
     settings = read_settings(server=server or None, db=db or None)
     if settings.server and not db:
-        # Somebody waits in front of a terminal.
+        # A person is waiting.
         return connect(settings.server, backoff=Backoff(first=0.25, longest=5.0, attempts=2))
     return open(db or None, create=create)
 

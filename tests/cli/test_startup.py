@@ -36,7 +36,7 @@ def test_help_imports_none_of_the_heavy_packages(of: list[str]) -> None:
 @pytest.mark.slow
 def test_commands_on_a_database_import_no_rarely_needed_packages() -> None:
     rare = ("scipy", "casadi", "pinocchio", "ray", "fastapi", "matplotlib", "pyarrow")
-    assert loaded_by("import gaitswarm.jobs.database.jobs", rare) == set()
+    assert loaded_by("import gaitswarm.jobs.database", rare) == set()
 
 
 def test_help_is_that_of_the_innermost_command(

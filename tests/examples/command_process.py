@@ -19,7 +19,7 @@ for _name in (
     "gaitswarm.cli.inputs.spec_file",
     "gaitswarm.cli.main",
     "gaitswarm.cli.tables",
-    "gaitswarm.jobs.database.jobs",
+    "gaitswarm.jobs.database",
     "numpy.random",
     "rich.console",
     "gaitswarm.services.monitoring.collectors",

@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -27,6 +28,10 @@ from gaitswarm.settings import Settings
 from tests.examples.api_document import api_document
 from tests.examples.forked import ForkedCommand
 from tests.examples.processes import line_with, output
+
+# pytest rewrites this module of a plug-in, which may fail in a server's thread: CPython 3.11 parses
+# in one thread at a time.
+import_module("anyio._backends._asyncio")
 
 QUICK_EVENTS: Final = {"GAITSWARM_API_EVENT_POLL_SECONDS": "0.1"}
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import ssl
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import aclosing
 from datetime import UTC, datetime, timedelta
 from email.utils import format_datetime
@@ -16,8 +16,8 @@ import httpx2
 import pytest
 
 import gaitswarm
-from gaitswarm.jobs.server.attempts import Attempts, authorities, error_of
-from gaitswarm.jobs.server.call import Call
+from gaitswarm.jobs.attempts import Attempts, error_of
+from gaitswarm.jobs.server import authorities
 from tests.library.conftest import SMALL, Finished
 
 URL = "http://127.0.0.1:1"
@@ -39,9 +39,9 @@ def refusal(status: int, kind: str = "unavailable", **headers: str) -> httpx2.Re
     return httpx2.Response(status, json=problem, headers=headers)
 
 
-def attempts(method: str = "GET", **headers: str) -> Attempts:
+def attempts(*, repeatable: bool = True) -> Attempts:
     backoff = gaitswarm.Backoff(first=1.0, longest=10.0, attempts=3)
-    return Attempts(Call(method, "/jobs", bytes, headers=headers), URL, backoff)
+    return Attempts(URL, backoff, repeatable=repeatable)
 
 
 def test_waits_grow_and_end() -> None:
@@ -54,9 +54,8 @@ def test_waits_grow_and_end() -> None:
 @pytest.mark.parametrize("error", LOST)
 def test_a_lost_connection_is_made_again_for_what_may_be_repeated(error: type) -> None:
     assert attempts().after_failure(error("lost")) == 1.0
-    assert attempts("POST", **{"Idempotency-Key": "k"}).after_failure(error("lost")) == 1.0
     with pytest.raises(gaitswarm.StoreUnavailable, match=URL):
-        attempts("POST").after_failure(error("lost"))
+        attempts(repeatable=False).after_failure(error("lost"))
 
 
 @pytest.mark.parametrize("error", [httpx2.ReadTimeout, httpx2.UnsupportedProtocol])
@@ -83,7 +82,7 @@ def test_a_server_that_wants_more_patience_than_there_is_is_not_asked_again() ->
 
 def test_a_command_to_a_busy_server_is_not_repeated() -> None:
     with pytest.raises(gaitswarm.StoreUnavailable):
-        attempts("POST").after_refusal(refusal(503))
+        attempts(repeatable=False).after_refusal(refusal(503))
 
 
 @pytest.mark.parametrize(
@@ -131,26 +130,6 @@ class Flaky(httpx2.BaseTransport):
 
     def close(self) -> None:
         self._way.close()
-
-
-class AsyncFlaky(httpx2.AsyncBaseTransport):
-    """The same for programs with an event loop."""
-
-    def __init__(self, losses: int) -> None:
-        self.losses = losses
-        self.sent: list[httpx2.Request] = []
-        self._way = httpx2.AsyncHTTPTransport()
-
-    async def handle_async_request(self, request: httpx2.Request) -> httpx2.Response:
-        self.sent.append(request)
-        response = await self._way.handle_async_request(request)
-        if len(self.sent) <= self.losses:
-            await response.aclose()
-            raise httpx2.ReadError("the connection broke before the answer came")
-        return response
-
-    async def aclose(self) -> None:
-        await self._way.aclose()
 
 
 @pytest.mark.slow
@@ -219,8 +198,9 @@ def test_a_program_with_an_event_loop_makes_the_same_attempts(
     url = serve(db)
 
     async def work() -> None:
-        way = AsyncFlaky(losses=2)
-        async with gaitswarm.AsyncServerJobs(url, backoff=QUICK, transport=way) as jobs:
+        way = Flaky(losses=2)
+        there = gaitswarm.ServerJobs(url, backoff=QUICK, transport=way)
+        async with gaitswarm.AsyncJobs(lambda: there, url) as jobs:
             job = await jobs.submit(**SMALL)
             assert len({request.headers["Idempotency-Key"] for request in way.sent}) == 1
             assert [found.id async for found in jobs.jobs()] == [job.id]
@@ -310,7 +290,7 @@ def test_headers_go_with_every_request() -> None:
     assert seen == ["Bearer x"] * 3
 
 
-class Stream(httpx2.SyncByteStream, httpx2.AsyncByteStream):
+class Stream(httpx2.SyncByteStream):
     """Server-sent events, after which the connection ends or breaks."""
 
     def __init__(self, events: str, *, breaks: bool) -> None:
@@ -321,10 +301,6 @@ class Stream(httpx2.SyncByteStream, httpx2.AsyncByteStream):
         yield self._events
         if self._breaks:
             raise httpx2.ReadError("the connection broke")
-
-    async def __aiter__(self) -> AsyncIterator[bytes]:
-        for part in self:
-            yield part
 
 
 class Script:
@@ -378,8 +354,9 @@ def follow(request: pytest.FixtureRequest) -> Follow:
         else:
 
             async def following() -> list[gaitswarm.JobEvent]:
+                there = gaitswarm.ServerJobs(URL, transport=way, **options)
                 async with (
-                    gaitswarm.AsyncServerJobs(URL, transport=way, **options) as jobs,
+                    gaitswarm.AsyncJobs(lambda: there, URL) as jobs,
                     aclosing(cast(Any, jobs.follow("k2q7zr5dm9xw", after=after))) as events,
                 ):
                     return [event async for event in events]

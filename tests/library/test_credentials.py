@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import gaitswarm
-from gaitswarm.jobs.server.credentials import with_token
+from gaitswarm.jobs.open import with_token
 from gaitswarm.settings import Settings
 
 OWN = "https://robots.example"

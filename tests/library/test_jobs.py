@@ -327,17 +327,6 @@ def test_a_job_is_followed_from_its_submission_to_its_end(reach: Reach, db: Path
     assert states[:-1] in ([], ["running"])
 
 
-def test_polling_a_database_tells_what_is_new_once(db: Path) -> None:
-    with gaitswarm.open(db) as jobs:
-        job = jobs.submit(**SMALL)
-        news = jobs.news(job.id)
-        received = [[type(event) for event in news.poll()] for _ in range(2)]
-        jobs.run(job.id)
-        received += [[type(event) for event in news.poll()] for _ in range(2)]
-    iteration, state = gaitswarm.IterationView, gaitswarm.StateView
-    assert received == [[state], [], [iteration, iteration, state], []]
-
-
 def test_waiting_for_a_job_returns_it_as_it_ended(reach: Reach, finished: Finished) -> None:
     jobs = reach(finished.db)
     assert jobs.wait(finished.id).state == "succeeded"

@@ -56,7 +56,7 @@ def test_many_designs_walk_in_a_world_as_each_alone() -> None:
         ({"gravity": 3.0}, "world.gravity", "unknown perturbation; known are friction_factor"),
         ({"friction_factor": -1.0}, "world.friction_factor", "-1 must lie in 0 to 100"),
         ({"slope_added": float("nan")}, "world.slope_added", "finite number"),
-        ([0.8], "world", "must be a mapping"),
+        ([0.8], "world", "must be an object"),
     ],
 )
 def test_a_world_that_cannot_be_is_refused_with_its_field(

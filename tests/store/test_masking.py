@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from gaitswarm.jobs.database.jobs import DatabaseJobs
+from gaitswarm.jobs.database import DatabaseJobs
 from gaitswarm.services.optimizer.masking import masked_url
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import Store

@@ -1,4 +1,4 @@
-"""A job run by this process: taken up, run to its end, given back on Ctrl-C."""
+"""A job run in this process: resumed, run to its end, returned to the queue on Ctrl-C."""
 
 from __future__ import annotations
 
@@ -20,21 +20,18 @@ from gaitswarm.services.runtime import EvaluatorKind, open_evaluator, run_embedd
 from gaitswarm.settings import read_settings
 from gaitswarm.views import JobView
 
-_TAKEN_UP: Final = (JobState.PAUSED, JobState.PAUSING, JobState.FAILED)
-"""States in which going on with a job needs the command to."""
+_RESUMED: Final = (JobState.PAUSED, JobState.PAUSING, JobState.FAILED)
+"""States from which a job continues only by a command."""
 
 
 @dataclass(frozen=True, slots=True)
 class Workers:
-    """What walks run on.
+    """Workers of simulations; raises InvalidRequest for an unknown kind.
 
     Attributes:
-        evaluator: A kind of workers to open, or workers that are open already.
-        cpus: Walks to compute at once on this machine; all of its cores by default.
+        evaluator: A kind of workers to open, or open workers.
+        cpus: Simulations to run at once on this machine; default all processors.
         ray_address: Of a Ray cluster, as for `open_evaluator`.
-
-    Raises:
-        InvalidRequest: The kind does not exist, or `cpus` is less than 1.
     """
 
     evaluator: EvaluatorKind | Evaluator
@@ -54,13 +51,9 @@ class Workers:
     def when_needed(
         self, should_stop: Callable[[], bool]
     ) -> Iterator[Evaluator | Callable[[], Evaluator]]:
-        """Open workers no earlier than they are needed, and close those again.
+        """Yield open workers, or a function that opens them at its first call.
 
-        Args:
-            should_stop: Polled while they are opened, which it ends with EvaluationStopped.
-
-        Yields:
-            Workers that are open already, or a function that opens them at its first call.
+        Those are closed again. `should_stop` is polled while they are opened.
         """
         if not isinstance(self.evaluator, str):
             yield self.evaluator
@@ -84,22 +77,13 @@ class Workers:
 
 
 def check_same(stored: Spec, asked: Spec, job_id: str) -> None:
-    """Check that a job to be resumed is the one that is asked for.
-
-    Args:
-        stored: Spec of the job.
-        asked: Spec that was given once more.
-        job_id: Identifier of the job.
-
-    Raises:
-        Conflict: They differ in more than the name; names the fields.
-    """
+    """Raise Conflict if a spec differs from that of the job to resume in more than the name."""
     before, wanted = stored.model_dump(), asked.resolved().model_dump()
     changed = [f for f in before if f != "name" and before[f] != wanted.get(f)]
     if changed:
         raise Conflict(
-            f"job {job_id} was submitted with another {', '.join(changed)}, and a job stays what it"
-            " is; resume it without a spec and options, or start a new one"
+            f"job {job_id} was submitted with another {', '.join(changed)}, which cannot change;"
+            " resume it without a spec and options, or start a new one"
         )
 
 
@@ -116,22 +100,19 @@ def run_here(
     """Run a job until it ends, is paused, or `stop` is set.
 
     Args:
-        service: Of the database that the job is in.
+        service: Of the job's database.
         url: Of the database, for messages.
-        job: Identifier of the job, or the claim of this process, which has submitted it.
-        workers: What walks run on.
-        on_iteration: Called with the index of every iteration that is committed, here or by another
-            process that runs the job meanwhile.
-        stop: When set, the job is given back to the queue.
-        accept_changes: Whether it goes on although what its numbers depend on has changed.
-
-    Returns:
-        The job as it is then.
+        job: Identifier of the job, or the claim of this process, which submitted it.
+        workers: Workers of its simulations.
+        on_iteration: Called with the index of every committed iteration, also while another process
+            runs the job.
+        stop: When set, the job is returned to the queue.
+        accept_changes: Whether it continues although its provenance has changed.
 
     Raises:
         Interrupted: Ctrl-C, unless the job has ended meanwhile.
         Conflict: The job was cancelled.
-        ProvenanceChanged: What its numbers depend on has changed, and that is not accepted.
+        ProvenanceChanged: The provenance has changed, which is not accepted.
     """
     job_id = job if isinstance(job, str) else job.job.id
     if isinstance(job, str):
@@ -161,40 +142,22 @@ def run_here(
 
 
 def taken_up(service: JobService, job_id: str, *, accept_changes: bool) -> Job:
-    """An earlier job, ready to be gone on with.
+    """Resume a paused or failed job; return any other as it is.
 
-    Args:
-        service: Of the database that the job is in.
-        job_id: Identifier of the job.
-        accept_changes: Whether it may go on although what its numbers depend on has changed.
-
-    Returns:
-        The job, queued again if it was paused or had failed.
-
-    Raises:
-        NotFound: There is no such job.
-        Conflict: It was cancelled.
-        ProvenanceChanged: What its numbers depend on has changed, and that is not accepted.
+    Raises Conflict if it was cancelled, and ProvenanceChanged if that is not accepted.
     """
     job = service.job(job_id)
     if job.state is JobState.CANCELLED:
-        raise Conflict(f"job {job_id} was cancelled, which is for good; start a new one")
+        raise Conflict(f"job {job_id} was cancelled, which is final; start a new one")
     if job.state is not JobState.SUCCEEDED and not accept_changes:
         service.check_unchanged(job)
-    return service.command(job_id, Command.RESUME) if job.state in _TAKEN_UP else job
+    return service.command(job_id, Command.RESUME) if job.state in _RESUMED else job
 
 
 def earlier_job(service: JobService, spec: Spec, *, any_budget: bool = False) -> Job | None:
-    """The job that was submitted before to do the same, under the same name.
+    """Find a job of the same spec and name that was not cancelled and has today's provenance.
 
-    Args:
-        service: Of the database to look in.
-        spec: What the job is to do; its name should be its alone.
-        any_budget: Whether it may have been given more or fewer iterations.
-
-    Returns:
-        One that was not cancelled, and whose numbers depend on what they would depend on if it were
-        run now, from its first iteration on; None if there is none.
+    any_budget: whether its number of iterations may differ.
     """
     wanted = spec.resolved()
     after: str | None = None
@@ -223,14 +186,13 @@ def _interrupted(job: Job, url: str) -> Interrupted:
 
 @contextmanager
 def _ctrl_c(stop: threading.Event) -> Iterator[threading.Event]:
-    """The first Ctrl-C sets `stop` and the event that is yielded; the second interrupts at once.
+    """Yield an event that the first Ctrl-C sets, as it sets `stop`; the second one interrupts.
 
-    Where Python's own handler is not in place, or is not this thread's to replace, Ctrl-C does
-    what it does there.
+    Nothing changes where Python's own handler is not in place, or outside the main thread.
     """
     pressed = threading.Event()
-    mine = threading.current_thread() is threading.main_thread()
-    if not mine or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+    in_main = threading.current_thread() is threading.main_thread()
+    if not in_main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield pressed
         return
 

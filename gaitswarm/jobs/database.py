@@ -1,0 +1,202 @@
+"""Jobs in a database, opened by this process."""
+
+from __future__ import annotations
+
+import shlex
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from typing import Final, TypeVar
+
+from pydantic import BaseModel
+
+from gaitswarm import operations
+from gaitswarm.errors import simulation_errors
+from gaitswarm.jobs.base import JobEvent, Jobs, Stop, Submission
+from gaitswarm.jobs.embedded import Workers, earlier_job, run_here
+from gaitswarm.operations import Operation
+from gaitswarm.requests.firmware import FirmwareRequest, firmware_view, run_firmware
+from gaitswarm.services.optimizer.jobs.job import Claim
+from gaitswarm.services.optimizer.masking import masked_url
+from gaitswarm.services.optimizer.run.evaluator import Evaluator
+from gaitswarm.services.optimizer.service import JobService
+from gaitswarm.services.runtime import EvaluatorKind
+from gaitswarm.settings import default_database
+from gaitswarm.specs import SpecInput, chosen_spec
+from gaitswarm.tables import EvaluationTable
+from gaitswarm.views import HistoryIterationView, IterationView, JobView
+from gaitswarm.views.firmware import FirmwareView
+
+T = TypeVar("T")
+
+POLL_SECONDS: Final = 0.5
+"""Time between two readings of a followed job [s]."""
+
+
+class DatabaseJobs(Jobs):
+    """Jobs in a database, which this process can also run. Owns its store."""
+
+    def __init__(
+        self, service: JobService, url: str, *, poll_seconds: float = POLL_SECONDS
+    ) -> None:
+        """Take over a service.
+
+        Args:
+            service: Of the database; closed with this.
+            url: Of the database, as it was opened.
+            poll_seconds: Time between two readings of a followed job [s].
+        """
+        self._service = service
+        self._url = url
+        self._poll_seconds = poll_seconds
+
+    @property
+    def url(self) -> str:
+        """The database's file name or URL."""
+        return self._url
+
+    @property
+    def place(self) -> str:
+        """Options by which a command reaches the same jobs; none for the default database.
+
+        A password is masked.
+        """
+        if self._url == str(default_database()):
+            return ""
+        return f" --db {shlex.quote(masked_url(self._url))}"
+
+    def _send(
+        self, operation: Operation[T], path: tuple[str | int, ...], request: BaseModel | None
+    ) -> T:
+        subject = "" if operation.request is None else operation.request.name
+        with simulation_errors(subject):
+            arguments = path if request is None else (*path, request)
+            return operation.answer(self._service, *arguments)
+
+    def _submit(
+        self,
+        operation: Operation[JobView],
+        path: tuple[str, ...],
+        request: BaseModel,
+        submission: Submission,
+    ) -> JobView:
+        with simulation_errors((path and "fork") or "spec"):
+            return operation.answer(self._service, *path, request, **dict(submission))
+
+    def _follow(self, job_id: str, after: int | None, stop: Stop) -> Iterator[JobEvent]:
+        query = operations.EventsQuery(after=after)
+        return operations.stream_events.answer(
+            self._service, job_id, query, wait=lambda: stop.wait(self._poll_seconds)
+        )
+
+    def _export(self, job_id: str, query: operations.ExportQuery) -> Iterator[bytes]:
+        return self._send(operations.export_job, (job_id,), query)
+
+    def history(self, job_id: str) -> Iterator[HistoryIterationView]:
+        """Read committed iterations with their designs, many at once."""
+        spec = self._service.job(job_id).spec
+        for iteration, evaluations in self._service.history(job_id):
+            yield HistoryIterationView.from_iteration_and_evaluations(iteration, evaluations, spec)
+
+    def evaluations(self, job_id: str) -> EvaluationTable:
+        """Read every evaluation."""
+        job = self._service.job(job_id)
+        return EvaluationTable.from_pieces(job.spec, self._service.column_pieces(job))
+
+    def delete(self, job_id: str) -> None:
+        """Delete a job, and remove all of its rows."""
+        super().delete(job_id)
+        self._service.store.purge_deleted()
+
+    def _firmware(self, request: FirmwareRequest) -> tuple[FirmwareView, Mapping[str, bytes]]:
+        firmware = run_firmware(request)
+        return firmware_view(request, firmware), firmware.files
+
+    def submit_embedded(self, spec: SpecInput | None) -> Claim:
+        """Store a job that only this process is to run, so that no runner claims it before.
+
+        Args:
+            spec: As for `submit`.
+
+        Returns:
+            A claim on the job, which lasts some seconds: give it to `run` at once.
+
+        Raises:
+            InvalidRequest: The job is invalid or cannot be simulated; names the field.
+        """
+        chosen = chosen_spec(spec, {})
+        with simulation_errors("spec"):
+            return self._service.submit_embedded(chosen)
+
+    def earlier(self, spec: SpecInput) -> str | None:
+        """Find a job of the same name and specification that is still valid.
+
+        Args:
+            spec: As for `submit`.
+
+        Returns:
+            Identifier of a job that was not cancelled and whose provenance (code, robot and
+            libraries) is that of a new one; None if there is none.
+        """
+        job = earlier_job(self._service, chosen_spec(spec, {}))
+        return None if job is None else job.id
+
+    def run(
+        self,
+        job: str | Claim,
+        *,
+        evaluator: EvaluatorKind | Evaluator = "in-process",
+        cpus: int | None = None,
+        ray_address: str | None = None,
+        accept_changes: bool = False,
+        on_iteration: Callable[[IterationView], None] | None = None,
+        stop: threading.Event | None = None,
+    ) -> JobView:
+        """Run a job in this process, from its last committed iteration to its end.
+
+        A paused or failed job is resumed. One that another process runs is followed, and continues
+        here when that process returns it to the queue or its lease runs out. Ctrl-C returns the job
+        to the queue, as does an exception of `on_iteration`, which is passed on.
+
+        Args:
+            job: Identifier of the job; or the result of `submit_embedded`.
+            evaluator: "in-process": threads of this process; "ray": the same, and Ray in long
+                jobs or at `ray_address`; or an open evaluator, which stays open.
+            cpus: Simulations to run at once on this machine; default all processors.
+            ray_address: A running Ray cluster, for all simulations.
+            accept_changes: Whether the job continues although its provenance (code, robot,
+                compiler) has changed; the change is recorded with it.
+            on_iteration: Called after each iteration is committed.
+            stop: When another thread sets it, the job is returned to the queue and the method
+                returns.
+
+        Returns:
+            The job as it is then: ended, paused, or queued if it was stopped.
+
+        Raises:
+            Interrupted: Ctrl-C; says how to resume.
+            Conflict: The job was cancelled.
+            ProvenanceChanged: The provenance has changed, which is not accepted.
+            EvaluatorUnavailable: The cluster cannot be reached.
+        """
+        workers = Workers(evaluator, cpus=cpus, ray_address=ray_address)
+        job_id = job if isinstance(job, str) else job.job.id
+
+        def committed(index: int) -> None:
+            if on_iteration is not None:
+                after = index - 1 if index else None
+                on_iteration(next(self.iterations(job_id, after=after)))
+
+        ended = run_here(
+            self._service,
+            self._url,
+            job,
+            workers=workers,
+            on_iteration=committed,
+            stop=stop,
+            accept_changes=accept_changes,
+        )
+        return operations.full_view(self._service, ended)
+
+    def close(self) -> None:
+        """Close the store."""
+        self._service.store.close()

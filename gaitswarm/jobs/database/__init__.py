@@ -1,1 +1,0 @@
-"""Jobs in a database that this process opens itself."""

@@ -1,0 +1,273 @@
+"""Jobs of a gaitswarm server, over its HTTP API."""
+
+from __future__ import annotations
+
+import ssl
+import time
+import uuid
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from socket import SHUT_RDWR
+from typing import Any, Final, TypeVar
+from urllib.parse import quote, urlsplit
+
+import httpx2
+from pydantic import BaseModel, ValidationError
+
+from gaitswarm import operations
+from gaitswarm.errors import InvalidRequest, NotFound, StoreUnavailable
+from gaitswarm.jobs.attempts import Attempts, foreign, unreachable
+from gaitswarm.jobs.base import JobEvent, Jobs, Stop, Submission
+from gaitswarm.operations import Operation
+from gaitswarm.services.optimizer.masking import masked_url
+from gaitswarm.services.optimizer.run.outage import Backoff
+from gaitswarm.views import PREFIX, IterationView, JobView, StateView
+
+T = TypeVar("T")
+
+TIMEOUT: Final = 30.0
+"""Longest silence of a server [s]."""
+
+BACKOFF: Final = Backoff(first=0.25, longest=10.0, attempts=4)
+"""Default repetition of requests."""
+
+RECONNECT: Final = Backoff(first=1.0, longest=1.0, attempts=30)
+"""Default repetition of connections to an event stream; a restarted server is back by then."""
+
+
+class ServerJobs(Jobs):
+    """Jobs behind a server.
+
+    A request is repeated after a lost connection or a 503 if it is safe: one that only reads, or
+    has an idempotency key, as `submit` sends. After a 429, which says that nothing was done, every
+    request is.
+    """
+
+    def __init__(
+        self,
+        url: str,
+        *,
+        timeout: float = TIMEOUT,
+        backoff: Backoff = BACKOFF,
+        reconnect: Backoff = RECONNECT,
+        headers: Mapping[str, str] | None = None,
+        transport: httpx2.BaseTransport | None = None,
+    ) -> None:
+        """Create a client; nothing is sent yet.
+
+        Args:
+            url: Of the server, such as http://127.0.0.1:8000.
+            timeout: Longest silence of the server [s].
+            backoff: Waits before requests are repeated.
+            reconnect: Waits before a broken event stream is resumed; every event resets them.
+            headers: Sent with every request, such as a proxy requires.
+            transport: Sends requests, in place of httpx2's own.
+
+        Raises:
+            InvalidRequest: It is not a URL.
+        """
+        self._url = server_url(url)
+        self._backoff = backoff
+        self._reconnect = reconnect
+        self._client = httpx2.Client(
+            base_url=self._url + PREFIX,
+            timeout=timeout,
+            headers=headers,
+            transport=transport,
+            verify=authorities(self._url),
+        )
+
+    @property
+    def url(self) -> str:
+        """The server's URL."""
+        return self._url
+
+    @property
+    def place(self) -> str:
+        """Options by which a command reaches the same jobs."""
+        return f" --server {masked_url(self._url)}"
+
+    def _send(
+        self, operation: Operation[T], path: tuple[str | int, ...], request: BaseModel | None
+    ) -> T:
+        return self._read(operation, self._response(operation, path, request))
+
+    def _submit(
+        self,
+        operation: Operation[JobView],
+        path: tuple[str, ...],
+        request: BaseModel,
+        submission: Submission,
+    ) -> JobView:
+        headers = {
+            "Idempotency-Key": submission.idempotency_key or uuid.uuid4().hex,
+            "Job-Priority": str(submission.priority),
+        }
+        if submission.notify_url is not None:
+            headers["Notify-URL"] = submission.notify_url
+        return self._read(operation, self._response(operation, path, request, headers))
+
+    def _export(self, job_id: str, query: operations.ExportQuery) -> Iterator[bytes]:
+        with self._stream(operations.export_job, job_id, query) as response:
+            try:
+                yield from response.iter_bytes()
+            except httpx2.HTTPError as error:
+                raise unreachable(self._url, error) from error
+
+    def _follow(self, job_id: str, after: int | None, stop: Stop) -> Iterator[JobEvent]:
+        self.job(job_id)
+        failures, state = 0, None
+        while not stop.is_set():
+            seconds = self._reconnect.first
+            try:
+                for event in self._events(job_id, after, stop):
+                    failures = 0
+                    if isinstance(event, IterationView):
+                        after = event.index
+                    elif event.state is state:
+                        # A new connection begins with the state that the previous one sent.
+                        continue
+                    else:
+                        state = event.state
+                    yield event
+            except (httpx2.HTTPError, StoreUnavailable) as error:
+                failures += 1
+                if not stop.is_set():
+                    seconds = self._pause(failures, error)
+            except ValidationError as error:
+                raise foreign(self._url) from error
+            if state is not None and state.terminal:
+                return
+            stop.wait(seconds)
+
+    def _pause(self, failures: int, error: httpx2.HTTPError | StoreUnavailable) -> float:
+        """Return the time until the next connection [s]; raise the error if there is none."""
+        seconds = self._reconnect.delay(failures)
+        if seconds is not None:
+            return seconds
+        if isinstance(error, StoreUnavailable):
+            raise error
+        raise unreachable(self._url, error) from error
+
+    def _events(self, job_id: str, after: int | None, stop: Stop) -> Iterator[JobEvent]:
+        """Yield the events of one connection."""
+        headers = {"Accept": "text/event-stream", "Cache-Control": "no-store"}
+        if after is not None:
+            headers["Last-Event-ID"] = str(after)
+        with (
+            self._stream(operations.stream_events, job_id, None, headers) as response,
+            stop.waking(lambda: _shut(response)),
+        ):
+            for sent in httpx2.EventSource(response):
+                event = _event(sent)
+                if event is not None:
+                    yield event
+
+    def close(self) -> None:
+        """Close the connections."""
+        self._client.close()
+
+    @contextmanager
+    def _stream(
+        self,
+        operation: Operation[Any],
+        job_id: str,
+        query: BaseModel | None,
+        headers: Mapping[str, str] | None = None,
+    ) -> Iterator[httpx2.Response]:
+        """Open a successful response whose body is read piece by piece."""
+        response = self._response(operation, (job_id,), query, headers or {}, stream=True)
+        try:
+            yield response
+        finally:
+            response.close()
+
+    def _read(self, operation: Operation[T], response: httpx2.Response) -> T:
+        """Decode a successful response."""
+        if operation.result is bytes:
+            return response.content  # type: ignore[return-value]
+        try:
+            return operation.adapter.validate_json(response.content or b"null")
+        except ValueError as error:
+            raise foreign(self._url) from error
+
+    def _response(
+        self,
+        operation: Operation[Any],
+        path: tuple[str | int, ...],
+        request: BaseModel | None,
+        headers: Mapping[str, str] | None = None,
+        *,
+        stream: bool = False,
+    ) -> httpx2.Response:
+        """Return a successful response, after as many attempts as necessary and allowed."""
+        arguments: dict[str, Any] = {"headers": dict(headers or {})}
+        if request is not None and operation.method == "GET":
+            arguments["params"] = request.model_dump(mode="json", exclude_none=True)
+        elif request is not None:
+            arguments["content"] = request.model_dump_json()
+            arguments["headers"]["Content-Type"] = "application/json"
+        names = dict(zip(operation.path_names, map(_segment, path), strict=True))
+        url = operation.path.format(**names)
+        repeatable = operation.reads or "Idempotency-Key" in arguments["headers"]
+        attempts = Attempts(self._url, self._backoff, repeatable=repeatable)
+        while True:
+            sent = self._client.build_request(operation.method, url, **arguments)
+            try:
+                response = self._client.send(sent, stream=stream)
+                if response.is_success:
+                    return response
+                response.read()
+                response.close()
+            except httpx2.HTTPError as error:
+                seconds = attempts.after_failure(error)
+            else:
+                seconds = attempts.after_refusal(response)
+            time.sleep(seconds)
+
+
+def _event(sent: httpx2.ServerSentEvent) -> JobEvent | None:
+    if sent.event == "deleted":
+        raise NotFound("the job was deleted while it was followed")
+    if sent.event == "iteration":
+        return IterationView.model_validate_json(sent.data)
+    return StateView.model_validate_json(sent.data) if sent.event == "state" else None
+
+
+def _segment(name: str | int) -> str:
+    """Quote an identifier as one segment of a path."""
+    text = str(name)
+    if text in ("", ".", ".."):
+        raise NotFound(f"no resource has the id {text!r}")
+    return quote(text, safe="")
+
+
+def _shut(response: httpx2.Response) -> None:
+    """Shut the connection of a response, so that a thread that reads from it continues."""
+    stream = response.extensions.get("network_stream")
+    connection = None if stream is None else stream.get_extra_info("socket")
+    if connection is not None:
+        with suppress(OSError):
+            connection.shutdown(SHUT_RDWR)
+
+
+def server_url(url: str) -> str:
+    """Return a server's URL without a slash at its end; raise InvalidRequest if it is not one."""
+    try:
+        parts = urlsplit(url)
+        valid = parts.scheme in ("http", "https") and parts.hostname and parts.port != 0
+    except ValueError:
+        valid = False
+    if not valid:
+        raise InvalidRequest(
+            f"{masked_url(url)!r} is not a URL like http://127.0.0.1:8000", field="server"
+        )
+    return url.rstrip("/")
+
+
+def authorities(url: str) -> ssl.SSLContext | bool:
+    """Return the trusted authorities: the usual ones for https, none otherwise.
+
+    Reading the usual ones takes longer than most requests.
+    """
+    return urlsplit(url).scheme == "https" or ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)

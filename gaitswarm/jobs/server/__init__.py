@@ -1,1 +1,0 @@
-"""Jobs of a gaitswarm server, over its HTTP API."""

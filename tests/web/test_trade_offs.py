@@ -105,23 +105,23 @@ def test_the_preference_for_a_design_ranks_the_history_and_starts_a_job(
 ) -> None:
     front = front_of(server, finished_job)
     best = place(server.job(finished_job)["best"])
-    chosen = next(
+    selected = next(
         design
         for design in front["designs"]
         if place(design) != best and preference_of(server, finished_job, design)["wins"]
     )
-    expected = preference_of(server, finished_job, chosen)["fits"][0]["preference"]
+    expected = preference_of(server, finished_job, selected)["fits"][0]["preference"]
     page = visit(server.url).go(f"/jobs/{finished_job}/trade-offs")
-    expect(page.get_by_role("heading", name="No design chosen")).to_be_visible()
+    expect(page.get_by_role("heading", name="No design selected")).to_be_visible()
     page.get_by_role("button", name=re.compile("^Show as table.*Pareto front")).click()
-    name = f"design {place(chosen)}"
+    name = f"design {place(selected)}"
     row = table(page, "Designs of the front").get_by_role("row").filter(has_text=name)
     row.get_by_role("button").click()
     expect(page.locator("[data-wins='true']")).to_contain_text("is the best design of the job")
-    assert parse_qs(urlsplit(page.url).query)["design"] == [place(chosen)]
+    assert parse_qs(urlsplit(page.url).query)["design"] == [place(selected)]
 
     page.get_by_role("link", name="Rank the history with it").click()
-    expect(page.locator("[data-winner]")).to_have_attribute("data-winner", place(chosen))
+    expect(page.locator("[data-winner]")).to_have_attribute("data-winner", place(selected))
     page.go_back()
     page.get_by_role("link", name="Start a job with it").click()
     query = parse_qs(urlsplit(page.url).query)
@@ -140,15 +140,15 @@ def test_a_click_in_the_chart_chooses_the_nearest_design_of_the_front(
     chart.scroll_into_view_if_needed()
     box = chart.bounding_box()
     assert box is not None
-    chosen = page.locator("[data-chosen]")
-    expect(chosen).to_have_attribute("data-chosen", "")
+    selected = page.locator("[data-selected-design]")
+    expect(selected).to_have_attribute("data-selected-design", "")
     # There is a design somewhere along these lines.
     for share, step in product((0.3, 0.5, 0.7), range(8, 60)):
         page.mouse.click(box["x"] + box["width"] * step / 60, box["y"] + box["height"] * share)
-        if chosen.get_attribute("data-chosen") != "":
+        if selected.get_attribute("data-selected-design") != "":
             break
-    expect(chosen, "no click chose a design").not_to_have_attribute("data-chosen", "")
-    assert chosen.get_attribute("data-chosen") in {place(design) for design in front["designs"]}
+    expect(selected, "no click selected a design").not_to_have_attribute("data-selected-design", "")
+    assert selected.get_attribute("data-selected-design") in {place(design) for design in front["designs"]}
 
 
 def test_a_missing_design_is_reported(

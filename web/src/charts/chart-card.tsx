@@ -100,7 +100,7 @@ export function LegendEntry({
   )
 }
 
-interface LineCardProps extends LineChartProps {
+export interface LineCardProps extends LineChartProps {
   readonly title: string
   readonly note?: string
   readonly tools?: ComponentChildren

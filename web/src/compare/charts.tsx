@@ -8,7 +8,7 @@ import { lineLabel, paintReference } from '../charts/lines/reference-line'
 import { Check } from '../components/fields/controls'
 import { Table } from '../components/table/table'
 import { formatNumber, percent } from '../format/number'
-import { fittedRange } from '../job/overview/convergence-model'
+import { fittedRange } from '../job/overview/model'
 import { setQuery } from '../router/navigation'
 import { flag, oneOf, useQueryValue } from '../router/query-value'
 import {

@@ -1,15 +1,22 @@
-/** Values of a chart by iteration, as a table. */
+/** Values by iteration, as a table and as a chart. */
 
+import { useMemo } from 'preact/hooks'
+import { LineCard, type LineCardProps } from '../charts/chart-card'
 import { type Column, Table } from '../components/table/table'
+import { capitalized } from '../format/words'
 
-export function ByIteration<R extends { readonly index: number }>({
+interface Indexed {
+  readonly index: number
+}
+
+/** columns: those after the iteration. */
+export function ByIteration<R extends Indexed>({
   caption,
   rows,
   columns,
 }: {
   caption: string
   rows: readonly R[]
-  /** Columns after the iteration index. */
   columns: readonly Column<R>[]
 }) {
   return (
@@ -18,17 +25,46 @@ export function ByIteration<R extends { readonly index: number }>({
       tall
       rows={rows}
       rowKey={(row) => String(row.index)}
-      order={{ column: 'index', descending: true }}
+      order={{ column: 'iteration', descending: true }}
       columns={[
-        {
-          key: 'index',
-          label: 'Iteration',
-          numeric: true,
-          header: true,
-          value: (row) => row.index,
-        },
+        { key: 'iteration', numeric: true, header: true, value: (row) => row.index },
         ...columns,
       ]}
+    />
+  )
+}
+
+/** A card with a line over the iterations. */
+export function IterationChart<R extends Indexed>({
+  rows,
+  name,
+  value,
+  colour = '--series-1',
+  ...card
+}: Omit<LineCardProps, 'x' | 'xLabel' | 'series' | 'caption' | 'yLabel'> & {
+  rows: readonly R[]
+  /** Name of the values. */
+  name: string
+  value: (row: R) => number | null
+  yLabel?: string
+  colour?: `--${string}`
+}) {
+  const drawn = useMemo(
+    () => ({
+      x: rows.map(({ index }) => index),
+      series: [{ label: name, values: rows.map(value), colour, width: 2 }],
+    }),
+    [rows],
+  )
+  return (
+    <LineCard
+      yLabel={name}
+      {...card}
+      {...drawn}
+      caption={`${capitalized(name)} by iteration`}
+      order={{ column: 'x', descending: true }}
+      xLabel="iteration"
+      counted
     />
   )
 }

@@ -38,7 +38,7 @@ async function load(job: Job, choice: string, signal: AbortSignal): Promise<Refe
 }
 
 /** Simulate the published designs of the job's controller in its scenarios. */
-export async function publishedWalks(job: Job): Promise<readonly Reference[]> {
+export async function publishedReferences(job: Job): Promise<readonly Reference[]> {
   const spec = job.spec as JobSpec
   const match = (await catalogue()).find(({ name }) => name === spec.controller)
   const walks = Object.entries(match?.published ?? {}).map(async ([study, design]) => {

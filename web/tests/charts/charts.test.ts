@@ -11,7 +11,7 @@ import {
   valueAt,
 } from '../../src/charts/parallel/parallel-model'
 import { decodeParticles } from '../../src/job/designs/particles'
-import { grouped } from '../../src/job/overview/grouped'
+import { grouped } from '../../src/job/overview/model'
 
 describe('a logarithmic axis', () => {
   test('has round numbers within a decade', () => {

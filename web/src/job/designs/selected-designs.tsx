@@ -2,11 +2,10 @@
 
 import type { Job } from '../../api/types'
 import { type Column, Table } from '../../components/table/table'
-import { placeWord } from '../../format/place'
 import { formatValue, named } from '../../format/value'
 import { inWords } from '../../format/words'
 import { PAGE_NUMBER, useQueryValue } from '../../router/query-value'
-import { jobPath, withQuery } from '../../router/routes'
+import { DesignLink } from '../columns'
 import { caseWords } from '../fitness'
 import { columnNamed, type ParticleColumn, type Particles } from './particles'
 
@@ -40,10 +39,11 @@ export function SelectedDesigns({
       columns={[
         {
           key: 'design',
-          label: 'Design',
           header: true,
           value: (row) => iteration[row] * 1e5 + particle[row],
-          cell: (row) => <Where job={job} iteration={iteration[row]} particle={particle[row]} />,
+          cell: (row) => (
+            <DesignLink job={job} iteration={iteration[row]} particle={particle[row]} />
+          ),
         },
         ...numbers.map(
           (column): Column<number> => ({
@@ -58,28 +58,6 @@ export function SelectedDesigns({
         ),
       ]}
     />
-  )
-}
-
-/** Link to a design's simulation, or to its iteration if it has none. */
-export function Where({
-  job,
-  iteration,
-  particle,
-}: {
-  job: Job
-  iteration: number
-  particle: number
-}) {
-  const scenario = job.scenarios[0]
-  const target =
-    job.kind === 'tuning'
-      ? withQuery('/walk', { job: job.id, iteration, particle, scenario })
-      : jobPath(job.id, `iterations/${iteration}`)
-  return (
-    <a href={target} class="nowrap">
-      design {placeWord({ iteration, particle })}
-    </a>
   )
 }
 

@@ -1,6 +1,6 @@
 /** Best, median and quantiles of the fitness by iteration. */
 
-import { useCallback, useMemo, useRef } from 'preact/hooks'
+import { useCallback, useMemo } from 'preact/hooks'
 import type uPlot from 'uplot'
 import { getBytes } from '../../api/client'
 import { useResource, useSlowly } from '../../api/resource'
@@ -10,23 +10,19 @@ import { type Band, LineChart, type Series } from '../../charts/lines/line-chart
 import { lineLabel, type ReferenceLine } from '../../charts/lines/reference-line'
 import { Check } from '../../components/fields/controls'
 import { formatCount, formatNumber, withUnit } from '../../format/number'
+import { capitalized, inWords } from '../../format/words'
 import { flag, useQueryValue } from '../../router/query-value'
 import { ByIteration } from '../by-iteration'
 import { decodeParticles } from '../designs/particles'
 import { fitnessUnit } from '../fitness'
-import {
-  type Dots,
-  dotsOf,
-  fittedRange,
-  iterationsAbove,
-  type Line,
-  MOST_DOTS,
-} from './convergence-model'
-import { type Painted, paintDots, paintOver } from './convergence-painter'
+import { paintDots, paintOver } from './convergence-painter'
+import { type Dots, dotsOf, fittedRange, iterationsAbove, MOST_DOTS } from './model'
 import type { Distribution } from './use-distribution'
 
 /** Polling interval for single designs of a running job [ms]. */
 const RENEW_MS = 8000
+
+const COLUMNS = ['best_so_far', 'best', 'median', 'mean', 'worst'] as const
 
 export function ConvergenceChart({
   job,
@@ -50,7 +46,13 @@ export function ConvergenceChart({
     const [bests, medians] = drawn.series.slice(-2).map(({ values }) => values)
     const range = fittedRange([bests, medians], reference ? [reference.fitness] : [], logarithmic)
     const highest = drawn.bands.length > 0 ? drawn.series[0].values : null
-    return { range, painted: paintedOf({ drawn, best, dots, range, highest, reference }) }
+    const last = drawn.x.at(-1)
+    const end =
+      best === null || last === undefined
+        ? null
+        : { x: last, y: best, label: `best ${formatNumber(best)}` }
+    const above = iterationsAbove(range, drawn.x, highest, dots)
+    return { range, painted: { dots, reference, end, above } }
   }, [drawn, dots, reference, logarithmic, best])
   const paint = useCallback((plot: uPlot) => paintDots(plot, painted), [painted])
   const over = useCallback((plot: uPlot) => paintOver(plot, painted), [painted])
@@ -74,16 +76,35 @@ export function ConvergenceChart({
               <LegendEntry colour="--fan-outer" label="5 % to 95 %" area />
             </>
           )}
-          {dots && <span data-dots={dots.fitness.length}>{dotsInWords(dots)}</span>}
+          {dots && (
+            <span data-dots={dots.fitness.length}>
+              dots: {formatCount(dots.fitness.length)}
+              {dots.fitness.length < dots.total && ` of ${formatCount(dots.total)}`} designs
+            </span>
+          )}
           {painted.above.size > 0 && (
             <span data-above={painted.above.size}>▴ worse designs outside the range shown</span>
           )}
         </>
       }
-      table={() => <IterationTable iterations={iterations} unit={unit} />}
+      table={() => (
+        <ByIteration<Iteration>
+          caption={withUnit('Fitness by iteration', unit)}
+          rows={iterations}
+          columns={COLUMNS.map((key) => ({
+            key,
+            label: capitalized(inWords(key)),
+            unit,
+            digits: 5,
+            value: (i) => i[key],
+          }))}
+        />
+      )}
     >
       <LineChart
-        label={describe(iterations.length, best, painted)}
+        label={`Convergence over ${iterations.length} iterations; best fitness ${formatNumber(best)}${
+          reference ? `, ${lineLabel(reference)}` : ''
+        }`}
         x={drawn.x}
         xLabel="iteration"
         counted
@@ -101,60 +122,24 @@ export function ConvergenceChart({
   )
 }
 
-function describe(iterations: number, best: number | null, { reference }: Painted): string {
-  const referenceText = reference ? `, ${lineLabel(reference)}` : ''
-  return `Convergence over ${iterations} iterations; best fitness ${formatNumber(best)}${referenceText}`
-}
-
-function dotsInWords({ fitness, total }: Dots): string {
-  const drawn = formatCount(fitness.length)
-  return fitness.length < total
-    ? `dots: ${drawn} of ${formatCount(total)} designs`
-    : `dots: ${drawn} designs`
-}
-
 /** Load single designs when enabled, and refresh them while the job is running. */
 function useDots(job: Job, committed: number, enabled: boolean): Dots | null {
   const renewed = useSlowly(committed, RENEW_MS)
-  const particles = useResource(enabled ? `dots ${job.id} ${renewed}` : null, (signal) =>
-    getBytes('/v1/jobs/{job_id}/particles', {
-      path: { job_id: job.id },
-      query: { max_points: MOST_DOTS },
-      signal,
-    }).then((bytes) => dotsOf(decodeParticles(bytes))),
+  const dots = useResource(
+    enabled ? `dots ${job.id} ${renewed}` : null,
+    (signal) =>
+      getBytes('/v1/jobs/{job_id}/particles', {
+        path: { job_id: job.id },
+        query: { max_points: MOST_DOTS },
+        signal,
+      }).then((bytes) => dotsOf(decodeParticles(bytes))),
+    { keep: true },
   )
-  const shown = useRef<Dots | null>(null)
-  if (particles.data) shown.current = particles.data
-  return enabled ? shown.current : null
+  return dots.data
 }
 
-function paintedOf({
-  drawn,
-  best,
-  dots,
-  range,
-  highest,
-  reference,
-}: {
-  drawn: { readonly x: readonly number[] }
-  best: number | null
-  dots: Dots | null
-  range: readonly [number, number] | null
-  /** Upper edge of the band drawn. */
-  highest: Line | null
-  reference: ReferenceLine | null
-}): Painted {
-  const last = drawn.x.at(-1)
-  return {
-    dots,
-    reference,
-    end:
-      best === null || last === undefined
-        ? null
-        : { x: last, y: best, label: `best ${formatNumber(best)}` },
-    above: iterationsAbove(range, drawn.x, highest, dots),
-  }
-}
+/** Quantiles between which the bands are drawn. */
+const EDGES = [0.95, 0.75, 0.25, 0.05]
 
 function content(iterations: readonly Iteration[], { quantiles, items }: Distribution) {
   const x = iterations.map((i) => i.index)
@@ -167,6 +152,7 @@ function content(iterations: readonly Iteration[], { quantiles, items }: Distrib
     },
     { label: 'median', values: iterations.map((i) => i.median), colour: '--series-2' },
   ]
+  if (!EDGES.every((share) => quantiles.includes(share))) return { x, series: lines, bands: [] }
   const edge = (share: number): Series => {
     const column = quantiles.indexOf(share)
     const byIndex = new Map(items.map((item) => [item.index, item.fitness[column]]))
@@ -177,37 +163,9 @@ function content(iterations: readonly Iteration[], { quantiles, items }: Distrib
       width: 0,
     }
   }
-  if (![0.05, 0.25, 0.75, 0.95].every((share) => quantiles.includes(share))) {
-    return { x, series: lines, bands: [] }
-  }
-  const edges = [edge(0.95), edge(0.75), edge(0.25), edge(0.05)]
   const bands: Band[] = [
     { upper: 0, lower: 3, colour: '--series-1', opacity: 0.13 },
     { upper: 1, lower: 2, colour: '--series-1', opacity: 0.22 },
   ]
-  return { x, series: [...edges, ...lines], bands }
-}
-
-function IterationTable({ iterations, unit }: { iterations: readonly Iteration[]; unit: string }) {
-  const fitness = (key: 'best_so_far' | 'best' | 'median' | 'mean' | 'worst', label: string) => ({
-    key,
-    label,
-    unit,
-    numeric: true,
-    value: (i: Iteration) => i[key],
-    cell: (i: Iteration) => formatNumber(i[key], 5),
-  })
-  return (
-    <ByIteration
-      caption={withUnit('Fitness by iteration', unit)}
-      rows={iterations}
-      columns={[
-        fitness('best_so_far', 'Best so far'),
-        fitness('best', 'Best'),
-        fitness('median', 'Median'),
-        fitness('mean', 'Mean'),
-        fitness('worst', 'Worst'),
-      ]}
-    />
-  )
+  return { x, series: [...EDGES.map(edge), ...lines], bands }
 }

@@ -4,7 +4,7 @@ import type uPlot from 'uplot'
 import { withAlpha } from '../../charts/lines/line-chart'
 import { chartFont, paintReference, type ReferenceLine } from '../../charts/lines/reference-line'
 import { themeColour } from '../../theme'
-import type { Dots } from './convergence-model'
+import type { Dots } from './model'
 
 export interface Painted {
   readonly dots: Dots | null

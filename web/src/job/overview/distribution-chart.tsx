@@ -5,11 +5,11 @@ import type uPlot from 'uplot'
 import type { DistributionItem, Iteration, Job } from '../../api/types'
 import { ChartCard, LegendEntry } from '../../charts/chart-card'
 import { LineChart, withAlpha } from '../../charts/lines/line-chart'
-import { formatNumber, percent } from '../../format/number'
+import { percent } from '../../format/number'
 import { themeColour } from '../../theme'
 import { ByIteration } from '../by-iteration'
 import { fitnessUnit } from '../fitness'
-import { grouped, type Strip } from './grouped'
+import { grouped, type Strip } from './model'
 import type { Distribution } from './use-distribution'
 
 /** More strips could not be distinguished on a common screen. */
@@ -62,11 +62,10 @@ export function DistributionChart({
               key: String(share),
               label: share === 0 ? 'best' : share === 1 ? 'worst' : percent(share, 2),
               unit,
-              numeric: true,
+              digits: 5,
               value: (item: DistributionItem) => item.fitness[column],
-              cell: (item: DistributionItem) => formatNumber(item.fitness[column], 5),
             })),
-            { key: 'failed', label: 'Failed', numeric: true, value: (i) => i.failed },
+            { key: 'failed', numeric: true, value: (i) => i.failed },
           ]}
         />
       )}

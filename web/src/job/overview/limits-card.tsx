@@ -3,7 +3,7 @@
 import type { Job, JobSpec, Preference } from '../../api/types'
 import { ChartCard } from '../../charts/chart-card'
 import { Table } from '../../components/table/table'
-import { formatNumber, percent, quantity } from '../../format/number'
+import { formatNumber, NONE, percent, quantity } from '../../format/number'
 import { inWords } from '../../format/words'
 import { type Analysis, analyse, type Factor } from '../preference'
 
@@ -15,7 +15,30 @@ export function LimitsCard({ job, spec }: { job: Job; spec: JobSpec }) {
   return (
     <ChartCard
       title="Limiting factors"
-      table={() => <FactorTable analysis={analysis} units={units} />}
+      table={() => (
+        <Table<Factor>
+          caption="Limiting factors"
+          rows={analysis.factors}
+          order={{ column: 'sensitivity', descending: true }}
+          columns={[
+            { key: 'scenario', header: true, value: (f) => f.scenario },
+            { key: 'objective', value: (f) => inWords(f.objective) },
+            { key: 'value', digits: 4, value: (f) => f.value },
+            { key: 'unit', value: (f) => units.get(f.objective) ?? '1' },
+            {
+              key: 'contribution to log utility',
+              digits: 3,
+              value: (f) => f.contribution,
+            },
+            {
+              key: 'sensitivity',
+              label: 'Sensitivity of the fitness',
+              digits: 3,
+              value: (f) => f.sensitivity,
+            },
+          ]}
+        />
+      )}
     >
       <div class="stack">
         <p data-limit={`${analysis.worstScenario} ${analysis.worstFactor.objective}`}>
@@ -51,34 +74,31 @@ function explain(
 }
 
 /** Contribution of each objective to a scenario's utility relative to the mean; rows add up. */
-function ContributionTable({ analysis }: { analysis: Analysis }) {
-  const scenarios = Object.keys(analysis.utilities)
-  const objectives = [...new Set(analysis.factors.map((f) => f.objective))]
-  const most = Math.max(...analysis.factors.map((f) => Math.abs(f.contribution)))
-  const factor = (scenario: string, objective: string) =>
-    analysis.factors.find((f) => f.scenario === scenario && f.objective === objective) ?? null
+function ContributionTable({ analysis: { factors, utilities } }: { analysis: Analysis }) {
+  const objectives = [...new Set(factors.map((f) => f.objective))]
+  const most = Math.max(...factors.map((f) => Math.abs(f.contribution)))
+  const contribution = (scenario: string, objective: string) =>
+    factors.find((f) => f.scenario === scenario && f.objective === objective)?.contribution ?? null
   return (
     <div>
-      <Table
+      <Table<string>
         caption="Contributions of the objectives to the logarithm of a scenario’s relative utility"
-        rows={scenarios}
-        rowKey={(scenario) => scenario}
+        rows={Object.keys(utilities)}
         order={{ column: 'sum', descending: true }}
         columns={[
-          { key: 'scenario', label: 'Scenario', header: true, value: (s) => s },
+          { key: 'scenario', header: true, value: (s) => s },
           ...objectives.map((objective) => ({
             key: objective,
             label: inWords(objective),
             numeric: true,
-            value: (s: string) => factor(s, objective)?.contribution ?? null,
-            cell: (s: string) => <Share factor={factor(s, objective)} most={most} />,
+            value: (s: string) => contribution(s, objective),
+            cell: (s: string) => <Share value={contribution(s, objective)} most={most} />,
           })),
           {
             key: 'sum',
-            label: 'Sum',
             numeric: true,
-            value: (s) => analysis.utilities[s],
-            cell: (s) => <strong>{formatNumber(analysis.utilities[s], 3)}</strong>,
+            value: (s) => utilities[s],
+            cell: (s) => <strong>{formatNumber(utilities[s], 3)}</strong>,
           },
         ]}
       />
@@ -90,51 +110,12 @@ function ContributionTable({ analysis }: { analysis: Analysis }) {
   )
 }
 
-/** Value, contribution and sensitivity of every objective in every scenario. */
-function FactorTable({ analysis, units }: { analysis: Analysis; units: Map<string, string> }) {
+function Share({ value, most }: { value: number | null; most: number }) {
+  if (value === null) return <>{NONE}</>
   return (
-    <Table
-      caption="Limiting factors"
-      rows={analysis.factors}
-      rowKey={({ scenario, objective }) => `${scenario} ${objective}`}
-      order={{ column: 'sensitivity', descending: true }}
-      columns={[
-        { key: 'scenario', label: 'Scenario', header: true, value: (f) => f.scenario },
-        { key: 'objective', label: 'Objective', value: (f) => inWords(f.objective) },
-        {
-          key: 'value',
-          label: 'Value',
-          numeric: true,
-          value: (f) => f.value,
-          cell: (f) => formatNumber(f.value, 4),
-        },
-        { key: 'unit', label: 'Unit', value: (f) => units.get(f.objective) ?? '1' },
-        {
-          key: 'contribution',
-          label: 'Contribution to log utility',
-          numeric: true,
-          value: (f) => f.contribution,
-          cell: (f) => formatNumber(f.contribution, 3),
-        },
-        {
-          key: 'sensitivity',
-          label: 'Sensitivity of the fitness',
-          numeric: true,
-          value: (f) => f.sensitivity,
-          cell: (f) => formatNumber(f.sensitivity, 3),
-        },
-      ]}
-    />
-  )
-}
-
-function Share({ factor, most }: { factor: Factor | null; most: number }) {
-  if (factor === null) return <>–</>
-  const width = (Math.abs(factor.contribution) / most) * 100
-  return (
-    <span class="share" data-negative={factor.contribution < 0}>
-      <i style={{ width: `${width}%` }} aria-hidden="true" />
-      <span>{formatNumber(factor.contribution, 3)}</span>
+    <span class="share" data-negative={value < 0}>
+      <i style={{ width: `${(Math.abs(value) / most) * 100}%` }} aria-hidden="true" />
+      <span>{formatNumber(value, 3)}</span>
     </span>
   )
 }

@@ -1,12 +1,14 @@
 /** Overview of a job: convergence, distribution, diversity, winner and limiting factors. */
 
 import type { Job } from '../../api/types'
-import { Empty, ErrorNotice } from '../../components/feedback'
+import { EmptyCard } from '../../components/card'
+import { ErrorNotice } from '../../components/feedback'
+import { percent } from '../../format/number'
+import { IterationChart } from '../by-iteration'
 import type { Gain } from '../gain'
 import type { LiveJob } from '../live/use-job'
 import { ConvergenceChart } from './convergence-chart'
 import { DistributionChart } from './distribution-chart'
-import { DiversityChart } from './diversity-chart'
 import { LimitsCard } from './limits-card'
 import { useDistribution } from './use-distribution'
 import { WinnerCard } from './winner-card'
@@ -25,20 +27,16 @@ export function OverviewPanel({
   const distribution = useDistribution(job.id, iterations.length)
   if (iterations.length === 0) {
     return (
-      <section class="card">
-        <Empty title={job.state === 'queued' ? 'Waiting for a runner' : 'No iteration yet'}>
-          <p>
-            {job.state === 'queued'
-              ? 'The job starts when a runner has capacity; this page updates automatically.'
-              : 'The first iteration appears here once it is committed.'}
-          </p>
-        </Empty>
-      </section>
+      <EmptyCard title={job.state === 'queued' ? 'Waiting for a runner' : 'No iteration yet'}>
+        {job.state === 'queued'
+          ? 'The job starts when a runner has capacity; this page updates automatically.'
+          : 'The first iteration appears here once it is committed.'}
+      </EmptyCard>
     )
   }
   return (
     <div class="stack">
-      {distribution.error !== null && distribution.error !== undefined && (
+      {distribution.error !== null && (
         <ErrorNotice
           what="Could not load the distribution of fitness."
           error={distribution.error}
@@ -52,7 +50,22 @@ export function OverviewPanel({
       />
       <div class="grid">
         <DistributionChart job={job} iterations={iterations} distribution={distribution} />
-        <DiversityChart distribution={distribution} />
+        <IterationChart
+          title="Diversity of the designs"
+          note={
+            distribution.items.some(({ diversity }) => diversity !== null)
+              ? 'Spread of the designs as a share of each variable’s range; near zero, the search has converged.'
+              : 'The method evaluates one design at a time, which has no spread.'
+          }
+          label={`Diversity of the designs, now ${percent(distribution.items.at(-1)?.diversity)} of the range`}
+          rows={distribution.items}
+          name="diversity"
+          yUnit="%"
+          value={({ diversity }) => diversity && diversity * 100}
+          colour="--series-3"
+          zoomName="zoom-diversity"
+          fromZero
+        />
       </div>
       {job.best && job.kind !== 'certificate' && (
         <>

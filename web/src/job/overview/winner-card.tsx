@@ -4,12 +4,13 @@ import type { Job } from '../../api/types'
 import { ChartCard } from '../../charts/chart-card'
 import { BrokenName } from '../../components/broken-name'
 import { Table } from '../../components/table/table'
-import { formatExact, percent } from '../../format/number'
+import { formatExact, NONE, percent } from '../../format/number'
 import { placeWord } from '../../format/place'
 import { exactValueQuantity } from '../../format/value'
 import { withQuery } from '../../router/routes'
+import { VARIABLE } from '../columns'
 import { searchedVariables } from '../designs/variables'
-import { type WinnerVariable, winnerVariables } from './winner-model'
+import { type WinnerVariable, winnerVariables } from './model'
 
 export function WinnerCard({ job }: { job: Job }) {
   const best = job.best!
@@ -34,7 +35,36 @@ export function WinnerCard({ job }: { job: Job }) {
           </>
         )
       }
-      table={() => <WinnerTable rows={rows} />}
+      table={() => (
+        <Table<WinnerVariable>
+          caption="Winner and search bounds"
+          rows={rows}
+          pageSize={60}
+          columns={[
+            VARIABLE,
+            {
+              key: 'value',
+              numeric: true,
+              value: ({ value }) => value,
+              cell: ({ value, unit }) => exactValueQuantity(value, unit),
+            },
+            {
+              key: 'from',
+              numeric: true,
+              value: ({ low }) => low,
+              cell: ({ low }) => formatExact(low),
+            },
+            {
+              key: 'to',
+              numeric: true,
+              value: ({ high }) => high,
+              cell: ({ high }) => formatExact(high),
+            },
+            { key: 'position in range', percent: 3, value: ({ share }) => share },
+            { key: 'bound', value: ({ at, fixed }) => (fixed ? 'fixed' : (at ?? NONE)) },
+          ]}
+        />
+      )}
     >
       <dl class="design" data-active-bounds={atBound.map(({ name }) => name).join(' ')}>
         {rows.map((row) => (
@@ -44,17 +74,17 @@ export function WinnerCard({ job }: { job: Job }) {
             </dt>
             <dd>{exactValueQuantity(row.value, row.unit)}</dd>
             <dd class="in-bounds">
-              {row.share === null ? <Unplaced row={row} /> : <RangeBar row={row} />}
+              {row.share === null ? (
+                <span class="muted small">{row.fixed ? 'fixed' : 'categorical'}</span>
+              ) : (
+                <RangeBar row={row} />
+              )}
             </dd>
           </div>
         ))}
       </dl>
     </ChartCard>
   )
-}
-
-function Unplaced({ row }: { row: WinnerVariable }) {
-  return <span class="muted small">{row.fixed ? 'fixed' : 'categorical'}</span>
 }
 
 function RangeBar({ row }: { row: WinnerVariable }) {
@@ -76,57 +106,4 @@ function RangeBar({ row }: { row: WinnerVariable }) {
 function inWords({ low, high, share, at }: WinnerVariable): string {
   const range = `of the range from ${formatExact(low)} to ${formatExact(high)}`
   return `at ${percent(share, 3)} ${range}${at === null ? '' : `, at the ${at === 'low' ? 'lower' : 'upper'} bound`}`
-}
-
-function WinnerTable({ rows }: { rows: readonly WinnerVariable[] }) {
-  return (
-    <Table
-      caption="Winner and search bounds"
-      rows={rows}
-      rowKey={({ name }) => name}
-      pageSize={60}
-      columns={[
-        {
-          key: 'name',
-          label: 'Variable',
-          header: true,
-          value: ({ name }) => name,
-          cell: ({ name }) => <BrokenName name={name} />,
-        },
-        {
-          key: 'value',
-          label: 'Value',
-          numeric: true,
-          value: ({ value }) => value,
-          cell: ({ value, unit }) => exactValueQuantity(value, unit),
-        },
-        {
-          key: 'low',
-          label: 'From',
-          numeric: true,
-          value: ({ low }) => low,
-          cell: ({ low }) => formatExact(low),
-        },
-        {
-          key: 'high',
-          label: 'To',
-          numeric: true,
-          value: ({ high }) => high,
-          cell: ({ high }) => formatExact(high),
-        },
-        {
-          key: 'share',
-          label: 'Position in range',
-          numeric: true,
-          value: ({ share }) => share,
-          cell: ({ share }) => percent(share, 3),
-        },
-        {
-          key: 'at',
-          label: 'Bound',
-          value: ({ at, fixed }) => (fixed ? 'fixed' : (at ?? '–')),
-        },
-      ]}
-    />
-  )
 }

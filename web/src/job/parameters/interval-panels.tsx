@@ -7,8 +7,8 @@ import { type Column, Table } from '../../components/table/table'
 import { Unit } from '../../components/unit'
 import { formatExact, formatNumber, percent } from '../../format/number'
 import { exactValueQuantity, type Value, valueQuantity } from '../../format/value'
-import { DECISIVE, outline, placeOf, shareOf } from './intervals'
-import { TrustBadge } from './verdicts'
+import { VARIABLE } from '../columns'
+import { DECISIVE, outline, placeOf, shareOf, type Trust } from './intervals'
 
 /** Size of a chart's coordinate system, stretched to its box. */
 const WIDTH = 100
@@ -17,24 +17,23 @@ const HEIGHT = 60
 export function IntervalPanels({
   identifiability,
   shown,
-  labels,
-  judgedAt,
+  runs,
+  judged,
 }: {
   identifiability: Identifiability
   /** The parameters with intervals. */
   shown: readonly FittedParameter[]
-  labels: readonly string[]
-  /** Threshold at which agreement is judged; null if none. */
-  judgedAt: number | null
+  runs: number
+  /** Whether agreement is judged at the decisive threshold. */
+  judged: boolean
 }) {
   const { thresholds } = identifiability
   const [least, most] = [Math.min(...thresholds), Math.max(...thresholds)]
-  const runs = labels.length > 1 ? `${labels.length} runs` : 'the run'
   return (
     <ChartCard
       title="Intervals by threshold"
       note={
-        `Values of designs of ${runs} whose fitness is within a threshold of the run’s best.` +
+        `Values of designs of ${runs > 1 ? `${runs} runs` : 'the run'} whose fitness is within a threshold of the run’s best.` +
         ` x: the threshold from ${percent(least, 1)} to ${percent(most, 1)}, logarithmic;` +
         ' y: the search range.'
       }
@@ -48,7 +47,7 @@ export function IntervalPanels({
             <i class="interval-best" aria-hidden="true" />
             overall best
           </span>
-          {labels.length > 1 && (
+          {runs > 1 && (
             <span>
               <i class="interval-run" aria-hidden="true" />
               best of each run
@@ -56,11 +55,38 @@ export function IntervalPanels({
           )}
           <span>
             dotted: {percent(DECISIVE, 1)}
-            {judgedAt === DECISIVE && ', the threshold of the verdict'}
+            {judged && ', the threshold of the verdict'}
           </span>
         </>
       }
-      table={() => <IntervalTable identifiability={identifiability} shown={shown} />}
+      table={() => (
+        <Table
+          caption="Intervals by threshold"
+          rows={shown}
+          columns={[
+            {
+              ...VARIABLE,
+              label: 'Parameter',
+              cell: ({ name, unit }) => (
+                <>
+                  <BrokenName name={name} />
+                  <Unit unit={unit} />
+                </>
+              ),
+            },
+            ...thresholds.map(
+              (threshold, k): Column<FittedParameter> => ({
+                key: String(threshold),
+                label: `within ${formatExact(threshold * 100)} %`,
+                numeric: true,
+                data: ({ intervals }) => `${intervals[k].low} – ${intervals[k].high}`,
+                cell: ({ intervals }) => rangeInWords(intervals[k]),
+              }),
+            ),
+          ]}
+          pageSize={60}
+        />
+      )}
     >
       <div class="intervals">
         {shown.map((parameter) => (
@@ -69,6 +95,10 @@ export function IntervalPanels({
       </div>
     </ChartCard>
   )
+}
+
+function rangeInWords({ low, high }: { low: number; high: number }): string {
+  return `${formatNumber(low, 3)} – ${formatNumber(high, 3)}`
 }
 
 function Panel({
@@ -83,7 +113,7 @@ function Panel({
   const decisive = parameter.intervals[thresholds.indexOf(DECISIVE)]
   const middle = placeOf(DECISIVE, thresholds) * WIDTH
   const y = (value: Value) => (1 - shareOf(value, parameter)) * HEIGHT
-  const text = decisive && `${formatNumber(decisive.low, 3)} – ${formatNumber(decisive.high, 3)}`
+  const text = decisive && rangeInWords(decisive)
   return (
     <figure class="interval" data-trust={trust ?? 'none'}>
       <figcaption>
@@ -118,44 +148,16 @@ function Panel({
   )
 }
 
-function IntervalTable({
-  identifiability,
-  shown,
-}: {
-  identifiability: Identifiability
-  shown: readonly FittedParameter[]
-}) {
-  const columns: Column<FittedParameter>[] = [
-    {
-      key: 'name',
-      label: 'Parameter',
-      header: true,
-      value: (p) => p.name,
-      cell: (p) => (
-        <>
-          <BrokenName name={p.name} />
-          <Unit unit={p.unit} />
-        </>
-      ),
-    },
-    ...identifiability.thresholds.map(
-      (threshold, k): Column<FittedParameter> => ({
-        key: String(threshold),
-        label: `within ${formatExact(threshold * 100)} %`,
-        numeric: true,
-        data: ({ intervals }) => `${intervals[k].low} – ${intervals[k].high}`,
-        cell: ({ intervals }) =>
-          `${formatNumber(intervals[k].low, 3)} – ${formatNumber(intervals[k].high, 3)}`,
-      }),
-    ),
-  ]
+const TONES: Readonly<Record<Trust, 'good' | 'warn' | 'muted'>> = {
+  trusted: 'good',
+  rough: 'warn',
+  unknown: 'muted',
+}
+
+export function TrustBadge({ trust }: { trust: Trust }) {
   return (
-    <Table
-      caption="Intervals by threshold"
-      rows={shown}
-      rowKey={({ name }) => name}
-      columns={columns}
-      pageSize={60}
-    />
+    <span class="badge" data-tone={TONES[trust]} data-trust={trust}>
+      {trust}
+    </span>
   )
 }

@@ -9,7 +9,7 @@ export type Trust = NonNullable<FittedParameter['trust']>
 const TRUSTS: readonly Trust[] = ['trusted', 'rough', 'unknown']
 
 /** Thresholds whose widths are listed. */
-export const LISTED = [0.2, 0.1, 0.05, 0.02] as const
+export const WIDTHS = [0.2, 0.1, 0.05, 0.02] as const
 
 /** Threshold at which a parameter is judged. */
 export const DECISIVE = 0.05

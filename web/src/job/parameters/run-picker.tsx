@@ -4,8 +4,10 @@ import { get } from '../../api/client'
 import { jobSearch } from '../../api/job-search'
 import { useResource } from '../../api/resource'
 import type { Job, JobSummary } from '../../api/types'
+import { Card } from '../../components/card'
 import { ErrorNotice } from '../../components/feedback'
 import { Combobox } from '../../components/fields/combobox'
+import { Check } from '../../components/fields/controls'
 import { formatCount, quantity } from '../../format/number'
 import { jobPath, withQuery } from '../../router/routes'
 import { caseWords, fitnessUnit } from '../fitness'
@@ -14,61 +16,72 @@ import { furtherRuns, isSameFit, MOST_RUNS, repeatedSeeds } from './runs'
 /** Number of newest jobs searched for runs of the same fit. */
 const OFFERED = 100
 
+/** others: ids of the runs compared with the job; runs: the compared ones loaded so far. */
 export function RunPicker({
   job,
   runs,
-  also,
-  onChoose,
+  others,
+  onSelect,
 }: {
   job: Job
-  /** The compared runs loaded so far. */
   runs: readonly Job[]
-  /** Ids of the runs compared with the job. */
-  also: readonly string[]
-  onChoose: (also: readonly string[]) => void
+  others: readonly string[]
+  onSelect: (others: readonly string[]) => void
 }) {
   const listed = useResource(`fits ${job.kind}`, (signal) =>
     get('/v1/jobs', { query: { kind: job.kind, limit: OFFERED }, signal }),
   )
-  const words = caseWords(job.kind)
+  const { items } = caseWords(job.kind)
   const same = furtherRuns(listed.data?.items ?? [], job)
-  const offered = new Set(same.map(({ id }) => id))
-  const added = also.filter((id) => !offered.has(id))
-  const all = same.map(({ id }) => id).slice(0, MOST_RUNS)
+  const offered = same.map(({ id }) => id)
+  const added = listed.data ? others.filter((id) => !offered.includes(id)) : []
+  const all = offered.slice(0, MOST_RUNS)
   const repeated = repeatedSeeds(runs)
+  const unusedSeed = Math.max(...runs.map(({ spec }) => spec.seed ?? 0)) + 1
   const toggle = (id: string, on: boolean) =>
-    onChoose(on ? [...also, id] : also.filter((each) => each !== id))
-  const run = (other: JobSummary | string) => {
-    const id = typeof other === 'string' ? other : other.id
+    onSelect(on ? [...others, id] : others.filter((each) => each !== id))
+  const run = (id: string, summary?: JobSummary) => {
+    const loaded = runs.find((each) => each.id === id)
+    const details = summary ?? loaded
+    const selected = others.includes(id)
     return (
-      <Run
-        key={id}
-        id={id}
-        summary={typeof other === 'string' ? null : other}
-        job={runs.find((each) => each.id === id) ?? null}
-        chosen={also.includes(id)}
-        full={also.length >= MOST_RUNS}
-        onToggle={(on) => toggle(id, on)}
-      />
+      <li key={id} data-run={id}>
+        <Check
+          small={false}
+          label={details?.name ? `${details.name} (${id})` : id}
+          checked={selected}
+          disabled={!selected && others.length >= MOST_RUNS}
+          onChange={(on) => toggle(id, on)}
+        />
+        {details && <span class="muted small">{described(details, loaded?.spec.seed)}</span>}
+        <a class="small" href={jobPath(id)} aria-label={`Open job ${id}`}>
+          open
+        </a>
+      </li>
     )
   }
   return (
-    <section class="card run-card" aria-labelledby="runs">
-      <header class="row spread">
-        <h2 id="runs">Compared runs</h2>
+    <Card
+      class="run-card"
+      title="Compared runs"
+      tools={
         <span class="row">
-          {all.length > 0 && all.some((id) => !also.includes(id)) && (
-            <button type="button" class="compact primary" onClick={() => onChoose(all)}>
+          {all.some((id) => !others.includes(id)) && (
+            <button type="button" class="compact primary" onClick={() => onSelect(all)}>
               {listed.data?.next
                 ? `Compare the ${all.length + 1} runs listed here`
-                : `Compare all ${all.length + 1} runs on these ${words.items}`}
+                : `Compare all ${all.length + 1} runs on these ${items}`}
             </button>
           )}
-          <a class="button compact" href={nextRun(job, [...runs])}>
+          <a
+            class="button compact"
+            href={withQuery('/jobs/new', { clone: job.id, seed: unusedSeed })}
+          >
             Run with another seed
           </a>
         </span>
-      </header>
+      }
+    >
       <ul class="runs">
         <li>
           <label class="check">
@@ -77,24 +90,24 @@ export function RunPicker({
           </label>
           <span class="muted small">{described(job, job.spec.seed)}</span>
         </li>
-        {same.map(run)}
-        {listed.data && added.map(run)}
+        {same.map((each) => run(each.id, each))}
+        {added.map((id) => run(id))}
       </ul>
-      {also.length < MOST_RUNS && (
+      {others.length < MOST_RUNS && (
         <Combobox
           label="Add a run"
           chosenLabel=""
           placeholder="name, id, note or tag"
           hint={
             listed.data?.next
-              ? `Listed above: runs among the newest ${OFFERED} jobs on these ${words.items}. Search for others here.`
+              ? `Listed above: runs among the newest ${OFFERED} jobs on these ${items}. Search for others here.`
               : undefined
           }
           remote={{
             label: 'Jobs, newest first',
             search: jobSearch(job.kind, {
-              exclude: [job.id, ...also],
-              note: (other) => (isSameFit(other, job) ? '' : `different ${words.items}`),
+              exclude: [job.id, ...others],
+              note: (other) => (isSameFit(other, job) ? '' : `different ${items}`),
             }),
           }}
           onChoose={(id) => toggle(id, true)}
@@ -109,43 +122,7 @@ export function RunPicker({
       {listed.error && (
         <ErrorNotice what="Could not load other runs." error={listed.error} retry={listed.reload} />
       )}
-    </section>
-  )
-}
-
-function Run({
-  id,
-  summary,
-  job,
-  chosen,
-  full,
-  onToggle,
-}: {
-  id: string
-  summary: JobSummary | null
-  job: Job | null
-  chosen: boolean
-  /** Whether the maximum number of runs is selected. */
-  full: boolean
-  onToggle: (chosen: boolean) => void
-}) {
-  const details = summary ?? job
-  return (
-    <li data-run={id}>
-      <label class="check">
-        <input
-          type="checkbox"
-          checked={chosen}
-          disabled={!chosen && full}
-          onChange={(event) => onToggle(event.currentTarget.checked)}
-        />
-        {details?.name ? `${details.name} (${id})` : id}
-      </label>
-      {details && <span class="muted small">{described(details, job?.spec.seed)}</span>}
-      <a class="small" href={jobPath(id)} aria-label={`Open job ${id}`}>
-        open
-      </a>
-    </li>
+    </Card>
   )
 }
 
@@ -155,16 +132,10 @@ function described(job: JobSummary | Job, seed: number | undefined): string {
       ? 'no parameters yet'
       : `fitness ${quantity(job.best_fitness, fitnessUnit(job))}`
   const parts = [
-    seed === undefined ? null : `seed ${seed}`,
+    seed !== undefined && `seed ${seed}`,
     fitness,
     `${formatCount(job.iterations)} iterations`,
-    job.state === 'succeeded' ? null : job.state,
+    job.state !== 'succeeded' && job.state,
   ]
-  return parts.filter((part) => part !== null).join(' · ')
-}
-
-/** New-job form of the same job with an unused seed. */
-function nextRun(job: Job, runs: readonly Job[]): string {
-  const seed = Math.max(...runs.map(({ spec }) => spec.seed ?? 0)) + 1
-  return withQuery('/jobs/new', { clone: job.id, seed })
+  return parts.filter(Boolean).join(' · ')
 }

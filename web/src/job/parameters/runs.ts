@@ -13,11 +13,6 @@ export function runsOf(query: URLSearchParams, job: string): readonly string[] {
     .slice(0, MOST_RUNS)
 }
 
-/** Inverse of `runsOf`; null for no ids. */
-export function wordOfRuns(ids: readonly string[]): string | null {
-  return ids.length === 0 ? null : ids.join(',')
-}
-
 type Fitted = Pick<JobSummary, 'kind' | 'scenarios'>
 
 /** Whether two jobs are of the same kind and fitted to the same data. */

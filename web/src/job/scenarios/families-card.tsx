@@ -4,11 +4,13 @@ import { useState } from 'preact/hooks'
 import { get } from '../../api/client'
 import { useResource } from '../../api/resource'
 import type { Job, ScenarioFamilies, ScenarioLeftOut, ScenarioLoss } from '../../api/types'
-import { Empty, ErrorNotice, Loading } from '../../components/feedback'
+import { Card, Loaded } from '../../components/card'
+import { Empty } from '../../components/feedback'
+import { Select } from '../../components/fields/controls'
 import { type Column, Table } from '../../components/table/table'
 import { exactQuantity, formatCount, formatNumber, NONE, percent } from '../../format/number'
 import { withQuery } from '../../router/routes'
-import { Where } from '../designs/selected-designs'
+import { DesignLink } from '../columns'
 
 /** Choices for the largest tolerated regret. */
 const TOLERANCES = [0.005, 0.01, 0.02, 0.05]
@@ -18,47 +20,36 @@ export function ScenarioFamiliesCard({ job }: { job: Job }) {
   const families = useResource(`${job.id} ${job.best_iteration} ${tolerance}`, (signal) =>
     get('/v1/jobs/{job_id}/scenarios', { path: { job_id: job.id }, query: { tolerance }, signal }),
   )
-  const { data } = families
   return (
-    <section class="card" aria-labelledby="families" data-smallest={smallestOf(data)}>
-      <header class="row spread">
-        <h2 id="families">Required scenarios</h2>
-        <label class="row small">
-          <span>Tolerated regret</span>
-          <select
-            value={String(tolerance)}
-            onChange={(event) => setTolerance(Number(event.currentTarget.value))}
-          >
-            {TOLERANCES.map((share) => (
-              <option key={share} value={String(share)}>
-                {percent(share, 1)}
-              </option>
-            ))}
-          </select>
-        </label>
-      </header>
-      {families.error && (
-        <ErrorNotice
-          what="Could not analyse the scenarios."
-          error={families.error}
-          retry={families.reload}
+    <Card
+      title="Required scenarios"
+      data={{ 'data-smallest': families.data?.smallest?.scenarios.join(' ') ?? '' }}
+      tools={
+        <Select
+          label="Tolerated regret"
+          value={String(tolerance)}
+          options={TOLERANCES.map((share) => [String(share), percent(share, 1)] as const)}
+          onChoose={(share) => setTolerance(Number(share))}
         />
-      )}
-      {families.loading && !data && <Loading what="results of fewer scenarios" />}
-      {data &&
-        (data.left_out.length === 0 ? (
-          <Empty title="Only one scenario">
-            <p>This analysis requires a job with several scenarios.</p>
-          </Empty>
-        ) : (
-          <Families job={job} families={data} />
-        ))}
-    </section>
+      }
+    >
+      <Loaded
+        resource={families}
+        what="results of fewer scenarios"
+        failed="Could not analyse the scenarios."
+      >
+        {(data) =>
+          data.left_out.length === 0 ? (
+            <Empty title="Only one scenario">
+              <p>This analysis requires a job with several scenarios.</p>
+            </Empty>
+          ) : (
+            <Families job={job} families={data} />
+          )
+        }
+      </Loaded>
+    </Card>
   )
-}
-
-function smallestOf(families: ScenarioFamilies | null): string {
-  return families?.smallest?.scenarios.join(' ') ?? ''
 }
 
 function Families({ job, families }: { job: Job; families: ScenarioFamilies }) {
@@ -68,42 +59,28 @@ function Families({ job, families }: { job: Job; families: ScenarioFamilies }) {
       <Table
         caption="Results without one scenario"
         rows={families.left_out}
-        rowKey={({ scenario }) => scenario}
         rowData={({ scenario }) => ({ 'data-left-out': scenario })}
         columns={leftOutColumns(job)}
       />
-      <Table
+      <Table<ScenarioFamilies['sizes'][number]>
         caption="Sets of scenarios by size"
         rows={families.sizes}
-        rowKey={({ size }) => String(size)}
         columns={[
-          { key: 'size', label: 'Scenarios', header: true, value: ({ size }) => size },
+          { key: 'scenarios', header: true, value: ({ size }) => size },
+          { key: 'sets considered', numeric: true, value: ({ families }) => families },
           {
-            key: 'families',
-            label: 'Sets considered',
-            numeric: true,
-            value: ({ families }) => families,
-          },
-          {
-            key: 'median',
-            label: 'Median regret',
+            key: 'median regret',
             numeric: true,
             value: ({ median }) => median,
             cell: ({ median }) => shareWords(median),
           },
           {
             key: 'worst',
-            label: 'Worst',
             numeric: true,
             value: ({ worst }) => worst,
             cell: ({ worst }) => shareWords(worst),
           },
-          {
-            key: 'within',
-            label: 'Within tolerance',
-            numeric: true,
-            value: ({ within }) => within,
-          },
+          { key: 'within tolerance', numeric: true, value: ({ within }) => within },
         ]}
       />
       <p class="muted small">
@@ -151,42 +128,27 @@ function Smallest({
 
 function leftOutColumns(job: Job): readonly Column<ScenarioLeftOut>[] {
   return [
-    { key: 'scenario', label: 'Without', header: true, value: ({ scenario }) => scenario },
+    { key: 'without', header: true, value: ({ scenario }) => scenario },
     {
-      key: 'regret',
-      label: 'Regret over all',
+      key: 'regret over all',
       numeric: true,
       value: ({ family }) => family.regret.value,
       cell: ({ family }) => <LossCell loss={family.regret} />,
     },
     {
-      key: 'loss',
-      label: 'Loss in this scenario',
+      key: 'loss in this scenario',
       numeric: true,
       value: ({ loss }) => loss.value,
       cell: ({ loss }) => <LossCell loss={loss} />,
     },
     {
-      key: 'similar',
-      label: 'Most similar',
+      key: 'most similar',
       value: ({ similarity }) => similarity,
       cell: ({ similar, similarity }) =>
         similar === null ? NONE : `${similar} (${formatNumber(similarity, 2)})`,
     },
-    {
-      key: 'correlation',
-      label: 'Rank correlation',
-      numeric: true,
-      minor: true,
-      value: ({ family }) => family.correlation,
-      cell: ({ family }) => formatNumber(family.correlation, 3),
-    },
-    {
-      key: 'winner',
-      label: 'Winner',
-      minor: true,
-      cell: ({ family }) => <Where job={job} {...family} />,
-    },
+    { key: 'rank correlation', digits: 3, minor: true, value: ({ family }) => family.correlation },
+    { key: 'winner', minor: true, cell: ({ family }) => <DesignLink job={job} {...family} /> },
   ]
 }
 

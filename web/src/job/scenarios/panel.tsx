@@ -1,20 +1,22 @@
 /** Utilities and objectives of the winner by scenario, compared with a reference. */
 
+import { get } from '../../api/client'
+import { type Resource, useResource } from '../../api/resource'
 import { isPublished } from '../../api/robots'
-import type { Job, JobSpec, Preference, ScenarioResult } from '../../api/types'
-import { Empty, ErrorNotice, Loading } from '../../components/feedback'
+import type { Job, JobSpec, Preference, RecordingView, ScenarioResult } from '../../api/types'
+import { ChartCard, LegendEntry } from '../../charts/chart-card'
+import { Card, EmptyCard, Loaded } from '../../components/card'
 import { type Column, Table } from '../../components/table/table'
-import { change, formatNumber } from '../../format/number'
+import { change, formatNumber, quantity } from '../../format/number'
 import { capitalized, inWords } from '../../format/words'
 import { setQuery, usePlace } from '../../router/navigation'
 import { withQuery } from '../../router/routes'
+import { Bars } from '../bars'
 import { caseWords, fitnessUnit } from '../fitness'
 import { utilityOf } from '../preference'
 import { type Reference, ReferencePicker, useReference } from '../reference'
 import { ScenarioFamiliesCard } from './families-card'
 import './notes.css'
-import { caseLabel, type RecordingSummary, RecordingsCard, useRecordings } from './recordings'
-import { UtilityBars } from './utility-bars'
 
 interface Row {
   readonly scenario: string
@@ -29,69 +31,57 @@ interface Row {
 export function ScenariosPanel({ job }: { job: Job }) {
   const { query } = usePlace()
   const hasPublished = job.kind === 'tuning' && isPublished((job.spec as JobSpec).robot)
-  const byDefault = hasPublished ? 'published:fuzzy-pi:A' : 'none'
-  const choice = query.get('against') ?? byDefault
+  const choice = query.get('against') ?? (hasPublished ? 'published:fuzzy-pi:A' : 'none')
   const reference = useReference(job, choice)
   const recordings = useRecordings(job)
-  const isFit = job.kind === 'identification'
   const words = caseWords(job.kind)
   if (!job.best) {
     return (
-      <section class="card">
-        <Empty title="No winner yet">
-          <p>
-            No design has succeeded in every {words.item} yet. Results appear here once one has.
-          </p>
-        </Empty>
-      </section>
+      <EmptyCard title="No winner yet">
+        {`No design has succeeded in every ${words.item} yet. Results appear here once one has.`}
+      </EmptyCard>
     )
   }
   const rows = rowsOf(job, reference.data, recordings.data)
+  const label = reference.data?.label ?? null
   return (
     <div class="stack">
-      {isFit && <RecordingsCard recordings={recordings} />}
+      {job.kind === 'identification' && <RecordingsCard recordings={recordings} />}
       <div class="row spread">
         <ReferencePicker
           job={job}
           choice={choice}
-          label={reference.data?.label ?? null}
+          label={label}
           onChoose={(against) => setQuery({ against })}
         />
-        {reference.data && isRanked(job) && (
-          <Summary job={job} rows={rows} label={reference.data.label} />
-        )}
+        {label !== null && isRanked(job) && <Summary job={job} rows={rows} label={label} />}
       </div>
-      {reference.loading && <Loading what="the reference" />}
-      {reference.error && (
-        <ErrorNotice
-          what="Could not load the reference."
-          error={reference.error}
-          retry={reference.reload}
-        />
-      )}
-      <UtilityBars
-        unit={fitnessUnit(job)}
-        words={words}
-        rows={rows.map((r) => ({ name: r.label, winner: r.utility, other: r.otherUtility }))}
-        label={reference.data?.label ?? null}
-        table={() => <UtilityTable job={job} rows={rows} reference={reference.data} />}
-      />
-      <section class="card" aria-labelledby="objectives">
-        <h2 id="objectives">Objectives of the winner</h2>
+      <Loaded resource={reference} what="the reference" />
+      <UtilityCard job={job} rows={rows} label={label} />
+      <Card title="Objectives of the winner">
         <Table
           caption={`Objectives of the winner by ${words.item}`}
           rows={rows}
-          rowKey={(row) => row.scenario}
-          columns={objectiveColumns(job, reference.data)}
+          columns={objectiveColumns(job, label !== null)}
         />
-        {reference.data && (
+        {label !== null && (
           <p class="muted small table-note">
-            Each cell shows the winner, the reference ({reference.data.label}) and the relative
-            difference.{isRanked(job) && ' Lower is better.'}
+            Each cell shows the winner, the reference ({label}) and the relative difference.
+            {isRanked(job) && ' Lower is better.'}
           </p>
         )}
-        <ObjectiveNotes job={job} />
-      </section>
+        <details class="small notes-fold">
+          <summary>Descriptions of the objectives</summary>
+          <dl class="notes">
+            {job.objectives.map(({ name, description }) => (
+              <div key={name}>
+                <dt>{inWords(name)}</dt>
+                <dd class="muted">{description}</dd>
+              </div>
+            ))}
+          </dl>
+        </details>
+      </Card>
       {job.kind === 'tuning' && <ScenarioFamiliesCard job={job} />}
     </div>
   )
@@ -112,7 +102,8 @@ function rowsOf(
     const other = reference?.scenarios[scenario] ?? null
     // Preferences may differ between jobs: recompute utilities under this job's preference.
     const otherUtility = other && (preference ? utilityOf(other, preference) : other.utility)
-    const label = caseLabel(scenario, recordings)
+    const recording = recordings?.find(({ name }) => name === scenario)
+    const label = recording ? `${recording.scenario} (${scenario})` : scenario
     return { scenario, label, winner, other, utility: winner.utility, otherUtility }
   })
 }
@@ -127,15 +118,13 @@ function Summary({ job, rows, label }: { job: Job; rows: readonly Row[]; label: 
         {label} has no {words.item} in common with this job.
       </p>
     )
-  const ratio =
-    fitnessOf(
-      job,
-      both.map((r) => r.utility!),
-    ) /
-    fitnessOf(
-      job,
-      both.map((r) => r.otherUtility!),
-    )
+  const fitness = (part: 'utility' | 'otherUtility') => {
+    const values = both.map((row) => row[part]!)
+    const mean = (terms: readonly number[]) => terms.reduce((a, b) => a + b, 0) / terms.length
+    // Geometric mean (eq. 4.2); arithmetic mean of an identification's errors.
+    return job.kind === 'tuning' ? Math.exp(mean(values.map(Math.log))) : mean(values)
+  }
+  const ratio = fitness('utility') / fitness('otherUtility')
   const share = Math.abs(ratio - 1) * 100
   return (
     <p data-ratio={ratio}>
@@ -146,89 +135,95 @@ function Summary({ job, rows, label }: { job: Job; rows: readonly Row[]; label: 
   )
 }
 
-/** Geometric mean of utilities (eq. 4.2); arithmetic mean of an identification's errors. */
-function fitnessOf(job: Job, utilities: readonly number[]): number {
-  const mean = (values: readonly number[]) => values.reduce((a, b) => a + b, 0) / values.length
-  return job.kind === 'tuning' ? Math.exp(mean(utilities.map(Math.log))) : mean(utilities)
-}
-
-function UtilityTable({
+/** Bars of the winner's utilities, with those of a reference. label: of the reference, if any. */
+function UtilityCard({
   job,
   rows,
-  reference,
+  label,
 }: {
   job: Job
   rows: readonly Row[]
-  reference: Reference | null
+  label: string | null
 }) {
   const unit = fitnessUnit(job)
-  const words = caseWords(job.kind)
-  const columns: Column<Row>[] = [
-    {
-      key: 'scenario',
-      label: capitalized(words.item),
-      header: true,
-      value: (r) => r.label,
-    },
-    {
-      key: 'winner',
-      label: 'Winner',
-      unit,
-      numeric: true,
-      value: (r) => r.utility,
-      cell: (r) => formatNumber(r.utility),
-    },
-  ]
-  if (reference) {
-    columns.push({
-      key: 'other',
-      label: reference.label,
-      unit,
-      numeric: true,
-      value: (r) => r.otherUtility,
-      cell: (r) => formatNumber(r.otherUtility),
-    })
+  const { item, measure, note } = caseWords(job.kind)
+  const title = `${capitalized(measure)} by ${item}`
+  const bar = (value: number | null, colour: `--${string}`) => ({
+    value,
+    text: value === null ? 'not simulated' : quantity(value, unit),
+    colour,
+  })
+  const other: Column<Row> = {
+    key: 'other',
+    label: label ?? '',
+    unit,
+    digits: 4,
+    value: (r) => r.otherUtility,
   }
   return (
-    <Table
-      caption={`${capitalized(words.measure)} by ${words.item}`}
-      rows={rows}
-      rowKey={(r) => r.scenario}
-      columns={columns}
-    />
+    <ChartCard
+      title={title}
+      note={`${note}; lower is better. The ${item} with the longest bar limits the winner.`}
+      legend={
+        <>
+          <LegendEntry colour="--series-1" label="winner" area />
+          {label !== null && <LegendEntry colour="--series-6" label={label} area />}
+        </>
+      }
+      table={() => (
+        <Table<Row>
+          caption={title}
+          rows={rows}
+          columns={[
+            { key: item, header: true, value: (r) => r.label },
+            { key: 'winner', unit, digits: 4, value: (r) => r.utility },
+            ...(label === null ? [] : [other]),
+          ]}
+        />
+      )}
+    >
+      <Bars
+        rows={rows.map(({ label: name, utility, otherUtility }) => ({
+          name,
+          bars: [
+            bar(utility, '--series-1'),
+            ...(label === null ? [] : [bar(otherUtility, '--series-6')]),
+          ],
+        }))}
+        most={Math.max(...rows.flatMap((r) => [r.utility ?? 0, r.otherUtility ?? 0]), 1e-12)}
+      />
+    </ChartCard>
   )
 }
 
-function objectiveColumns(job: Job, reference: Reference | null): readonly Column<Row>[] {
+function objectiveColumns(job: Job, compared: boolean): readonly Column<Row>[] {
   const { iteration, particle } = job.best!
-  const walk = (scenario: string) =>
-    withQuery('/walk', { job: job.id, iteration, particle, scenario })
+  // Scenarios of perturbed worlds are not presets.
+  const isPreset = job.spec.kind === 'tuning' && !job.spec.worlds
   return [
     {
-      key: 'scenario',
-      label: capitalized(caseWords(job.kind).item),
+      key: caseWords(job.kind).item,
       header: true,
-      value: (row) => row.label,
-      cell: (row) =>
-        // Scenarios of perturbed worlds are not presets.
-        job.spec.kind === 'tuning' && !job.spec.worlds ? (
-          <a href={walk(row.scenario)}>{row.label}</a>
+      value: ({ label }) => label,
+      cell: ({ label, scenario }) =>
+        isPreset ? (
+          <a href={withQuery('/walk', { job: job.id, iteration, particle, scenario })}>{label}</a>
         ) : (
-          row.label
+          label
         ),
     },
     ...job.objectives.map(
-      (objective): Column<Row> => ({
-        key: objective.name,
-        label: inWords(objective.name),
-        unit: objective.unit,
+      ({ name, unit }): Column<Row> => ({
+        key: name,
+        label: inWords(name),
+        unit,
         numeric: true,
-        value: (row) => row.winner.objectives[objective.name] ?? null,
-        cell: (row) => (
+        value: ({ winner }) => winner.objectives[name] ?? null,
+        cell: ({ winner, other }) => (
           <Compared
             ranked={isRanked(job)}
-            winner={row.winner.objectives[objective.name]}
-            other={reference ? (row.other?.objectives[objective.name] ?? null) : undefined}
+            winner={winner.objectives[name]}
+            other={compared ? (other?.objectives[name] ?? null) : undefined}
           />
         ),
       }),
@@ -263,19 +258,49 @@ function Compared({
   )
 }
 
-/** Descriptions of the objectives. */
-function ObjectiveNotes({ job }: { job: Job }) {
+/** A recording without its samples. */
+interface RecordingSummary extends RecordingView {
+  /** Name in the results: the beginning of its id. */
+  readonly name: string
+}
+
+/** Recordings of an identification, in its order; no requests for other jobs. */
+function useRecordings({ spec, scenarios }: Job): Resource<readonly RecordingSummary[]> {
+  const ids = spec.kind === 'identification' ? spec.recordings : []
+  const path = '/v1/recordings/{recording_id}/summary'
+  return useResource(ids.length === 0 ? null : ids.join(), (signal) =>
+    Promise.all(
+      ids.map(async (id, k) => {
+        const recording = await get(path, { path: { recording_id: id }, signal })
+        return { ...recording, name: scenarios[k] }
+      }),
+    ),
+  )
+}
+
+function RecordingsCard({ recordings }: { recordings: Resource<readonly RecordingSummary[]> }) {
   return (
-    <details class="small notes-fold">
-      <summary>Descriptions of the objectives</summary>
-      <dl class="notes">
-        {job.objectives.map(({ name, description }) => (
-          <div key={name}>
-            <dt>{inWords(name)}</dt>
-            <dd class="muted">{description}</dd>
-          </div>
-        ))}
-      </dl>
-    </details>
+    <Card title="Recordings">
+      <Loaded resource={recordings} what="the recordings">
+        {(rows) => (
+          <Table<RecordingSummary>
+            caption="Recordings"
+            rows={rows}
+            columns={[
+              { key: 'recording', header: true, value: (r) => r.name },
+              { key: 'scenario', value: (r) => r.scenario },
+              { key: 'controller', minor: true, value: (r) => r.controller },
+              {
+                key: 'source',
+                minor: true,
+                value: (r) => (r.synthetic ? 'simulated' : 'measured'),
+              },
+              { key: 'duration', unit: 's', digits: 3, value: (r) => r.seconds },
+              { key: 'mean current', unit: 'A', digits: 3, value: (r) => r.mean_current },
+            ]}
+          />
+        )}
+      </Loaded>
+    </Card>
   )
 }

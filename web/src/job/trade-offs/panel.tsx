@@ -1,18 +1,20 @@
 /** Pareto front of a job, and the preferences that select its designs. */
 
-import { useRef } from 'preact/hooks'
 import { get, getBytes } from '../../api/client'
 import { useResource, useSlowly } from '../../api/resource'
-import type { Front, Job } from '../../api/types'
-import { Empty, ErrorNotice, Loading } from '../../components/feedback'
-import { formatCount } from '../../format/number'
+import type { Front, FrontWinner, Job } from '../../api/types'
+import { Card, EmptyCard, Loaded } from '../../components/card'
+import { Table } from '../../components/table/table'
+import { formatCount, formatNumber, percent } from '../../format/number'
 import { type Place, placeOf, placeWord } from '../../format/place'
+import { capitalized } from '../../format/words'
 import { setQuery, usePlace } from '../../router/navigation'
-import { decodeParticles, type Particles } from '../designs/particles'
-import { HypervolumeCard } from './hypervolume-card'
+import { IterationChart } from '../by-iteration'
+import { designColumn, objectiveColumns } from '../columns'
+import { decodeParticles } from '../designs/particles'
+import { ownerWords } from './designs'
 import { PreferenceCard } from './preference-card'
-import { ScatterCard } from './scatter-card'
-import { WinnersCard } from './winners-card'
+import { fitColumn, ScatterCard } from './scatter-card'
 
 /** Polling interval while the job runs [ms]. */
 const RENEW_MS = 8000
@@ -20,68 +22,117 @@ const RENEW_MS = 8000
 const MOST_DRAWN = 5000
 
 export function TradeOffsPanel({ job }: { job: Job }) {
-  if (job.best_fitness === null) {
+  const selected = placeOf(usePlace().query.get('design'))
+  const iterations = useSlowly(job.iterations, RENEW_MS)
+  const exists = job.best_fitness !== null
+  const path = { job_id: job.id }
+  const front = useResource(
+    exists ? `${job.id} ${iterations}` : null,
+    (signal) => get('/v1/jobs/{job_id}/front', { path, signal }),
+    { keep: true },
+  )
+  const all = useResource(
+    exists ? `${job.id} ${iterations} all` : null,
+    (signal) => {
+      const query = { objectives: true, max_points: MOST_DRAWN }
+      return getBytes('/v1/jobs/{job_id}/particles', { path, query, signal }).then(decodeParticles)
+    },
+    { keep: true },
+  )
+  if (!exists) {
     return (
-      <section class="card">
-        <Empty title="No front yet">
-          <p>The front appears here once a design has succeeded in every scenario.</p>
-        </Empty>
-      </section>
+      <EmptyCard title="No front yet">
+        The front appears here once a design has succeeded in every scenario.
+      </EmptyCard>
     )
   }
-  return <TradeOffs job={job} />
-}
-
-function TradeOffs({ job }: { job: Job }) {
-  const { query } = usePlace()
-  const iterations = useSlowly(job.iterations, RENEW_MS)
-  const loadedFront = useResource(`${job.id} ${iterations}`, (signal) =>
-    get('/v1/jobs/{job_id}/front', { path: { job_id: job.id }, signal }),
-  )
-  // Keep the previous result while the next one loads.
-  const shown = useRef<Front | null>(null)
-  if (loadedFront.data) shown.current = loadedFront.data
-  const front = shown.current
-  const particles = useResource(`${job.id} ${iterations} all`, (signal) =>
-    getBytes('/v1/jobs/{job_id}/particles', {
-      path: { job_id: job.id },
-      query: { objectives: true, max_points: MOST_DRAWN },
-      signal,
-    }).then(decodeParticles),
-  )
-  const all = useRef<Particles | null>(null)
-  if (particles.data) all.current = particles.data
-  const chosen = placeOf(query.get('design'))
-  const choose = (place: Place) => setQuery({ design: placeWord(place) })
+  const select = (place: Place) => setQuery({ design: placeWord(place) })
   return (
     <div class="stack">
-      {loadedFront.error && (
-        <ErrorNotice
-          what="Could not load the front."
-          error={loadedFront.error}
-          retry={loadedFront.reload}
-        />
-      )}
-      {!front && loadedFront.loading && <Loading what="the front" />}
-      {front && (
-        <>
-          <p data-front={front.size} data-knees={front.knees.length}>
-            <strong>{formatCount(front.size)}</strong> of {formatCount(front.designs_judged)}{' '}
-            successful designs are on the Pareto front: no other design is at least as good in every
-            objective and better in one.
-          </p>
-          <ScatterCard
-            job={job}
-            front={front}
-            all={all.current}
-            chosen={chosen}
-            onChoose={choose}
-          />
-          <PreferenceCard job={job} chosen={chosen} />
-          <WinnersCard job={job} front={front} onChoose={choose} />
-          <HypervolumeCard front={front} />
-        </>
-      )}
+      <Loaded resource={front} what="the front">
+        {(data) => (
+          <>
+            <p data-front={data.size} data-knees={data.knees.length}>
+              <strong>{formatCount(data.size)}</strong> of {formatCount(data.designs_judged)}{' '}
+              successful designs are on the Pareto front: no other design is at least as good in
+              every objective and better in one.
+            </p>
+            <ScatterCard
+              job={job}
+              front={data}
+              all={all.data}
+              selected={selected}
+              onSelect={select}
+            />
+            <PreferenceCard job={job} selected={selected} />
+            <WinnersCard job={job} front={data} onSelect={select} />
+            <HypervolumeCard front={data} />
+          </>
+        )}
+      </Loaded>
     </div>
+  )
+}
+
+/** Best designs under A, B, C and the job's preference, and their positions relative to the front. */
+function WinnersCard({
+  job,
+  front,
+  onSelect,
+}: {
+  job: Job
+  front: Front
+  onSelect: (place: Place) => void
+}) {
+  return (
+    <Card title="Winners by preference">
+      <Table<FrontWinner>
+        caption="Best designs by preference"
+        rows={front.winners}
+        rowData={(winner) => ({
+          'data-preference': winner.preference,
+          'data-place': placeWord(winner),
+        })}
+        columns={[
+          {
+            key: 'best under',
+            header: true,
+            value: ({ preference }) => capitalized(ownerWords(preference)),
+          },
+          designColumn(job),
+          {
+            key: 'on the front',
+            value: ({ dominated_by }) => dominated_by,
+            cell: ({ on_front, dominated_by, behind }) =>
+              on_front
+                ? 'yes'
+                : `no: dominated by ${formatCount(dominated_by)}, one of them ${percent(behind, 2)} better in every objective`,
+          },
+          ...objectiveColumns(front.objectives),
+          fitColumn(null, onSelect),
+        ]}
+      />
+      <p class="muted small table-note">
+        Biases apply in each scenario separately, so a design that is dominated over all scenarios
+        can still win.
+      </p>
+    </Card>
+  )
+}
+
+function HypervolumeCard({ front }: { front: Front }) {
+  const { iterations, hypervolume, hypervolume_error: error } = front
+  const now = formatNumber(hypervolume, 4) + (error > 0 ? ` ± ${formatNumber(error, 1)}` : '')
+  return (
+    <IterationChart
+      title="Hypervolume"
+      note={`Share of the box between ideal and reference point that the front dominates, on logarithmic axes. It never decreases. Current value: ${now}.`}
+      label={`Hypervolume over ${iterations.length} iterations, now ${now}`}
+      rows={iterations}
+      name="hypervolume"
+      value={(row) => row.hypervolume}
+      fromZero
+      height={220}
+    />
   )
 }

@@ -1,77 +1,72 @@
-/** Preferences under which a chosen design wins. */
+/** Preferences under which a selected design wins. */
 
 import { get } from '../../api/client'
 import { useResource } from '../../api/resource'
 import type { Job, PreferenceFit, PreferenceFor } from '../../api/types'
-import { Empty, ErrorNotice, Loading } from '../../components/feedback'
+import { Card, Loaded } from '../../components/card'
+import { Empty } from '../../components/feedback'
 import { type Column, Table } from '../../components/table/table'
 import { formatCount, formatExact, formatNumber, NONE, percent } from '../../format/number'
 import { type Place, placeWord } from '../../format/place'
 import { inWords } from '../../format/words'
 import { jobPath, withQuery } from '../../router/routes'
-import { Where } from '../designs/selected-designs'
+import { DesignLink } from '../columns'
 import { preferenceQuery, weighed } from '../preference'
 import { ownerWords } from './designs'
 
-export function PreferenceCard({ job, chosen }: { job: Job; chosen: Place | null }) {
-  const key = chosen && `${job.id} ${job.iterations} ${placeWord(chosen)}`
+export function PreferenceCard({ job, selected }: { job: Job; selected: Place | null }) {
+  const key = selected && `${job.id} ${job.iterations} ${placeWord(selected)}`
   const preferenceFor = useResource(key, (signal) =>
-    get('/v1/jobs/{job_id}/preference-for', { path: { job_id: job.id }, query: chosen!, signal }),
+    get('/v1/jobs/{job_id}/preference-for', { path: { job_id: job.id }, query: selected!, signal }),
   )
   return (
-    <section
-      class="card"
-      aria-labelledby="preference-for"
-      aria-live="polite"
-      data-chosen={chosen ? placeWord(chosen) : ''}
+    <Card
+      title="Preference for a design"
+      data={{ 'data-selected-design': selected ? placeWord(selected) : '' }}
     >
-      <h2 id="preference-for">Preference for a design</h2>
-      {!chosen && (
-        <Empty title="No design chosen">
-          <p>Click a design in the chart, or choose one in a table.</p>
-        </Empty>
-      )}
-      {preferenceFor.error && (
-        <ErrorNotice
-          what="Could not find a preference."
-          error={preferenceFor.error}
-          retry={preferenceFor.reload}
-        />
-      )}
-      {chosen && preferenceFor.loading && !preferenceFor.data && <Loading what="the preference" />}
-      {chosen && preferenceFor.data && <Fits job={job} preferenceFor={preferenceFor.data} />}
-    </section>
+      <div aria-live="polite">
+        {selected ? (
+          <Loaded
+            resource={preferenceFor}
+            what="the preference"
+            failed="Could not find a preference."
+          >
+            {(data) => <Fits job={job} preferenceFor={data} />}
+          </Loaded>
+        ) : (
+          <Empty title="No design chosen">
+            <p>Click a design in the chart, or choose one in a table.</p>
+          </Empty>
+        )}
+      </div>
+    </Card>
   )
 }
 
 function Fits({ job, preferenceFor }: { job: Job; preferenceFor: PreferenceFor }) {
-  const { chosen, fits, wins } = preferenceFor
+  const { chosen: design, fits, wins } = preferenceFor
+  const { iteration, particle } = design
   const [best] = fits
   const query = { preference: preferenceQuery(best.preference) }
-  const start = withQuery('/jobs/new', {
-    clone: job.id,
-    ...query,
-    iteration: chosen.iteration,
-    particle: chosen.particle,
-  })
   return (
     <div class="stack" data-wins={wins}>
       <p>
-        <Where job={job} iteration={chosen.iteration} particle={chosen.particle} />{' '}
-        {verdict(preferenceFor)}
+        <DesignLink job={job} iteration={iteration} particle={particle} /> {verdict(preferenceFor)}
       </p>
       <p class="row">
         <a class="button compact" href={withQuery(jobPath(job.id, 'preferences'), query)}>
           Rank the history with it
         </a>
-        <a class="button primary compact" href={start}>
+        <a
+          class="button primary compact"
+          href={withQuery('/jobs/new', { clone: job.id, ...query, iteration, particle })}
+        >
           Start a job with it
         </a>
       </p>
       <Table
         caption="Preferences for the design, by biases"
         rows={fits}
-        rowKey={({ biases_of }) => biases_of.join()}
         columns={fitColumns(job, best)}
       />
       <p class="muted small table-note">
@@ -83,24 +78,23 @@ function Fits({ job, preferenceFor }: { job: Job; preferenceFor: PreferenceFor }
 }
 
 function verdict({ wins, certain, on_front, fits: [best] }: PreferenceFor): string {
-  const whose = best.biases_of.map(ownerWords).join(', ')
+  const owners = best.biases_of.map(ownerWords).join(', ')
   if (wins) {
     const lead =
       best.margin === null ? '' : `; under it, the next design is ${percent(best.margin, 2)} worse`
-    return `is the best design of the job with the biases of ${whose} and the exponents below${lead}.`
+    return `is the best design of the job with the biases of ${owners} and the exponents below${lead}.`
   }
   const front = on_front ? '' : ' Other designs dominate it.'
   const proof = certain
     ? 'With these biases, there is no preference under which it is the best.'
     : 'No preference was found under which it is the best.'
-  return `has rank ${formatCount(best.rank)} at best, with the biases of ${whose}.${front} ${proof}`
+  return `has rank ${formatCount(best.rank)} at best, with the biases of ${owners}.${front} ${proof}`
 }
 
 function fitColumns(job: Job, best: PreferenceFit): readonly Column<PreferenceFit>[] {
   return [
     {
-      key: 'biases',
-      label: 'Biases of',
+      key: 'biases of',
       header: true,
       value: ({ biases_of }) => biases_of.map(ownerWords).join(', '),
     },
@@ -117,19 +111,17 @@ function fitColumns(job: Job, best: PreferenceFit): readonly Column<PreferenceFi
         ),
       }),
     ),
-    { key: 'rank', label: 'Rank', numeric: true, value: ({ rank }) => rank },
+    { key: 'rank', numeric: true, value: ({ rank }) => rank },
     {
-      key: 'margin',
-      label: 'Lead',
+      key: 'lead',
       unit: '%',
       numeric: true,
       value: ({ margin }) => margin,
       cell: ({ margin }) => (margin === null ? NONE : formatNumber(margin * 100, 3)),
     },
     {
-      key: 'rival',
-      label: 'Closest rival',
-      cell: ({ rival }) => (rival ? <Where job={job} {...rival} /> : NONE),
+      key: 'closest rival',
+      cell: ({ rival }) => (rival ? <DesignLink job={job} {...rival} /> : NONE),
     },
   ]
 }

@@ -3,65 +3,72 @@
 import { useMemo } from 'preact/hooks'
 import { useResource } from '../../api/resource'
 import { isPublished } from '../../api/robots'
-import type { Front, Job, JobSpec } from '../../api/types'
+import type { Front, FrontDesign, Job, JobSpec } from '../../api/types'
 import { ChartCard, LegendEntry } from '../../charts/chart-card'
 import { Scatter } from '../../charts/scatter/scatter'
 import { ErrorNotice } from '../../components/feedback'
 import { Check } from '../../components/fields/controls'
-import { formatCount } from '../../format/number'
+import { type Column, Table } from '../../components/table/table'
+import { formatCount, NONE } from '../../format/number'
 import { type Place, placeWord } from '../../format/place'
-import { capitalized, inWords } from '../../format/words'
+import { inWords } from '../../format/words'
 import { setQuery, usePlace } from '../../router/navigation'
-import { flag, useQueryValue } from '../../router/query-value'
+import { flag, PAGE_NUMBER, useQueryValue } from '../../router/query-value'
+import { AxisSelect } from '../axis-select'
+import { designColumn, objectiveColumns } from '../columns'
 import type { Particles } from '../designs/particles'
 import { selectedRows } from '../designs/selection'
-import { publishedWalks } from '../reference'
+import { publishedReferences } from '../reference'
 import {
   allCloud,
   axesOf,
   frontCloud,
   marksOf,
+  type PublishedDesign,
   publishedDesign,
   publishedMarks,
   selectedCloud,
 } from './designs'
-import { FrontTable, PublishedTable } from './front-table'
 
 export function ScatterCard({
   job,
   front,
   all,
-  chosen,
-  onChoose,
+  selected,
+  onSelect,
 }: {
   job: Job
   front: Front
   /** Designs drawn behind the front; null while loading. */
   all: Particles | null
-  chosen: Place | null
-  onChoose: (place: Place) => void
+  selected: Place | null
+  onSelect: (place: Place) => void
 }) {
   const { query } = usePlace()
   const [logarithmic, setLogarithmic] = useQueryValue('log', flag(true), true)
   const [x, y] = axesOf(front, query.get('x'), query.get('y'))
   const brush = query.get('brush')
-  const selected = useMemo(() => all && selectedRows(all, brush), [all, brush])
+  const brushed = useMemo(() => all && selectedRows(all, brush), [all, brush])
   const clouds = useMemo(() => {
     const behind = all && allCloud(all, x, y)
-    const marked = all && selected && selectedCloud(all, selected, x, y)
+    const marked = all && brushed && selectedCloud(all, brushed, x, y)
     return [behind, marked, frontCloud(front, x, y)].filter((cloud) => cloud !== null)
-  }, [front, all, selected, x, y])
+  }, [front, all, brushed, x, y])
   // With worlds, an objective is not a mean over scenarios.
   const { worlds, robot } = job.spec as JobSpec
   const comparable = !worlds && isPublished(robot)
   const showPublished = comparable && query.has('published')
-  const published = usePublished(job, front, showPublished)
+  // Those that succeed in all scenarios of the job.
+  const published = useResource(showPublished ? `published ${job.id}` : null, async () => {
+    const references = await publishedReferences(job)
+    return references.map((each) => publishedDesign(front, each)).filter((each) => each !== null)
+  })
   const marks = useMemo(
     () => [...marksOf(front, x, y), ...publishedMarks(published.data ?? [], x, y)],
     [front, published.data, x, y],
   )
   const index = front.designs.findIndex(
-    (design) => chosen !== null && placeWord(design) === placeWord(chosen),
+    (design) => selected !== null && placeWord(design) === placeWord(selected),
   )
   const unit = (name: string) => front.objectives.find((o) => o.name === name)!.unit
   const listed =
@@ -74,35 +81,32 @@ export function ScatterCard({
       note={`Each objective is its geometric mean over the scenarios; lower is better.${listed} Click a design to find the preference that selects it.`}
       tools={
         <>
-          <AxisPicker
-            label="across"
-            front={front}
-            chosen={x}
+          <AxisSelect
+            label="Across"
+            axes={front.objectives}
+            x={x}
             other={y}
-            onChoose={(name) => setQuery({ x: name, y })}
+            onSelect={(name) => setQuery({ x: name, y })}
           />
-          <AxisPicker
-            label="up"
-            front={front}
-            chosen={y}
+          <AxisSelect
+            label="Up"
+            axes={front.objectives}
+            x={y}
             other={x}
-            onChoose={(name) => setQuery({ x, y: name })}
+            onSelect={(name) => setQuery({ x, y: name })}
           />
           {comparable && (
-            <label class="check small">
-              <input
-                type="checkbox"
-                checked={showPublished}
-                onChange={() => setQuery({ published: showPublished ? null : '' })}
-              />
-              published designs
-            </label>
+            <Check
+              label="published designs"
+              checked={showPublished}
+              onChange={(on) => setQuery({ published: on ? '' : null })}
+            />
           )}
-          {selected && (
+          {brushed && (
             <button
               type="button"
               class="compact"
-              data-selected={selected.length}
+              data-selected={brushed.length}
               onClick={() => setQuery({ brush: null })}
             >
               Select all
@@ -115,10 +119,10 @@ export function ScatterCard({
         <>
           <LegendEntry colour="--series-1" label="front" area />
           <LegendEntry colour="--series-6" label="other designs" area />
-          {selected && (
+          {brushed && (
             <LegendEntry
               colour="--text"
-              label={`${formatCount(selected.length)} selected in Variables`}
+              label={`${formatCount(brushed.length)} selected in Variables`}
               area
             />
           )}
@@ -134,8 +138,17 @@ export function ScatterCard({
       }
       table={() => (
         <>
-          <FrontTable job={job} front={front} chosen={chosen} onChoose={onChoose} />
-          {published.data && <PublishedTable front={front} designs={published.data} />}
+          <FrontTable job={job} front={front} selected={selected} onSelect={onSelect} />
+          {published.data && (
+            <Table<PublishedDesign>
+              caption="Published designs"
+              rows={published.data}
+              columns={[
+                { key: 'design', header: true, value: ({ label }) => label },
+                ...objectiveColumns(front.objectives),
+              ]}
+            />
+          )}
         </>
       )}
     >
@@ -156,44 +169,60 @@ export function ScatterCard({
         marks={marks}
         logarithmic={logarithmic}
         chosen={index < 0 ? null : index}
-        onChoose={(k) => onChoose(front.designs[k])}
+        onChoose={(k) => onSelect(front.designs[k])}
       />
     </ChartCard>
   )
 }
 
-/** Published designs that succeed in all scenarios of the job; simulated on demand. */
-function usePublished(job: Job, front: Front, showPublished: boolean) {
-  return useResource(showPublished ? `published ${job.id}` : null, async () => {
-    const walks = await publishedWalks(job)
-    return walks.map((walk) => publishedDesign(front, walk)).filter((design) => design !== null)
-  })
-}
-
-function AxisPicker({
-  label,
+function FrontTable({
+  job,
   front,
-  chosen,
-  other,
-  onChoose,
+  selected,
+  onSelect,
 }: {
-  label: string
+  job: Job
   front: Front
-  chosen: string
-  /** Objective of the other axis. */
-  other: string
-  onChoose: (name: string) => void
+  selected: Place | null
+  onSelect: (place: Place) => void
 }) {
   return (
-    <label class="row small">
-      <span>{capitalized(label)}</span>
-      <select value={chosen} onChange={(event) => onChoose(event.currentTarget.value)}>
-        {front.objectives.map(({ name }) => (
-          <option key={name} value={name} disabled={name === other}>
-            {inWords(name)}
-          </option>
-        ))}
-      </select>
-    </label>
+    <Table<FrontDesign>
+      caption="Designs of the front"
+      rows={front.designs}
+      rowKey={placeWord}
+      paging={useQueryValue('page', PAGE_NUMBER, 0)}
+      order={{ column: 'property', descending: false }}
+      pageSize={20}
+      columns={[
+        designColumn(job, true),
+        {
+          key: 'property',
+          value: ({ marks }) => (marks.length === 0 ? null : marks.join(', ')),
+          cell: ({ marks }) => (marks.length === 0 ? NONE : marks.map(inWords).join(', ')),
+        },
+        ...objectiveColumns(front.objectives),
+        { key: 'fitness', digits: 5, value: ({ fitness }) => fitness },
+        fitColumn(selected, onSelect),
+      ]}
+    />
   )
+}
+
+/** Buttons that fit a preference to the row's design. */
+export function fitColumn(selected: Place | null, onSelect: (place: Place) => void): Column<Place> {
+  return {
+    key: 'preference',
+    cell: (design) => (
+      <button
+        type="button"
+        class="compact"
+        aria-pressed={selected !== null && placeWord(selected) === placeWord(design)}
+        aria-label={`Find the preference that selects design ${placeWord(design)}`}
+        onClick={() => onSelect(design)}
+      >
+        Find
+      </button>
+    ),
+  }
 }

@@ -8,6 +8,7 @@ import {
   valueAt,
 } from '../../charts/parallel/parallel-model'
 import { BrokenName } from '../../components/broken-name'
+import { Select } from '../../components/fields/controls'
 import { NumberField } from '../../components/fields/number-field'
 import { Unit } from '../../components/unit'
 import { inWords } from '../../format/words'
@@ -67,20 +68,16 @@ function Bound({
   const label = `${axis.name} ${name}`
   if (axis.choices.length > 0) {
     return (
-      <label class="row small">
+      <div class="row small">
         {name}
-        <select
-          aria-label={label}
-          value={Math.round(valueAt(axis, place))}
-          onChange={(event) => onChange(event.currentTarget.value)}
-        >
-          {axis.choices.map((choice, index) => (
-            <option key={choice} value={index}>
-              {inWords(choice)}
-            </option>
-          ))}
-        </select>
-      </label>
+        <Select
+          hidden
+          label={label}
+          value={String(Math.round(valueAt(axis, place)))}
+          options={axis.choices.map((choice, index) => [String(index), inWords(choice)] as const)}
+          onChoose={onChange}
+        />
+      </div>
     )
   }
   return (

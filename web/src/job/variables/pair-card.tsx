@@ -7,27 +7,28 @@ import { type Brushes, withBrush } from '../../charts/parallel/parallel-coordina
 import type { Axis, ParallelModel } from '../../charts/parallel/parallel-model'
 import { valueAt } from '../../charts/parallel/parallel-model'
 import { Check } from '../../components/fields/controls'
-import { type Column, Table } from '../../components/table/table'
-import { formatCount, formatExact, formatNumber } from '../../format/number'
+import { Table } from '../../components/table/table'
+import { formatCount, formatExact } from '../../format/number'
 import { inWords } from '../../format/words'
 import { setQuery, usePlace } from '../../router/navigation'
 import { flag, useQueryValue } from '../../router/query-value'
+import { AxisSelect } from '../axis-select'
 
 export function PairCard({
   model,
   selected,
   brushes,
   onBrush,
-  chosen,
-  onChoose,
+  marked,
+  onMark,
 }: {
   model: ParallelModel
   selected: Uint32Array
   brushes: Brushes
   onBrush: (brushes: Brushes) => void
   /** Highlighted row; null for none. */
-  chosen: number | null
-  onChoose: (row: number) => void
+  marked: number | null
+  onMark: (row: number) => void
 }) {
   const { query } = usePlace()
   const index = (name: string | null) => model.axes.findIndex((axis) => axis.name === name)
@@ -45,16 +46,25 @@ export function PairCard({
       note={`Drag to select designs in all charts; click a design to highlight it.${sampled}`}
       tools={
         <>
-          <AxisPicker label="Across" axes={model.axes} chosen={x} other={y} name="x" />
-          <AxisPicker label="Up" axes={model.axes} chosen={y} other={x} name="y" />
-          <label class="check small">
-            <input
-              type="checkbox"
-              checked={asCells}
-              onChange={() => setQuery({ as: asCells ? null : 'ranks' })}
-            />
-            mean rank by cell
-          </label>
+          <AxisSelect
+            label="Across"
+            axes={model.axes}
+            x={across.name}
+            other={up.name}
+            onSelect={(name) => setQuery({ x: name })}
+          />
+          <AxisSelect
+            label="Up"
+            axes={model.axes}
+            x={up.name}
+            other={across.name}
+            onSelect={(name) => setQuery({ y: name })}
+          />
+          <Check
+            label="mean rank by cell"
+            checked={asCells}
+            onChange={(on) => setQuery({ as: on ? 'ranks' : null })}
+          />
           <Check label="isolines" checked={isolines} onChange={setIsolines} />
         </>
       }
@@ -76,42 +86,12 @@ export function PairCard({
         asCells={asCells}
         isolines={isolines}
         brushes={[brushes.get(x) ?? null, brushes.get(y) ?? null]}
-        chosen={chosen}
+        chosen={marked}
         label={`${formatCount(selected.length)} designs by ${inWords(across.name)} and ${inWords(up.name)}`}
         onSelect={(a, b) => onBrush(withBrush(withBrush(brushes, x, a), y, b))}
-        onChoose={onChoose}
+        onChoose={onMark}
       />
     </ChartCard>
-  )
-}
-
-function AxisPicker({
-  label,
-  axes,
-  chosen,
-  other,
-  name,
-}: {
-  label: string
-  axes: readonly Axis[]
-  chosen: number
-  other: number
-  name: 'x' | 'y'
-}) {
-  return (
-    <label class="row small">
-      <span>{label}</span>
-      <select
-        value={axes[chosen].name}
-        onChange={(event) => setQuery({ [name]: event.currentTarget.value })}
-      >
-        {axes.map((axis, k) => (
-          <option key={axis.name} value={axis.name} disabled={k === other}>
-            {inWords(axis.name)}
-          </option>
-        ))}
-      </select>
-    </label>
   )
 }
 
@@ -131,41 +111,37 @@ function CellTable({
   const [across, up] = [model.axes[x], model.axes[y]]
   const stretch = (axis: Axis, at: number) =>
     [at, at + 1].map((end) => formatExact(valueAt(axis, end / CELLS), 4)).join(' to ')
-  const columns: Column<Row>[] = [
-    {
-      key: 'x',
-      label: inWords(across.name),
-      unit: across.unit,
-      header: true,
-      value: ({ column }) => column,
-      data: ({ column }) => stretch(across, column),
-      cell: ({ column }) => stretch(across, column),
-    },
-    {
-      key: 'y',
-      label: inWords(up.name),
-      unit: up.unit,
-      value: ({ row }) => row,
-      data: ({ row }) => stretch(up, row),
-      cell: ({ row }) => stretch(up, row),
-    },
-    { key: 'designs', label: 'Designs', numeric: true, value: ({ designs }) => designs },
-    {
-      key: 'rank',
-      label: 'Mean rank, in twelfths',
-      numeric: true,
-      value: ({ bucket }) => bucket,
-      data: ({ bucket }) => (bucket === null ? null : bucket + 1),
-      cell: ({ bucket }) => formatNumber(bucket === null ? null : bucket + 1, 3),
-    },
-  ]
   return (
-    <Table
+    <Table<Row>
       caption="Designs by cell"
       rows={cells}
-      rowKey={({ column, row }) => `${column} ${row}`}
       order={{ column: 'rank', descending: false }}
-      columns={columns}
+      columns={[
+        {
+          key: 'x',
+          label: inWords(across.name),
+          unit: across.unit,
+          header: true,
+          value: ({ column }) => column,
+          data: ({ column }) => stretch(across, column),
+          cell: ({ column }) => stretch(across, column),
+        },
+        {
+          key: 'y',
+          label: inWords(up.name),
+          unit: up.unit,
+          value: ({ row }) => row,
+          data: ({ row }) => stretch(up, row),
+          cell: ({ row }) => stretch(up, row),
+        },
+        { key: 'designs', numeric: true, value: ({ designs }) => designs },
+        {
+          key: 'rank',
+          label: 'Mean rank, in twelfths',
+          digits: 3,
+          value: ({ bucket }) => (bucket === null ? null : bucket + 1),
+        },
+      ]}
       pageSize={20}
     />
   )

@@ -1,6 +1,6 @@
 /** All designs of a job by variable, coloured by fitness, with brushing. */
 
-import { useMemo, useRef, useState } from 'preact/hooks'
+import { useMemo, useState } from 'preact/hooks'
 import { getBytes } from '../../api/client'
 import { useResource, useSlowly } from '../../api/resource'
 import type { Job } from '../../api/types'
@@ -12,7 +12,9 @@ import {
   type ParallelModel,
   selectRows,
 } from '../../charts/parallel/parallel-model'
-import { Empty, ErrorNotice, Loading } from '../../components/feedback'
+import { Card, EmptyCard, Loaded } from '../../components/card'
+import { Empty } from '../../components/feedback'
+import { Check } from '../../components/fields/controls'
 import { formatCount } from '../../format/number'
 import { type Place, placeOf, placeWord } from '../../format/place'
 import { ignore } from '../../router/ignored'
@@ -31,43 +33,36 @@ const RENEW_MS = 8000
 
 export function VariablesPanel({ job }: { job: Job }) {
   const iterations = useSlowly(job.iterations, RENEW_MS)
-  const particles = useResource(`${job.id} ${iterations}`, (signal) =>
-    getBytes('/v1/jobs/{job_id}/particles', {
-      path: { job_id: job.id },
-      query: { objectives: job.kind === 'tuning' },
-      signal,
-    }).then(decodeParticles),
+  const particles = useResource(
+    `${job.id} ${iterations}`,
+    (signal) =>
+      getBytes('/v1/jobs/{job_id}/particles', {
+        path: { job_id: job.id },
+        query: { objectives: job.kind === 'tuning' },
+        signal,
+      }).then(decodeParticles),
+    { keep: true },
   )
-  // Keep the previous designs while newer ones load.
-  const shown = useRef<Particles | null>(null)
-  if (particles.data) shown.current = particles.data
-  if (particles.error && !shown.current) {
-    return (
-      <ErrorNotice
-        what="Could not load the designs."
-        error={particles.error}
-        retry={particles.reload}
-      />
-    )
-  }
-  if (!shown.current) return <Loading what="all designs" />
-  if (shown.current.rows === 0) {
-    return (
-      <section class="card">
-        <Empty title="No designs yet">
-          <p>Designs appear here after the first iteration.</p>
-        </Empty>
-      </section>
-    )
-  }
-  return <Designs job={job} particles={shown.current} />
+  return (
+    <Loaded resource={particles} what="all designs" failed="Could not load the designs.">
+      {(data) =>
+        data.rows === 0 ? (
+          <EmptyCard title="No designs yet">
+            Designs appear here after the first iteration.
+          </EmptyCard>
+        ) : (
+          <Designs job={job} particles={data} />
+        )
+      }
+    </Loaded>
+  )
 }
 
 function Designs({ job, particles }: { job: Job; particles: Particles }) {
   const words = caseWords(job.kind)
   const [utilities, setUtilities] = useQueryValue('utilities', flag(false), false)
   const [objectives, setObjectives] = useQueryValue('objectives', flag(false), false)
-  const [chosen, setChosen] = useQueryValue('design', DESIGN, null)
+  const [design, setDesign] = useQueryValue('design', DESIGN, null)
   const sources = useMemo(
     () => axesOf(particles, { utility: utilities, objective: objectives }),
     [particles, utilities, objectives],
@@ -78,7 +73,7 @@ function Designs({ job, particles }: { job: Job; particles: Particles }) {
   )
   const [brushes, setBrushes] = useBrushes(model)
   const selected = useMemo(() => selectRows(model, brushes), [model, brushes])
-  const marked = useMemo(() => rowOf(particles, chosen), [particles, chosen])
+  const marked = useMemo(() => rowOf(particles, design), [particles, design])
   const best = useMemo(() => {
     const rows = bestRows(model, selected, 20)
     return marked === null || rows.includes(marked) ? rows : [marked, ...rows]
@@ -96,29 +91,23 @@ function Designs({ job, particles }: { job: Job; particles: Particles }) {
         }`}
         tools={
           <>
-            <label class="check small">
-              <input
-                type="checkbox"
-                checked={utilities}
-                onChange={(event) => {
-                  setUtilities(event.currentTarget.checked)
+            <Check
+              label={`${words.measures} by ${words.item}`}
+              checked={utilities}
+              onChange={(on) => {
+                setUtilities(on)
+                setBrushes(NONE)
+              }}
+            />
+            {job.kind === 'tuning' && (
+              <Check
+                label="objectives"
+                checked={objectives}
+                onChange={(on) => {
+                  setObjectives(on)
                   setBrushes(NONE)
                 }}
               />
-              {words.measures} by {words.item}
-            </label>
-            {job.kind === 'tuning' && (
-              <label class="check small">
-                <input
-                  type="checkbox"
-                  checked={objectives}
-                  onChange={(event) => {
-                    setObjectives(event.currentTarget.checked)
-                    setBrushes(NONE)
-                  }}
-                />
-                objectives
-              </label>
             )}
             <button
               type="button"
@@ -154,11 +143,10 @@ function Designs({ job, particles }: { job: Job; particles: Particles }) {
         selected={selected}
         brushes={brushes}
         onBrush={setBrushes}
-        chosen={marked}
-        onChoose={(row) => setChosen(placeIn(particles, row))}
+        marked={marked}
+        onMark={(row) => setDesign(placeIn(particles, row))}
       />
-      <section class="card" aria-labelledby="selected">
-        <h2 id="selected">Best selected designs</h2>
+      <Card title="Best selected designs">
         {best.length === 0 ? (
           <Empty title="No design with a fitness is selected">
             <button type="button" onClick={() => setBrushes(NONE)}>
@@ -168,7 +156,7 @@ function Designs({ job, particles }: { job: Job; particles: Particles }) {
         ) : (
           <SelectedDesigns job={job} particles={particles} rows={best} marked={marked} />
         )}
-      </section>
+      </Card>
     </div>
   )
 }

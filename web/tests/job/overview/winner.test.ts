@@ -2,7 +2,7 @@ import { expect, test } from 'vitest'
 import type { Variable } from '../../../src/api/types'
 import { gainOf } from '../../../src/job/gain'
 import { endInWords, noticeState } from '../../../src/job/header/end-notice'
-import { winnerVariables } from '../../../src/job/overview/winner-model'
+import { winnerVariables } from '../../../src/job/overview/model'
 
 const variable = (name: string, low: number | null, high: number | null) =>
   ({ name, unit: 'V', low, high, kind: 'continuous' }) as unknown as Variable

@@ -9,13 +9,7 @@ import {
   verdicts,
   widthAt,
 } from '../../../src/job/parameters/intervals'
-import {
-  furtherRuns,
-  labelsOf,
-  repeatedSeeds,
-  runsOf,
-  wordOfRuns,
-} from '../../../src/job/parameters/runs'
+import { furtherRuns, labelsOf, repeatedSeeds, runsOf } from '../../../src/job/parameters/runs'
 
 const voltage: FittedParameter = {
   name: 'battery_voltage',
@@ -93,8 +87,6 @@ test('an address names each further run once, without the job itself', () => {
   const query = new URLSearchParams('also=b,,c, b,a')
   expect(runsOf(query, 'a')).toEqual(['b', 'c'])
   expect(runsOf(new URLSearchParams(), 'a')).toEqual([])
-  expect(wordOfRuns(['b', 'c'])).toBe('b,c')
-  expect(wordOfRuns([])).toBeNull()
 })
 
 test('runs beyond the limit of the API are ignored', () => {

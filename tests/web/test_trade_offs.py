@@ -148,7 +148,9 @@ def test_a_click_in_the_chart_chooses_the_nearest_design_of_the_front(
         if selected.get_attribute("data-selected-design") != "":
             break
     expect(selected, "no click selected a design").not_to_have_attribute("data-selected-design", "")
-    assert selected.get_attribute("data-selected-design") in {place(design) for design in front["designs"]}
+    assert selected.get_attribute("data-selected-design") in {
+        place(design) for design in front["designs"]
+    }
 
 
 def test_a_missing_design_is_reported(

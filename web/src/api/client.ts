@@ -28,73 +28,46 @@ type Query<P extends keyof paths, M extends Method> =
 type Params<P extends keyof paths, M extends Method> =
   Operation<P, M> extends { parameters: { path: infer V } } ? V : never
 
-interface Options {
+interface Options<P extends keyof paths, M extends Method> {
+  readonly path?: Params<P, M>
+  readonly query?: Query<P, M>
+  readonly body?: Body<P, M>
+  readonly headers?: Readonly<Record<string, string>>
   readonly signal?: AbortSignal
 }
 
+/** A function that sends requests of a method and returns the JSON of their responses. */
+function jsonOf<M extends Method>(method: M) {
+  return async <P extends PathOf<M>>(
+    path: P,
+    options: Options<P, M> = {},
+  ): Promise<Answer<P, M>> => {
+    const response = await send(method, path, options)
+    return (response.status === 204 ? undefined : await response.json()) as Answer<P, M>
+  }
+}
+
 /** GET a resource; `get('/v1/jobs/{job_id}', { path: { job_id } })`. */
-export async function get<P extends PathOf<'get'>>(
-  path: P,
-  options: Options & { path?: Params<P, 'get'>; query?: Query<P, 'get'> } = {},
-): Promise<Answer<P, 'get'>> {
-  const response = await send(url(path, options.path, options.query), { signal: options.signal })
-  return (await response.json()) as Answer<P, 'get'>
-}
-
-export async function post<P extends PathOf<'post'>>(
-  path: P,
-  options: Options & {
-    path?: Params<P, 'post'>
-    body?: Body<P, 'post'>
-    headers?: Record<string, string>
-  } = {},
-): Promise<Answer<P, 'post'>> {
-  const request = posted(options.body, options.signal, options.headers)
-  const response = await send(url(path, options.path), request)
-  return (await response.json()) as Answer<P, 'post'>
-}
-
-export async function put<P extends PathOf<'put'>>(
-  path: P,
-  options: Options & { path?: Params<P, 'put'>; body?: Body<P, 'put'> } = {},
-): Promise<Answer<P, 'put'>> {
-  const request = { ...posted(options.body, options.signal), method: 'PUT' }
-  const response = await send(url(path, options.path), request)
-  return (await response.json()) as Answer<P, 'put'>
-}
-
-export async function patch<P extends PathOf<'patch'>>(
-  path: P,
-  options: Options & { path?: Params<P, 'patch'>; body: Body<P, 'patch'> },
-): Promise<Answer<P, 'patch'>> {
-  const request = { ...posted(options.body, options.signal), method: 'PATCH' }
-  const response = await send(url(path, options.path), request)
-  return (await response.json()) as Answer<P, 'patch'>
-}
-
-export async function remove<P extends PathOf<'delete'>>(
-  path: P,
-  options: Options & { path?: Params<P, 'delete'> } = {},
-): Promise<void> {
-  await send(url(path, options.path), { method: 'DELETE', signal: options.signal })
-}
+export const get = jsonOf('get')
+export const post = jsonOf('post')
+export const put = jsonOf('put')
+export const patch = jsonOf('patch')
+export const remove = jsonOf('delete')
 
 /** GET a resource that is not JSON. */
 export async function getBytes<P extends PathOf<'get'>>(
   path: P,
-  options: Options & { path?: Params<P, 'get'>; query?: Query<P, 'get'> } = {},
+  options: Options<P, 'get'> = {},
 ): Promise<ArrayBuffer> {
-  const response = await send(url(path, options.path, options.query), { signal: options.signal })
-  return response.arrayBuffer()
+  return (await send('get', path, options)).arrayBuffer()
 }
 
 /** POST a body; the response is not JSON. */
 export async function postBytes<P extends PathOf<'post'>>(
   path: P,
-  options: Options & { path?: Params<P, 'post'>; body?: Body<P, 'post'> } = {},
+  options: Options<P, 'post'> = {},
 ): Promise<ArrayBuffer> {
-  const response = await send(url(path, options.path), posted(options.body, options.signal))
-  return response.arrayBuffer()
+  return (await send('post', path, options)).arrayBuffer()
 }
 
 /** Fill in the path parameters and append the query; null values are left out, lists repeat the name. */
@@ -111,36 +84,28 @@ export function url(path: string, params?: unknown, query?: unknown): string {
   return `${filled}?${new URLSearchParams(set.map(([name, value]) => [name, String(value)]))}`
 }
 
-function posted(
-  body: unknown,
-  signal?: AbortSignal,
-  headers: Record<string, string> = {},
-): RequestInit {
-  if (body === undefined) return { method: 'POST', headers, signal }
-  return {
-    method: 'POST',
-    headers: { ...headers, 'Content-Type': 'application/json' },
-    body: JSON.stringify(body),
-    signal,
-  }
-}
-
 /** Throw ApiProblem for any response but a success; AbortError passes through. */
-async function send(target: string, init: RequestInit): Promise<Response> {
+async function send<P extends keyof paths, M extends Method>(
+  method: M,
+  path: P,
+  { path: params, query, body, headers, signal }: Options<P, M>,
+): Promise<Response> {
   let response: Response
   try {
-    response = await fetch(target, init)
+    response = await fetch(url(path, params, query), {
+      method: method.toUpperCase(),
+      headers: { ...headers, ...(body !== undefined && { 'Content-Type': 'application/json' }) },
+      body: body === undefined ? undefined : JSON.stringify(body),
+      signal,
+    })
   } catch (error) {
     if (error instanceof DOMException && error.name === 'AbortError') throw error
     throw new ApiProblem(0, 'cannot reach the server; is `gaitswarm serve` still running?')
   }
-  if (!response.ok) {
-    // The sign-in form reports a rejected token itself.
-    if (response.status === 401 && target !== SESSION)
-      for (const listener of unauthorized) listener()
-    throw await problemOf(response)
-  }
-  return response
+  if (response.ok) return response
+  // The sign-in form reports a rejected token itself.
+  if (response.status === 401 && path !== SESSION) for (const listener of unauthorized) listener()
+  throw await problemOf(response)
 }
 
 const SESSION = '/v1/session'

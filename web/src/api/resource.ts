@@ -1,7 +1,6 @@
 /** API responses as component state. */
 
 import { useCallback, useEffect, useRef, useState } from 'preact/hooks'
-import { messageOf } from './problem'
 
 /** A pending, received or failed response; `data` is kept during a reload. */
 export interface Resource<T> {
@@ -11,14 +10,18 @@ export interface Resource<T> {
   readonly reload: () => void
 }
 
-/**
- * Fetch when `key` changes, dropping outdated responses; a null key fetches nothing.
- * keep: whether the data of the previous key stay until those of the next one arrive.
- */
+interface Options {
+  /** Whether a response stays until that of the next key arrives. */
+  readonly keep?: boolean
+  /** Time without another key before a request is sent [ms]. */
+  readonly pause?: number
+}
+
+/** Fetch when `key` changes, dropping outdated responses; a null key fetches nothing. */
 export function useResource<T>(
   key: string | null,
   load: (signal: AbortSignal) => Promise<T>,
-  { keep = false } = {},
+  { keep = false, pause = 0 }: Options = {},
 ): Resource<T> {
   const [state, setState] = useState<Omit<Resource<T>, 'reload'> & { key: string | null }>({
     data: null,
@@ -37,21 +40,26 @@ export function useResource<T>(
     const abort = new AbortController()
     setState((s) => ({
       data: keep || s.key === key ? s.data : null,
-      error: null,
+      error: keep ? s.error : null,
       loading: true,
       key,
     }))
-    latest.current(abort.signal).then(
-      (data) => {
-        if (!abort.signal.aborted) setState({ data, error: null, loading: false, key })
-      },
-      (error: unknown) => {
-        if (abort.signal.aborted) return
-        const shown = error instanceof Error ? error : new Error(messageOf(error))
-        setState((s) => ({ ...s, error: shown, loading: false, key }))
-      },
-    )
-    return () => abort.abort()
+    const send = () =>
+      latest.current(abort.signal).then(
+        (data) => {
+          if (!abort.signal.aborted) setState({ data, error: null, loading: false, key })
+        },
+        (error: unknown) => {
+          if (abort.signal.aborted) return
+          const shown = error instanceof Error ? error : new Error(String(error))
+          setState((s) => ({ ...s, error: shown, loading: false, key }))
+        },
+      )
+    const timer = pause > 0 ? setTimeout(send, pause) : void send()
+    return () => {
+      clearTimeout(timer)
+      abort.abort()
+    }
   }, [key, turn])
   const reload = useCallback(() => setTurn((n) => n + 1), [])
   return { data: state.data, error: state.error, loading: state.loading, reload }

@@ -2,7 +2,6 @@
 
 import { useEffect, useRef, useState } from 'preact/hooks'
 import { get } from '../api/client'
-import { LatestAnswer } from '../api/latest-answer'
 import { usePolling, useResource } from '../api/resource'
 import type { JobFacets, JobState, JobSummary } from '../api/types'
 import { type ListQuery, PAGE } from './list-query'
@@ -12,48 +11,22 @@ const FACETS_MS = 15_000
 /** Debounce of typing [ms]. */
 const PAUSE_MS = 150
 
-interface Page {
-  readonly items: readonly JobSummary[]
-  readonly next: string | null
-}
-
-interface Request {
-  readonly query: ListQuery
-  readonly after: string | null
-}
-
 export function useList(query: ListQuery, after: string | null) {
-  const [page, setPage] = useState<Page | null>(null)
-  const [error, setError] = useState<unknown>(null)
   const [announcement, setAnnouncement] = useState('')
-  const before = useRef(new Map<string, JobState>())
-  const [latest] = useState(
-    () =>
-      new LatestAnswer<Request, Page>(
-        (request, signal) =>
-          get('/v1/jobs', {
-            query: { ...request.query, after: request.after, limit: PAGE },
-            signal,
-          }),
-        (answer) => {
-          setPage(answer)
-          setError(null)
-          const news = changeOfState(before.current, answer.items)
-          if (news !== null) setAnnouncement(news)
-          for (const job of answer.items) before.current.set(job.id, job.state)
-        },
-        setError,
-        PAUSE_MS,
-      ),
+  const states = useRef(new Map<string, JobState>())
+  const list = useResource(
+    JSON.stringify([query, after]),
+    (signal) => get('/v1/jobs', { query: { ...query, after, limit: PAGE }, signal }),
+    { keep: true, pause: PAUSE_MS },
   )
-  const key = JSON.stringify([query, after])
+  usePolling(list.reload, POLL_MS)
   useEffect(() => {
-    latest.ask({ query, after })
-    return () => latest.stop()
-  }, [key])
-  usePolling(() => latest.ask({ query, after }), POLL_MS)
-  const reload = () => latest.ask({ query, after })
-  return { page, error, announcement, reload }
+    const jobs = list.data?.items ?? []
+    const news = changeOfState(states.current, jobs)
+    if (news !== null) setAnnouncement(news)
+    for (const job of jobs) states.current.set(job.id, job.state)
+  }, [list.data])
+  return { page: list.data, error: list.error, announcement, reload: list.reload }
 }
 
 /** Job counts by filter value; null while loading. */

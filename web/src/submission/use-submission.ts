@@ -1,9 +1,9 @@
 /** Validation and estimate of a spec during editing, and its submission. */
 
-import { useEffect, useRef, useState } from 'preact/hooks'
+import { useRef, useState } from 'preact/hooks'
 import { post } from '../api/client'
-import { LatestAnswer } from '../api/latest-answer'
 import { ApiProblem } from '../api/problem'
+import { useResource } from '../api/resource'
 import type { AnySpec, Estimate } from '../api/types'
 import { navigate } from '../router/navigation'
 import { jobPath } from '../router/routes'
@@ -31,30 +31,17 @@ export interface Submission {
 }
 
 export function useSubmission(spec: AnySpec): Submission {
-  const [estimate, setEstimate] = useState<Estimate | null>(null)
-  const [problem, setProblem] = useState<unknown>(null)
+  const [rejected, setRejected] = useState<{ text: string; error: unknown } | null>(null)
   const [sending, setSending] = useState(false)
   const [attempts, setAttempts] = useState(0)
   const [priority, setPriority] = useState('0')
   const [notify, setNotify] = useState('')
-  const [latest] = useState(
-    () =>
-      new LatestAnswer(
-        (body: AnySpec, signal) => post('/v1/estimates', { body, signal }),
-        (answer) => {
-          setEstimate(answer)
-          setProblem(null)
-        },
-        (error) => {
-          setEstimate(null)
-          setProblem(error)
-        },
-        PAUSE_MS,
-      ),
-  )
   const text = JSON.stringify(spec)
-  useEffect(() => latest.ask(spec), [text])
-  useEffect(() => () => latest.stop(), [])
+  const estimate = useResource(text, (signal) => post('/v1/estimates', { body: spec, signal }), {
+    keep: true,
+    pause: PAUSE_MS,
+  })
+  const problem = rejected?.text === text ? rejected.error : estimate.error
 
   // The same spec uses the same key, so a repeated request does not create a second job.
   const key = useRef({ text: '', key: '' })
@@ -72,14 +59,14 @@ export function useSubmission(spec: AnySpec): Submission {
         (error: unknown) => {
           // A response invalidates the key. Without one the job may exist, so a retry must reuse the key.
           if (error instanceof ApiProblem && error.status !== 0) key.current.text = ''
-          setProblem(error)
+          setRejected({ text, error })
           setAttempts((n) => n + 1)
         },
       )
       .finally(() => setSending(false))
   }
   return {
-    ...{ estimate, problem, sending, attempts },
+    ...{ estimate: problem === null ? estimate.data : null, problem, sending, attempts },
     ...{ priority, setPriority, notify, setNotify, submit },
   }
 }

@@ -1,7 +1,7 @@
 /** Paginated search results of a picker. */
 
-import { useEffect, useState } from 'preact/hooks'
-import { LatestAnswer } from '../../api/latest-answer'
+import { useState } from 'preact/hooks'
+import { useResource } from '../../api/resource'
 
 export interface Choice {
   readonly value: string
@@ -24,57 +24,31 @@ export type Search = (
   signal: AbortSignal,
 ) => Promise<ChoicePage>
 
-interface Query {
-  readonly text: string
-  readonly after: string | null
-}
-
-interface Matches extends ChoicePage {
-  /** Null before the first response. */
-  readonly text: string | null
-  readonly error: unknown
-}
-
-const NOTHING: Matches = { items: [], next: null, text: null, error: null }
+const NOTHING = { items: [], next: null, text: null }
 
 /** Debounce of typing [ms]. */
 const PAUSE_MS = 150
 
 /** Search while `text` is not null; previous matches stay until the response arrives. */
 export function useChoiceSearch(text: string | null, search: Search | undefined) {
-  const [matches, setMatches] = useState(NOTHING)
-  const [latest] = useState(
-    () =>
-      new LatestAnswer<Query & { search: Search }, { query: Query; page: ChoicePage }>(
-        async (query, signal) => ({
-          query,
-          page: await query.search(query.text, query.after, signal),
-        }),
-        ({ query, page }) =>
-          setMatches((before) => ({
-            items: query.after === null ? page.items : [...before.items, ...page.items],
-            next: page.next,
-            text: query.text,
-            error: null,
-          })),
-        (error) => setMatches((before) => ({ ...before, error })),
-        PAUSE_MS,
-      ),
+  /** Matches before the page to request. */
+  const [before, setBefore] = useState<ChoicePage & { text: string | null }>(NOTHING)
+  const { items: earlier, next: after } = before.text === text ? before : NOTHING
+  const { data, error } = useResource(
+    text === null || !search ? null : JSON.stringify([text, after]),
+    async (signal) => {
+      const page = await search!(text!, after, signal)
+      return { items: [...earlier, ...page.items], next: page.next, text }
+    },
+    { keep: true, pause: PAUSE_MS },
   )
-  useEffect(() => {
-    if (text === null || !search) setMatches(NOTHING)
-    else latest.ask({ text, after: null, search })
-    return () => latest.stop()
-  }, [text])
-  const more = () => {
-    if (search && text !== null && matches.next) latest.ask({ text, after: matches.next, search })
-  }
+  const matches = data ?? NOTHING
+  const isCurrent = matches.text === text
   return {
     items: matches.items,
-    hasMore: matches.next !== null && matches.text === text,
-    pending:
-      search !== undefined && text !== null && matches.text !== text && matches.error === null,
-    error: matches.error,
-    more,
+    hasMore: matches.next !== null && isCurrent,
+    pending: search !== undefined && text !== null && !isCurrent && error === null,
+    error,
+    more: () => setBefore(matches),
   }
 }

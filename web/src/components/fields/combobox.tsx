@@ -1,7 +1,6 @@
 /** A combobox (ARIA pattern) with local choices and server-side search. */
 
 import { useEffect, useId, useRef, useState } from 'preact/hooks'
-import { messageOf } from '../../api/problem'
 import './combobox.css'
 import { matching } from '../table/rows'
 import { type Choice, type Search, useChoiceSearch } from './choice-search'
@@ -188,8 +187,8 @@ export function Combobox({
   )
 }
 
-function statusOf(count: number, jobs: { pending: boolean; error: unknown }): string {
-  if (jobs.error !== null) return `Search failed: ${messageOf(jobs.error)}`
+function statusOf(count: number, jobs: { pending: boolean; error: Error | null }): string {
+  if (jobs.error !== null) return `Search failed: ${jobs.error.message}`
   if (jobs.pending) return 'Searching …'
   return count === 0 ? 'No matches.' : ''
 }

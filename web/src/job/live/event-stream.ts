@@ -18,19 +18,19 @@ export interface Followed {
   readonly staleSince: number | null
 }
 
-/** The subset of EventSource in use. */
-export interface Source {
-  addEventListener(type: string, listener: (event: MessageEvent<string>) => void): void
-  close(): void
+export const NOT_CONNECTED: Followed = {
+  iterations: [],
+  state: null,
+  error: null,
+  waiting: null,
+  connection: 'connecting',
+  staleSince: null,
 }
 
-export interface StreamPorts {
-  /** Open the stream after an iteration; from the beginning if null. */
-  open(after: number | null): Source
-  now(): number
-  /** Schedule a call; returns the function that cancels it. */
-  later(call: () => void, milliseconds: number): () => void
-}
+/** The part of an EventSource in use. */
+export type Source = Pick<EventSource, 'addEventListener' | 'close'>
+
+type Timer = ReturnType<typeof setTimeout>
 
 const FIRST_WAIT_MS = 500
 const LONGEST_WAIT_MS = 8000
@@ -51,150 +51,98 @@ const GATHER_MS = 40
  */
 export class EventStream {
   private readonly iterations: Iteration[]
-  private state: JobState | null = null
-  private error: string | null = null
-  private waiting: string | null = null
-  private connection: Connection = 'connecting'
-  private staleSince: number | null = null
+  private followed = NOT_CONNECTED
   private source: Source | null = null
   private failures = 0
-  private cancelRetry: (() => void) | null = null
-  private cancelNotify: (() => void) | null = null
+  private retry: Timer | undefined
+  private report: Timer | undefined
 
+  /**
+   * open: opens the stream after an iteration, or from the beginning if null. loaded: iterations from
+   * index 0 on; the stream continues after them.
+   */
   constructor(
-    private readonly ports: StreamPorts,
+    private readonly open: (after: number | null) => Source,
     private readonly changed: (followed: Followed) => void,
-    /** Iterations already loaded, from index 0; the stream continues after them. */
     loaded: readonly Iteration[] = [],
   ) {
     this.iterations = [...loaded]
     this.connect()
   }
 
-  /** Index of the last iteration; null before the first. */
-  get last(): number | null {
-    return this.iterations.at(-1)?.index ?? null
-  }
-
   /** Reconnect immediately: after the job continues, or when the network is back. */
   restart(): void {
-    if (this.connection === 'open') return
+    if (this.followed.connection === 'open') return
     this.failures = 0
     this.connect()
   }
 
   /** The browser went offline; the stream itself may notice much later. */
   interrupt(): void {
-    if (this.connection === 'open' || this.connection === 'connecting') this.broken()
+    if (['open', 'connecting'].includes(this.followed.connection)) this.broken()
   }
 
   close(): void {
     this.drop()
-    this.cancelRetry?.()
-    this.cancelNotify?.()
+    clearTimeout(this.report)
   }
 
   private connect(): void {
     this.drop()
-    this.cancelRetry?.()
-    const source = this.ports.open(this.last)
+    const last = this.iterations.at(-1)?.index ?? null
+    const source = this.open(last)
     this.source = source
-    const ifCurrent = (handle: (data: string) => void) => (event: MessageEvent<string>) => {
-      // Events of a closed stream may still arrive.
-      if (this.source === source) handle(event.data)
-    }
-    source.addEventListener(
-      'open',
-      ifCurrent(() => this.opened()),
-    )
-    source.addEventListener(
-      'iteration',
-      ifCurrent((data) => this.arrived(JSON.parse(data))),
-    )
-    source.addEventListener(
-      'state',
-      ifCurrent((data) => this.stateChanged(JSON.parse(data))),
-    )
-    source.addEventListener(
-      'deleted',
-      ifCurrent(() => this.deleted()),
-    )
-    source.addEventListener(
-      'error',
-      ifCurrent(() => this.broken()),
-    )
+    const on = <T>(type: string, handle: (data: T) => void) =>
+      source.addEventListener(type, (event) => {
+        const { data } = event as MessageEvent<string | undefined>
+        // Events of a closed stream may still arrive.
+        if (this.source === source) handle(data === undefined ? null : JSON.parse(data))
+      })
+    on('open', () => {
+      this.failures = 0
+      this.set({ connection: 'open', staleSince: null })
+    })
+    on<Iteration>('iteration', (iteration) => {
+      const expected = this.iterations.length
+      if (iteration.index > expected) return this.connect()
+      if (iteration.index < expected) return
+      this.iterations.push(iteration)
+      this.set({})
+    })
+    on<Pick<Followed, 'error' | 'waiting'> & { state: JobState }>('state', (update) => {
+      const { state, error, waiting = null } = update
+      if (hasEnded(update)) this.end({ state, error, waiting })
+      else this.set({ state, error, waiting })
+    })
+    on('deleted', () => this.end({ error: 'The job was deleted.' }))
+    on('error', () => this.broken())
   }
 
-  private opened(): void {
-    this.connection = 'open'
-    this.staleSince = null
-    this.failures = 0
-    this.notify()
-  }
-
-  private arrived(iteration: Iteration): void {
-    const expected = (this.last ?? -1) + 1
-    if (iteration.index < expected) return
-    if (iteration.index > expected) {
-      this.connect()
-      return
-    }
-    this.iterations.push(iteration)
-    this.notify()
-  }
-
-  private stateChanged(update: {
-    state: JobState
-    error: string | null
-    waiting?: string | null
-  }): void {
-    this.state = update.state
-    this.error = update.error
-    this.waiting = update.waiting ?? null
-    if (hasEnded(update)) {
-      this.connection = 'ended'
-      this.staleSince = null
-      this.drop()
-    }
-    this.notify()
-  }
-
-  private deleted(): void {
-    this.error = 'The job was deleted.'
-    this.connection = 'ended'
-    this.staleSince = null
+  private end(changes: Partial<Followed>): void {
     this.drop()
-    this.notify()
+    this.set({ ...changes, connection: 'ended', staleSince: null })
   }
 
   private broken(): void {
     this.drop()
-    this.connection = 'stale'
-    this.staleSince ??= this.ports.now()
     const wait = Math.min(FIRST_WAIT_MS * 2 ** this.failures, LONGEST_WAIT_MS)
     this.failures += 1
-    this.cancelRetry?.()
-    this.cancelRetry = this.ports.later(() => this.connect(), wait)
-    this.notify()
+    this.retry = setTimeout(() => this.connect(), wait)
+    this.set({ connection: 'stale', staleSince: this.followed.staleSince ?? Date.now() })
   }
 
+  /** Close the connection and do not reconnect. */
   private drop(): void {
+    clearTimeout(this.retry)
     this.source?.close()
     this.source = null
   }
 
-  private notify(): void {
-    if (this.cancelNotify) return
-    this.cancelNotify = this.ports.later(() => {
-      this.cancelNotify = null
-      this.changed({
-        iterations: [...this.iterations],
-        state: this.state,
-        error: this.error,
-        waiting: this.waiting,
-        connection: this.connection,
-        staleSince: this.staleSince,
-      })
+  private set(changes: Partial<Followed>): void {
+    this.followed = { ...this.followed, ...changes }
+    this.report ??= setTimeout(() => {
+      this.report = undefined
+      this.changed({ ...this.followed, iterations: [...this.iterations] })
     }, GATHER_MS)
   }
 }

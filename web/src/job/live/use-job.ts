@@ -4,7 +4,7 @@ import { useCallback, useEffect, useRef, useState } from 'preact/hooks'
 import { get, url } from '../../api/client'
 import { ApiProblem } from '../../api/problem'
 import type { Iteration, StoredJob } from '../../api/types'
-import { EventStream, type Followed, type Source } from './event-stream'
+import { EventStream, type Followed, NOT_CONNECTED } from './event-stream'
 
 export interface LiveJob {
   readonly job: StoredJob | null
@@ -18,26 +18,17 @@ export interface LiveJob {
   readonly hold: (held: boolean) => void
 }
 
-const NOTHING_YET: Followed = {
-  iterations: [],
-  state: null,
-  error: null,
-  waiting: null,
-  connection: 'connecting',
-  staleSince: null,
-}
-
 /** Page sizes: a small first page, to show something early, and larger ones after it. */
 const FIRST = 100
 const FURTHER = 1000
 
 /** Shortest interval between requests [ms]. */
-const ASK_MS = 1000
+const REQUEST_MS = 1000
 
 export function useJob(id: string): LiveJob {
   const [job, setJob] = useState<StoredJob | null>(null)
   const [error, setError] = useState<unknown>(null)
-  const [followed, setFollowed] = useState<Followed>(NOTHING_YET)
+  const [followed, setFollowed] = useState<Followed>(NOT_CONNECTED)
   const stream = useRef<EventStream | null>(null)
   const lastRequest = useRef(0)
   const missing = useRef(false)
@@ -59,9 +50,9 @@ export function useJob(id: string): LiveJob {
       return true
     }
     get('/v1/jobs/{job_id}', { path: { job_id: id }, signal }).then(
-      (answer) => {
+      (current) => {
         if (!isNewer()) return
-        setJob(answer)
+        setJob(current)
         setError(null)
       },
       (problem: unknown) => {
@@ -88,11 +79,13 @@ export function useJob(id: string): LiveJob {
     abortController.current = abort
     refresh()
     const show = (iterations: readonly Iteration[]) => {
-      if (!signal.aborted) setFollowed({ ...NOTHING_YET, iterations })
+      if (!signal.aborted) setFollowed({ ...NOT_CONNECTED, iterations })
     }
     committedSoFar(id, show, signal).then((loaded) => {
       if (signal.aborted || missing.current) return
-      stream.current = new EventStream(browserPorts(id), setFollowed, loaded)
+      const open = (after: number | null) =>
+        new EventSource(url('/v1/jobs/{job_id}/events', { job_id: id }, { after }))
+      stream.current = new EventStream(open, setFollowed, loaded)
     })
     const online = () => stream.current?.restart()
     const offline = () => stream.current?.interrupt()
@@ -111,14 +104,14 @@ export function useJob(id: string): LiveJob {
   }, [followed.state, followed.waiting, followed.connection])
   useEffect(() => {
     if (followed.iterations.length === 0) return
-    const wait = Math.max(0, lastRequest.current + ASK_MS - Date.now())
+    const wait = Math.max(0, lastRequest.current + REQUEST_MS - Date.now())
     const timer = setTimeout(refresh, wait)
     return () => clearTimeout(timer)
   }, [followed.iterations.length])
 
-  const replace = useCallback((answer: StoredJob) => {
+  const replace = useCallback((current: StoredJob) => {
     shown.current = ++sent.current
-    setJob(answer)
+    setJob(current)
     stream.current?.restart()
   }, [])
   const hold = useCallback((suspended: boolean) => {
@@ -149,18 +142,5 @@ async function committedSoFar(
     }
   } catch {
     return loaded
-  }
-}
-
-function browserPorts(id: string) {
-  const path = '/v1/jobs/{job_id}/events'
-  return {
-    open: (after: number | null): Source =>
-      new EventSource(url(path, { job_id: id }, { after })) as Source,
-    now: () => Date.now(),
-    later: (call: () => void, milliseconds: number) => {
-      const timer = setTimeout(call, milliseconds)
-      return () => clearTimeout(timer)
-    },
   }
 }

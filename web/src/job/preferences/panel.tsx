@@ -1,8 +1,6 @@
 /** What-if analysis: ranking of a job's history under another preference, without simulation. */
 
-import { useEffect, useState } from 'preact/hooks'
 import { get, post } from '../../api/client'
-import { LatestAnswer } from '../../api/latest-answer'
 import { useResource } from '../../api/resource'
 import type {
   Job,
@@ -33,6 +31,9 @@ import './what-if.css'
 /** Range of the sliders, extended to the current value; fields accept any value that the API accepts. */
 const REACH = 2
 
+/** Pause while a slider is moved [ms]. */
+const PAUSE_MS = 50
+
 export function PreferencesPanel({ job }: { job: Job }) {
   const jobPreference = (job.spec as JobSpec).preference as Preference
   const codec = {
@@ -41,7 +42,16 @@ export function PreferencesPanel({ job }: { job: Job }) {
       isSame(preference, jobPreference) ? null : preferenceQuery(preference),
   }
   const [preference, setPreference] = useQueryValue('preference', codec, jobPreference)
-  const { ranking, error } = useRanking(job, preference)
+  const { data: ranking, error } = useResource(
+    `${job.iterations} ${preferenceQuery(preference)}`,
+    (signal) =>
+      post('/v1/jobs/{job_id}/ranking', {
+        path: { job_id: job.id },
+        body: { preference, top: 20 },
+        signal,
+      }),
+    { keep: true, pause: PAUSE_MS },
+  )
   const presets = useResource('preferences', (signal) =>
     get('/v1/preferences', { signal }).then((answer) => answer.items),
   )
@@ -64,27 +74,6 @@ export function PreferencesPanel({ job }: { job: Job }) {
       </div>
     </div>
   )
-}
-
-/** Ranking, updated when the preference changes or the job commits. */
-function useRanking(job: Job, preference: Preference) {
-  const [ranking, setRanking] = useState<Ranking | null>(null)
-  const [error, setError] = useState<unknown>(null)
-  const [latest] = useState(
-    () =>
-      new LatestAnswer(
-        (body: { preference: Preference; top: number }, signal) =>
-          post('/v1/jobs/{job_id}/ranking', { path: { job_id: job.id }, body, signal }),
-        (answer) => {
-          setRanking(answer)
-          setError(null)
-        },
-        setError,
-      ),
-  )
-  useEffect(() => latest.ask({ preference, top: 20 }), [preference, job.iterations])
-  useEffect(() => () => latest.stop(), [])
-  return { ranking, error }
 }
 
 function isSame(a: Preference, b: Preference): boolean {

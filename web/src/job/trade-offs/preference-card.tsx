@@ -34,8 +34,8 @@ export function PreferenceCard({ job, selected }: { job: Job; selected: Place | 
             {(data) => <Fits job={job} preferenceFor={data} />}
           </Loaded>
         ) : (
-          <Empty title="No design chosen">
-            <p>Click a design in the chart, or choose one in a table.</p>
+          <Empty title="No design selected">
+            <p>Click a design in the chart, or select one in a table.</p>
           </Empty>
         )}
       </div>

@@ -1,9 +1,9 @@
-import { beforeEach, describe, expect, test } from 'vitest'
+import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest'
 import type { Iteration } from '../../../src/api/types'
 import { EventStream, type Followed, type Source } from '../../../src/job/live/event-stream'
 
 /** A stream whose events are sent by the test. */
-class FakeSource implements Source {
+class FakeSource {
   closed = false
   private listeners = new Map<string, (event: MessageEvent<string>) => void>()
 
@@ -22,63 +22,33 @@ class FakeSource implements Source {
   }
 }
 
-/** A clock advanced by the test. */
-class FakeClock {
-  now = 1000
-  private due: { at: number; call: () => void }[] = []
-
-  later = (call: () => void, milliseconds: number) => {
-    const entry = { at: this.now + milliseconds, call }
-    this.due.push(entry)
-    return () => {
-      this.due = this.due.filter((other) => other !== entry)
-    }
-  }
-
-  pass(milliseconds: number): void {
-    const until = this.now + milliseconds
-    for (;;) {
-      const next = this.due.filter(({ at }) => at <= until).sort((a, b) => a.at - b.at)[0]
-      if (!next) break
-      this.due = this.due.filter((other) => other !== next)
-      this.now = next.at
-      next.call()
-    }
-    this.now = until
-  }
-}
-
-let clock: FakeClock
 let sources: FakeSource[]
 let latest: Followed | null
 let stream: EventStream
 
+const open = (after: number | null) => {
+  sources.push(new FakeSource(after))
+  return source() as unknown as Source
+}
 const source = () => sources.at(-1)!
 const iteration = (index: number) => ({ index, best: 1 }) as Iteration
 const indices = () => latest?.iterations.map(({ index }) => index)
 
 beforeEach(() => {
-  clock = new FakeClock()
+  vi.useFakeTimers({ now: 1000 })
   sources = []
   latest = null
-  stream = new EventStream(
-    {
-      open: (after) => {
-        sources.push(new FakeSource(after))
-        return source()
-      },
-      now: () => clock.now,
-      later: clock.later,
-    },
-    (followed) => {
-      latest = followed
-    },
-  )
+  stream = new EventStream(open, (followed) => {
+    latest = followed
+  })
+})
+afterEach(() => {
+  vi.useRealTimers()
 })
 
 const receive = (...numbers: number[]) => {
   for (const number of numbers) source().send('iteration', iteration(number))
-  clock.pass(50)
+  vi.advanceTimersByTime(50)
 }
 
 describe('an intact stream', () => {
@@ -91,17 +61,11 @@ describe('an intact stream', () => {
   })
 
   test('reports simultaneous events once', () => {
-    let times = 0
-    const counting = new EventStream(
-      { open: () => new FakeSource(null), now: () => 0, later: clock.later },
-      () => {
-        times += 1
-      },
-    )
-    const countingSource = (counting as unknown as { source: FakeSource }).source
-    for (let index = 0; index < 100; index++) countingSource.send('iteration', iteration(index))
-    clock.pass(1000)
-    expect(times).toBe(1)
+    const changed = vi.fn()
+    new EventStream(open, changed)
+    for (let index = 0; index < 100; index++) source().send('iteration', iteration(index))
+    vi.advanceTimersByTime(1000)
+    expect(changed).toHaveBeenCalledOnce()
   })
 
   test('ends with a final state and does not reconnect', () => {
@@ -109,7 +73,7 @@ describe('an intact stream', () => {
     receive(0)
     source().send('state', { state: 'failed', error: 'the disk is full' })
     source().send('error')
-    clock.pass(60_000)
+    vi.advanceTimersByTime(60_000)
     expect(sources).toHaveLength(1)
     expect(source().closed).toBe(true)
     expect(latest).toMatchObject({
@@ -121,17 +85,8 @@ describe('an intact stream', () => {
 })
 
 test('iterations already loaded are not requested again', () => {
-  let after: number | null = null
-  const seeded = new EventStream({
-    open: (last) => {
-      after = last
-      return new FakeSource(last)
-    },
-    now: () => 0,
-    later: clock.later,
-  }, () => {}, [iteration(0), iteration(1)])
-  expect(after).toBe(1)
-  expect(seeded.last).toBe(1)
+  new EventStream(open, () => {}, [iteration(0), iteration(1)])
+  expect(source().after).toBe(1)
 })
 
 describe('a duplicate', () => {
@@ -158,11 +113,11 @@ describe('a broken stream', () => {
   test('is stale from the break on, and continues after the last iteration', () => {
     source().send('open')
     receive(0, 1)
-    const broke = clock.now
+    const broke = Date.now()
     source().send('error')
-    clock.pass(60)
+    vi.advanceTimersByTime(60)
     expect(latest).toMatchObject({ connection: 'stale', staleSince: broke })
-    clock.pass(1000)
+    vi.advanceTimersByTime(1000)
     expect(source().after).toBe(1)
     source().send('open')
     receive(2)
@@ -173,10 +128,10 @@ describe('a broken stream', () => {
   test('stays stale since the first break until it is reopened', () => {
     source().send('open')
     receive(0)
-    const broke = clock.now
+    const broke = Date.now()
     for (let times = 0; times < 5; times++) {
       source().send('error')
-      clock.pass(10_000)
+      vi.advanceTimersByTime(10_000)
     }
     expect(sources).toHaveLength(6)
     expect(latest?.staleSince).toBe(broke)
@@ -185,12 +140,12 @@ describe('a broken stream', () => {
   test('backs off exponentially, but reconnects at once when the network is back', () => {
     source().send('open')
     source().send('error')
-    clock.pass(499)
+    vi.advanceTimersByTime(499)
     expect(sources).toHaveLength(1)
-    clock.pass(1)
+    vi.advanceTimersByTime(1)
     expect(sources).toHaveLength(2)
     source().send('error')
-    clock.pass(999)
+    vi.advanceTimersByTime(999)
     expect(sources).toHaveLength(2)
     stream.restart()
     expect(sources).toHaveLength(3)
@@ -201,9 +156,9 @@ describe('a broken stream', () => {
     first.send('open')
     receive(0)
     first.send('error')
-    clock.pass(1000)
+    vi.advanceTimersByTime(1000)
     first.send('iteration', iteration(1))
-    clock.pass(100)
+    vi.advanceTimersByTime(100)
     expect(indices()).toEqual([0])
   })
 })
@@ -211,6 +166,6 @@ describe('a broken stream', () => {
 test('a closed stream does not reconnect', () => {
   source().send('error')
   stream.close()
-  clock.pass(60_000)
+  vi.advanceTimersByTime(60_000)
   expect(sources).toHaveLength(1)
 })

@@ -1,17 +1,17 @@
 /** Code splitting: components loaded when first shown. */
 
-import type { ComponentType } from 'preact'
+import type { FunctionComponent } from 'preact'
 import { useEffect, useState } from 'preact/hooks'
 import { ErrorNotice, Loading } from '../components/feedback'
 
 /** Wrap a module's default export. what: as in "Loading the walk". */
 export function lazyPage<P extends object>(
   what: string,
-  load: () => Promise<{ default: ComponentType<P> }>,
-): ComponentType<P> {
-  let loaded: ComponentType<P> | null = null
+  load: () => Promise<{ default: FunctionComponent<P> }>,
+): FunctionComponent<P> {
+  let loaded: FunctionComponent<P> | null = null
   return function LazyPage(props: P) {
-    const [Page, setPage] = useState<ComponentType<P> | null>(() => loaded)
+    const [Page, setPage] = useState<FunctionComponent<P> | null>(() => loaded)
     const [error, setError] = useState<unknown>(null)
     useEffect(() => {
       if (loaded) return
@@ -31,13 +31,4 @@ export function lazyPage<P extends object>(
     }
     return Page ? <Page {...props} /> : <Loading what={what} />
   }
-}
-
-/** Wrap a named export. */
-export function lazyPart<K extends string, P extends object>(
-  what: string,
-  name: K,
-  load: () => Promise<Readonly<Record<K, ComponentType<P>>>>,
-): ComponentType<P> {
-  return lazyPage<P>(what, async () => ({ default: (await load())[name] }))
 }

@@ -20,7 +20,7 @@ const LEVELS = ['DEBUG', 'INFO', 'WARNING', 'ERROR'] as const
 type Level = (typeof LEVELS)[number]
 const LEVEL = oneOf<Level>(LEVELS, 'INFO')
 
-export function ActivityPanel({ job }: { job: Job }) {
+export default function ActivityPanel({ job }: { job: Job }) {
   const [level, setLevel] = useQueryValue('level', LEVEL, 'INFO')
   const activity = useResource(`activity ${job.id} ${level} ${job.state}`, (signal) =>
     get('/v1/jobs/{job_id}/activity', { path: { job_id: job.id }, query: { level }, signal }),

@@ -29,7 +29,7 @@ const RENEW_MS = 8000
 /** Correlation above which the importance of one of two variables may be spurious. */
 const CORRELATED = 0.5
 
-export function AnalysisPanel({ job }: { job: Job }) {
+export default function AnalysisPanel({ job }: { job: Job }) {
   const iterations = useSlowly(job.iterations, RENEW_MS)
   const importance = useResource(
     job.iterations === 0 ? null : `${job.id} ${iterations}`,

@@ -22,7 +22,7 @@ import { isRunning } from '../state'
 /** Polling interval while the job runs [ms]. */
 const RENEW_MS = 15_000
 
-export function CertificatePanel({ job }: { job: Job }) {
+export default function CertificatePanel({ job }: { job: Job }) {
   // The first evaluation is the nominal world.
   const exists = job.evaluations >= 2
   const certificate = useResource(exists ? job.id : null, (signal) =>

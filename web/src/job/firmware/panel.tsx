@@ -15,7 +15,7 @@ import { inWords } from '../../format/words'
 const TABLE_BITS = ['10x6', '9x6', '8x6', '8x5']
 const [USUAL_BITS] = TABLE_BITS
 
-export function FirmwarePanel({ job }: { job: Job }) {
+export default function FirmwarePanel({ job }: { job: Job }) {
   const [bits, setBits] = useState(USUAL_BITS)
   const query = { table_bits: bits === USUAL_BITS ? undefined : bits }
   const exists = job.best_fitness !== null

@@ -1,12 +1,10 @@
 /** Overview of a job: convergence, distribution, diversity, winner and limiting factors. */
 
-import type { Job } from '../../api/types'
 import { EmptyCard } from '../../components/card'
 import { ErrorNotice } from '../../components/feedback'
-import { percent } from '../../format/number'
+import { formatNumber, percent } from '../../format/number'
 import { IterationChart } from '../by-iteration'
-import type { Gain } from '../gain'
-import type { LiveJob } from '../live/use-job'
+import type { PanelProps } from '../page'
 import { ConvergenceChart } from './convergence-chart'
 import { DistributionChart } from './distribution-chart'
 import { LimitsCard } from './limits-card'
@@ -14,15 +12,7 @@ import { useDistribution } from './use-distribution'
 import { WinnerCard } from './winner-card'
 import './overview.css'
 
-export function OverviewPanel({
-  live,
-  job,
-  reference,
-}: {
-  live: LiveJob
-  job: Job
-  reference: Gain['reference']
-}) {
+export function OverviewPanel({ live, job, gain: { reference } }: PanelProps) {
   const { iterations } = live.followed
   const distribution = useDistribution(job.id, iterations.length)
   if (iterations.length === 0) {
@@ -61,6 +51,7 @@ export function OverviewPanel({
           rows={distribution.items}
           name="diversity"
           yUnit="%"
+          format={(value) => formatNumber(value, 3)}
           value={({ diversity }) => diversity && diversity * 100}
           colour="--series-3"
           zoomName="zoom-diversity"

@@ -28,7 +28,7 @@ import './parameters.css'
 /** Polling interval while the job runs [ms]. */
 const RENEW_MS = 15_000
 
-export function ParametersPanel({ job }: { job: Job }) {
+export default function ParametersPanel({ job }: { job: Job }) {
   const { query } = usePlace()
   if (!job.best) {
     return (

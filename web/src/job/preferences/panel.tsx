@@ -34,7 +34,7 @@ const REACH = 2
 /** Pause while a slider is moved [ms]. */
 const PAUSE_MS = 50
 
-export function PreferencesPanel({ job }: { job: Job }) {
+export default function PreferencesPanel({ job }: { job: Job }) {
   const jobPreference = (job.spec as JobSpec).preference as Preference
   const codec = {
     read: preferenceOf,

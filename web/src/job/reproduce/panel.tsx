@@ -15,7 +15,7 @@ import { withQuery } from '../../router/routes'
 import { methodNamed, settingText, settingTexts } from '../../submission/draft/optimizer'
 import { startDesigns } from '../start'
 
-export function ReproducePanel({ job }: { job: Job }) {
+export default function ReproducePanel({ job }: { job: Job }) {
   return (
     <div class="stack">
       <Card

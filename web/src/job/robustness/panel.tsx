@@ -46,7 +46,7 @@ function samplesOf(job: Job, least: number): number {
   return Math.max(least, 4 * (searchedVariables(job.spec).length + 1))
 }
 
-export function RobustnessPanel({ job }: { job: Job }) {
+export default function RobustnessPanel({ job }: { job: Job }) {
   const { best } = job
   const key = best && `${job.id} ${placeWord(best)}`
   const response = useResource(key, () => cached(key!, () => estimate(job)))

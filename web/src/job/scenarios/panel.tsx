@@ -28,7 +28,7 @@ interface Row {
   readonly otherUtility: number | null
 }
 
-export function ScenariosPanel({ job }: { job: Job }) {
+export default function ScenariosPanel({ job }: { job: Job }) {
   const { query } = usePlace()
   const hasPublished = job.kind === 'tuning' && isPublished((job.spec as JobSpec).robot)
   const choice = query.get('against') ?? (hasPublished ? 'published:fuzzy-pi:A' : 'none')

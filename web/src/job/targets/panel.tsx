@@ -21,7 +21,7 @@ const LEAVE_OUT = [
   ['walk', 'all targets of its walk'],
 ] as const
 
-export function TargetsPanel({ job }: { job: Job }) {
+export default function TargetsPanel({ job }: { job: Job }) {
   const word = usePlace().query.get('leave_out')
   const leaveOut = LEAVE_OUT.find(([what]) => what === word)?.[0] ?? ''
   const targets = useResource(job.best ? `${job.id} ${leaveOut}` : null, (signal) =>

@@ -21,7 +21,7 @@ const RENEW_MS = 8000
 /** Most designs drawn behind the front. */
 const MOST_DRAWN = 5000
 
-export function TradeOffsPanel({ job }: { job: Job }) {
+export default function TradeOffsPanel({ job }: { job: Job }) {
   const selected = placeOf(usePlace().query.get('design'))
   const iterations = useSlowly(job.iterations, RENEW_MS)
   const exists = job.best_fitness !== null
@@ -131,6 +131,7 @@ function HypervolumeCard({ front }: { front: Front }) {
       rows={iterations}
       name="hypervolume"
       value={(row) => row.hypervolume}
+      format={(value) => formatNumber(value, 4)}
       fromZero
       height={220}
     />

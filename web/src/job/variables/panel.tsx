@@ -31,7 +31,7 @@ const NONE: Brushes = new Map()
 /** Polling interval while the job runs [ms]. */
 const RENEW_MS = 8000
 
-export function VariablesPanel({ job }: { job: Job }) {
+export default function VariablesPanel({ job }: { job: Job }) {
   const iterations = useSlowly(job.iterations, RENEW_MS)
   const particles = useResource(
     `${job.id} ${iterations}`,

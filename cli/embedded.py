@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from gaitswarm.cli.exit_codes import JobEnded
-from gaitswarm.cli.output import note, print_json, stdout_console
+from gaitswarm.cli.output import note, show
 from gaitswarm.cli.progress import show_progress
+from gaitswarm.cli.tables import design_table, results_table, search_line, worth
 from gaitswarm.jobs.database import DatabaseJobs
 from gaitswarm.jobs.embedded import check_same, earlier_job, taken_up
 from gaitswarm.jobs.open import database_to_write
+from gaitswarm.requests.simulations import SimulationRequest, run_simulation
 from gaitswarm.services.optimizer.analysis.reference import note_reference
 from gaitswarm.services.optimizer.jobs.job import JobState
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.reference import adapted_to_job, published_study
 from gaitswarm.services.optimizer.masking import masked_url
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.runtime import (
@@ -26,10 +30,13 @@ from gaitswarm.services.runtime import (
     stop_on_signals,
 )
 from gaitswarm.settings import read_settings
+from gaitswarm.sim.controllers import CONTROLLERS
 
 if TYPE_CHECKING:
     from gaitswarm.cli.inputs.options import WorkerOptions
+    from gaitswarm.cli.output import Printed
     from gaitswarm.cli.progress import Progress
+    from gaitswarm.cli.rich_table import Table
     from gaitswarm.services.optimizer.jobs.documents import AnySpec
     from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration, Iteration
     from gaitswarm.services.optimizer.jobs.job import Claim, Job
@@ -37,7 +44,7 @@ if TYPE_CHECKING:
     from gaitswarm.services.optimizer.run.evaluator import Evaluator
     from gaitswarm.services.optimizer.store import Store
     from gaitswarm.settings import Settings
-    from gaitswarm.views import JobView
+    from gaitswarm.views import JobView, SimulationView
 
 
 def resumed_job(
@@ -171,10 +178,10 @@ def job_run(
 def run_seeds(
     specs: Sequence[AnySpec],
     workers: WorkerOptions,
-    report: Callable[[DatabaseJobs, list[str]], None],
+    report: Callable[[DatabaseJobs, list[str]], Printed],
     *,
     report_command: str,
-) -> None:
+) -> Printed:
     """Run jobs that differ in their seed one after another, then report on all.
 
     report_command: the command that prints the report later, for users who interrupt.
@@ -196,7 +203,7 @@ def run_seeds(
             ended = store.job(job.id)
             if ended.state is not JobState.SUCCEEDED:
                 note(f"job {job.id} is {ended.state}: {ended.error or 'no reason given'}")
-        report(jobs, ids)
+        return report(jobs, ids)
 
 
 def finish(
@@ -216,10 +223,7 @@ def finish(
     if interrupted and not job.state.terminal:
         _explain_interruption(job, jobs.place)
         raise KeyboardInterrupt
-    if as_json:
-        print_json(job)
-    else:
-        _report(job, jobs.place, compare=compare, others=others)
+    show(job, _report(job, jobs.place, compare=compare, others=others), as_json=as_json)
     if job.state is not JobState.SUCCEEDED:
         raise ended(job, jobs.place)
 
@@ -250,28 +254,47 @@ def _resume_hint(job_id: str, place: str) -> str:
     return f"to resume, run\n  gaitswarm optimize --resume {job_id}{place}"
 
 
-def _report(job: JobView, place: str, *, compare: bool, others: Mapping[str, JobView]) -> None:
-    from gaitswarm.cli.comparison import published_results
-    from gaitswarm.cli.tables import design_table, results_table, search_line, worth
-
-    console = stdout_console()
+def _report(
+    job: JobView, place: str, *, compare: bool, others: Mapping[str, JobView]
+) -> Iterator[Table | str]:
     if job.best is None:
-        console.print("no design walks in every scenario", markup=False)
+        yield "no design walks in every scenario"
     else:
         best = {name: other.best for name, other in others.items() if other.best is not None}
         published = published_results(job.spec) if compare else {}
         evaluations = {"best": job.best} | best | published
-        console.print(design_table(job.spec, {k: e.design for k, e in evaluations.items()}))
-        results = {k: e.scenarios for k, e in evaluations.items()}
-        console.print(results_table(results, job.objectives))
+        yield design_table(job.spec, {k: e.design for k, e in evaluations.items()})
+        yield results_table({k: e.scenarios for k, e in evaluations.items()}, job.objectives)
         for name, evaluation in evaluations.items():
-            console.print(f"fitness of {name}: {worth(evaluation)}", markup=False)
-        searched = search_line(job.best)
-        if searched is not None:
-            console.print(searched, markup=False)
+            yield f"fitness of {name}: {worth(evaluation)}"
+        yield from search_line(job.best)
     rate = job.simulations_per_second
     speed = f" at {rate:.0f} simulations/s" if rate else ""
     saved = f"; {job.evaluations_saved} of them cached" if job.evaluations_saved else ""
     note(f"{job.evaluations} designs in {len(job.spec.case_names)} simulations each{speed}{saved}")
     note(f"history: gaitswarm history {job.id}{place}")
     note(f"page: gaitswarm serve{place}, then http://127.0.0.1:8000/jobs/{job.id}")
+
+
+def published_results(spec: Spec) -> dict[str, SimulationView]:
+    """Return the published optimum for the job's controller and preference, by label.
+
+    If none was published for that preference, the controller's first; none for jobs that tune no
+    drive.
+    """
+    study = published_study(spec) if isinstance(spec, JobSpec) else None
+    if study is None or not isinstance(spec, JobSpec):
+        return {}
+    return {f"published {study}": published_walk(spec, study)}
+
+
+def published_walk(spec: JobSpec, study: str) -> SimulationView:
+    published = CONTROLLERS[spec.controller].published[study]
+    request = SimulationRequest(
+        robot=spec.robot,
+        controller=spec.controller,
+        design=adapted_to_job(published, spec),
+        scenarios=spec.scenarios,
+        preference=spec.preference,
+    )
+    return run_simulation(request)

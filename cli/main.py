@@ -15,8 +15,7 @@ from typing import Annotated, Any, Final, TextIO, cast
 
 import typer
 from typer.core import TyperGroup
-from typer.main import get_command, get_command_name
-from typer.models import CommandInfo
+from typer.main import get_command
 
 from gaitswarm.cli.commands import (
     administration,
@@ -38,6 +37,7 @@ from gaitswarm.cli.commands import (
     simulate,
 )
 from gaitswarm.cli.exit_codes import ExitCode, exit_code, explanation
+from gaitswarm.cli.inputs.options import expanded
 from gaitswarm.cli.output import (
     OutputClosed,
     Stdout,
@@ -46,24 +46,58 @@ from gaitswarm.cli.output import (
     warnings_as_notes,
 )
 
-PANELS: Final = {
-    "Start here": ("optimize", "serve", "submit", "list", "status", "best", "simulate", "robot"),
+_GROUPS: Final = {
+    "robot": (
+        "Create a robot from a URDF file, and check it.",
+        {"init": robot.init, "check": robot.check},
+    ),
+    "plot": (
+        "Draw a job's convergence or front, a controller's surface, or designs' robustness.",
+        {name: getattr(plot, name) for name in ("convergence", "front", "surface", "robustness")},
+    ),
+    "token": (
+        "Create, list and revoke tokens for access to a server.",
+        {
+            "create": administration.create,
+            "list": administration.list_tokens,
+            "revoke": administration.revoke,
+        },
+    ),
+    "db": (
+        "Upgrade, check, back up, restore and prune the database.",
+        {
+            name: getattr(administration, name)
+            for name in ("upgrade", "check", "backup", "restore", "prune")
+        },
+    ),
+}
+"""Help texts and commands of groups."""
+
+_PANELS: Final[dict[str, tuple[Callable[..., object] | str, ...]]] = {
+    "Start here": (
+        *(optimize.optimize, serve.serve, jobs.submit, jobs.list_jobs, jobs.status, jobs.best),
+        *(simulate.simulate, "robot"),
+    ),
     "Jobs": (
-        *("watch", "history", "pause", "resume", "extend", "prioritize", "cancel", "fork"),
-        *("label", "keep", "delete", "diff", "runner"),
+        *(jobs.watch, jobs.history, jobs.pause, jobs.resume, jobs.extend, jobs.prioritize),
+        *(jobs.cancel, jobs.fork, jobs.label, jobs.keep, jobs.delete, jobs.diff, serve.runner),
     ),
     "Analysis of jobs": (
-        *("rank", "front", "importance", "scenarios", "preferences", "plot"),
-        *("export", "evidence", "verify"),
+        *(analysis.rank, analysis.front, analysis.importance, analysis.scenarios),
+        *(analysis.preferences, "plot", evidence.export, evidence.evidence, evidence.verify),
     ),
-    "Designs": ("compare", "certify", "robustness", "firmware"),
+    "Designs": (compare.compare, certify.certify, robustness.robustness, firmware.firmware),
     "Robots and measurements": (
-        *("gaits", "mjcf", "record", "recordings", "identify", "parameters"),
-        *("calibrate", "targets", "validate", "synthesize"),
+        *(gaits.gaits, gaits.mjcf, measurements.record, measurements.recordings),
+        *(measurements.identify, measurements.parameters, calibrate.calibrate, calibrate.targets),
+        *(measurements.validate, measurements.synthesize),
     ),
-    "Installation": (*("optimizers", "cases", "plugins", "token", "audit", "db", "bench"),),
+    "Installation": (
+        *(optimize.optimizers, optimize.cases, optimize.plugins, "token", administration.audit),
+        *("db", bench.bench),
+    ),
 }
-"""Commands in the order of the help text, by heading."""
+"""Commands and groups in the order of the help text, by heading."""
 
 
 class _HelpAtOnce(TyperGroup):
@@ -80,7 +114,10 @@ class _HelpAtOnce(TyperGroup):
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         commands = {name: self.get_command(ctx, name) for name in self.list_commands(ctx)}
-        for panel, names in (PANELS if "optimize" in commands else {"Commands": commands}).items():
+        panels = {panel: list(map(_name, entries)) for panel, entries in _PANELS.items()}
+        if "optimize" not in commands:
+            panels = {"Commands": list(commands)}
+        for panel, names in panels.items():
             listed = [(name, commands[name]) for name in names if name in commands]
             with formatter.section(panel):
                 formatter.write_dl([(name, c.get_short_help_str(1000)) for name, c in listed if c])
@@ -98,7 +135,7 @@ class _HelpAtOnce(TyperGroup):
         return command, context
 
 
-app = typer.Typer(
+_app = typer.Typer(
     name="gaitswarm",
     cls=_HelpAtOnce,
     epilog="Exit codes: 0 done, 1 job failed or cancelled, or a check failed, 2 bad input, 3 not"
@@ -120,7 +157,7 @@ def _print_version(requested: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
+@_app.callback()
 def _root(
     _: Annotated[
         bool,
@@ -132,28 +169,6 @@ def _root(
     """Find robust drive controllers for walking robots."""
 
 
-for _module in (
-    optimize,
-    serve,
-    jobs,
-    evidence,
-    administration,
-    simulate,
-    compare,
-    firmware,
-    bench,
-    analysis,
-    robustness,
-    plot,
-    measurements,
-    gaits,
-    calibrate,
-    certify,
-    robot,
-):
-    _module.register(app)
-
-
 def main() -> None:
     replace_closed_streams()
     warnings_as_notes()
@@ -163,15 +178,23 @@ def main() -> None:
 @cache
 def commands(only: str | None = None) -> Callable[..., object]:
     """Build one command, or all: building all takes longer than most of them run."""
-    alone = copy(app)
-    alone.registered_commands = [c for c in app.registered_commands if _name(c) == only]
-    alone.registered_groups = [g for g in app.registered_groups if g.name == only]
-    exists = alone.registered_commands or alone.registered_groups
-    return get_command(alone if exists else app)
+    every = {_name(entry): entry for entries in _PANELS.values() for entry in entries}
+    app = copy(_app)
+    app.registered_commands, app.registered_groups = [], []
+    for name, entry in {only: every[only]}.items() if only in every else every.items():
+        if isinstance(entry, str):
+            text, members = _GROUPS[entry]
+            group = typer.Typer(help=text)
+            for member, command in members.items():
+                group.command(member)(expanded(command))
+            app.add_typer(group, name=entry)
+        else:
+            app.command(name)(expanded(entry))
+    return get_command(app)
 
 
-def _name(command: CommandInfo) -> str:
-    return command.name or get_command_name(cast(Any, command.callback).__name__)
+def _name(entry: Callable[..., object] | str) -> str:
+    return entry if isinstance(entry, str) else entry.__name__.removesuffix("_jobs")
 
 
 def run(arguments: Sequence[str]) -> int:

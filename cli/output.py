@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import sys
 import warnings
@@ -46,15 +47,36 @@ def print_text(text: str) -> None:
     sys.stdout.write(f"{text}\n")
 
 
-def print_json(view: BaseModel) -> None:
-    """Print a JSON document with bit-exact floats and null for values that are not finite."""
-    print_text(view.model_dump_json(indent=2))
+Printed = tuple[Any, "Iterable[Any] | str"]
+"""What a command prints: a document for --json, and otherwise text and tables.
+
+The document is a model, an iterator of models, or made of dicts and lists.
+"""
 
 
-def print_json_list(views: Iterable[BaseModel]) -> None:
-    """Print a JSON array while the views are read."""
-    write_json_items(sys.stdout, views)
-    sys.stdout.write("\n")
+def show(document: Any, parts: Iterable[Any] | str, *, as_json: bool) -> None:
+    """Print a document with bit-exact floats, or text and tables, which are made only then."""
+    if as_json:
+        print_document(document)
+        return
+    console = None
+    for part in [parts] if isinstance(parts, str) else parts:
+        if isinstance(part, str):
+            print_text(part)
+        else:
+            console = console or stdout_console()
+            console.print(part)
+
+
+def print_document(document: Any) -> None:
+    """Print JSON; an iterator of models becomes an array while they are read."""
+    if isinstance(document, Iterator):
+        write_json_items(sys.stdout, document)
+        sys.stdout.write("\n")
+    elif isinstance(document, dict | list):
+        print_text(json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False))
+    else:
+        print_text(document.model_dump_json(indent=2))
 
 
 def write_json_items(out: TextIO, views: Iterable[BaseModel], *, indent: int = 0) -> None:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from rich.text import Text
 
 from gaitswarm.cli.files import replacing
 from gaitswarm.cli.pictures import save
-from gaitswarm.cli.tables import Table
+from gaitswarm.cli.tables import table
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.measurement.measured_log import Quantity
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from gaitswarm.cli.rich_table import Table
     from gaitswarm.sim.measurement.measured_log import MeasuredLog
     from gaitswarm.sim.measurement.synchronise import Synchronised
     from gaitswarm.sim.validation import Agreement, Comparison, QuantityComparison
@@ -52,55 +52,40 @@ def write_report(
 
 
 def _lines(comparison: Comparison, facts: Mapping[str, str], *, leg: str) -> Iterable[str]:
-    yield "# Validation"
-    yield ""
+    def picture(heading: str, text: str, file: str) -> list[str]:
+        return [f"## {heading}", "", f"![{text}]({file}.png)", ""]
+
+    yield from ("# Validation", "")
     for remark in remarks(comparison):
-        yield f"**Note:** {remark}."
-        yield ""
+        yield from (f"**Note:** {remark}.", "")
     common = {
         "compared": f"{alignment(comparison)}; {comparison.samples} rows",
         "desired angles": f"correlation {comparison.correlation:.6f}",
         "repeats": str(comparison.repeats),
     }
     yield from _table(["", ""], [[k, v] for k, v in {**facts, **common}.items()])
-    yield ""
-    yield "X is measured, Y simulated; formulas are in docs/validation.md of gaitswarm."
-    yield ""
-    yield "![RMAE by quantity and link](rmae.png)"
-    yield ""
-    yield "## Tolerance classes of RMAE"
-    yield ""
+    yield from ("", "X is measured, Y simulated; formulas are in docs/validation.md of gaitswarm.")
+    yield from ("", "![RMAE by quantity and link](rmae.png)", "")
+    yield from ("## Tolerance classes of RMAE", "")
     classes = [[tolerance.value, _range(tolerance), tolerance.phrase] for tolerance in Tolerance]
     yield from _table(["class", "RMAE", "meaning"], classes)
-    yield ""
-    yield "## By quantity and link"
-    yield ""
+    yield from ("", "## By quantity and link", "")
     yield from _agreements(
         (judged, agreement)
         for judged in comparison.quantities
         for agreement in (*judged.links, judged.whole)
     )
     yield ""
-    yield f"## Joint angles of {leg}"
-    yield ""
-    yield "![Joint angles over time](angles.png)"
-    yield ""
-    yield f"## Motor currents of {leg}"
-    yield ""
-    yield "![Motor currents over time](currents.png)"
-    yield ""
-    yield "## Spectra of the motor currents"
-    yield ""
+    yield from picture(f"Joint angles of {leg}", "Joint angles over time", "angles")
+    yield from picture(f"Motor currents of {leg}", "Motor currents over time", "currents")
+    yield from ("## Spectra of the motor currents", "")
     spectra = comparison.quantity(Quantity.CURRENT).spectra
     yield from _table(
         ["link", "spectral error"], [[s.name, percent(s.spectral_error)] for s in spectra]
     )
-    yield ""
-    yield "![Amplitude spectra of the motor currents](spectra.png)"
+    yield from ("", "![Amplitude spectra of the motor currents](spectra.png)")
     for judged in comparison.quantities:
-        yield ""
-        yield f"## {judged.quantity}: {judged.meaning}"
-        yield ""
+        yield from ("", f"## {judged.quantity}: {judged.meaning}", "")
         yield from _agreements((judged, agreement) for agreement in judged.channels)
 
 
@@ -149,48 +134,42 @@ STYLES: Final = {
     Tolerance.PURPLE: "magenta",
 }
 
-_WITHIN: Final = {True: "inside", False: "outside"}
+
+def _by_link(comparison: Comparison) -> Iterator[tuple[str, Agreement]]:
+    """Yield agreements by link, or of the whole robot, and the quantity with each first one."""
+    for judged in comparison.quantities:
+        for row, agreement in enumerate(judged.links or (judged.whole,)):
+            yield "" if row else f"{judged.quantity} [{judged.unit}]", agreement
 
 
 def comparison_table(comparison: Comparison) -> Table:
     """Return a table with one row per quantity and link; one for supply and acceleration."""
-    table = Table(box=None, padding=(0, 1, 0, 0))
-    table.add_column("quantity", no_wrap=True)
-    for column in ("of", "mean |X|", "mean |Y|", "MSE", "MAE", "RMAE", "class", "RAM"):
-        table.add_column(column, justify="left" if column in ("of", "class") else "right")
-    for judged in comparison.quantities:
-        for row, agreement in enumerate(judged.links or (judged.whole,)):
-            style = STYLES[agreement.tolerance]
-            cells: list[str | Text] = [
-                _heading(judged) if row == 0 else "",
-                agreement.name,
-                f"{agreement.mean_absolute_measured:.4g}",
-                f"{agreement.mean_absolute_simulated:.4g}",
-                f"{agreement.mse:.3g}",
-                f"{agreement.mae:.3g}",
-                Text(percent(agreement.rmae), style=style),
-                Text(agreement.tolerance, style=style),
-                percent(agreement.ram),
-            ]
-            table.add_row(*cells)
-    return table
+    heads = ("quantity", "<of", "mean |X|", "mean |Y|", "MSE", "MAE", "RMAE", "<class", "RAM")
+    rows = (
+        (
+            *(quantity, a.name),
+            *(f"{x:.4g}" for x in (a.mean_absolute_measured, a.mean_absolute_simulated)),
+            *(f"{x:.3g}" for x in (a.mse, a.mae)),
+            *((text, STYLES[a.tolerance]) for text in (percent(a.rmae), a.tolerance.value)),
+            percent(a.ram),
+        )
+        for quantity, a in _by_link(comparison)
+    )
+    return table(heads, rows, gap=1)
 
 
 def confidence_table(comparison: Comparison) -> Table:
     """Return a table of simulated means within repeated measurements (eq. 2.20)."""
-    table = Table(box=None, padding=(0, 1, 0, 0))
-    for column in ("quantity", "of", "CONF of mean |X|", "mean |Y|", ""):
-        table.add_column(column, no_wrap=True)
-    for judged in comparison.quantities:
-        for row, agreement in enumerate(judged.links or (judged.whole,)):
-            table.add_row(
-                _heading(judged) if row == 0 else "",
-                agreement.name,
-                confidence(agreement),
-                f"{agreement.mean_absolute_simulated:.5g}",
-                "" if agreement.within_confidence is None else _WITHIN[agreement.within_confidence],
-            )
-    return table
+    within = {None: "", True: "inside", False: "outside"}
+    rows = (
+        (
+            *(quantity, a.name, confidence(a), f"{a.mean_absolute_simulated:.5g}"),
+            within[a.within_confidence],
+        )
+        for quantity, a in _by_link(comparison)
+    )
+    heads = ("quantity", "<of", "<CONF of mean |X|", "<mean |Y|", "<")
+    return table(heads, rows, gap=1)
 
 
 def confidence(agreement: Agreement) -> str:
@@ -199,11 +178,6 @@ def confidence(agreement: Agreement) -> str:
         return ""
     low, high = agreement.confidence
     return f"{low:.5g} – {high:.5g}"
-
-
-def _heading(judged: QuantityComparison) -> Text:
-    # As a plain string, [rad] would be a style of Rich.
-    return Text(f"{judged.quantity} [{judged.unit}]")
 
 
 def percent(share: float) -> str:

@@ -2,36 +2,25 @@
 
 from __future__ import annotations
 
-import json
-from contextlib import contextmanager
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from gaitswarm.cli.exit_codes import CheckFailed
 from gaitswarm.cli.inputs.options import Db, Json, completed
+from gaitswarm.cli.output import note, show
+from gaitswarm.services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
+    from gaitswarm.cli.output import Printed
     from gaitswarm.services.optimizer.access import Token
     from gaitswarm.services.optimizer.store.tokens import Tokens
 
 Force = Annotated[bool, typer.Option("--force", help="Overwrite existing data.")]
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands."""
-    group = typer.Typer(help="Upgrade, check, back up, restore and prune the database.")
-    for command in (upgrade, check, backup, restore, prune):
-        group.command()(command)
-    app.add_typer(group, name="db")
-    group = typer.Typer(help="Create, list and revoke tokens for access to a server.")
-    group.command()(create)
-    group.command("list")(list_)
-    group.command()(revoke)
-    app.add_typer(group, name="token")
-    app.command()(audit)
 
 
 def upgrade(db: Db = None) -> None:
@@ -39,7 +28,6 @@ def upgrade(db: Db = None) -> None:
 
     No other command does. The database must not be in use; back it up first.
     """
-    from gaitswarm.cli.output import note
     from gaitswarm.services.optimizer.store import schema
 
     before = schema.upgrade(_database(db))
@@ -61,10 +49,6 @@ def check(
 
     The history of every job is compared with its digests. The exit code is 1 if there are findings.
     """
-    from contextlib import closing
-
-    from gaitswarm.cli.exit_codes import CheckFailed
-    from gaitswarm.cli.output import note, print_text
     from gaitswarm.services.optimizer.analysis.verification import check_histories
     from gaitswarm.services.optimizer.store import maintenance, open_store
 
@@ -73,10 +57,7 @@ def check(
     if not skip_histories:
         with closing(open_store(database)) as store:
             findings += check_histories(store)
-    if as_json:
-        print_text(json.dumps(findings, indent=2) + "\n")
-    else:
-        print_text("".join(f"{finding}\n" for finding in findings))
+    show(findings, findings, as_json=as_json)
     if findings:
         raise CheckFailed(f"the database is inconsistent: {len(findings)} findings")
     note("the database is consistent")
@@ -91,7 +72,6 @@ def backup(
 
     The file is an SQLite database, also for PostgreSQL.
     """
-    from gaitswarm.cli.output import note
     from gaitswarm.services.optimizer.store import maintenance
 
     maintenance.backup(_database(db), file, overwrite=force)
@@ -108,7 +88,6 @@ def restore(
     Backups of older versions are upgraded; backups of SQLite can be restored to PostgreSQL, and
     vice versa.
     """
-    from gaitswarm.cli.output import note
     from gaitswarm.jobs.open import database_to_write
     from gaitswarm.services.optimizer.store import maintenance
     from gaitswarm.settings import read_settings
@@ -136,10 +115,6 @@ def prune(
 
     With --older-than, also jobs, except those that are kept or have active forks.
     """
-    from datetime import timedelta
-
-    from gaitswarm.cli.output import note
-    from gaitswarm.services.optimizer.errors import InvalidRequest
     from gaitswarm.services.optimizer.jobs.job import ENDED, JobState
     from gaitswarm.services.optimizer.store import maintenance
 
@@ -179,57 +154,53 @@ def create(
         ),
     ] = "submit",
     db: Db = None,
-    as_json: Json = False,
-) -> None:
+) -> Printed:
     """Create a token; its secret is printed once and never stored."""
-    from gaitswarm.cli.output import note, print_text
     from gaitswarm.services.optimizer.access import Scope
 
     with _tokens(db) as tokens:
         token, secret = tokens.create(name, Scope(scope))
-    if as_json:
-        print_text(json.dumps({**_document(token), "secret": secret}, indent=2))
-        return
-    note(f"token {name!r} of scope {scope}; the secret is shown only once:")
-    print_text(secret)
+
+    def parts() -> Iterator[str]:
+        note(f"token {name!r} of scope {scope}; the secret is shown only once:")
+        yield secret
+
+    return {**_document(token), "secret": secret}, parts()
 
 
-def list_(db: Db = None, as_json: Json = False) -> None:
+def list_tokens(db: Db = None) -> Printed:
     """List tokens, oldest first."""
-    from gaitswarm.cli.output import note, print_text
-
     with _tokens(db, create=False) as tokens:
         listed = tokens.all()
-    if as_json:
-        print_text(json.dumps([_document(token) for token in listed], indent=2))
-        return
-    if not listed:
-        note("there are no tokens; create one by `gaitswarm token create NAME`")
-    for token in listed:
-        state = "valid" if token.revoked_at is None else f"revoked {token.revoked_at:%Y-%m-%d}"
-        created = f"{token.created_at:%Y-%m-%d}"
-        print_text(f"{token.name:24} {token.scope:7} created {created}  {state}")
+
+    def parts() -> Iterator[str]:
+        if not listed:
+            note("there are no tokens; create one by `gaitswarm token create NAME`")
+        for token in listed:
+            state = "valid" if token.revoked_at is None else f"revoked {token.revoked_at:%Y-%m-%d}"
+            created = f"{token.created_at:%Y-%m-%d}"
+            yield f"{token.name:24} {token.scope:7} created {created}  {state}"
+
+    return [_document(token) for token in listed], parts()
 
 
-def revoke(name: Name, db: Db = None, as_json: Json = False) -> None:
+def revoke(name: Name, db: Db = None) -> Printed:
     """Revoke a token; servers refuse it within five seconds."""
-    from gaitswarm.cli.output import note, print_text
-
     with _tokens(db, create=False) as tokens:
         token = tokens.revoke(name)
-    if as_json:
-        print_text(json.dumps(_document(token), indent=2))
-    else:
+
+    def parts() -> Iterator[str]:
         note(f"token {name!r} is revoked")
+        yield from ()
+
+    return _document(token), parts()
 
 
 @contextmanager
 def _tokens(db: str | None, *, create: bool = True) -> Iterator[Tokens]:
     """Open the tokens of the database; a missing one is created, or an error."""
-    from contextlib import closing
-
     from gaitswarm.jobs.open import database_to_read, database_to_write
-    from gaitswarm.services.runtime import open_store
+    from gaitswarm.services.optimizer.store import open_store
     from gaitswarm.settings import read_settings
 
     url = (database_to_write if create else database_to_read)(read_settings(db=db or None))
@@ -257,31 +228,28 @@ def audit(
     ] = None,
     limit: Annotated[int, typer.Option(min=1, max=10_000, help="Maximum number of entries.")] = 50,
     db: Db = None,
-    as_json: Json = False,
-) -> None:
+) -> Printed:
     """Show who submitted, controlled and deleted jobs and created tokens, newest first.
 
     Reads the database; administrators of a server can also read /v1/audit.
     """
-    from contextlib import closing
-
-    from gaitswarm.cli.output import note, print_json_list, print_text
     from gaitswarm.jobs.open import database_to_write
-    from gaitswarm.services.runtime import open_store
+    from gaitswarm.services.optimizer.store import open_store
     from gaitswarm.settings import read_settings
     from gaitswarm.views.operations import AuditEntryView
 
     settings = read_settings(db=db or None)
     with closing(open_store(database_to_write(settings))) as store:
         entries = store.audit(job_id=job, limit=limit).items
-    if as_json:
-        print_json_list(map(AuditEntryView.from_entry, entries))
-        return
-    if not entries:
-        note("no entries of this job" if job else "no entries yet")
-    for entry in entries:
-        details = ", ".join(f"{name}={value}" for name, value in entry.details.items())
-        print_text(
-            f"{entry.at:%Y-%m-%d %H:%M:%S}  {entry.actor:16} {entry.action:14}"
-            f" {entry.job_id or '-':12}  {details}".rstrip()
-        )
+
+    def parts() -> Iterator[str]:
+        if not entries:
+            note("no entries of this job" if job else "no entries yet")
+        for entry in entries:
+            details = ", ".join(f"{name}={value}" for name, value in entry.details.items())
+            yield (
+                f"{entry.at:%Y-%m-%d %H:%M:%S}  {entry.actor:16} {entry.action:14}"
+                f" {entry.job_id or '-':12}  {details}".rstrip()
+            )
+
+    return map(AuditEntryView.from_entry, entries), parts()

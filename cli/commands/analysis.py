@@ -2,21 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import csv
+import io
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, cast
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from gaitswarm.cli.commands.robustness import Radius, Samples, Seed
-from gaitswarm.cli.inputs.options import Db, JobId, Json, Precision, Server
+from gaitswarm.cli.commands.robustness import Radius, Samples, Seed, shown_progress
+from gaitswarm.cli.files import replacing
+from gaitswarm.cli.inputs.options import JobId, Json, Place, Precision
+from gaitswarm.cli.output import note, show
+from gaitswarm.cli.tables import MISSING, SHORT, interval, number, percent, place, table
+from gaitswarm.services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
-    from gaitswarm.cli.front import Placed
+    from gaitswarm.cli.output import Printed
+    from gaitswarm.cli.rich_table import Table
     from gaitswarm.jobs.base import Jobs
-    from gaitswarm.services.optimizer.analysis.preferences import RobustPreferencesView
+    from gaitswarm.services.optimizer.analysis.front import (
+        FrontView,
+        FrontWinnerView,
+        NormalisedDesignView,
+    )
+    from gaitswarm.services.optimizer.analysis.preferences import (
+        PreferenceFitView,
+        PreferenceForView,
+        RobustPreferencesView,
+    )
     from gaitswarm.sim.kernel.walk import Precision as PhysicsPrecision
-    from gaitswarm.views import RankingRequest, RankingView
+    from gaitswarm.views import RankingView, SimulationView
     from gaitswarm.views.analysis import (
         ImportanceView,
         IndexIntervalView,
@@ -24,15 +41,6 @@ if TYPE_CHECKING:
         ScenarioFamiliesView,
         VariableImportanceView,
     )
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands."""
-    app.command()(rank)
-    app.command()(front)
-    app.command()(importance)
-    app.command()(scenarios)
-    app.command()(preferences)
 
 
 def rank(
@@ -46,48 +54,33 @@ def rank(
         ),
     ],
     top: Annotated[int, typer.Option(help="Number of designs to show.")] = 20,
-    server: Server = None,
-    db: Db = None,
-    as_json: Json = False,
-) -> None:
+    *,
+    jobs: Jobs,
+) -> Printed:
     """Rank a job's stored designs by another preference, without simulation."""
-    from gaitswarm.cli.output import print_json
-    from gaitswarm.jobs.open import open_jobs
-
-    request = _ranking_request(preference, top)
-    with open_jobs(server, db) as jobs:
-        ranking = jobs.ranking(job_id, request.preference, top=request.top)
-    if as_json:
-        print_json(ranking)
-    else:
-        _print_ranking(ranking)
-
-
-def _ranking_request(preference: str, top: int) -> RankingRequest:
-    from pydantic import ValidationError
-
     from gaitswarm.cli.inputs.spec_file import preference_choice
-    from gaitswarm.errors import invalid_request
-    from gaitswarm.views import RankingRequest
 
-    data = {"preference": preference_choice(preference), "top": top}
-    try:
-        return RankingRequest.model_validate(data)
-    except ValidationError as error:
-        raise invalid_request(error) from error
+    ranking = jobs.ranking(job_id, preference_choice(preference), top=top)
+    return ranking, _ranking(ranking)
 
 
-def _print_ranking(ranking: RankingView) -> None:
-    from gaitswarm.cli.output import stdout_console
-    from gaitswarm.cli.tables import MISSING, number, ranking_table
-
-    console = stdout_console()
-    console.print(ranking_table(ranking))
+def _ranking(ranking: RankingView) -> Iterator[Table | str]:
+    """Yield the best designs by another preference, with their ranks before."""
+    columns = [">rank", "before", "design", "fitness", "before"]
+    maximized = any(design.figure_of_merit is not None for design in ranking.top)
+    rows = (
+        (
+            *(design.rank, design.rank_before, place(design)),
+            *(number(design.fitness), number(design.fitness_before)),
+            *([design.figure_of_merit] if maximized else []),
+        )
+        for design in ranking.top
+    )
+    yield table(columns + (["F (eq. 3.1)"] if maximized else []), rows)
     agreement = MISSING if ranking.correlation is None else f"{ranking.correlation:.3f}"
-    console.print(
+    yield (
         f"{ranking.evaluations} designs; fitness of the job's best:"
-        f" {number(ranking.fitness_of_present_best)}; rank correlation: {agreement}",
-        markup=False,
+        f" {number(ranking.fitness_of_present_best)}; rank correlation: {agreement}"
     )
 
 
@@ -104,8 +97,8 @@ def front(
         bool,
         typer.Option(help="Also simulate the controller's published designs and place them."),
     ] = False,
-    server: Server = None,
-    db: Db = None,
+    *,
+    place: Place,
     as_json: Json = False,
 ) -> None:
     """Show the Pareto front of a job's stored designs, without simulation.
@@ -113,37 +106,90 @@ def front(
     Lists knees, the best design in each objective, under A, B and C, and under the job's
     preference, and the hypervolume.
     """
-    from gaitswarm.cli.files import replacing
-    from gaitswarm.cli.front import front_csv, marked_table, placed_lines, summary
-    from gaitswarm.cli.output import note, print_json, stdout_console
-    from gaitswarm.jobs.open import open_jobs
-    from gaitswarm.services.optimizer.errors import InvalidRequest
-
     if output is not None and output.suffix != ".csv":
         raise InvalidRequest(f"{output} must end in .csv", field="output")
     if published and as_json:
         raise InvalidRequest("cannot be combined with --json", field="published")
-    with open_jobs(server, db) as jobs:
+    with place.open() as jobs:
         view = jobs.front(job_id, most=most)
         placed = _place_published(jobs, job_id) if published else {}
     if output is not None:
         with replacing(output, "output") as file:
-            file.write(front_csv(view))
+            file.write(_front_csv(view))
         note(f"{len(view.designs)} designs written to {output}")
-    if as_json:
-        print_json(view)
-        return
-    console = stdout_console()
-    console.print(marked_table(view))
-    for line in (*summary(view), *placed_lines(placed)):
-        console.print(line, markup=False)
+    show(view, _front(view, placed), as_json=as_json)
+
+
+def _front(view: FrontView, published: Mapping[str, Placed]) -> Iterator[Table | str]:
+    """Yield knees, the best in each objective, winners of preferences, and published designs."""
+    heads = [f"{SHORT[o.name]}\n{o.unit}" for o in view.objectives]
+    rows = (
+        (label, place(design), *map(number, design.objectives.values()), number(design.fitness))
+        for label, design in _marked(view).items()
+    )
+    yield table(["", "design", *heads, "fitness"], rows, gap=1)
+    error = f" ± {view.hypervolume_error:.4f}" if view.hypervolume_error else ""
+    yield (
+        f"{view.size} of {view.designs_judged} designs are not dominated; hypervolume"
+        f" {view.hypervolume:.4f}{error}; fitness uses the job's preference; all values are"
+        " minimized"
+    )
+    for winner in view.winners:
+        if not winner.on_front:
+            yield (
+                f"the best under {_whose(winner)} is dominated by {winner.dominated_by} designs,"
+                f" and behind one in every objective by {100.0 * winner.behind:.2g} %"
+            )
+    for name, design in published.items():
+        if design.objectives is None:
+            yield f"published {name} fails in a scenario"
+            continue
+        values = [f"{SHORT[key]} {number(value)}" for key, value in design.objectives.items()]
+        yield (
+            f"published {name} is dominated by {design.dominated_by} of {design.of} designs of the"
+            f" front, and dominates {design.dominates}: {', '.join(values)}, fitness"
+            f" {number(design.fitness)}"
+        )
+
+
+def _marked(view: FrontView) -> Mapping[str, NormalisedDesignView]:
+    """Return notable designs by label."""
+    marked: dict[str, NormalisedDesignView] = {}
+    for index, knee in enumerate(view.knees, start=1):
+        marked[f"knee {index} ({knee.distance:.2f})"] = knee
+    for extreme in view.extremes:
+        marked[f"least {extreme.objective.replace('_', ' ')}"] = extreme
+    for winner in view.winners:
+        dominated = "" if winner.on_front else ", dominated"
+        marked[f"best under {_whose(winner)}{dominated}"] = winner
+    return marked
+
+
+def _whose(winner: FrontWinnerView) -> str:
+    return "the job's own" if winner.preference == "job" else winner.preference
+
+
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """Position of another design relative to a front.
+
+    Attributes:
+        objectives: over all scenarios, by name; None if it fails in one.
+        fitness: by the job's preference.
+        dominated_by: number of designs of the front that dominate it.
+        dominates: number of designs of the front that it dominates.
+        of: number of designs of the front.
+    """
+
+    objectives: dict[str, float] | None
+    fitness: float | None
+    dominated_by: int
+    dominates: int
+    of: int
 
 
 def _place_published(jobs: Jobs, job_id: str) -> dict[str, Placed]:
-    """Place the published designs with respect to the front."""
-    from gaitswarm.cli.comparison import published_walk
-    from gaitswarm.cli.front import placed
-    from gaitswarm.services.optimizer.errors import InvalidRequest
+    from gaitswarm.cli.embedded import published_walk
     from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
     from gaitswarm.sim.controllers import CONTROLLERS
 
@@ -153,55 +199,87 @@ def _place_published(jobs: Jobs, job_id: str) -> dict[str, Placed]:
             "a job with worlds cannot be compared with published designs", field="published"
         )
     names = CONTROLLERS[spec.controller].published
-    return {name: placed(published_walk(spec, name), view) for name in names}
+    return {name: _placed(published_walk(spec, name), view) for name in names}
 
 
-def importance(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = False) -> None:
+def _placed(walk: SimulationView, view: FrontView) -> Placed:
+    """Place a design, simulated in the job's scenarios, relative to the front."""
+    import numpy as np
+
+    names = [objective.name for objective in view.objectives]
+    walks = [
+        [result.objectives[name] for name in names] for result in walk.scenarios.values()
+        if result.status == "ok"
+    ]  # fmt: skip
+    if len(walks) < len(walk.scenarios):
+        return Placed(None, None, 0, 0, len(view.designs))
+    means = np.exp(np.log(np.array(walks, dtype=np.float64)).mean(axis=0))
+    front = np.array([list(design.objectives.values()) for design in view.designs])
+    return Placed(
+        dict(zip(names, means.tolist(), strict=True)),
+        walk.fitness,
+        int(((front <= means).all(axis=1) & (front < means).any(axis=1)).sum()),
+        int(((means <= front).all(axis=1) & (means < front).any(axis=1)).sum()),
+        len(front),
+    )
+
+
+def _front_csv(view: FrontView) -> bytes:
+    """Return a CSV with one row per design: position, marks, fitness, objectives, variables."""
+    text = io.StringIO()
+    names = [objective.name for objective in view.objectives]
+    variables = list(view.designs[0].design) if view.designs else []
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(
+        [
+            *("iteration", "particle", "marks", "fitness"),
+            *names,
+            *(f"normalised.{name}" for name in names),
+            *(f"design.{name}" for name in variables),
+        ]
+    )
+    for design in view.designs:
+        cells: list[Any] = [design.iteration, design.particle, "; ".join(design.marks)]
+        cells += [design.fitness, *design.objectives.values(), *design.normalised.values()]
+        writer.writerow([*cells, *design.design.values()])
+    return text.getvalue().encode()
+
+
+def importance(job_id: JobId, *, jobs: Jobs) -> Printed:
     """Show which variables of a job matter, from stored designs, without simulation.
 
     First-order Sobol' indices of the fitness, each objective and failures, with intervals; and
     variables whose best value lies at a bound.
     """
-    from gaitswarm.cli.output import print_json
-    from gaitswarm.jobs.open import open_jobs
-
-    with open_jobs(server, db) as jobs:
-        view = jobs.importance(job_id)
-    if as_json:
-        print_json(view)
-    else:
-        _print_importance(view)
+    view = jobs.importance(job_id)
+    return view, _importance(view)
 
 
-def _print_importance(view: ImportanceView) -> None:
-    from gaitswarm.cli.output import stdout_console
-    from gaitswarm.cli.tables import MISSING, SHORT, Table
+def _importance(view: ImportanceView) -> Iterator[Table | str]:
+    def share(index: IndexIntervalView | None) -> str:
+        return MISSING if index is None else f"{100.0 * index.value:.0f}"
 
-    table = Table(box=None, padding=(0, 1, 0, 0))
-    table.add_column("variable", no_wrap=True)
-    for head in ("fitness\n%", "95 %", *(SHORT[name] for name in view.objectives), "failing"):
-        table.add_column(head, justify="right", no_wrap=True)
-    table.add_column("moved with", no_wrap=True)
-    for variable in sorted(view.variables, key=_by_fitness):
-        companion = MISSING
+    def by_fitness(variable: VariableImportanceView) -> float:
+        return -1.0 if variable.fitness is None else -variable.fitness.value
+
+    rows = []
+    for variable in sorted(view.variables, key=by_fitness):
+        companion = index = ""
         if variable.moved_with is not None:
             companion = f"{variable.moved_with}, {variable.correlation:.2f}"
-        table.add_row(
-            variable.name,
-            _index_percent(variable.fitness),
-            _index_interval(variable.fitness),
-            *(_index_percent(variable.objectives[name]) for name in view.objectives),
-            _index_percent(variable.failing),
-            companion,
+        if variable.fitness is not None:
+            index = f"{100.0 * variable.fitness.low:.0f}–{100.0 * variable.fitness.high:.0f}"
+        rows.append(
+            (
+                *(variable.name, share(variable.fitness), index),
+                *(share(variable.objectives[name]) for name in view.objectives),
+                *(share(variable.failing), companion or MISSING),
+            )
         )
-    console = stdout_console()
-    console.print(table)
-    for line in _importance_lines(view):
-        console.print(line, markup=False, highlight=False)
-
-
-def _by_fitness(variable: VariableImportanceView) -> float:
-    return -1.0 if variable.fitness is None else -variable.fitness.value
+    objectives = [SHORT[name] for name in view.objectives]
+    heads = ["variable", "fitness\n%", "95 %", *objectives, "failing", "<moved with"]
+    yield table(heads, rows, gap=1)
+    yield from _importance_lines(view)
 
 
 def _importance_lines(view: ImportanceView) -> Iterator[str]:
@@ -232,85 +310,53 @@ def _importance_lines(view: ImportanceView) -> Iterator[str]:
         )
 
 
-def _index_percent(index: IndexIntervalView | None) -> str:
-    return "–" if index is None else f"{100.0 * index.value:.0f}"
-
-
-def _index_interval(index: IndexIntervalView | None) -> str:
-    return "" if index is None else f"{100.0 * index.low:.0f}–{100.0 * index.high:.0f}"
-
-
 def scenarios(
     job_id: JobId,
     tolerance: Annotated[
         float, typer.Option(help="Largest accepted regret of a subset of scenarios, as a share.")
     ] = 0.01,
-    server: Server = None,
-    db: Db = None,
-    as_json: Json = False,
-) -> None:
+    *,
+    jobs: Jobs,
+) -> Printed:
     """Show which scenarios of a job matter, from stored designs, without simulation.
 
     Compares the job's best with those by subsets of its scenarios. A search with fewer scenarios
     visits other designs, so confirm the result by a job.
     """
-    from gaitswarm.cli.output import print_json
-    from gaitswarm.jobs.open import open_jobs
-
-    with open_jobs(server, db) as jobs:
-        view = jobs.scenarios(job_id, tolerance=tolerance)
-    if as_json:
-        print_json(view)
-    else:
-        _print_families(view)
+    view = jobs.scenarios(job_id, tolerance=tolerance)
+    return view, _families(view)
 
 
-def _print_families(view: ScenarioFamiliesView) -> None:
-    from gaitswarm.cli.output import stdout_console
-    from gaitswarm.cli.tables import MISSING, Table, number
+def _families(view: ScenarioFamiliesView) -> Iterator[Table | str]:
+    def share(value: float | None) -> str:
+        return "fails" if value is None else f"{100.0 * value:.1f}"
 
-    without = Table(title="Left out", title_justify="left", box=None, padding=(0, 1, 0, 0))
-    without.add_column("scenario", no_wrap=True)
-    for head in ("rank\ncorrelation", "regret\nover all %", "loss\nin it %"):
-        without.add_column(head, justify="right", no_wrap=True)
-    without.add_column("most like", no_wrap=True)
-    for left in view.left_out:
-        similar = MISSING if left.similar is None else f"{left.similar}, {left.similarity:.2f}"
-        without.add_row(
-            left.scenario,
-            number(left.family.correlation, 3),
-            _loss_percent(left.family.regret),
-            _loss_percent(left.loss),
-            similar,
+    def shares(loss: LossView) -> str:
+        return f"{share(loss.value)} ({share(loss.low)}–{share(loss.high)})"
+
+    heads = ["scenario", "rank\ncorrelation", "regret\nover all %", "loss\nin it %", "<most like"]
+    without = (
+        (
+            *(left.scenario, number(left.family.correlation, 3)),
+            *(shares(left.family.regret), shares(left.loss)),
+            MISSING if left.similar is None else f"{left.similar}, {left.similarity:.2f}",
         )
-    sizes = Table(title="Families", title_justify="left", box=None, padding=(0, 2, 0, 0))
-    for head in ("scenarios", "families", "median regret %", "worst %", "within tolerance"):
-        sizes.add_column(head, justify="right")
-    for size in view.sizes:
-        shares = [_loss_share(size.median), _loss_share(size.worst)]
-        sizes.add_row(str(size.size), str(size.families), *shares, str(size.within))
-    console = stdout_console()
-    console.print(without)
-    console.print(sizes)
-    smallest = view.smallest
-    subset = (
-        "none"
-        if smallest is None
-        else f"{', '.join(smallest.scenarios)}; regret {_loss_percent(smallest.regret)} %"
+        for left in view.left_out
     )
-    console.print(
+    yield table(heads, without, title="Left out", gap=1)
+    heads = [">scenarios", "families", "median regret %", "worst %", "within tolerance"]
+    sizes = (
+        (size.size, size.families, share(size.median), share(size.worst), size.within)
+        for size in view.sizes
+    )
+    yield table(heads, sizes, title="Families")
+    smallest, subset = view.smallest, "none"
+    if smallest is not None:
+        subset = f"{', '.join(smallest.scenarios)}; regret {shares(smallest.regret)} %"
+    yield (
         f"{view.designs} designs walk in all scenarios; smallest family within"
-        f" {100.0 * view.tolerance:g} %: {subset}",
-        markup=False,
+        f" {100.0 * view.tolerance:g} %: {subset}"
     )
-
-
-def _loss_percent(loss: LossView) -> str:
-    return f"{_loss_share(loss.value)} ({_loss_share(loss.low)}–{_loss_share(loss.high)})"
-
-
-def _loss_share(value: float | None) -> str:
-    return "fails" if value is None else f"{100.0 * value:.1f}"
 
 
 def preferences(
@@ -332,24 +378,22 @@ def preferences(
             " simulation.",
         ),
     ] = None,
-    server: Server = None,
-    db: Db = None,
-    as_json: Json = False,
-) -> None:
+    *,
+    jobs: Jobs,
+) -> Printed:
     """Find preferences whose winner among a job's designs is robust (thesis 4.5).
 
     Ranks stored designs under many preferences, and estimates the robustness index of the winners
     by simulation. With --for, finds the preference that makes a design the best.
     """
-    if for_design is not None:
-        _find_preference(job_id, for_design, server=server, db=db, as_json=as_json)
-        return
-    from gaitswarm.cli.commands.robustness import shown_progress
-    from gaitswarm.cli.output import print_json
-    from gaitswarm.jobs.open import open_jobs
     from gaitswarm.preferences import robust_preferences
+    from gaitswarm.settings import read_place
 
-    with open_jobs(server, db) as jobs, shown_progress() as progress:
+    if for_design is not None:
+        iteration, particle = read_place(for_design, field="for")
+        fits = jobs.preference_for(job_id, iteration, particle)
+        return fits, _fits(fits)
+    with shown_progress() as progress:
         view = robust_preferences(
             jobs,
             job_id,
@@ -361,57 +405,62 @@ def preferences(
             precision=cast("PhysicsPrecision", precision or "double"),
             progress=progress,
         )
-    if as_json:
-        print_json(view)
-    else:
-        _print_preferences(view)
+    return view, _preferences(view)
 
 
-def _find_preference(
-    job_id: str, for_design: str, *, server: str | None, db: str | None, as_json: bool
-) -> None:
-    from gaitswarm.cli.front import fits_table, verdict
-    from gaitswarm.cli.output import print_json, stdout_console
-    from gaitswarm.jobs.open import open_jobs
-    from gaitswarm.settings import read_place
-
-    iteration, particle = read_place(for_design, field="for")
-    with open_jobs(server, db) as jobs:
-        view = jobs.preference_for(job_id, iteration, particle)
-    if as_json:
-        print_json(view)
-        return
-    console = stdout_console()
-    console.print(fits_table(view))
-    console.print(verdict(view), markup=False)
-
-
-def _print_preferences(view: RobustPreferencesView) -> None:
-    from gaitswarm.cli.output import stdout_console
-    from gaitswarm.cli.tables import MISSING, Table, number
-    from gaitswarm.settings import place_of
-
-    table = Table(box=None, padding=(0, 2, 0, 0))
-    heads = ("design", "index", "95 %", "wins under", "fitness", "loss %", "bias", "exponent")
-    for head in heads:
-        table.add_column(head, no_wrap=head not in ("bias", "exponent"))
-    for candidate in view.candidates:
-        index = candidate.index
-        share = f"{100.0 * candidate.share:.0f} %"
-        table.add_row(
-            place_of(candidate.iteration, candidate.particle),
-            number(None if index is None else index.value, 3),
-            MISSING if index is None else f"{number(index.low, 3)}–{number(index.high, 3)}",
-            ", ".join([*candidate.named, share]),
+def _preferences(view: RobustPreferencesView) -> Iterator[Table | str]:
+    rows = (
+        (
+            place(candidate),
+            *interval(candidate.index),
+            ", ".join([*candidate.named, f"{100.0 * candidate.share:.0f} %"]),
             number(candidate.fitness),
-            number(None if candidate.loss is None else 100.0 * candidate.loss, 2),
+            percent(candidate.loss, 2),
             " ".join(number(value, 2) for value in candidate.preference.bias),
             " ".join(number(value, 2) for value in candidate.preference.exponent),
         )
-    console = stdout_console()
-    console.print(table)
-    console.print(
-        f"{view.winners} designs of the job win under A, B, C or any of {view.drawn} sampled"
-        " preferences; smaller indices are more robust; fitness and loss use the job's preference",
-        markup=False,
+        for candidate in view.candidates
     )
+    heads = ("index", "95 %", "wins under", "fitness", "loss %", "bias", "exponent")
+    yield table(["design", *(f"<{head}" for head in heads)], rows)
+    yield (
+        f"{view.winners} designs of the job win under A, B, C or any of {view.drawn} sampled"
+        " preferences; smaller indices are more robust; fitness and loss use the job's preference"
+    )
+
+
+def _fits(view: PreferenceForView) -> Iterator[Table | str]:
+    """Yield preferences that suit a design, one per set of biases, best first."""
+    rows = (
+        (
+            ", ".join("the job" if owner == "job" else owner for owner in fit.biases_of),
+            fit.rank,
+            percent(fit.margin, 3),
+            MISSING if fit.rival is None else place(fit.rival),
+            " ".join(number(value, 3) for value in fit.preference.bias),
+            " ".join(number(value) for value in fit.preference.exponent),
+        )
+        for fit in view.fits
+    )
+    heads = ("rank", "margin %", "rival", "bias", "exponent")
+    yield table(["biases of", *(f"<{head}" for head in heads)], rows)
+    yield _verdict(view)
+
+
+def _verdict(view: PreferenceForView) -> str:
+    """State in a sentence whether a design wins under any preference."""
+    chosen, best = place(view.chosen), view.fits[0]
+    if view.wins:
+        return f"design {chosen} wins{_by(best)} under {best.preference.model_dump_json()}"
+    tried = "" if view.certain else " that were tried"
+    dominated = "" if view.on_front else ", which is dominated"
+    rival = "another" if best.rival is None else place(best.rival)
+    return (
+        f"no exponents{tried} with these biases make design {chosen} win{dominated}; under"
+        f" {best.preference.model_dump_json()} it has rank {best.rank}, and {rival} is better"
+        f"{_by(best)}"
+    )
+
+
+def _by(fit: PreferenceFitView) -> str:
+    return "" if fit.margin is None else f" by {100.0 * abs(fit.margin):.3g} %"

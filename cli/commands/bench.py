@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from gaitswarm.cli.inputs.options import Json, Precision, one_of
+from gaitswarm.cli.inputs.options import Precision, one_of
 
 if TYPE_CHECKING:
+    from gaitswarm.cli.output import Printed
     from gaitswarm.services.profile import JobProfile
 
 _SHARES: Final = {
@@ -20,11 +21,6 @@ _SHARES: Final = {
     "search": "judging designs and asking for the next",
     "store": "store",
 }
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command()(bench)
 
 
 def bench(
@@ -42,14 +38,11 @@ def bench(
     evaluator: Annotated[
         str, typer.Option(help="Workers of the profiled job: ray or in-process.")
     ] = "ray",
-    as_json: Json = False,
-) -> None:
+) -> Printed:
     """Measure the simulator's speed on one core, for the main Fuzzy-PI job."""
-    import json
     from dataclasses import asdict
     from typing import get_args
 
-    from gaitswarm.cli.output import print_text
     from gaitswarm.services.worker import EvaluatorKind
     from gaitswarm.sim import benchmark
     from gaitswarm.sim.assembly import Backend
@@ -61,17 +54,13 @@ def bench(
 
         kind: EvaluatorKind = one_of(get_args(EvaluatorKind), evaluator, "evaluator")
         measured = profile_job(evaluator=kind, precision=digits)
-        print_text(json.dumps(asdict(measured), indent=2) if as_json else _profile_text(measured))
-        return
+        return asdict(measured), _profile_text(measured)
     requested: Backend = one_of(get_args(Backend), backend, "backend")
     result = benchmark.measure(repeats=repeats, backend=requested, precision=digits)
-    if as_json:
-        print_text(json.dumps(asdict(result), indent=2))
-        return
     size = (
         "" if result.bytes_of_code is None else f", {result.bytes_of_code / 1024:.0f} KiB of code"
     )
-    print_text(
+    return asdict(result), (
         f"{result.backend} kernel in {result.precision} precision, {result.lanes} walkers in"
         f" lock-step{size}: {result.us_per_step_per_walker:.3f} us per physics step and walker,"
         f" {result.real_time_factor_per_core:.0f} x real time on one core,"

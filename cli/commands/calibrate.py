@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
+from gaitswarm.cli.commands.measurements import ONE_RUN, parameters_table
 from gaitswarm.cli.inputs.options import (
-    Db,
     JobIds,
     JobName,
-    Json,
     Precision,
-    Server,
     WorkerOptions,
     name_and_value,
-    with_groups,
 )
+from gaitswarm.cli.output import note
+from gaitswarm.cli.tables import MISSING, number, place, table
+from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.sim.near_names import instead_of
 
 if TYPE_CHECKING:
+    from gaitswarm.cli.output import Printed
+    from gaitswarm.cli.rich_table import Table
     from gaitswarm.jobs.base import Jobs
+    from gaitswarm.views.calibration import ReachedView, TargetsView
+    from gaitswarm.views.identification import IdentifiabilityView
 
 LeaveOneOut = Annotated[
     str | None,
@@ -33,13 +38,6 @@ LeaveOneOut = Annotated[
 ]
 
 
-def register(app: typer.Typer) -> None:
-    """Add the commands."""
-    app.command()(calibrate)
-    app.command()(targets)
-
-
-@with_groups
 def calibrate(
     table: Annotated[
         Path,
@@ -79,12 +77,11 @@ def calibrate(
     name: JobName = None,
     leave_one_out: LeaveOneOut = None,
     workers: WorkerOptions,
-    as_json: Json = False,
-) -> None:
+) -> Printed:
     """Fit a robot and unknown conventions to a table of results, in this process."""
-    from gaitswarm.cli.calibration import read_targets
     from gaitswarm.cli.embedded import run_seeds
     from gaitswarm.cli.inputs.spec_file import parse_spec
+    from gaitswarm.cli.inputs.targets_file import read_targets
     from gaitswarm.operations import TargetsQuery
     from gaitswarm.specs import checked
 
@@ -108,10 +105,10 @@ def calibrate(
     if variables is not None:
         document["variables"] = _variables(document, variables)
     specs = [parse_spec({**document, "seed": seed + run}) for run in range(seeds)]
-    run_seeds(
+    return run_seeds(
         specs,
         workers,
-        lambda jobs, ids: _show(jobs, ids, leave_one_out, as_json=as_json),
+        lambda jobs, ids: _targets(jobs, ids, leave_one_out),
         report_command="targets",
     )
 
@@ -119,37 +116,73 @@ def calibrate(
 def targets(
     job_ids: JobIds,
     leave_one_out: LeaveOneOut = None,
-    server: Server = None,
-    db: Db = None,
-    as_json: Json = False,
-) -> None:
+    *,
+    jobs: Jobs,
+) -> Printed:
     """Show how closely calibrations meet their targets, and what the evidence decides.
 
     The jobs differ only in their seed.
     """
-    from gaitswarm.jobs.open import open_jobs
-
-    with open_jobs(server, db) as jobs:
-        _show(jobs, job_ids, leave_one_out, as_json=as_json)
+    return _targets(jobs, job_ids, leave_one_out)
 
 
-def _show(jobs: Jobs, job_ids: list[str], leave_one_out: str | None, *, as_json: bool) -> None:
-    import json
-
-    from gaitswarm.cli.calibration import show_targets
-    from gaitswarm.cli.output import print_text
+def _targets(
+    jobs: Jobs, job_ids: list[str], leave_one_out: str | None
+) -> tuple[dict[str, Any], Iterator[Table | str]]:
     from gaitswarm.operations import TargetsQuery
     from gaitswarm.specs import checked
 
     query = checked(TargetsQuery, {"leave_out": leave_one_out})
     reached = jobs.targets(job_ids, leave_out=query.leave_out)
     parameters = jobs.parameters(job_ids)
-    if as_json:
-        views = {"targets": reached, "parameters": parameters}
-        documents = {key: view.model_dump(mode="json") for key, view in views.items()}
-        print_text(json.dumps(documents, indent=2, allow_nan=False))
-    else:
-        show_targets(reached, parameters)
+    views = {"targets": reached, "parameters": parameters}
+    documents = {key: view.model_dump(mode="json") for key, view in views.items()}
+    return documents, _parts(reached, parameters)
+
+
+def _parts(reached: TargetsView, parameters: IdentifiabilityView) -> Iterator[Table | str]:
+    """Yield targets, simulated values and differences; then the fitted parameters."""
+
+    def values(target: ReachedView | None) -> tuple[str, str]:
+        off = None if target is None else target.difference
+        simulated = None if target is None else target.simulated
+        return number(simulated), MISSING if off is None else f"{off:+.2f}"
+
+    left_out = any(target.left_out is not None for target in reached.targets)
+    rows = (
+        (
+            t.walk if t.relative_to is None else f"{t.walk} / {t.relative_to}",
+            *(t.quantity, t.unit, number(t.value), *values(t)),
+            *(values(t.left_out) if left_out else ()),
+            "" if t.use == "fit" else "predict",
+        )
+        for t in reached.targets
+    )
+    heads = ["walk", "<quantity", "<unit", "target", "simulated", "off"]
+    heads += [*(("left out", "off") if left_out else ()), "<"]
+    yield table(heads, rows, title="Targets; off: difference in tolerances", gap=1)
+    yield (
+        f"misfit {reached.fitness:.3f} tolerances (root mean square over fitted targets): job"
+        f" {reached.job}, design {place(reached)}"
+    )
+    for job, fitness in zip(parameters.jobs, parameters.fitness, strict=True):
+        yield f"job {job}: misfit {fitness:.3f}"
+    yield parameters_table(parameters, {})
+    choices = [
+        (
+            *("" if index else parameter.name, choice.name),
+            *map(number, (choice.fitness, *choice.by_run)),
+            "" if index else parameter.explanation or "one run",
+        )
+        for parameter in parameters.parameters
+        for index, choice in enumerate(parameter.choices)
+    ]
+    if choices:
+        runs = (f"run {k}" for k in range(1, len(parameters.jobs) + 1))
+        heads = ["variable", "<choice", "misfit", *runs, "<evidence"]
+        yield table(heads, choices, title="Least misfit by choice", gap=1)
+    if len(parameters.jobs) == 1:
+        note(ONE_RUN)
 
 
 def _robots(text: str | None) -> dict[str, Any]:
@@ -163,7 +196,6 @@ def _robots(text: str | None) -> dict[str, Any]:
 
 def _variables(document: dict[str, Any], text: str) -> list[Any]:
     from gaitswarm.cli.inputs.spec_file import parse_spec
-    from gaitswarm.services.optimizer.errors import InvalidRequest
     from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
 
     entries = _entries(text)

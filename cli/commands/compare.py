@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import json
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gaitswarm.cli.inputs.options import Db, Json, RobotOption, Server
+from gaitswarm.cli.inputs.options import Place, RobotOption
+from gaitswarm.cli.output import note
+from gaitswarm.cli.tables import Bold, number, table
+from gaitswarm.services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
+    from gaitswarm.cli.output import Printed
+    from gaitswarm.cli.rich_table import Table
     from gaitswarm.sim.drives import NamedDrive, WalkFigures
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands."""
-    app.command()(compare)
 
 
 def compare(
@@ -35,32 +35,27 @@ def compare(
         Path | None, typer.Option(metavar="FILE", help="Draw speed, power and effectivity.")
     ] = None,
     robot: RobotOption = None,
-    server: Server = None,
-    db: Db = None,
-    as_json: Json = False,
-) -> None:
+    *,
+    place: Place,
+) -> Printed:
     """Compare drives in the same scenarios: speed, power, effectivity, objectives."""
     from gaitswarm.cli.inputs.robots import chosen_robot, chosen_scenarios
-    from gaitswarm.cli.output import note, print_text
-    from gaitswarm.cli.pictures import draw_comparison, save
     from gaitswarm.sim.drives import DRIVES
     from gaitswarm.sim.drives import compare as compare_drives
 
-    compared = [_drive(name, server, db) for name in drives or DRIVES]
+    compared = [_drive(name, place) for name in drives or DRIVES]
     walked = chosen_scenarios(scenario, robot)
     figures = compare_drives(compared, walked, robot=chosen_robot(robot))
-    if as_json:
-        print_text(json.dumps([_row(f) for f in figures], indent=2))
-    else:
-        _show(compared, figures)
     if plot is not None:
+        from gaitswarm.cli.pictures import draw_comparison, save
+
         save(draw_comparison(figures), plot)
         note(f"picture written to {plot}")
+    return [_row(f) for f in figures], _parts(compared, figures)
 
 
-def _drive(name: str, server: str | None, db: str | None) -> NamedDrive:
+def _drive(name: str, place: Place) -> NamedDrive:
     from gaitswarm.cli.inputs.design_file import given_design, read_design
-    from gaitswarm.services.optimizer.errors import InvalidRequest
     from gaitswarm.sim.controllers import CONTROLLERS
     from gaitswarm.sim.drives import drive_of_design, find_drive
 
@@ -68,7 +63,7 @@ def _drive(name: str, server: str | None, db: str | None) -> NamedDrive:
     if not colon:
         return find_drive(name)
     if kind == "job":
-        best = given_design(name, None, server=server, db=db)
+        best = given_design(name, None, place=place)
         return drive_of_design(name, best.controller, best.values)
     for controller in CONTROLLERS:
         if kind == controller:
@@ -90,25 +85,18 @@ def _row(figures: WalkFigures) -> dict[str, object]:
     }
 
 
-def _show(drives: list[NamedDrive], figures: tuple[WalkFigures, ...]) -> None:
-    from gaitswarm.cli.output import stdout_console
-    from gaitswarm.cli.tables import Table, number
-
-    table = Table(box=None, header_style="bold", pad_edge=False)
-    table.add_column("scenario\ndrive", no_wrap=True)
-    table.add_column("status")
-    heads = ("speed m/s", "power W", "effect. m/J", "torque N m", "accel. m/s2", "ang.acc. rad/s2")
-    for head in (*heads, "energy J/m"):
-        table.add_column(head.replace(" ", "\n", 1), justify="right")
+def _parts(drives: list[NamedDrive], figures: tuple[WalkFigures, ...]) -> Iterator[Table | str]:
+    named = ("torque", "acceleration", "angular_acceleration", "energy")
+    rows: list[list[Any]] = []
     scenario = ""
     for f in figures:
         if f.scenario != scenario:
             scenario = f.scenario
-            table.add_row(scenario, style="bold")
-        named = ("torque", "acceleration", "angular_acceleration", "energy")
+            rows.append(Bold([scenario]))
         values = (f.speed, f.power, f.effectivity, *(f.objectives[name] for name in named))
-        table.add_row(f"  {f.drive}", f.status.label, *(number(value) for value in values))
-    console = stdout_console()
-    console.print(table)
+        rows.append([f"  {f.drive}", f.status.label, *map(number, values)])
+    heads = ("speed m/s", "power W", "effect. m/J", "torque N m", "accel. m/s2", "ang.acc. rad/s2")
+    broken = (head.replace(" ", "\n", 1) for head in (*heads, "energy J/m"))
+    yield table(["scenario\ndrive", "<status", *broken], rows)
     for drive in drives:
-        console.print(f"{drive.name}: {drive.description}", markup=False, highlight=False)
+        yield f"{drive.name}: {drive.description}"

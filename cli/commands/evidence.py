@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
+import hashlib
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from gaitswarm.cli.inputs.options import Db, JobId, Json, Server
+from gaitswarm.cli.exit_codes import CheckFailed
+from gaitswarm.cli.files import replacing
+from gaitswarm.cli.inputs.options import JobId, Json, Place, full_id
+from gaitswarm.cli.output import note, show
+from gaitswarm.cli.tables import number, table
+from gaitswarm.cli.tables import place as place_of
+from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest
 
 if TYPE_CHECKING:
+    from gaitswarm.cli.rich_table import Table
     from gaitswarm.jobs.base import Jobs
     from gaitswarm.tables import TableFormat
     from gaitswarm.views.verification import HistoryVerificationView, VerificationView
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands."""
-    app.command()(export)
-    app.command()(evidence)
-    app.command()(verify)
 
 
 def export(
@@ -27,34 +29,16 @@ def export(
     output: Annotated[
         Path, typer.Option("--output", "-o", metavar="FILE", help="FILE.csv or FILE.parquet.")
     ],
-    server: Server = None,
-    db: Db = None,
+    *,
+    jobs: Jobs,
 ) -> None:
     """Write a table with one row per evaluated design: fitness, variables, results by scenario."""
-    from gaitswarm.cli.files import replacing
-    from gaitswarm.cli.output import note
-    from gaitswarm.jobs.open import open_jobs
-
-    file_format = _table_format(output)
-    with open_jobs(server, db) as jobs:
-        job = jobs.job(job_id)
-        with replacing(output, "output") as file:
-            for part in jobs.export(job_id, file_format):
-                file.write(part)
+    if output.suffix not in (".csv", ".parquet"):
+        raise InvalidRequest(f"{output} must end in .csv or .parquet", field="output")
+    job, file_format = jobs.job(job_id), cast("TableFormat", output.suffix[1:])
+    with replacing(output, "output") as file:
+        file.writelines(jobs.export(job_id, file_format))
     note(f"{job.evaluations} evaluations written to {output}")
-
-
-def _table_format(path: Path) -> TableFormat:
-    """Return the format of the file's suffix."""
-    from gaitswarm.services.optimizer.errors import InvalidRequest
-
-    match path.suffix:
-        case ".csv":
-            return "csv"
-        case ".parquet":
-            return "parquet"
-        case _:
-            raise InvalidRequest(f"{path} must end in .csv or .parquet", field="output")
 
 
 def evidence(
@@ -62,18 +46,11 @@ def evidence(
     output: Annotated[
         Path, typer.Option("--output", "-o", metavar="FILE", help="FILE.zip to write.")
     ],
-    server: Server = None,
-    db: Db = None,
+    *,
+    jobs: Jobs,
 ) -> None:
     """Write a job's spec, history and results to one file that `verify` checks."""
-    import hashlib
-
-    from gaitswarm.cli.files import replacing
-    from gaitswarm.cli.output import note
-    from gaitswarm.jobs.open import open_jobs
-
-    with open_jobs(server, db) as jobs:
-        content = jobs.evidence(job_id)
+    content = jobs.evidence(job_id)
     with replacing(output, "output") as file:
         file.write(content)
     note(f"{output}: SHA-256 {hashlib.sha256(content).hexdigest()}")
@@ -105,8 +82,8 @@ def verify(
             help="Digest of an iteration, noted earlier, that the history must contain.",
         ),
     ] = None,
-    server: Server = None,
-    db: Db = None,
+    *,
+    place: Place,
     as_json: Json = False,
 ) -> None:
     """Check evidence, or a job's stored history, to the bit; exit code 1 if anything differs.
@@ -114,25 +91,18 @@ def verify(
     Checking a file needs neither database nor network, and never trusts the file. For a job, the
     digests of its iterations are recomputed, and the first that differs is named.
     """
-    from gaitswarm.cli.exit_codes import CheckFailed
-    from gaitswarm.cli.inputs.options import full_id
-    from gaitswarm.cli.output import print_json
     from gaitswarm.evidence.verify import verify as verified
-    from gaitswarm.jobs.open import open_jobs
 
     view: VerificationView | HistoryVerificationView
     if Path(source).exists() or Path(source).name != source or "." in source:
         view = verified(source, replay=replay, seed=seed, head=head)
     else:
-        with open_jobs(server, db) as jobs:
+        with place.open() as jobs:
             source = full_id(jobs, source)
             view = jobs.verify(source, head=head)
             if view.verified:
                 view = _verify_evidence(jobs, source, view, replay=replay, seed=seed, head=head)
-    if as_json:
-        print_json(view)
-    else:
-        _print_verification(view)
+    show(view, _verification(view), as_json=as_json)
     if not view.verified:
         raise CheckFailed(f"verification of {source} failed")
 
@@ -147,7 +117,6 @@ def _verify_evidence(
     head: str | None,
 ) -> VerificationView | HistoryVerificationView:
     """Verify a job as evidence in this process."""
-    from gaitswarm.errors import Conflict
     from gaitswarm.evidence.verify import verify as verified
 
     try:
@@ -160,36 +129,33 @@ def _verify_evidence(
     return verified(content, replay=replay, seed=seed, head=head)
 
 
-def _print_verification(view: VerificationView | HistoryVerificationView) -> None:
-    from rich.text import Text
-
-    from gaitswarm.cli.output import stdout_console
-    from gaitswarm.cli.tables import Table, number
-    from gaitswarm.settings import place_of
-    from gaitswarm.views.verification import VerificationView
-
-    console = stdout_console()
-    table = Table(box=None, show_header=False)
+def _verification(
+    view: VerificationView | HistoryVerificationView,
+) -> Iterator[Table | str]:
     states = {True: ("passed", "green"), False: ("FAILED", "red"), None: ("not checked", "yellow")}
-    for check in view.checks:
-        word, style = states[check.passed]
-        whose = "" if check.certificate is None else f"certificate {check.certificate}: "
-        table.add_row(Text(f"{whose}{check.name}"), Text(word, style=style), Text(check.detail))
-    console.print(table)
+
+    def whose(certificate: str | None, end: str) -> str:
+        return "" if certificate is None else f"certificate {certificate}{end}"
+
+    yield table(
+        None,
+        (
+            (f"{whose(check.certificate, ': ')}{check.name}", states[check.passed], check.detail)
+            for check in view.checks
+        ),
+    )
     for difference in view.differences[:10]:
-        values = (number(difference.stored, 17), number(difference.simulated, 17))
-        whose = "" if difference.certificate is None else f"certificate {difference.certificate}, "
-        console.print(
-            f"{whose}design {place_of(difference.iteration, difference.particle)},"
-            f" {difference.case}, {difference.what}: stored {values[0]}, simulated {values[1]}",
-            markup=False,
+        stored, simulated = number(difference.stored, 17), number(difference.simulated, 17)
+        yield (
+            f"{whose(difference.certificate, ', ')}design {place_of(difference)},"
+            f" {difference.case}, {difference.what}: stored {stored}, simulated {simulated}"
         )
     if view.provenance:
-        console.print("provenance differs on this machine:", markup=False)
-    for line in view.provenance:
-        console.print(f"  {line}", markup=False)
+        yield "provenance differs on this machine:"
+        yield from (f"  {line}" for line in view.provenance)
     if view.replayed:
-        console.print(f"sampled by seed {view.seed}", markup=False)
+        yield f"sampled by seed {view.seed}"
     result = "verified" if view.verified else "NOT verified"
-    what = f"SHA-256 {view.sha256}" if isinstance(view, VerificationView) else f"job {view.job}"
-    console.print(f"{result}: {what}", markup=False)
+    digest = getattr(view, "sha256", None)
+    what = f"job {view.job}" if digest is None else f"SHA-256 {digest}"
+    yield f"{result}: {what}"

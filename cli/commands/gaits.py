@@ -7,16 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gaitswarm.cli.inputs.options import Json, RobotOption
+from gaitswarm.cli.inputs.options import RobotOption
+from gaitswarm.cli.output import note, print_text
+from gaitswarm.cli.tables import gait_in_words
+from gaitswarm.services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
+    from gaitswarm.cli.output import Printed
     from gaitswarm.gaits import GaitsView, GaitView
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands."""
-    app.command()(gaits)
-    app.command()(mjcf)
 
 
 def gaits(
@@ -36,11 +34,9 @@ def gaits(
         float | None,
         typer.Option(help="Share of the cycle in support [default: the gait's usual one]."),
     ] = None,
-    as_json: Json = False,
-) -> None:
+) -> Printed:
     """List gaits: order of footfalls, supporting feet, static stability."""
     from gaitswarm.cli.inputs.robots import chosen_robot, one_scenario
-    from gaitswarm.cli.output import print_json, print_text
     from gaitswarm.gaits import planned_gaits
 
     view = planned_gaits(
@@ -49,11 +45,8 @@ def gaits(
         name=gait,
         duty_factor=duty_factor,
     )
-    if as_json:
-        print_json(view)
-        return
     heading = f"{view.robot} in the scenario {view.scenario}\n\n"
-    print_text(heading + (_list(view) if gait is None else diagram(view.items[0])))
+    return view, heading + (_list(view) if gait is None else diagram(view.items[0]))
 
 
 def _list(view: GaitsView) -> str:
@@ -77,8 +70,6 @@ def diagram(item: GaitView) -> str:
 
 
 def _plan(item: GaitView) -> str:
-    from gaitswarm.cli.tables import gait_in_words
-
     return "out of the legs' reach" if item.planned is None else gait_in_words(item.planned)
 
 
@@ -106,8 +97,6 @@ def mjcf(
     Needs pip install 'gaitswarm[mujoco]'. To view it: python -m mujoco.viewer --mjcf=FILE.xml.
     """
     from gaitswarm.cli.inputs.robots import chosen_robot, one_scenario
-    from gaitswarm.cli.output import note, print_text
-    from gaitswarm.services.optimizer.errors import InvalidRequest
     from gaitswarm.sim.mujoco.engines import check_installed
     from gaitswarm.sim.robot import load_robot
 

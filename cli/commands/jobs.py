@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import sys
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,49 +11,30 @@ import typer
 
 from gaitswarm.cli.inputs.options import (
     AcceptChanges,
-    Db,
     JobId,
     JobIds,
     JobName,
     Json,
     Notify,
+    Place,
     Priority,
     RobotOption,
-    Server,
     SpecOptions,
     completed,
     one_of,
-    with_groups,
 )
+from gaitswarm.cli.output import note, print_text, write_json_items
+from gaitswarm.services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
+    from gaitswarm.cli.output import Printed
+    from gaitswarm.cli.rich_table import Table
     from gaitswarm.jobs.base import Jobs
     from gaitswarm.specs import ForkOptions
-    from gaitswarm.views import HistoryIterationView, JobView
+    from gaitswarm.views import HistoryIterationView, JobSummaryView, JobView
     from gaitswarm.views.comparison import JobComparisonView
 
 
-def register(app: typer.Typer) -> None:
-    """Add the commands."""
-    app.command()(submit)
-    app.command("list")(list_jobs)
-    app.command()(status)
-    app.command()(watch)
-    app.command()(pause)
-    app.command()(resume)
-    app.command()(extend)
-    app.command()(prioritize)
-    app.command()(cancel)
-    app.command()(history)
-    app.command()(best)
-    app.command()(diff)
-    app.command()(fork)
-    app.command()(label)
-    app.command()(delete)
-    app.command()(keep)
-
-
-@with_groups
 def submit(
     options: SpecOptions,
     idempotency_key: Annotated[
@@ -59,25 +42,23 @@ def submit(
     ] = None,
     priority: Priority = 0,
     notify: Notify = None,
-    server: Server = None,
-    db: Db = None,
-    as_json: Json = False,
-) -> None:
+    *,
+    place: Place,
+) -> Printed:
     """Queue a job for a running server; `optimize` runs one in this process."""
     from gaitswarm.cli.inputs.spec_file import build_spec
-    from gaitswarm.cli.output import note, print_json, stdout_console
-    from gaitswarm.jobs.open import open_jobs
 
     spec = build_spec(options)
-    with open_jobs(server, db, create=True) as jobs:
+    with place.open(create=True) as jobs:
         job = jobs.submit(
             spec, idempotency_key=idempotency_key, priority=priority, notify_url=notify
         )
-        if as_json:
-            print_json(job)
-            return
-        stdout_console().print(job.id, markup=False)
-        note(f"{job.state}; to follow it, run: gaitswarm watch {job.id}{jobs.place}")
+        return job, _submitted(job, f"{job.state}; ", jobs.place)
+
+
+def _submitted(job: JobView, state: str, place: str) -> Iterator[str]:
+    yield job.id
+    note(f"{state}to follow it, run: gaitswarm watch {job.id}{place}")
 
 
 def list_jobs(
@@ -125,206 +106,130 @@ def list_jobs(
     ] = "created",
     reverse: Annotated[bool, typer.Option("--reverse", help="Reverse the order.")] = False,
     limit: Annotated[int, typer.Option(min=1, help="Maximum number of jobs.")] = 50,
-    server: Server = None,
-    db: Db = None,
-    as_json: Json = False,
-) -> None:
+    *,
+    jobs: Jobs,
+) -> Printed:
     """List jobs, newest first by default."""
-    from gaitswarm.cli.output import note, print_json_list, stdout_console
-    from gaitswarm.cli.tables import jobs_table
-    from gaitswarm.jobs.open import open_jobs
-    from gaitswarm.services.optimizer.errors import InvalidRequest
     from gaitswarm.services.optimizer.jobs.job import JobOrder, JobState
     from gaitswarm.services.optimizer.jobs.labels import JobFilter
 
     if everything and archived is not None:
         raise InvalidRequest("--all and --archived are mutually exclusive", field="all")
+    hidden = None if everything else bool(archived)
+    where = JobFilter(hidden, robot, controller, preference, tag)
     job_state = None if state is None else one_of(JobState, state, "state")
     job_order = one_of(JobOrder, order, "order")
-    with open_jobs(server, db) as jobs:
-        matches = jobs.jobs(
+
+    def matches(most: int) -> Iterator[JobSummaryView]:
+        return jobs.jobs(
             state=job_state,
             parent=forks_of,
             search=search,
-            where=JobFilter(
-                None if everything else bool(archived), robot, controller, preference, tag
-            ),
+            where=where,
             order=job_order,
             reverse=reverse,
-            limit=limit if as_json else limit + 1,
+            limit=most,
         )
-        if as_json:
-            print_json_list(matches)
-            return
-        rows = list(matches)
-    if rows:
-        stdout_console().print(jobs_table(rows[:limit]))
-    else:
-        note("no job matches" if everything else "no job matches; --all includes archived jobs")
-    if len(rows) > limit:
-        note(f"more than {limit} jobs match: raise --limit, or narrow by --search or --tag")
 
+    def parts() -> Iterator[Table]:
+        from gaitswarm.cli.tables import jobs_table
 
-def status(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = False) -> None:
-    """Show a job's state, progress and best design, and the reason if it failed."""
-    from gaitswarm.cli.output import print_json
-    from gaitswarm.cli.tables import print_job
-    from gaitswarm.jobs.open import open_jobs
-
-    with open_jobs(server, db) as jobs:
-        job = jobs.job(job_id)
-        if as_json:
-            print_json(job)
+        rows = list(matches(limit + 1))
+        if rows:
+            yield jobs_table(rows[:limit])
         else:
-            print_job(job)
+            note("no job matches" if everything else "no job matches; --all includes archived jobs")
+        if len(rows) > limit:
+            note(f"more than {limit} jobs match: raise --limit, or narrow by --search or --tag")
+
+    return matches(limit), parts()
 
 
-def watch(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = False) -> None:
+def status(job_id: JobId, *, jobs: Jobs) -> Printed:
+    """Show a job's state, progress and best design, and the reason if it failed."""
+    from gaitswarm.cli.tables import job_parts
+
+    job = jobs.job(job_id)
+    return job, job_parts(job)
+
+
+def watch(job_id: JobId, *, place: Place, as_json: Json = False) -> None:
     """Follow a job until it ends; the exit code is 0 if it succeeded.
 
     With --json, every committed iteration and every change of state is one line.
     """
     from gaitswarm.cli.progress import watch_as_json, watch_with_progress
-    from gaitswarm.jobs.open import open_jobs
 
-    with open_jobs(server, db) as jobs:
+    with place.open() as jobs:
         follow = watch_as_json if as_json else watch_with_progress
         follow(jobs, job_id)
 
 
-def pause(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = False) -> None:
+def pause(job_id: JobId, *, jobs: Jobs) -> Printed:
     """Pause a job after its current iteration."""
-    _command("pause", job_id, server, db, as_json=as_json)
+    return _commanded(jobs, job_id, "pause")
 
 
-def resume(
-    job_id: JobId,
-    accept_changes: AcceptChanges = False,
-    server: Server = None,
-    db: Db = None,
-    as_json: Json = False,
-) -> None:
+def resume(job_id: JobId, accept_changes: AcceptChanges = False, *, jobs: Jobs) -> Printed:
     """Resume a paused or failed job."""
-    _command("resume", job_id, server, db, as_json=as_json, accept_changes=accept_changes)
+    return _commanded(jobs, job_id, "resume", accept_changes=accept_changes)
+
+
+def cancel(job_id: JobId, *, jobs: Jobs) -> Printed:
+    """Cancel a job for good; committed iterations remain."""
+    return _commanded(jobs, job_id, "cancel")
+
+
+def _commanded(
+    jobs: Jobs, job_id: str, command: str, *, accept_changes: bool = False
+) -> tuple[JobView, str]:
+    job = jobs.command(job_id, command, accept_changes=accept_changes)
+    return job, f"job {job.id} is {job.state}"
 
 
 def extend(
     job_id: JobId,
-    iterations: Annotated[
-        int,
-        typer.Option(help="Total budget, including iterations done."),
-    ],
-    server: Server = None,
-    db: Db = None,
-    as_json: Json = False,
-) -> None:
-    """Extend a job's budget; a job that has succeeded continues."""
-    from gaitswarm.cli.output import print_json, stdout_console
-    from gaitswarm.jobs.open import open_jobs
-
-    with open_jobs(server, db) as jobs:
-        job = jobs.extend(job_id, iterations)
-    if as_json:
-        print_json(job)
-    else:
-        stdout_console().print(
-            f"job {job.id} is {job.state}, with {job.spent}",
-            markup=False,
-        )
-
-
-def prioritize(
-    job_id: JobId,
-    priority: Priority,
-    server: Server = None,
-    db: Db = None,
-    as_json: Json = False,
-) -> None:
-    """Change the priority of a queued or running job."""
-    from gaitswarm.cli.output import print_json, stdout_console
-    from gaitswarm.jobs.open import open_jobs
-
-    with open_jobs(server, db) as jobs:
-        job = jobs.prioritize(job_id, priority)
-    if as_json:
-        print_json(job)
-    else:
-        stdout_console().print(
-            f"job {job.id} is {job.state}, with priority {job.priority}", markup=False
-        )
-
-
-def cancel(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = False) -> None:
-    """Cancel a job for good; committed iterations remain."""
-    _command("cancel", job_id, server, db, as_json=as_json)
-
-
-def _command(
-    command: str,
-    job_id: str,
-    server: str | None,
-    db: str | None,
+    iterations: Annotated[int, typer.Option(help="Total budget, including iterations done.")],
     *,
-    as_json: bool,
-    accept_changes: bool = False,
-) -> None:
-    from gaitswarm.cli.output import print_json, stdout_console
-    from gaitswarm.jobs.open import open_jobs
-    from gaitswarm.services.optimizer.jobs.job import Command
-
-    with open_jobs(server, db) as jobs:
-        job = jobs.command(job_id, Command(command), accept_changes=accept_changes)
-    if as_json:
-        print_json(job)
-    else:
-        stdout_console().print(f"job {job.id} is {job.state}", markup=False)
+    jobs: Jobs,
+) -> Printed:
+    """Extend a job's budget; a job that has succeeded continues."""
+    job = jobs.extend(job_id, iterations)
+    return job, f"job {job.id} is {job.state}, with {job.spent}"
 
 
-def history(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = False) -> None:
+def prioritize(job_id: JobId, priority: Priority, *, jobs: Jobs) -> Printed:
+    """Change the priority of a queued or running job."""
+    job = jobs.prioritize(job_id, priority)
+    return job, f"job {job.id} is {job.state}, with priority {job.priority}"
+
+
+def history(job_id: JobId, *, place: Place, as_json: Json = False) -> None:
     """Show every committed iteration.
 
     With --json, also every design: values, fitness, statuses and raw objectives.
     """
     from gaitswarm.cli.output import stdout_console
-    from gaitswarm.cli.tables import iterations_table
-    from gaitswarm.jobs.open import open_jobs
+    from gaitswarm.cli.tables import number, table
 
-    with open_jobs(server, db) as jobs:
-        if as_json:
-            _print_history(jobs.job(job_id), jobs.history(job_id))
-        else:
-            jobs.job(job_id)
-            stdout_console().print(iterations_table(jobs.iterations(job_id)))
-
-
-def best(job_id: JobId, server: Server = None, db: Db = None, as_json: Json = False) -> None:
-    """Show a job's best design so far, by scenario."""
-    from gaitswarm.cli.output import print_json, stdout_console
-    from gaitswarm.cli.tables import print_best, worth
-    from gaitswarm.jobs.open import open_jobs
-    from gaitswarm.settings import place_of
-
-    with open_jobs(server, db) as jobs:
-        view = jobs.best(job_id)
-        if as_json:
-            print_json(view)
-            return
+    with place.open() as jobs:
         job = jobs.job(job_id)
-        stdout_console().print(
-            f"job {job_id}: fitness {worth(view, digits=6)}, design"
-            f" {place_of(view.iteration, view.particle)}",
-            markup=False,
-        )
-        print_best(view, job)
+        if as_json:
+            _print_history(job, jobs.history(job_id))
+            return
+        rows = [
+            (
+                *(i.index, *map(number, (i.best_so_far, i.best, i.mean, i.median, i.worst))),
+                *(i.failed, f"{i.evaluate_seconds:.2f}"),
+            )
+            for i in jobs.iterations(job_id)
+        ]
+    headings = (">iteration", "best so far", "best", "mean", "median", "worst", "failed", "seconds")
+    stdout_console().print(table(headings, rows))
 
 
 def _print_history(job: JobView, iterations: Iterator[HistoryIterationView]) -> None:
     """Stream one JSON document: a history may be larger than memory."""
-    import json
-    import sys
-
-    from gaitswarm.cli.output import write_json_items
-
     head = {
         "id": job.id,
         "state": job.state.value,
@@ -337,48 +242,42 @@ def _print_history(job: JobView, iterations: Iterator[HistoryIterationView]) -> 
     sys.stdout.write("\n}\n")
 
 
-def diff(
-    job_ids: JobIds,
-    server: Server = None,
-    db: Db = None,
-    as_json: Json = False,
-) -> None:
+def best(job_id: JobId, *, jobs: Jobs) -> Printed:
+    """Show a job's best design so far, by scenario."""
+    view = jobs.best(job_id)
+
+    def parts() -> Iterator[Table | str]:
+        from gaitswarm.cli.tables import best_parts, place, worth
+
+        job = jobs.job(job_id)
+        yield f"job {job_id}: fitness {worth(view, digits=6)}, design {place(view)}"
+        yield from best_parts(view, job)
+
+    return view, parts()
+
+
+def diff(job_ids: JobIds, *, jobs: Jobs) -> Printed:
     """Compare up to 12 jobs: results, and differences of their specs.
 
     With --json, also convergence and the distribution of fitness.
     """
-    from gaitswarm.cli.output import print_json
-    from gaitswarm.jobs.open import open_jobs
-
-    with open_jobs(server, db) as jobs:
-        view = jobs.comparison(job_ids)
-    if as_json:
-        print_json(view)
-    else:
-        _print_comparison(view)
+    view = jobs.comparison(job_ids)
+    return view, _comparison(view)
 
 
-def _print_comparison(view: JobComparisonView) -> None:
-    from gaitswarm.cli.output import stdout_console
-    from gaitswarm.cli.tables import MISSING, Table, number
+def _comparison(view: JobComparisonView) -> Iterator[Table | str]:
+    from gaitswarm.cli.tables import MISSING, number, table
 
-    table = Table(box=None, padding=(0, 2, 0, 0))
-    table.add_column("", no_wrap=True)
-    for job in view.jobs:
-        table.add_column(job.id)
-    table.add_row("name", *(job.name or MISSING for job in view.jobs))
-    table.add_row("state", *(job.state for job in view.jobs))
-    table.add_row("best fitness", *(number(job.best_fitness, 5) for job in view.jobs))
-    table.add_row("evaluations", *(str(job.evaluations) for job in view.jobs))
-    for difference in view.differences:
-        values = (MISSING if value is None else value for value in difference.values)
-        table.add_row(difference.field, *values)
-    console = stdout_console()
-    console.print(table, markup=False)
+    rows = [
+        ("name", *(job.name or MISSING for job in view.jobs)),
+        ("state", *(job.state for job in view.jobs)),
+        ("best fitness", *(number(job.best_fitness, 5) for job in view.jobs)),
+        ("evaluations", *(job.evaluations for job in view.jobs)),
+        *((difference.field, *difference.values) for difference in view.differences),
+    ]
+    yield table(["", *(f"<{job.id}" for job in view.jobs)], rows)
     if not view.comparable:
-        console.print(
-            "the jobs use different measures, so their fitness is not comparable", markup=False
-        )
+        yield "the jobs use different measures, so their fitness is not comparable"
 
 
 def fork(
@@ -428,16 +327,13 @@ def fork(
     ] = None,
     priority: Priority = 0,
     notify: Notify = None,
-    server: Server = None,
-    db: Db = None,
-    as_json: Json = False,
-) -> None:
+    *,
+    jobs: Jobs,
+) -> Printed:
     """Queue a job that starts with iterations of another; omitted options keep its values."""
     from gaitswarm.cli.inputs.robots import chosen_robot, scenario_data
     from gaitswarm.cli.inputs.spec_file import optimizer_choice, preference_choice
-    from gaitswarm.cli.output import note, print_json, stdout_console
     from gaitswarm.cli.tables import lineage_line
-    from gaitswarm.jobs.open import open_jobs
 
     values = {
         "preference": None if preference is None else preference_choice(preference),
@@ -451,22 +347,16 @@ def fork(
         "accept_changes": accept_changes or None,
     }
     options: ForkOptions = {k: v for k, v in values.items() if v is not None}  # type: ignore[assignment]
-    with open_jobs(server, db) as jobs:
-        job = jobs.fork(
-            job_id,
-            from_iteration,
-            idempotency_key=idempotency_key,
-            priority=priority,
-            notify_url=notify,
-            **options,
-        )
-        if as_json:
-            print_json(job)
-            return
-        stdout_console().print(job.id, markup=False)
-        if job.lineage is not None:
-            note(f"{job.state}: {lineage_line(job.lineage)}")
-        note(f"to follow it, run: gaitswarm watch {job.id}{jobs.place}")
+    job = jobs.fork(
+        job_id,
+        from_iteration,
+        idempotency_key=idempotency_key,
+        priority=priority,
+        notify_url=notify,
+        **options,
+    )
+    lineage = "" if job.lineage is None else f"{job.state}: {lineage_line(job.lineage)}\n"
+    return job, _submitted(job, lineage, jobs.place)
 
 
 def label(
@@ -483,71 +373,33 @@ def label(
         bool | None,
         typer.Option("--archive/--unarchive", help="Hide the job from lists, or show it again."),
     ] = None,
-    server: Server = None,
-    db: Db = None,
-    as_json: Json = False,
-) -> None:
+    *,
+    jobs: Jobs,
+) -> Printed:
     """Name, annotate, tag or archive a job; its spec and results do not change."""
-    from gaitswarm.cli.output import print_json, stdout_console
-    from gaitswarm.jobs.open import open_jobs
-
     tags = [] if no_tags else tag or None
-    with open_jobs(server, db) as jobs:
-        job = jobs.label(job_id, name=name, note=note, tags=tags, archived=archive)
-    if as_json:
-        print_json(job)
-        return
+    job = jobs.label(job_id, name=name, note=note, tags=tags, archived=archive)
     labels = [f"name {job.name!r}", *(f"tag {word}" for word in job.tags)]
-    if job.note:
-        labels.append("a note")
-    if job.archived:
-        labels.append("archived")
-    stdout_console().print(f"job {job.id}: {', '.join(labels)}", markup=False)
+    labels += (["a note"] if job.note else []) + (["archived"] if job.archived else [])
+    return job, f"job {job.id}: {', '.join(labels)}"
 
 
 def delete(
     job_id: JobId,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask for confirmation.")] = False,
-    server: Server = None,
-    db: Db = None,
+    *,
+    jobs: Jobs,
 ) -> None:
     """Delete an ended or paused job with all its results."""
-    import sys
-
-    from gaitswarm.cli.output import note, stdout_console
-    from gaitswarm.jobs.open import open_jobs
-    from gaitswarm.services.optimizer.errors import InvalidRequest
-
-    with open_jobs(server, db) as jobs:
-        if not yes:
-            note(_loss(jobs, jobs.job(job_id)))
-            if not sys.stdin.isatty():
-                raise InvalidRequest("not a terminal: pass --yes to confirm", field="yes")
-            if not typer.confirm("Delete it?", err=True):
-                note("nothing was deleted")
-                return
-        jobs.delete(job_id)
-    stdout_console().print(f"job {job_id} is deleted", markup=False)
-
-
-def keep(
-    job_id: JobId,
-    release: Annotated[bool, typer.Option("--release", help="Allow deletion again.")] = False,
-    server: Server = None,
-    db: Db = None,
-    as_json: Json = False,
-) -> None:
-    """Protect a job from deletion."""
-    from gaitswarm.cli.output import print_json, stdout_console
-    from gaitswarm.jobs.open import open_jobs
-
-    with open_jobs(server, db) as jobs:
-        job = jobs.keep(job_id, kept=not release)
-    if as_json:
-        print_json(job)
-    else:
-        state = "is kept" if job.kept else "is no longer kept"
-        stdout_console().print(f"job {job.id} {state}", markup=False)
+    if not yes:
+        note(_loss(jobs, jobs.job(job_id)))
+        if not sys.stdin.isatty():
+            raise InvalidRequest("not a terminal: pass --yes to confirm", field="yes")
+        if not typer.confirm("Delete it?", err=True):
+            note("nothing was deleted")
+            return
+    jobs.delete(job_id)
+    print_text(f"job {job_id} is deleted")
 
 
 def _loss(jobs: Jobs, job: JobView) -> str:
@@ -561,3 +413,14 @@ def _loss(jobs: Jobs, job: JobView) -> str:
     if forks:
         loss += f"\nforks that keep their copies of its iterations: {forks}"
     return f"{loss}\ncertificates of its designs remain"
+
+
+def keep(
+    job_id: JobId,
+    release: Annotated[bool, typer.Option("--release", help="Allow deletion again.")] = False,
+    *,
+    jobs: Jobs,
+) -> Printed:
+    """Protect a job from deletion."""
+    job = jobs.keep(job_id, kept=not release)
+    return job, f"job {job.id} {'is kept' if job.kept else 'is no longer kept'}"

@@ -2,30 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
+from gaitswarm.cli.files import replacing
 from gaitswarm.cli.inputs.options import (
     ControllerOption,
-    Db,
     JobIds,
     JobName,
-    Json,
+    Place,
     Precision,
     RobotOption,
-    Server,
     WorkerOptions,
-    with_groups,
 )
+from gaitswarm.cli.output import note
+from gaitswarm.cli.tables import MISSING, number, table
 from gaitswarm.services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
+    from gaitswarm.cli.output import Printed
+    from gaitswarm.cli.rich_table import Table
+    from gaitswarm.jobs.base import Jobs
     from gaitswarm.sim.measurement.measured_log import MeasuredLog, MeasuredWalk
     from gaitswarm.sim.measurement.synchronise import Synchronised
     from gaitswarm.sim.robot import Robot
+    from gaitswarm.views.identification import IdentifiabilityView, ParameterView
 
 LARGEST_FILE: Final = 1 << 28
 """Largest accepted log [B]; one second takes about 1 MB."""
@@ -54,16 +58,6 @@ CyclesOption = Annotated[
 ]
 
 
-def register(app: typer.Typer) -> None:
-    """Add the commands."""
-    app.command()(record)
-    app.command()(identify)
-    app.command()(parameters)
-    app.command()(recordings)
-    app.command()(validate)
-    app.command()(synthesize)
-
-
 def read_walk(
     scenario: str,
     controller: str | None,
@@ -72,8 +66,7 @@ def read_walk(
     cycles: int | None,
     robot: str | None,
     *,
-    server: str | None,
-    db: str | None,
+    place: Place,
 ) -> MeasuredWalk:
     """Return the walk of a design; a job's best uses the job's robot by default."""
     from gaitswarm.cli.inputs.design_file import given_design
@@ -81,7 +74,7 @@ def read_walk(
     from gaitswarm.sim.measurement.measured_log import MeasuredWalk
     from gaitswarm.sim.robot import load_robot
 
-    given = given_design(design, controller, trajectory, robot=robot, server=server, db=db)
+    given = given_design(design, controller, trajectory, robot=robot, place=place)
     values: Mapping[str, Any] = given.values
     for name, value in values.items():
         number = isinstance(value, int | float) and not isinstance(value, bool)
@@ -150,32 +143,29 @@ def record(
     trajectory: TrajectoryOption = None,
     cycles: CyclesOption = None,
     robot: RobotOption = None,
-    server: Server = None,
-    db: Db = None,
-    as_json: Json = False,
-) -> None:
+    *,
+    place: Place,
+) -> Printed:
     """Store a measured walk for identification, and print the recording's id."""
-    from gaitswarm.cli.output import note, print_json, stdout_console
-    from gaitswarm.jobs.open import open_jobs
     from gaitswarm.sim.identification.recorded_walk import record as recorded
 
-    walk = read_walk(scenario, controller, design, trajectory, cycles, robot, server=server, db=db)
+    walk = read_walk(scenario, controller, design, trajectory, cycles, robot, place=place)
     log = read_measured(measured, walk.robot)
     pair = synchronised(measured, log, walk.simulated(), walk)
     recording = recorded(pair, walk.scenario, walk.controller, walk.design)
-    with open_jobs(server, db, create=True) as jobs:
+    with place.open(create=True) as jobs:
         view = jobs.record(recording)
-    if as_json:
-        print_json(view)
-        return
-    stdout_console().print(view.id, markup=False)
-    note(
-        f"{'SYNTHETIC ' if view.synthetic else ''}recording of {view.joints} currents over"
-        f" {view.seconds:g} s, {pair.cycles} cycles of {view.scenario}"
-    )
+
+    def parts() -> Iterator[str]:
+        yield view.id
+        note(
+            f"{'SYNTHETIC ' if view.synthetic else ''}recording of {view.joints} currents over"
+            f" {view.seconds:g} s, {pair.cycles} cycles of {view.scenario}"
+        )
+
+    return view, parts()
 
 
-@with_groups
 def identify(
     recordings: Annotated[
         list[str], typer.Argument(metavar="RECORDING...", help="Ids printed by `record`.")
@@ -202,10 +192,8 @@ def identify(
     name: JobName = None,
     truth: Truth = None,
     workers: WorkerOptions,
-    as_json: Json = False,
-) -> None:
+) -> Printed:
     """Fit a robot's parameters to recorded walks in this process, and show which are reliable."""
-    from gaitswarm.cli.calibration import read_truth, show_parameters
     from gaitswarm.cli.embedded import run_seeds
     from gaitswarm.cli.inputs.robots import chosen_robot
     from gaitswarm.cli.inputs.spec_file import parse_spec
@@ -229,12 +217,12 @@ def identify(
         "precision": precision or "double",
     }
     specs = [parse_spec({**document, "seed": seed + run}) for run in range(runs)]
-    run_seeds(
-        specs,
-        workers,
-        lambda jobs, ids: show_parameters(jobs.parameters(ids), true_values, as_json=as_json),
-        report_command="parameters",
-    )
+
+    def report(jobs: Jobs, ids: list[str]) -> Printed:
+        view = jobs.parameters(ids)
+        return view, _parameters(view, true_values)
+
+    return run_seeds(specs, workers, report, report_command="parameters")
 
 
 def parameters(
@@ -244,26 +232,70 @@ def parameters(
         Path | None,
         typer.Option("--output", "-o", metavar="FILE", help="Draw the intervals: .png, .svg."),
     ] = None,
-    server: Server = None,
-    db: Db = None,
-    as_json: Json = False,
-) -> None:
+    *,
+    jobs: Jobs,
+) -> Printed:
     """Show which fitted parameters are reliable: intervals at twelve fitness thresholds.
 
     Takes one job, or jobs that differ only in their seed.
     """
-    from gaitswarm.cli.calibration import draw_parameters, read_truth, show_parameters
-    from gaitswarm.cli.output import note
-    from gaitswarm.cli.pictures import save
-    from gaitswarm.jobs.open import open_jobs
-
     true_values = read_truth(truth)
-    with open_jobs(server, db) as jobs:
-        view = jobs.parameters(job_ids)
-    show_parameters(view, true_values, as_json=as_json)
+    view = jobs.parameters(job_ids)
     if output is not None:
+        from gaitswarm.cli.pictures import draw_parameters, save
+
         save(draw_parameters(view, true_values), output)
         note(f"picture written to {output}")
+    return view, _parameters(view, true_values)
+
+
+_SHOWN: Final = (0.2, 0.1, 0.05, 0.02)
+"""Thresholds shown in tables; JSON and the picture contain all twelve."""
+
+_TRUST: Final = {"trusted": "green", "rough": "yellow", "unknown": "red"}
+
+ONE_RUN: Final = "note: a single run always converges; runs with other seeds show what is reliable"
+
+
+def read_truth(path: Path | None) -> dict[str, float]:
+    """Read true values by name; none without a file."""
+    from gaitswarm.cli.inputs.spec_file import read_json_object
+
+    values = {} if path is None else read_json_object(path, "truth")
+    for name, value in values.items():
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise InvalidRequest("must be a number", field=f"truth.{name}")
+    return values
+
+
+def _parameters(view: IdentifiabilityView, truth: Mapping[str, float]) -> Iterator[Table | str]:
+    yield parameters_table(view, truth)
+    for job, fitness in zip(view.jobs, view.fitness, strict=True):
+        yield f"job {job}: mean error of currents {1000 * fitness:.2f} mA"
+    if len(view.jobs) == 1:
+        note(ONE_RUN)
+
+
+def parameters_table(view: IdentifiabilityView, truth: Mapping[str, float]) -> Table:
+    """Return a table of best and true values, and of intervals' widths in percent."""
+
+    def width(p: ParameterView, threshold: float) -> str:
+        interval = p.intervals[view.thresholds.index(threshold)]
+        return f"{100.0 * (interval.high - interval.low) / (p.high - p.low):.0f}"
+
+    rows = (
+        (
+            *(p.name, p.unit, number(p.best)),
+            *([truth.get(p.name)] if truth else []),
+            *(width(p, threshold) for threshold in _SHOWN),
+            (p.trust or "one run", _TRUST.get(p.trust or "", "")),
+        )
+        for p in view.parameters
+    )
+    heads = ["parameter", "<unit", "best", *(["true"] if truth else [])]
+    heads += [*(f"{threshold:.0%}" for threshold in _SHOWN), "<trust"]
+    title = "Fitted parameters; widths of their intervals in % of the range searched"
+    return table(heads, rows, title=title, gap=1)
 
 
 def recordings(
@@ -275,25 +307,30 @@ def recordings(
         ),
     ] = "",
     limit: Annotated[int, typer.Option(min=1, help="Maximum number of recordings.")] = 50,
-    server: Server = None,
-    db: Db = None,
-    as_json: Json = False,
-) -> None:
+    *,
+    jobs: Jobs,
+) -> Printed:
     """List recorded walks and their ids for `identify`, newest first."""
-    from gaitswarm.cli.output import note, print_json_list, stdout_console
-    from gaitswarm.cli.tables import recordings_table
-    from gaitswarm.jobs.open import open_jobs
 
-    with open_jobs(server, db) as jobs:
-        matches = jobs.recordings(search=search, limit=limit)
-        if as_json:
-            print_json_list(matches)
-            return
-        rows = list(matches)
-    if not rows:
-        note("no recording matches" if search else "no recordings yet; see `gaitswarm record`")
-        return
-    stdout_console().print(recordings_table(rows))
+    def parts() -> Iterator[Table]:
+        rows = [
+            (
+                entry.id,
+                (" ".join(filter(None, (entry.scenario, entry.controller))) or MISSING)
+                + (" SYNTHETIC" if entry.synthetic else ""),
+                MISSING
+                if entry.joints is None or entry.seconds is None
+                else f"{entry.joints} over {number(entry.seconds)} s",
+                f"{entry.created_at:%Y-%m-%d %H:%M}",
+            )
+            for entry in jobs.recordings(search=search, limit=limit)
+        ]
+        if rows:
+            yield table(("id", "<walk", "<currents", "<recorded (UTC)"), rows)
+        else:
+            note("no recording matches" if search else "no recordings yet; see `gaitswarm record`")
+
+    return jobs.recordings(search=search, limit=limit), parts()
 
 
 def validate(
@@ -317,12 +354,10 @@ def validate(
         Path | None,
         typer.Option(metavar="DIR", help="Write a report in Markdown, with pictures, to DIR."),
     ] = None,
-    server: Server = None,
-    db: Db = None,
-    as_json: Json = False,
-) -> None:
+    *,
+    place: Place,
+) -> Printed:
     """Simulate a measured walk, and classify the differences by tolerance."""
-    from gaitswarm.cli.output import note, print_json, stdout_console
     from gaitswarm.cli.validation import (
         alignment,
         comparison_table,
@@ -332,21 +367,11 @@ def validate(
     )
     from gaitswarm.sim.validation import compare_synchronised
 
-    walk = read_walk(scenario, controller, design, trajectory, cycles, robot, server=server, db=db)
+    walk = read_walk(scenario, controller, design, trajectory, cycles, robot, place=place)
     logs = {path: read_measured(path, walk.robot) for path in (measured, *(repeat or ()))}
     simulated = walk.simulated()
     pairs = [synchronised(path, log, simulated, walk) for path, log in logs.items()]
     comparison = compare_synchronised(pairs[0], [pair.measured for pair in pairs[1:]])
-    if as_json:
-        print_json(comparison)
-    else:
-        console = stdout_console()
-        console.print(comparison_table(comparison))
-        if comparison.repeats:
-            console.print(confidence_table(comparison))
-        console.print(alignment(comparison), markup=False)
-    for remark in remarks(comparison):
-        note(f"note: {remark}")
     if report is not None:
         facts = {
             "measured": measured.name,
@@ -356,6 +381,16 @@ def validate(
             "design": ", ".join(f"{name}={value:g}" for name, value in walk.design.items()),
         }
         note(f"report written to {write_report(report, comparison, pairs[0], facts)}")
+    for remark in remarks(comparison):
+        note(f"note: {remark}")
+
+    def parts() -> Iterator[Table | str]:
+        yield comparison_table(comparison)
+        if comparison.repeats:
+            yield confidence_table(comparison)
+        yield alignment(comparison)
+
+    return comparison, parts()
 
 
 def synthesize(
@@ -378,21 +413,17 @@ def synthesize(
             help="Parameter values by name; the twin differs only in these.",
         ),
     ] = None,
-    server: Server = None,
-    db: Db = None,
+    *,
+    place: Place,
 ) -> None:
     """Write a SYNTHETIC log of a perturbed twin of the robot with sensor noise, for tests."""
-    from gaitswarm.cli.calibration import read_truth
-    from gaitswarm.cli.files import replacing
-    from gaitswarm.cli.output import note
-    from gaitswarm.services.optimizer.errors import InvalidRequest
     from gaitswarm.sim.measurement.measured_csv import format_measured_log
     from gaitswarm.sim.measurement.synthetic import Perturbation, synthetic_log
     from gaitswarm.sim.robot.identifiable import identifiable_variables
 
     if output.suffix != ".csv":
         raise InvalidRequest(f"{output} must end in .csv", field="output")
-    walk = read_walk(scenario, controller, design, trajectory, cycles, robot, server=server, db=db)
+    walk = read_walk(scenario, controller, design, trajectory, cycles, robot, place=place)
     twin = None
     if parameters is not None:
         names = {variable.name for variable in identifiable_variables(walk.robot)}

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+import json
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import closing
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -12,19 +16,17 @@ from gaitswarm.cli.inputs.options import (
     SpecOptions,
     WorkerOptions,
     completed,
-    with_groups,
 )
+from gaitswarm.cli.output import note
+from gaitswarm.cli.tables import table
+from gaitswarm.services.optimizer.errors import InvalidRequest
+
+if TYPE_CHECKING:
+    from gaitswarm.cli.output import Printed
+    from gaitswarm.cli.rich_table import Table
+    from gaitswarm.views import CaseView, OptimizerView
 
 
-def register(app: typer.Typer) -> None:
-    """Add the commands."""
-    app.command()(optimize)
-    app.command()(optimizers)
-    app.command()(plugins)
-    app.command()(cases)
-
-
-@with_groups
 def optimize(
     options: SpecOptions,
     *,
@@ -52,15 +54,10 @@ def optimize(
     as_json: Json = False,
 ) -> None:
     """Run a job in this process. Ctrl-C stops it; --resume continues it."""
-    from contextlib import closing
-    from dataclasses import asdict
-
     from gaitswarm.cli.embedded import Embedded, finish, job_run, resumed_job
     from gaitswarm.cli.inputs.spec_file import build_spec, by_other_optimizer, check_optimizer_name
-    from gaitswarm.cli.output import note
     from gaitswarm.jobs.database import DatabaseJobs
     from gaitswarm.jobs.open import database_to_write
-    from gaitswarm.services.optimizer.errors import InvalidRequest
     from gaitswarm.services.optimizer.masking import masked_url
     from gaitswarm.services.optimizer.service import JobService
     from gaitswarm.services.runtime import open_store
@@ -100,55 +97,53 @@ def optimize(
         finish(jobs, job.id, interrupted, as_json=as_json, compare=compare_published, others=others)
 
 
-def optimizers(as_json: Json = False) -> None:
+def optimizers() -> Printed:
     """List search methods and their settings."""
-    from gaitswarm.cli.output import print_json_list, stdout_console
-    from gaitswarm.cli.tables import optimizers_table
     from gaitswarm.views import optimizer_views
 
-    if as_json:
-        print_json_list(optimizer_views())
-    else:
-        stdout_console().print(optimizers_table(optimizer_views()))
+    views = optimizer_views()
+    rows = (
+        (view.name, _described(view), _settings(view.settings.model_dump(exclude={"name"})))
+        for view in views
+    )
+    return iter(views), _listed(("name", "<description", "<settings"), rows)
 
 
-def plugins(as_json: Json = False) -> None:
+def plugins() -> Printed:
     """List installed plug-ins: controllers, cases and search methods of other packages."""
-    from rich.text import Text
-
-    from gaitswarm.cli.output import print_json_list, stdout_console
-    from gaitswarm.cli.tables import Table
     from gaitswarm.views import plugin_views
 
-    if as_json:
-        print_json_list(plugin_views())
-        return
-    table = Table("kind", "name", "distribution", "version", "state", box=None)
-    for view in plugin_views():
-        state = Text(view.state if view.reason is None else f"{view.state}: {view.reason}")
-        table.add_row(view.kind, view.name, view.distribution, view.version, state)
-    stdout_console().print(table)
+    views = plugin_views()
+    rows = (
+        (
+            *(view.kind, view.name, view.distribution, view.version),
+            view.state if view.reason is None else f"{view.state}: {view.reason}",
+        )
+        for view in views
+    )
+    return iter(views), _listed(("kind", "<name", "<distribution", "<version", "<state"), rows)
 
 
-def cases(as_json: Json = False) -> None:
+def cases() -> Printed:
     """List cases: plug-ins that evaluate designs instead of the simulator, and their settings."""
-    from rich.text import Text
-
-    from gaitswarm.cli.output import print_json_list, stdout_console
-    from gaitswarm.cli.tables import Table
     from gaitswarm.views import case_views
 
-    if as_json:
-        print_json_list(case_views())
-        return
-    table = Table("name", "description", "settings", box=None)
-    for view in case_views():
-        needs = "" if view.needs is None else f"; needs {view.needs}"
-        settings = view.settings_schema.get("properties", {})
-        lines = (
-            f"{name} {field.get('default', '')}"
-            for name, field in settings.items()
-            if name != "name"
-        )
-        table.add_row(view.name, Text(f"{view.description}{needs}"), Text("\n".join(lines)))
-    stdout_console().print(table)
+    views = case_views()
+    rows = []
+    for view in views:
+        fields = view.settings_schema.get("properties", {}).items()
+        lines = (f"{name} {f.get('default', '')}" for name, f in fields if name != "name")
+        rows.append((view.name, _described(view), "\n".join(lines)))
+    return iter(views), _listed(("name", "<description", "<settings"), rows)
+
+
+def _listed(headings: Sequence[str], rows: Iterable[Sequence[Any]]) -> Iterator[Table]:
+    yield table(headings, rows)
+
+
+def _described(view: OptimizerView | CaseView) -> str:
+    return f"{view.description}{'' if view.needs is None else f'; needs {view.needs}'}"
+
+
+def _settings(settings: dict[str, Any]) -> str:
+    return "\n".join(f"{name} {json.dumps(value)}" for name, value in settings.items())

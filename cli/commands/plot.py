@@ -15,9 +15,14 @@ from gaitswarm.cli.commands.robustness import (
     estimate,
     robustness_request,
 )
-from gaitswarm.cli.inputs.options import ControllerOption, Db, JobId, Precision, RobotOption, Server
+from gaitswarm.cli.inputs.options import ControllerOption, JobId, Place, Precision, RobotOption
+from gaitswarm.cli.output import note
+from gaitswarm.services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from gaitswarm.jobs.base import Jobs
     from gaitswarm.requests.robustness import RobustnessRequest
 
 Output = Annotated[
@@ -25,43 +30,20 @@ Output = Annotated[
 ]
 
 
-def register(app: typer.Typer) -> None:
-    """Add the commands."""
-    plots = typer.Typer(
-        help="Draw a job's convergence or front, a controller's surface, or designs' robustness."
-    )
-    plots.command()(convergence)
-    plots.command()(front)
-    plots.command()(surface)
-    plots.command()(robustness)
-    app.add_typer(plots, name="plot")
-
-
-def convergence(job_id: JobId, output: Output, server: Server = None, db: Db = None) -> None:
+def convergence(job_id: JobId, output: Output, *, jobs: Jobs) -> None:
     """Draw a job's fitness over its iterations."""
-    from gaitswarm.cli.output import note
-    from gaitswarm.cli.pictures import draw_convergence, save
-    from gaitswarm.jobs.open import open_jobs
+    from gaitswarm.cli.pictures import draw_convergence
 
-    with open_jobs(server, db) as jobs:
-        job = jobs.job(job_id)
-        iterations = list(jobs.iterations(job_id))
-    save(draw_convergence(iterations, title=job.name or f"job {job.id}"), output)
-    note(f"picture written to {output}")
+    job, iterations = jobs.job(job_id), list(jobs.iterations(job_id))
+    _save(draw_convergence(iterations, title=job.name or f"job {job.id}"), output)
 
 
-def front(job_id: JobId, output: Output, server: Server = None, db: Db = None) -> None:
+def front(job_id: JobId, output: Output, *, jobs: Jobs) -> None:
     """Draw the Pareto front of a job in every pair of objectives, with its knees and winners."""
-    from gaitswarm.cli.front import draw_front
-    from gaitswarm.cli.output import note
-    from gaitswarm.cli.pictures import save
-    from gaitswarm.jobs.open import open_jobs
+    from gaitswarm.cli.pictures import draw_front
 
-    with open_jobs(server, db) as jobs:
-        job = jobs.job(job_id)
-        view = jobs.front(job_id, most=10_000)
-    save(draw_front(view, title=f"Pareto front of {job.name or f'job {job.id}'}"), output)
-    note(f"picture written to {output}")
+    job, view = jobs.job(job_id), jobs.front(job_id, most=10_000)
+    _save(draw_front(view, title=f"Pareto front of {job.name or f'job {job.id}'}"), output)
 
 
 def surface(
@@ -73,21 +55,19 @@ def surface(
             help="Design as for `simulate`, or as published:A.",
         ),
     ] = "published:A",
-    server: Server = None,
-    db: Db = None,
+    *,
+    place: Place,
 ) -> None:
     """Draw the quantised output of a Fuzzy-PI design over angle error and motor current."""
     from gaitswarm.cli.inputs.design_file import given_design
-    from gaitswarm.cli.output import note
-    from gaitswarm.cli.pictures import draw_surface, save
+    from gaitswarm.cli.pictures import draw_surface
     from gaitswarm.sim.controllers import CONTROLLERS
     from gaitswarm.sim.controllers.surface import surface as surface_of
 
-    given = given_design(design, "fuzzy-pi", server=server, db=db)
+    given = given_design(design, "fuzzy-pi", place=place)
     (inference,) = CONTROLLERS["fuzzy-pi"].inferences(given.values)
     drawn = surface_of(inference, error_points=129, current_points=65)
-    save(draw_surface(drawn, title=f"Fuzzy-P of {given.label}"), output)
-    note(f"picture written to {output}")
+    _save(draw_surface(drawn, title=f"Fuzzy-P of {given.label}"), output)
 
 
 def robustness(
@@ -103,19 +83,16 @@ def robustness(
     robot: RobotOption = None,
     precision: Precision = None,
     title: Annotated[str, typer.Option(help="Title of the picture.")] = "Robustness",
-    server: Server = None,
-    db: Db = None,
+    *,
+    place: Place,
 ) -> None:
     """Draw robustness indices of designs by scenario, with their intervals."""
     from gaitswarm.cli.inputs.design_file import given_design
-    from gaitswarm.cli.output import note
-    from gaitswarm.cli.pictures import save
-    from gaitswarm.cli.robustness import draw_robustness
-    from gaitswarm.services.optimizer.errors import InvalidRequest
+    from gaitswarm.cli.pictures import draw_robustness
 
     requests: dict[str, RobustnessRequest] = {}
     for design in designs:
-        given = given_design(design, controller, robot=robot, server=server, db=db)
+        given = given_design(design, controller, robot=robot, place=place)
         label = f"{given.label} ({design})" if given.label in requests else given.label
         requests[label] = robustness_request(
             given,
@@ -131,5 +108,11 @@ def robustness(
             "the designs' jobs have different scenarios; pass --scenarios", field="scenarios"
         )
     views = {label: estimate(request) for label, request in requests.items()}
-    save(draw_robustness(views, title=title), output)
+    _save(draw_robustness(views, title=title), output)
+
+
+def _save(figure: Figure, output: Path) -> None:
+    from gaitswarm.cli.pictures import save
+
+    save(figure, output)
     note(f"picture written to {output}")

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-import json
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from gaitswarm.cli.inputs.options import Json, one_of
+from gaitswarm.cli.inputs.options import one_of
+from gaitswarm.cli.output import note
+from gaitswarm.services.optimizer.errors import InvalidRequest
 
 if TYPE_CHECKING:
+    from gaitswarm.cli.output import Printed
     from gaitswarm.meshes import MeshCopies
+    from gaitswarm.robots import MadeRobot
     from gaitswarm.sim.robot import RobotFiles
     from gaitswarm.views.robots import RobotCheckView
 
@@ -30,14 +34,6 @@ PackagePath = Annotated[
         help="Search path of package:// meshes, before ROS_PACKAGE_PATH; repeatable.",
     ),
 ]
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands."""
-    group = typer.Typer(help="Create a robot from a URDF file, and check it.")
-    group.command()(init)
-    group.command()(check)
-    app.add_typer(group, name="robot")
 
 
 def init(
@@ -81,14 +77,12 @@ def init(
         ),
     ] = True,
     package_path: PackagePath = None,
-    as_json: Json = False,
-) -> None:
+) -> Printed:
     """Find legs, choose a stance, propose actuators, and write a robot's folder.
 
     It contains robot.toml, with a comment on every guess; robot.urdf and its meshes; and job.json,
     the defaults of this robot's jobs. Then pass --robot FOLDER to any command.
     """
-    from gaitswarm.cli.output import note, print_text
     from gaitswarm.robots import init_robot
     from gaitswarm.sim.proposal.drive import ACTUATOR_CHOICES
     from gaitswarm.sim.proposal.frame import AXES
@@ -103,24 +97,25 @@ def init(
         meshes=meshes,
         packages=package_path or [],
     )
-    if as_json:
-        left_out = [{"name": name, "problem": problem} for name, problem in created.meshes.left_out]
-        document = {
-            "folder": str(output),
-            "name": created.name,
-            "guesses": list(created.guesses),
-            "meshes": {"copied": list(created.meshes.copied), "left_out": left_out},
-        }
-        print_text(json.dumps(document, indent=2, ensure_ascii=False) + "\n")
-        return
+    left_out = [{"name": name, "problem": problem} for name, problem in created.meshes.left_out]
+    document = {
+        "folder": str(output),
+        "name": created.name,
+        "guesses": list(created.guesses),
+        "meshes": {"copied": list(created.meshes.copied), "left_out": left_out},
+    }
+    return document, _created(created, output)
+
+
+def _created(created: MadeRobot, folder: Path) -> Iterator[str]:
     for guess in created.guesses:
-        print_text(f"{guess}\n")
-    print_text(_mesh_summary(created.meshes))
+        yield f"{guess}\n"
+    yield _mesh_summary(created.meshes)
     note(
-        f"robot {created.name!r} written to {output}; check it by `gaitswarm robot check {output}`"
+        f"robot {created.name!r} written to {folder}; check it by `gaitswarm robot check {folder}`"
     )
     if created.meshes.copied:
-        note(f"`gaitswarm serve --robots {output}` shows its meshes on the page")
+        note(f"`gaitswarm serve --robots {folder}` shows its meshes on the page")
 
 
 def check(
@@ -131,10 +126,8 @@ def check(
         typer.Option(metavar="FILE", help="Draw its stance to FILE.png, .svg or .pdf."),
     ] = None,
     package_path: PackagePath = None,
-    as_json: Json = False,
-) -> None:
+) -> Printed:
     """Load a robot, simulate it standing for a second, and show its properties."""
-    from gaitswarm.cli.output import note, print_json, print_text
     from gaitswarm.robots import check_robot
 
     view = check_robot(_files(folder), folder=folder, packages=package_path or [])
@@ -143,10 +136,11 @@ def check(
 
         save(draw_robot(view), draw, "draw")
         note(f"picture written to {draw}")
-    if as_json:
-        print_json(view)
-        return
-    print_text(_summary(view))
+    return view, _checked(view)
+
+
+def _checked(view: RobotCheckView) -> Iterator[str]:
+    yield _summary(view)
     for warning in view.warnings:
         note(f"warning: {warning}")
 
@@ -164,7 +158,6 @@ def _mesh_summary(meshes: MeshCopies) -> str:
 
 def _files(folder: Path) -> RobotFiles:
     from gaitswarm.cli.inputs.robots import chosen_robot
-    from gaitswarm.services.optimizer.errors import InvalidRequest
     from gaitswarm.sim.robot import RobotFiles
 
     if not folder.is_dir():

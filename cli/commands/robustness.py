@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gaitswarm.cli.inputs.options import ControllerOption, Db, Json, Precision, RobotOption, Server
+from gaitswarm.cli.inputs.options import ControllerOption, Place, Precision, RobotOption
+from gaitswarm.cli.output import note
+from gaitswarm.cli.tables import SHORT, Bold, interval, number, table
 
 if TYPE_CHECKING:
     from gaitswarm.cli.inputs.design_file import GivenDesign
+    from gaitswarm.cli.output import Printed
+    from gaitswarm.cli.rich_table import Table
     from gaitswarm.requests.robustness import Progress, RobustnessRequest
     from gaitswarm.views.robustness import RobustnessView
 
@@ -27,11 +32,6 @@ Scenarios = Annotated[
         show_default="those of the job, else all of the robot",
     ),
 ]
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands."""
-    app.command()(robustness)
 
 
 def robustness(
@@ -50,33 +50,65 @@ def robustness(
     controller: ControllerOption = None,
     robot: RobotOption = None,
     precision: Precision = None,
-    server: Server = None,
-    db: Db = None,
-    as_json: Json = False,
-) -> None:
+    *,
+    place: Place,
+) -> Printed:
     """Estimate the robustness index of a design (thesis 4.4.3); smaller is more robust.
 
     It is the norm of the Jacobian of the objectives' logarithms with respect to the variables as
     shares of their bounds, from a regression over designs sampled around the given one.
     """
     from gaitswarm.cli.inputs.design_file import given_design
-    from gaitswarm.cli.output import print_json
 
-    given = given_design(design, controller, robot=robot, server=server, db=db)
-    request = robustness_request(
-        given,
-        samples=samples,
-        radius=radius,
-        seed=seed,
-        scenarios=scenarios,
-        robot=robot,
-        precision=precision,
+    given = given_design(design, controller, robot=robot, place=place)
+    view = estimate(
+        robustness_request(
+            given,
+            samples=samples,
+            radius=radius,
+            seed=seed,
+            scenarios=scenarios,
+            robot=robot,
+            precision=precision,
+        )
     )
-    view = estimate(request)
-    if as_json:
-        print_json(view)
-    else:
-        _print(view)
+    return view, _parts(view)
+
+
+def _parts(view: RobustnessView) -> Iterator[Table | str]:
+    def cells(name: str, part: Any, failed: int) -> list[Any]:
+        shares = [number(value, 3) for value in part.by_objective.values()]
+        return [name, *interval(part.index), *shares, failed]
+
+    rows = [cells(name, part, part.failed) for name, part in view.scenarios.items()]
+    rows.append(Bold(cells("all", view, sum(part.failed for part in view.scenarios.values()))))
+    heads = ["scenario", "index", "95 %", *(SHORT[o.name] for o in view.objectives), "failed"]
+    yield table(heads, rows, title="Robustness index", gap=1)
+    parts: list[Any] = [view, *view.scenarios.values()]
+    by_variable = (
+        (
+            variable.name,
+            f"{number(variable.least)} – {number(variable.most)}",
+            *(number(part.by_variable[variable.name], 3) for part in parts),
+        )
+        for variable in sorted(
+            view.variables, key=lambda v: view.by_variable[v.name] or 0.0, reverse=True
+        )
+    )
+    heads = ["sampled", "all", *(name.replace("-", "-\n") for name in view.scenarios)]
+    yield table(["variable", *heads], by_variable, title="By variable", gap=1)
+    yield (
+        f"{view.samples} designs within {100.0 * view.radius:g} % of each variable's bounds;"
+        " values are relative changes of objectives over the whole bounds; smaller is more robust"
+    )
+    largest = {
+        o.name: max(part.unexplained[o.name] or 0.0 for part in view.scenarios.values())
+        for o in view.objectives
+    }
+    shares = (f"{SHORT[name]} {number(100.0 * value, 2)} %" for name, value in largest.items())
+    yield f"unexplained by the linear model, largest of all scenarios: {', '.join(shares)}"
+    if view.held:
+        yield f"fixed: {', '.join(view.held)}"
 
 
 def robustness_request(
@@ -129,10 +161,6 @@ def estimate(request: RobustnessRequest) -> RobustnessView:
 @contextmanager
 def shown_progress() -> Iterator[Progress]:
     """Print progress to stderr every two seconds."""
-    import time
-
-    from gaitswarm.cli.output import note
-
     last = time.monotonic()
 
     def progress(done: int, planned: int) -> None:
@@ -142,14 +170,3 @@ def shown_progress() -> Iterator[Progress]:
             note(f"{done} of {planned} simulations")
 
     yield progress
-
-
-def _print(view: RobustnessView) -> None:
-    from gaitswarm.cli.output import stdout_console
-    from gaitswarm.cli.robustness import scenarios_table, summary, variables_table
-
-    console = stdout_console()
-    console.print(scenarios_table(view))
-    console.print(variables_table(view))
-    for line in summary(view):
-        console.print(line, markup=False)

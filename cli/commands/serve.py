@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import gc
-from contextlib import contextmanager
+import logging
+import os
+import threading
+from contextlib import contextmanager, suppress
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from gaitswarm.cli.inputs.options import RunnerOptions, with_groups
+from gaitswarm.cli.inputs.options import RunnerOptions
+from gaitswarm.cli.output import note
 
 if TYPE_CHECKING:
-    import threading
     from collections.abc import Callable, Iterator
     from contextlib import AbstractContextManager
 
@@ -28,13 +32,6 @@ _SIGNAL_POLL: Final = 0.2
 """Maximum delay before a signal is handled [s]."""
 
 
-def register(app: typer.Typer) -> None:
-    """Add the commands."""
-    app.command()(serve)
-    app.command()(runner)
-
-
-@with_groups
 def serve(
     *,
     host: Annotated[
@@ -65,14 +62,10 @@ def serve(
     options: RunnerOptions,
 ) -> None:
     """Serve the page and the REST API, and run queued jobs, until Ctrl-C."""
-    import logging
-    from dataclasses import asdict
-
     from gaitswarm.api.app import create_app
     from gaitswarm.api.page import is_built
     from gaitswarm.api.server import ApiServer
     from gaitswarm.cli.logs import log_to_stderr
-    from gaitswarm.cli.output import note
     from gaitswarm.services.monitoring.activity import Activity
     from gaitswarm.services.monitoring.metrics import Metrics
     from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
@@ -113,18 +106,12 @@ def serve(
         server.run()
 
 
-@with_groups
 def runner(options: RunnerOptions) -> None:
     """Run queued jobs, without page and API, until Ctrl-C or SIGTERM.
 
     Running jobs then commit their current iterations and return to the queue; a second signal
     discards these iterations.
     """
-    import logging
-    import threading
-    from contextlib import suppress
-    from dataclasses import asdict
-
     from gaitswarm.cli.logs import log_to_stderr
     from gaitswarm.services.optimizer.run.evaluator import EvaluationStopped
     from gaitswarm.services.runtime import stop_on_signals
@@ -156,7 +143,6 @@ def runner(options: RunnerOptions) -> None:
 
 
 def _drain(runner: Runner | None, settings: Settings, at_once: threading.Event) -> None:
-    import logging
 
     if runner is None:
         return
@@ -232,9 +218,6 @@ def _runtime(
 
 def _tracing() -> Tracing | None:
     """Export spans if OpenTelemetry's variables name a collector."""
-    import logging
-    import os
-
     names = ("OTEL_EXPORTER_OTLP_ENDPOINT", "OTEL_EXPORTER_OTLP_TRACES_ENDPOINT")
     if not any(os.environ.get(name) for name in names):
         return None

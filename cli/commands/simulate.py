@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gaitswarm.cli.inputs.options import ControllerOption, Db, Json, Precision, RobotOption, Server
+from gaitswarm.cli.inputs.options import ControllerOption, Place, Precision, RobotOption
+from gaitswarm.cli.output import note
+from gaitswarm.cli.tables import gait_in_words, number, results_table, table, worth
 
 if TYPE_CHECKING:
+    from gaitswarm.cli.output import Printed
+    from gaitswarm.cli.rich_table import Table
     from gaitswarm.views import SimulationView
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands."""
-    app.command()(simulate)
 
 
 def simulate(
@@ -62,21 +62,19 @@ def simulate(
     ] = None,
     robot: RobotOption = None,
     precision: Precision = None,
-    server: Server = None,
-    db: Db = None,
-    as_json: Json = False,
-) -> None:
+    *,
+    place: Place,
+) -> Printed:
     """Simulate one design and show its objectives and fitness; a fall is a result, not an error."""
     from pydantic import ValidationError
 
     from gaitswarm.cli.inputs.design_file import given_design
     from gaitswarm.cli.inputs.robots import robot_defaults, scenario_data
     from gaitswarm.cli.inputs.spec_file import json_object
-    from gaitswarm.cli.output import note
     from gaitswarm.errors import invalid_request
     from gaitswarm.requests.simulations import SimulationRequest, run_simulation
 
-    given = given_design(design, controller, trajectory, robot=robot, server=server, db=db)
+    given = given_design(design, controller, trajectory, robot=robot, place=place)
     data: dict[str, Any] = {
         "robot": given.robot(robot),
         "controller": given.controller,
@@ -98,28 +96,32 @@ def simulate(
     except ValidationError as error:
         raise invalid_request(error) from error
     view = run_simulation(request)
-    if log is not None:
+    return without_logs(view, log), _parts(view)
+
+
+def without_logs(view: SimulationView, path: Path | None) -> dict[str, Any]:
+    """Write the logs of a simulation if there is a path; return the rest as JSON."""
+    if path is not None:
         from gaitswarm.cli.files import write_walk_logs
 
-        write_walk_logs(log, {name: result.log for name, result in view.scenarios.items()})
-        note(f"log written to {log}")
-    _show(view, as_json=as_json)
+        write_walk_logs(path, {name: result.log for name, result in view.scenarios.items()})
+        note(f"log written to {path}")
+    return view.model_dump(mode="json", exclude={"scenarios": {"__all__": {"log"}}})
 
 
-def _show(view: SimulationView, *, as_json: bool) -> None:
-    from gaitswarm.cli.output import print_text, stdout_console
-    from gaitswarm.cli.tables import gait_in_words, measurements_table, results_table, worth
-    from gaitswarm.sim.outcome import OBJECTIVES
+def _parts(view: SimulationView) -> Iterator[Table | str]:
+    from gaitswarm.sim.outcome import MEASUREMENTS, OBJECTIVES
 
-    if as_json:
-        print_text(view.model_dump_json(indent=2, exclude={"scenarios": {"__all__": {"log"}}}))
-        return
-    console = stdout_console()
-    console.print(results_table({"": view.scenarios}, OBJECTIVES))
-    console.print(measurements_table(view.scenarios))
-    console.print(f"fitness {worth(view)}, in {view.precision} precision", markup=False)
+    yield results_table({"": view.scenarios}, OBJECTIVES)
+    heads = [f"{m.name.replace('_', ' ')}\n{m.unit}" for m in MEASUREMENTS]
+    measured = (
+        (name, *(number(getattr(result.measurements, m.name)) for m in MEASUREMENTS))
+        for name, result in view.scenarios.items()
+    )
+    yield table(["scenario", *heads], measured, title="Measured", gap=1)
+    yield f"fitness {worth(view)}, in {view.precision} precision"
     for name, result in view.scenarios.items():
         if result.gait is not None:
-            console.print(f"{name}: {gait_in_words(result.gait)}", markup=False)
+            yield f"{name}: {gait_in_words(result.gait)}"
         if result.status != "ok":
-            console.print(f"{name}: {result.explanation}", markup=False)
+            yield f"{name}: {result.explanation}"

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from gaitswarm.cli.inputs.options import full_id
+from gaitswarm.cli.inputs.options import Place, full_id
 from gaitswarm.cli.inputs.robots import chosen_robot, robot_defaults
 from gaitswarm.cli.inputs.spec_file import json_object, read_json_object
 from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
@@ -51,12 +51,11 @@ def given_design(
     trajectory: Path | None = None,
     *,
     robot: str | None = None,
-    server: str | None,
-    db: str | None,
+    place: Place,
 ) -> GivenDesign:
     """Return the design of an argument DESIGN|ID."""
     if not may_be_file(given):
-        best = _best_of_job(given.removeprefix(_JOB), controller, server, db)
+        best = _best_of_job(given.removeprefix(_JOB), controller, place)
         return replace(best, values=_in_gait(best.values, trajectory))
     if given.startswith(_PUBLISHED):
         label = f"published {given.removeprefix(_PUBLISHED)}"
@@ -78,14 +77,11 @@ def _is_json(given: str) -> bool:
     return given.lstrip().startswith("{")
 
 
-def _best_of_job(
-    job_id: str, controller: str | None, server: str | None, db: str | None
-) -> GivenDesign:
-    from gaitswarm.jobs.open import open_jobs
+def _best_of_job(job_id: str, controller: str | None, place: Place) -> GivenDesign:
     from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
     from gaitswarm.sim.catalogue import design_numbers
 
-    with open_jobs(server, db) as jobs:
+    with place.open() as jobs:
         job_id = full_id(jobs, job_id)
         try:
             spec = jobs.job(job_id).spec
@@ -151,7 +147,7 @@ def _read_values(design: str, controller: str) -> dict[str, Any]:
             )
         return dict(published[name])
     if design.startswith(_JOB):
-        return _best_of_job(design.removeprefix(_JOB), controller, None, None).values
+        return _best_of_job(design.removeprefix(_JOB), controller, Place()).values
     if _is_json(design):
         content = json_object(design, "design")
     else:

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass, fields, is_dataclass
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar, cast, get_type_hints
 
 import typer
+
+from gaitswarm.cli.output import show
+from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
 
 if TYPE_CHECKING:
     from gaitswarm.jobs.base import Jobs
@@ -22,8 +26,6 @@ _LENGTH: Final = 12
 
 def one_of(choices: Iterable[C], text: str, option: str) -> C:
     """Return the choice that equals the text of an option."""
-    from gaitswarm.services.optimizer.errors import InvalidRequest
-
     choices = tuple(choices)
     for choice in choices:
         if choice == text:
@@ -33,8 +35,6 @@ def one_of(choices: Iterable[C], text: str, option: str) -> C:
 
 def name_and_value(entry: str, option: str, form: str = "NAME=VALUE") -> tuple[str, str]:
     """Split NAME=VALUE at the equals sign."""
-    from gaitswarm.services.optimizer.errors import InvalidRequest
-
     name, equals, value = entry.partition("=")
     if not (name and equals and value):
         raise InvalidRequest(f"{entry!r} is not {form}", field=option)
@@ -43,8 +43,6 @@ def name_and_value(entry: str, option: str, form: str = "NAME=VALUE") -> tuple[s
 
 def full_id(jobs: Jobs, prefix: str) -> str:
     """Return the only id with a prefix, or the text itself if there is none."""
-    from gaitswarm.services.optimizer.errors import InvalidRequest
-
     if not 0 < len(prefix) < _LENGTH:
         return prefix
     matches = [job.id for job in jobs.jobs(search=prefix) if job.id.startswith(prefix)]
@@ -74,8 +72,6 @@ def completed_start(context: typer.Context, text: str | None) -> str | None:
     """Complete prefixes of ids separated by commas; names of CSV files do not change."""
     if text is None or text.lower().endswith(".csv"):
         return text
-    from gaitswarm.services.optimizer.errors import NotFound
-
     ids = [entry.strip() for entry in text.split(",") if entry.strip()]
     try:
         return ",".join(completed_all(context, ids))
@@ -324,26 +320,52 @@ class RunnerOptions(WorkerOptions):
     ] = None
 
 
-def with_groups(command: Callable[..., None]) -> Callable[..., None]:
-    """Expand dataclasses among a command's parameters to single options for Typer."""
-    annotations = get_type_hints(command, include_extras=True)
-    groups: dict[str, type[Any]] = {
-        name: kind
-        for name, kind in annotations.items()
-        if isinstance(kind, type) and is_dataclass(kind)
-    }
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Options of commands about jobs: where the jobs are."""
+
+    server: Server = None
+    db: Db = None
+
+    def open(self, *, create: bool = False) -> Jobs:
+        """Open the jobs; a missing SQLite file is created, or an error."""
+        from gaitswarm.jobs.open import open_jobs
+
+        return open_jobs(self.server, self.db, create=create)
+
+
+def expanded(command: Callable[..., Any]) -> Callable[..., None]:
+    """Return a command with the parameters that Typer expects.
+
+    Dataclasses among its parameters become single options. A parameter `jobs: Jobs` becomes the
+    options of `Place`, which is open until the result is printed. A command that returns `Printed`
+    gets --json.
+    """
+    names = {"Jobs": Place, "Printed": tuple}
+    annotations = get_type_hints(command, None, names, include_extras=True)
+    prints = annotations.pop("return") is tuple
+    groups = {name: kind for name, kind in annotations.items() if is_dataclass(kind)}
     parameters: list[inspect.Parameter] = []
     for name, parameter in inspect.signature(command).parameters.items():
         if name in groups:
-            parameters += _parameters(groups[name])
+            parameters += _parameters(cast(type, groups[name]))
         else:
             parameters.append(parameter.replace(annotation=annotations[name]))
+    if prints:
+        kind = inspect.Parameter.KEYWORD_ONLY
+        parameters.append(inspect.Parameter("as_json", kind, default=False, annotation=Json))
 
     @wraps(command)
     def called(**values: Any) -> None:
-        for name, kind in groups.items():
-            values[name] = kind(**{field.name: values.pop(field.name) for field in fields(kind)})
-        command(**values)
+        as_json = values.pop("as_json") if prints else False
+        with ExitStack() as stack:
+            for name, kind in groups.items():
+                options = {field.name: values.pop(field.name) for field in fields(kind)}
+                group: Any = cast(type, kind)(**options)
+                values[name] = stack.enter_context(group.open()) if name == "jobs" else group
+            printed = command(**values)
+            if prints:
+                show(*printed, as_json=as_json)
 
     by_name = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in parameters]
     called.__signature__ = inspect.Signature(by_name)  # type: ignore[attr-defined]

@@ -149,7 +149,7 @@ def optimizer_choice(name: str | None, settings: str | None) -> Any:
     return fields["optimizer"]
 
 
-def preference_choice(text: str) -> str | dict[str, Any]:
+def preference_choice(text: str) -> Any:
     """Return a preference's name, or an unchecked one of JSON."""
     if not text.lstrip().startswith("{"):
         return text

@@ -15,13 +15,12 @@ from collections.abc import Callable, Iterable, Iterator
 from importlib import import_module
 from typing import Any, ClassVar
 
-import typer
 from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 from sphinx.util.typing import ExtensionMetadata
 
-from gaitswarm.cli.main import app as command_line
+from gaitswarm.cli import main as command_line
 from scripts.manual.fields import models, settings
 from scripts.manual.rest import routes, schemas
 
@@ -55,7 +54,7 @@ def setup(app: Sphinx) -> ExtensionMetadata:
 
 def commands() -> Iterator[str]:
     """Every command with its help, as printed at 80 characters: lines of Markdown."""
-    return _commands(typer.main.get_command(command_line))
+    return _commands(command_line.commands())
 
 
 def _commands(command: Any, path: str = "gaitswarm", parent: Any = None) -> Iterator[str]:

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from gaitswarm.cli.inputs.design_file import GivenDesign, given_design
+from gaitswarm.cli.inputs.options import Place
 from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.store import Store
@@ -20,7 +21,7 @@ from tests.setup import command_line
 
 
 def given(text: str, db: Path | None = None, controller: str | None = None) -> GivenDesign:
-    return given_design(text, controller, server=None, db=None if db is None else str(db))
+    return given_design(text, controller, place=Place(None, None if db is None else str(db)))
 
 
 def test_published_designs_are_named_with_their_controller() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from gaitswarm.cli.comparison import published_results
+from gaitswarm.cli.embedded import published_results
 from gaitswarm.cli.inputs.design_file import read_design
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec

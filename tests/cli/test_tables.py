@@ -7,7 +7,7 @@ import io
 import pytest
 from rich.console import Console
 
-from gaitswarm.cli.tables import Table
+from gaitswarm.cli.rich_table import Table
 
 ROWS = [
     ("wnb852gbnr7w", "first try on slopes", "succeeded", "18.1539"),

@@ -11,7 +11,7 @@ from typing import Any
 
 import typer
 
-from gaitswarm.cli.main import app
+from gaitswarm.cli import main
 
 
 @cache
@@ -69,7 +69,7 @@ def refusal(arguments: Sequence[str]) -> str | None:
 
 @cache
 def _root() -> Any:
-    return typer.main.get_command(app)
+    return main.commands()
 
 
 def _leaves(command: Any, prefix: str) -> list[tuple[str, Any]]:

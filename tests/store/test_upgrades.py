@@ -10,8 +10,6 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
-from alembic import command
-from alembic.config import Config
 from sqlalchemy import Connection, text
 
 from gaitswarm.services.optimizer.errors import Conflict, StoreUnavailable
@@ -33,15 +31,8 @@ from tests.examples.forked import ForkedCommand
 from tests.examples.processes import output
 from tests.store import worker_process
 from tests.store.examples import spec
+from tests.store.first_schema import create_first_schema
 from tests.store.test_opening import edit
-
-
-def alembic(connection: Connection) -> Config:
-    """Of Alembic's commands, which run in a transaction of ours."""
-    config = Config()
-    config.set_main_option("script_location", str(MIGRATIONS))
-    config.attributes["connection"] = connection
-    return config
 
 
 def schema(connection: Connection) -> list[str]:
@@ -112,7 +103,9 @@ def revision(url: str) -> str | None:
 def test_a_new_database_is_as_all_migrations_make_one(fresh_url: str) -> None:
     with closing(Database(fresh_url, for_migration=True)) as database:
         with database.write() as connection:
-            command.upgrade(alembic(connection), "head")
+            create_first_schema(connection)
+        assert upgrade(fresh_url) == FIRST
+        with database.write() as connection:
             migrated, revision = schema(connection), read_revision(connection)
             metadata.drop_all(connection)
             connection.execute(text("DROP TABLE alembic_version"))
@@ -122,19 +115,9 @@ def test_a_new_database_is_as_all_migrations_make_one(fresh_url: str) -> None:
             assert len(migrated) > len(metadata.tables)
             assert schema(connection) == migrated
             assert read_revision(connection) == revision == head()
-
-
-def test_a_database_of_the_first_revision_is_adopted(fresh_url: str) -> None:
-    with (
-        closing(Database(fresh_url, for_migration=True)) as database,
-        database.write() as connection,
-    ):
-        command.upgrade(alembic(connection), FIRST)
-    assert upgrade(fresh_url) == FIRST
     with closing(open_store(fresh_url)) as store:
         job, _ = store.create_job(spec())
         assert store.jobs().items[0].id == job.id
-    assert revision(fresh_url) == NEWEST
 
 
 def test_a_database_of_the_first_revision_is_upgraded_with_what_jobs_are_searched_by(

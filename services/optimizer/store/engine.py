@@ -17,17 +17,7 @@ from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any, Final
 
-from sqlalchemy import (
-    URL,
-    Connection,
-    Engine,
-    NullPool,
-    create_engine,
-    event,
-    func,
-    make_url,
-    select,
-)
+import sqlalchemy as sa
 from sqlalchemy.exc import (
     ArgumentError,
     DatabaseError,
@@ -71,29 +61,29 @@ _NETWORK: Final = re.compile(
 )
 """File systems of other machines, as the kernel calls them; 9p: a virtual machine's host."""
 
-Clock = Callable[[Connection], datetime]
+Clock = Callable[[sa.Connection], datetime]
 """Returns the aware time inside a transaction."""
 
 
-def database_time(connection: Connection) -> datetime:
+def database_time(connection: sa.Connection) -> datetime:
     """Return the time of the clock that all users of a database share.
 
     A lease is written by one process and judged by another, whose own clock may be hours off.
     """
     if connection.dialect.name == "postgresql":
         # CURRENT_TIMESTAMP is the transaction's start, before any wait for a lock.
-        now: datetime = connection.execute(select(func.clock_timestamp())).scalar_one()
+        now: datetime = connection.execute(sa.select(sa.func.clock_timestamp())).scalar_one()
         return now
     return datetime.now(UTC)
 
 
-def parse_url(text: str) -> URL:
+def parse_url(text: str) -> sa.URL:
     """Parse `sqlite:///path`, a bare path, or `postgresql://...`. Raises StoreUnavailable."""
     forms = "use a file name, sqlite:///FILE or postgresql://USER:PASSWORD@HOST/DATABASE"
     if not text.strip():
         raise StoreUnavailable(f"the database URL is empty; {forms}")
     try:
-        url = make_url(text) if "://" in text else URL.create("sqlite", database=text)
+        url = sa.make_url(text) if "://" in text else sa.URL.create("sqlite", database=text)
     except (ArgumentError, ValueError) as error:
         raise StoreUnavailable(f"the database URL cannot be understood; {forms}") from error
     if url.drivername in ("postgresql", "postgres", "postgresql+psycopg"):
@@ -102,7 +92,7 @@ def parse_url(text: str) -> URL:
         raise StoreUnavailable(f"{url.drivername} databases are not supported; {forms}")
     if url.database in (None, "", ":memory:"):
         raise StoreUnavailable(f"a database in memory forgets every job; {forms}")
-    return URL.create("sqlite+pysqlite", database=str(Path(str(url.database)).expanduser()))
+    return sa.URL.create("sqlite+pysqlite", database=str(Path(str(url.database)).expanduser()))
 
 
 class Observer:
@@ -136,7 +126,7 @@ class Database:
         observers: of this process's use of the database.
     """
 
-    def __init__(self, url: str | URL, *, for_migration: bool = False) -> None:
+    def __init__(self, url: str | sa.URL, *, for_migration: bool = False) -> None:
         """Prepare connections.
 
         For a migration there is no pool, no limit on the time of statements, and on SQLite no
@@ -147,7 +137,7 @@ class Database:
         self._file: _OpenFile | None = None
         options: dict[str, Any] = {"json_serializer": _strict_json}
         if for_migration:
-            options |= {"poolclass": NullPool}
+            options |= {"poolclass": sa.NullPool}
         else:
             # The connection used last has most of the database in its cache.
             options |= {"pool_size": 8, "max_overflow": 24, "pool_timeout": BUSY_SECONDS}
@@ -163,7 +153,7 @@ class Database:
             self.path = None
             self.engine = _postgresql_engine(self.url, options, unlimited=for_migration)
 
-    def read(self, operation: str = "") -> AbstractContextManager[Connection]:
+    def read(self, operation: str = "") -> AbstractContextManager[sa.Connection]:
         """Open a transaction that reads.
 
         On SQLite it never waits for a writer and sees one state of the database. On PostgreSQL
@@ -171,7 +161,7 @@ class Database:
         """
         return self.transaction(operation, write=False)
 
-    def write(self, operation: str = "") -> AbstractContextManager[Connection]:
+    def write(self, operation: str = "") -> AbstractContextManager[sa.Connection]:
         """Open a transaction that writes: committed at the end, rolled back on any exception."""
         return self.transaction(operation, write=True)
 
@@ -181,8 +171,8 @@ class Database:
         operation: str = "",
         *,
         write: bool,
-        before: Callable[[Connection], None] | None = None,
-    ) -> Iterator[Connection]:
+        before: Callable[[sa.Connection], None] | None = None,
+    ) -> Iterator[sa.Connection]:
         """Open a transaction.
 
         Args:
@@ -301,12 +291,12 @@ def _strict_json(value: object) -> str:
     return json.dumps(value, allow_nan=False, separators=(",", ":"))
 
 
-def _sqlite_engine(url: URL, options: dict[str, Any], *, foreign_keys: bool) -> Engine:
+def _sqlite_engine(url: sa.URL, options: dict[str, Any], *, foreign_keys: bool) -> sa.Engine:
     # Without an isolation level the driver begins no transaction of its own.
     connect_args = {"isolation_level": None, "timeout": BUSY_SECONDS}
-    engine = create_engine(url, connect_args=connect_args, **options)
+    engine = sa.create_engine(url, connect_args=connect_args, **options)
 
-    @event.listens_for(engine, "connect")
+    @sa.event.listens_for(engine, "connect")
     def _configure(connection: sqlite3.Connection, _record: object) -> None:
         _enable_write_ahead_log(connection)
         # A text that is not UTF-8 must not hide the other rows of a query.
@@ -316,8 +306,8 @@ def _sqlite_engine(url: URL, options: dict[str, Any], *, foreign_keys: bool) -> 
         connection.execute(f"PRAGMA cache_size = {-_CACHE_KIB}")
         connection.execute(f"PRAGMA foreign_keys = {'ON' if foreign_keys else 'OFF'}")
 
-    @event.listens_for(engine, "begin")
-    def _begin(connection: Connection) -> None:
+    @sa.event.listens_for(engine, "begin")
+    def _begin(connection: sa.Connection) -> None:
         options = connection.get_execution_options()
         if options.get("isolation_level") == "AUTOCOMMIT":
             return
@@ -350,15 +340,15 @@ class _OpenFile:
     file, in which nothing that is written here will be found.
     """
 
-    def __init__(self, path: Path, engine: Engine) -> None:
+    def __init__(self, path: Path, engine: sa.Engine) -> None:
         self._name = str(path)
         self._file = self._log = path.absolute()
         self._lock = threading.Lock()
         self._connections = 0
         self._identity: tuple[object, object] = (None, None)
-        event.listen(engine, "do_connect", self._before_connection)
-        event.listen(engine, "checkout", self._opened)
-        event.listen(engine, "close", self._closed)
+        sa.event.listen(engine, "do_connect", self._before_connection)
+        sa.event.listen(engine, "checkout", self._opened)
+        sa.event.listen(engine, "close", self._closed)
 
     def check(self) -> None:
         with self._lock:
@@ -405,7 +395,7 @@ def _identity(path: Path) -> tuple[int, int] | None:
     return status.st_dev, status.st_ino
 
 
-def check_file_system(url: URL) -> None:
+def check_file_system(url: sa.URL) -> None:
     """Refuse an SQLite file on a network file system, where SQLite loses writes.
 
     The write-ahead log is memory shared between processes, and locks are those of the file system,
@@ -448,7 +438,7 @@ def is_network(point: PurePosixPath, kind: str) -> bool:
     return not sandbox and _NETWORK.fullmatch(kind) is not None
 
 
-def _postgresql_engine(url: URL, options: dict[str, Any], *, unlimited: bool) -> Engine:
+def _postgresql_engine(url: sa.URL, options: dict[str, Any], *, unlimited: bool) -> sa.Engine:
     """Create an engine on psycopg whose connections end within `SILENCE_SECONDS` of a partition.
 
     Both ends probe a silent connection: the client detects a lost server, and the server ends the
@@ -480,13 +470,13 @@ def _postgresql_engine(url: URL, options: dict[str, Any], *, unlimited: bool) ->
     # The last of several equal settings counts.
     connect_args["options"] = " ".join([*(f"-c {k}={v}" for k, v in settings.items()), given])
     try:
-        engine = create_engine(url, connect_args=connect_args, **options)
+        engine = sa.create_engine(url, connect_args=connect_args, **options)
     except ModuleNotFoundError as error:
         raise StoreUnavailable(
             f"PostgreSQL needs {error.name}: install gaitswarm[postgres]"
         ) from error
 
-    @event.listens_for(engine, "checkout")
+    @sa.event.listens_for(engine, "checkout")
     def _replace_cut_connection(connection: Any, _record: object, _proxy: object) -> None:
         # Ping only if something, such as an end, has arrived on the idle connection.
         try:

@@ -9,19 +9,7 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any, Final
 
-from sqlalchemy import (
-    URL,
-    Column,
-    Connection,
-    MetaData,
-    PrimaryKeyConstraint,
-    String,
-    Table,
-    event,
-    inspect,
-    select,
-    text,
-)
+import sqlalchemy as sa
 from sqlalchemy.exc import DBAPIError
 
 from gaitswarm.services.optimizer.errors import Conflict, StoreUnavailable
@@ -41,11 +29,11 @@ MIGRATIONS: Final = Path(__file__).with_name("migrations")
 _MIGRATING: Final = 0x6761_6974_7377_6D01
 _IN_USE: Final = 0x6761_6974_7377_6D02
 
-_alembic_version: Final = Table(
+_alembic_version: Final = sa.Table(
     "alembic_version",
-    MetaData(),
-    Column("version_num", String(32), nullable=False),
-    PrimaryKeyConstraint("version_num", name="alembic_version_pkc"),
+    sa.MetaData(),
+    sa.Column("version_num", sa.String(32), nullable=False),
+    sa.PrimaryKeyConstraint("version_num", name="alembic_version_pkc"),
 )
 """Alembic's own table."""
 
@@ -66,9 +54,9 @@ def _known_revisions() -> list[str]:
     return known
 
 
-def read_revision(connection: Connection) -> str | None:
+def read_revision(connection: sa.Connection) -> str | None:
     """Return the revision of a database; None if it has none."""
-    if not inspect(connection).has_table("alembic_version"):
+    if not sa.inspect(connection).has_table("alembic_version"):
         return None
     row = connection.exec_driver_sql("SELECT version_num FROM alembic_version").first()
     return None if row is None else str(row[0])
@@ -111,7 +99,7 @@ def _require_known(revision: str, name: str) -> None:
     )
 
 
-def create(url: URL) -> None:
+def create(url: sa.URL) -> None:
     """Create the tables of an empty database, by one of several processes at once.
 
     Raises StoreUnavailable for a database that cannot be opened or has an older schema.
@@ -156,7 +144,7 @@ def upgrade(url: str) -> str | None:
         return before
 
 
-def lock_for_migration(connection: Connection) -> None:
+def lock_for_migration(connection: sa.Connection) -> None:
     """Migrate in one process at a time; on SQLite the write transaction is lock enough."""
     if connection.dialect.name == "postgresql":
         connection.exec_driver_sql(f"SELECT pg_advisory_xact_lock({_MIGRATING})")
@@ -174,7 +162,7 @@ def _explained_errors(database: Database) -> Iterator[None]:
         ) from error
 
 
-def _migrate(connection: Connection, name: str) -> None:
+def _migrate(connection: sa.Connection, name: str) -> None:
     # Slow to import, and most databases are up to date.
     from alembic import command  # noqa: PLC0415
     from alembic.config import Config  # noqa: PLC0415
@@ -192,7 +180,7 @@ def _migrate(connection: Connection, name: str) -> None:
 
 
 @contextmanager
-def exclusive(database: Database) -> Iterator[Connection]:
+def exclusive(database: Database) -> Iterator[sa.Connection]:
     """Open a write transaction in a database that no other process has open or can open.
 
     Raises Conflict if it is in use: another process has it open, or a job has a live lease.
@@ -201,10 +189,10 @@ def exclusive(database: Database) -> Iterator[Connection]:
     with database.transaction(write=True, before=prepare) as connection:
         if database.path is None:
             _lock_server(connection, database.name)
-        if inspect(connection).has_table("jobs"):
+        if sa.inspect(connection).has_table("jobs"):
             # A runner may be cut off from the server.
             columns = (jobs.c.id, jobs.c.lease_owner)
-            leased = select(*columns).where(has_live_lease(database_time(connection)))
+            leased = sa.select(*columns).where(has_live_lease(database_time(connection)))
             row = connection.execute(leased.limit(1)).first()
             if row is not None:
                 raise Conflict(
@@ -215,7 +203,7 @@ def exclusive(database: Database) -> Iterator[Connection]:
         yield connection
 
 
-def _lock_file(connection: Connection) -> None:
+def _lock_file(connection: sa.Connection) -> None:
     with closing(connection.connection.cursor()) as cursor:
         lock_file(cursor, str(connection.engine.url.database))
 
@@ -235,11 +223,11 @@ def lock_file(cursor: Any, name: str) -> None:
         ) from error
 
 
-def _lock_server(connection: Connection, name: str) -> None:
-    locked = text("SELECT pg_try_advisory_xact_lock(:key)")
+def _lock_server(connection: sa.Connection, name: str) -> None:
+    locked = sa.text("SELECT pg_try_advisory_xact_lock(:key)")
     if connection.execute(locked, {"key": _IN_USE}).scalar_one():
         return
-    query = text(
+    query = sa.text(
         "SELECT DISTINCT coalesce(nullif(application_name, ''), 'process ' || pid)"
         " FROM pg_locks JOIN pg_stat_activity USING (pid)"
         " WHERE locktype = 'advisory' AND objid = :low AND granted AND pid <> pg_backend_pid()"
@@ -257,7 +245,7 @@ def admit(database: Database) -> None:
     So a process that was cut off from its server during an upgrade is refused afterwards.
     """
 
-    @event.listens_for(database.engine, "connect")
+    @sa.event.listens_for(database.engine, "connect")
     def _admit(connection: Any, _record: object) -> None:
         try:
             _require_newest(_revision_in_use(database, connection), database.name)

@@ -11,25 +11,7 @@ from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from typing import Any, Final
 
-from sqlalchemy import (
-    JSON,
-    BigInteger,
-    Boolean,
-    Column,
-    DateTime,
-    Dialect,
-    Double,
-    ForeignKeyConstraint,
-    Index,
-    Integer,
-    LargeBinary,
-    MetaData,
-    PrimaryKeyConstraint,
-    Table,
-    Text,
-    UniqueConstraint,
-    text,
-)
+import sqlalchemy as sa
 from sqlalchemy.sql.operators import OperatorType
 from sqlalchemy.types import TypeDecorator, TypeEngine
 
@@ -40,10 +22,10 @@ Row = Mapping[Any, Any]
 class UtcDateTime(TypeDecorator[datetime]):
     """An aware time, read as UTC. SQLite, which has no time zones, stores naive UTC."""
 
-    impl = DateTime(timezone=True)
+    impl = sa.DateTime(timezone=True)
     cache_ok = True
 
-    def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:
+    def process_bind_param(self, value: datetime | None, dialect: sa.Dialect) -> datetime | None:
         if value is None:
             return None
         if value.tzinfo is None:
@@ -54,7 +36,7 @@ class UtcDateTime(TypeDecorator[datetime]):
     def process_result_value(
         self,
         value: datetime | None,
-        dialect: Dialect,  # noqa: ARG002
+        dialect: sa.Dialect,  # noqa: ARG002
     ) -> datetime | None:
         if value is None:
             return None
@@ -70,26 +52,26 @@ class UnparsedText(str):
 class Document(TypeDecorator[Any]):
     """A JSON document; a damaged one is read as `UnparsedText`, so that it hides no other row."""
 
-    impl = JSON
+    impl = sa.JSON
     cache_ok = True
 
     def coerce_compared_value(self, op: OperatorType | None, value: Any) -> TypeEngine[Any]:
         # Paths into the document are names, as for JSON.
         return self.impl_instance.coerce_compared_value(op, value)
 
-    def result_processor(self, dialect: Dialect, coltype: object) -> Callable[[Any], Any] | None:
+    def result_processor(self, dialect: sa.Dialect, coltype: object) -> Callable[[Any], Any] | None:
         parse = super().result_processor(dialect, coltype)
 
-        def parse_if_possible(text: Any) -> Any:
+        def parse_if_possible(raw: Any) -> Any:
             try:
-                return text if parse is None else parse(text)
+                return raw if parse is None else parse(raw)
             except (ValueError, RecursionError):
-                return UnparsedText(text)
+                return UnparsedText(raw)
 
         return parse_if_possible
 
 
-metadata: Final = MetaData(
+metadata: Final = sa.MetaData(
     naming_convention={
         "ix": "ix_%(table_name)s_%(column_0_N_name)s",
         "uq": "uq_%(table_name)s_%(column_0_N_name)s",
@@ -98,84 +80,84 @@ metadata: Final = MetaData(
     }
 )
 
-_DELETED: Final = text("deleted_at IS NOT NULL")
+_DELETED: Final = sa.text("deleted_at IS NOT NULL")
 
-jobs: Final = Table(
+jobs: Final = sa.Table(
     "jobs",
     metadata,
-    Column("id", Text, nullable=False),
-    Column("state", Text, nullable=False),
-    Column("spec", Document, nullable=False),
-    Column("idempotency_key", Text),
-    Column("created_at", UtcDateTime, nullable=False),
-    Column("updated_at", UtcDateTime, nullable=False),
-    Column("started_at", UtcDateTime),
-    Column("finished_at", UtcDateTime),
-    Column("error", Text),
+    sa.Column("id", sa.Text, nullable=False),
+    sa.Column("state", sa.Text, nullable=False),
+    sa.Column("spec", Document, nullable=False),
+    sa.Column("idempotency_key", sa.Text),
+    sa.Column("created_at", UtcDateTime, nullable=False),
+    sa.Column("updated_at", UtcDateTime, nullable=False),
+    sa.Column("started_at", UtcDateTime),
+    sa.Column("finished_at", UtcDateTime),
+    sa.Column("error", sa.Text),
     # The token never decreases; the owner is NULL while no runner holds the job.
-    Column("lease_owner", Text),
-    Column("lease_token", BigInteger, nullable=False),
-    Column("lease_expires_at", UtcDateTime),
+    sa.Column("lease_owner", sa.Text),
+    sa.Column("lease_token", sa.BigInteger, nullable=False),
+    sa.Column("lease_expires_at", UtcDateTime),
     # Number of committed iterations, and index of the next.
-    Column("iterations", Integer, nullable=False),
-    Column("evaluations", BigInteger, nullable=False),
-    Column("best_fitness", Double),
-    Column("best_iteration", Integer),
-    Column("best_particle", Integer),
-    Column("compute_seconds", Double, nullable=False),
+    sa.Column("iterations", sa.Integer, nullable=False),
+    sa.Column("evaluations", sa.BigInteger, nullable=False),
+    sa.Column("best_fitness", sa.Double),
+    sa.Column("best_iteration", sa.Integer),
+    sa.Column("best_particle", sa.Integer),
+    sa.Column("compute_seconds", sa.Double, nullable=False),
     # Iterations to run if the job was extended; the spec stays as submitted.
-    Column("budget", Integer),
+    sa.Column("budget", sa.Integer),
     # Of the request with the idempotency key; NULL without a key.
-    Column("request_digest", Text),
+    sa.Column("request_digest", sa.Text),
     # `ProvenanceRecords`.
-    Column("provenance", Document(none_as_null=True)),
+    sa.Column("provenance", Document(none_as_null=True)),
     # See `Job.accepts_changes`; NULL is false.
-    Column("accepts_changes", Boolean),
+    sa.Column("accepts_changes", sa.Boolean),
     # Evaluations answered from the cache; NULL is none.
-    Column("evaluations_saved", BigInteger),
+    sa.Column("evaluations_saved", sa.BigInteger),
     # Of a fork; no foreign key, as a fork outlives its parent.
-    Column("parent_id", Text),
-    Column("lineage", Document(none_as_null=True)),
+    sa.Column("parent_id", sa.Text),
+    sa.Column("lineage", Document(none_as_null=True)),
     # Name of the token it was submitted with; NULL for none.
-    Column("owner", Text),
+    sa.Column("owner", sa.Text),
     # Consecutive claims whose lease expired; NULL is none.
-    Column("crashes", Integer),
+    sa.Column("crashes", sa.Integer),
     # Reason for waiting while running; NULL if it does not wait.
-    Column("waiting", Text),
+    sa.Column("waiting", sa.Text),
     # `Progress.recent_seconds`.
-    Column("recent_seconds", Double),
+    sa.Column("recent_seconds", sa.Double),
     # Digest of the last committed iteration; NULL before the first.
-    Column("head", Text),
+    sa.Column("head", sa.Text),
     # URL notified of the job's end.
-    Column("notify_url", Text),
+    sa.Column("notify_url", sa.Text),
     # Set from deletion until all rows are removed.
-    Column("deleted_at", UtcDateTime),
+    sa.Column("deleted_at", UtcDateTime),
     # Protected from deletion; NULL is false.
-    Column("kept", Boolean),
+    sa.Column("kept", sa.Boolean),
     # Simulated time of the whole budget [s]; NULL if unknown.
-    Column("simulated_seconds", Double),
+    sa.Column("simulated_seconds", sa.Double),
     # Higher priorities are claimed first.
-    Column("priority", Integer, nullable=False, server_default="0"),
+    sa.Column("priority", sa.Integer, nullable=False, server_default="0"),
     # `Labels`; NULL for none.
-    Column("labels", Document(none_as_null=True)),
+    sa.Column("labels", Document(none_as_null=True)),
     # Hidden in lists; NULL is false.
-    Column("archived", Boolean),
+    sa.Column("archived", sa.Boolean),
     # `Reference`; NULL until determined.
-    Column("reference", Document(none_as_null=True)),
+    sa.Column("reference", Document(none_as_null=True)),
     # Folded name and searched text, see `search_columns`; sorted by code points in both databases.
-    Column("sort_name", Text().with_variant(Text(collation="C"), "postgresql")),
-    Column("search_text", Text),
-    PrimaryKeyConstraint("id"),
-    UniqueConstraint("idempotency_key"),
-    Index(None, "created_at", "id"),
-    Index(None, "state", "created_at", "id"),
-    Index(None, "parent_id"),
+    sa.Column("sort_name", sa.Text().with_variant(sa.Text(collation="C"), "postgresql")),
+    sa.Column("search_text", sa.Text),
+    sa.PrimaryKeyConstraint("id"),
+    sa.UniqueConstraint("idempotency_key"),
+    sa.Index(None, "created_at", "id"),
+    sa.Index(None, "state", "created_at", "id"),
+    sa.Index(None, "parent_id"),
     # Of deleted jobs only: SQLite would use a full index to find all others, and sort these.
-    Index(None, "deleted_at", sqlite_where=_DELETED, postgresql_where=_DELETED),
-    Index(None, "best_fitness", "id"),
+    sa.Index(None, "deleted_at", sqlite_where=_DELETED, postgresql_where=_DELETED),
+    sa.Index(None, "best_fitness", "id"),
     # Columns that lists filter and sort by. SQLite reads rows from their start, where the spec,
     # which may be large, precedes them; PostgreSQL stores large documents apart.
-    Index(
+    sa.Index(
         "ix_jobs_entries",
         "id",
         "created_at",
@@ -192,129 +174,129 @@ jobs: Final = Table(
         "deleted_at",
         "sort_name",
         "search_text",
-        sqlite_where=text("deleted_at IS NULL"),
+        sqlite_where=sa.text("deleted_at IS NULL"),
     ).ddl_if(dialect="sqlite"),
 )
 
 EXISTING: Final = jobs.c.deleted_at.is_(None)
 """Condition on jobs that are not deleted."""
 
-iterations: Final = Table(
+iterations: Final = sa.Table(
     "iterations",
     metadata,
-    Column("job_id", Text, nullable=False),
-    Column("iteration", Integer, nullable=False),
+    sa.Column("job_id", sa.Text, nullable=False),
+    sa.Column("iteration", sa.Integer, nullable=False),
     # The ask: (particles, d) positions and the optimizer's state, {} once a later iteration is
     # committed.
-    Column("positions", Document, nullable=False),
-    Column("optimizer_state", Document, nullable=False),
-    Column("asked_at", UtcDateTime, nullable=False),
+    sa.Column("positions", Document, nullable=False),
+    sa.Column("optimizer_state", Document, nullable=False),
+    sa.Column("asked_at", UtcDateTime, nullable=False),
     # The following are NULL until the iteration is committed, the statistics also if all designs
     # failed.
-    Column("committed_at", UtcDateTime),
-    Column("best", Double),
-    Column("mean", Double),
-    Column("median", Double),
-    Column("worst", Double),
-    Column("best_so_far", Double),
-    Column("failed", Integer),
-    Column("evaluate_seconds", Double),
+    sa.Column("committed_at", UtcDateTime),
+    sa.Column("best", sa.Double),
+    sa.Column("mean", sa.Double),
+    sa.Column("median", sa.Double),
+    sa.Column("worst", sa.Double),
+    sa.Column("best_so_far", sa.Double),
+    sa.Column("failed", sa.Integer),
+    sa.Column("evaluate_seconds", sa.Double),
     # Of positions and state, and of the committed iteration, chained to the previous one.
-    Column("ask_digest", Text),
-    Column("digest", Text),
-    PrimaryKeyConstraint("job_id", "iteration"),
-    ForeignKeyConstraint(["job_id"], ["jobs.id"]),
+    sa.Column("ask_digest", sa.Text),
+    sa.Column("digest", sa.Text),
+    sa.PrimaryKeyConstraint("job_id", "iteration"),
+    sa.ForeignKeyConstraint(["job_id"], ["jobs.id"]),
 )
 
-evaluations: Final = Table(
+evaluations: Final = sa.Table(
     "evaluations",
     metadata,
-    Column("job_id", Text, nullable=False),
-    Column("iteration", Integer, nullable=False),
-    Column("particle", Integer, nullable=False),
+    sa.Column("job_id", sa.Text, nullable=False),
+    sa.Column("iteration", sa.Integer, nullable=False),
+    sa.Column("particle", sa.Integer, nullable=False),
     # (v,) numbers; (K, m) numbers, null for NaN; (K,) labels; a fitness of +inf is NULL.
-    Column("design", JSON, nullable=False),
-    Column("objectives", JSON, nullable=False),
-    Column("statuses", JSON, nullable=False),
-    Column("fitness", Double),
+    sa.Column("design", sa.JSON, nullable=False),
+    sa.Column("objectives", sa.JSON, nullable=False),
+    sa.Column("statuses", sa.JSON, nullable=False),
+    sa.Column("fitness", sa.Double),
     # Key of the simulated design; NULL if the outcome was cached.
-    Column("walk_key", LargeBinary),
-    PrimaryKeyConstraint("job_id", "iteration", "particle"),
-    ForeignKeyConstraint(["job_id", "iteration"], ["iterations.job_id", "iterations.iteration"]),
-    Index(None, "walk_key"),
+    sa.Column("walk_key", sa.LargeBinary),
+    sa.PrimaryKeyConstraint("job_id", "iteration", "particle"),
+    sa.ForeignKeyConstraint(["job_id", "iteration"], ["iterations.job_id", "iterations.iteration"]),
+    sa.Index(None, "walk_key"),
 )
 
 # Best designs of searches in single precision, evaluated again in double.
-reevaluations: Final = Table(
+reevaluations: Final = sa.Table(
     "reevaluations",
     metadata,
-    Column("job_id", Text, nullable=False),
-    Column("iteration", Integer, nullable=False),
-    Column("particle", Integer, nullable=False),
-    Column("objectives", JSON, nullable=False),
-    Column("statuses", JSON, nullable=False),
-    Column("fitness", Double),
-    PrimaryKeyConstraint("job_id", "iteration", "particle"),
-    ForeignKeyConstraint(
+    sa.Column("job_id", sa.Text, nullable=False),
+    sa.Column("iteration", sa.Integer, nullable=False),
+    sa.Column("particle", sa.Integer, nullable=False),
+    sa.Column("objectives", sa.JSON, nullable=False),
+    sa.Column("statuses", sa.JSON, nullable=False),
+    sa.Column("fitness", sa.Double),
+    sa.PrimaryKeyConstraint("job_id", "iteration", "particle"),
+    sa.ForeignKeyConstraint(
         ["job_id", "iteration", "particle"],
         ["evaluations.job_id", "evaluations.iteration", "evaluations.particle"],
     ),
 )
 
-recordings: Final = Table(
+recordings: Final = sa.Table(
     "recordings",
     metadata,
     # Digest of the content.
-    Column("id", Text, nullable=False),
-    Column("document", Document, nullable=False),
-    Column("created_at", UtcDateTime, nullable=False),
-    PrimaryKeyConstraint("id"),
+    sa.Column("id", sa.Text, nullable=False),
+    sa.Column("document", Document, nullable=False),
+    sa.Column("created_at", UtcDateTime, nullable=False),
+    sa.PrimaryKeyConstraint("id"),
 )
 
-tokens: Final = Table(
+tokens: Final = sa.Table(
     "tokens",
     metadata,
-    Column("name", Text, nullable=False),
-    Column("scope", Text, nullable=False),
+    sa.Column("name", sa.Text, nullable=False),
+    sa.Column("scope", sa.Text, nullable=False),
     # Of the secret, which is not stored.
-    Column("digest", Text, nullable=False),
-    Column("created_at", UtcDateTime, nullable=False),
-    Column("revoked_at", UtcDateTime),
-    PrimaryKeyConstraint("name"),
-    UniqueConstraint("digest"),
+    sa.Column("digest", sa.Text, nullable=False),
+    sa.Column("created_at", UtcDateTime, nullable=False),
+    sa.Column("revoked_at", UtcDateTime),
+    sa.PrimaryKeyConstraint("name"),
+    sa.UniqueConstraint("digest"),
 )
 
-audit: Final = Table(
+audit: Final = sa.Table(
     "audit",
     metadata,
-    Column("id", BigInteger().with_variant(Integer, "sqlite"), autoincrement=True),
-    Column("at", UtcDateTime, nullable=False),
-    Column("actor", Text, nullable=False),
-    Column("action", Text, nullable=False),
+    sa.Column("id", sa.BigInteger().with_variant(sa.Integer, "sqlite"), autoincrement=True),
+    sa.Column("at", UtcDateTime, nullable=False),
+    sa.Column("actor", sa.Text, nullable=False),
+    sa.Column("action", sa.Text, nullable=False),
     # No foreign key: entries outlive their job.
-    Column("job_id", Text),
-    Column("details", JSON, nullable=False),
-    PrimaryKeyConstraint("id"),
-    Index(None, "job_id", "id"),
+    sa.Column("job_id", sa.Text),
+    sa.Column("details", sa.JSON, nullable=False),
+    sa.PrimaryKeyConstraint("id"),
+    sa.Index(None, "job_id", "id"),
     # An id is never reused.
     sqlite_autoincrement=True,
 )
 
-notifications: Final = Table(
+notifications: Final = sa.Table(
     "notifications",
     metadata,
-    Column("id", Text, nullable=False),
+    sa.Column("id", sa.Text, nullable=False),
     # No foreign key: a notification outlives its job.
-    Column("job_id", Text, nullable=False),
-    Column("url", Text, nullable=False),
-    Column("document", JSON, nullable=False),
-    Column("created_at", UtcDateTime, nullable=False),
-    Column("attempts", Integer, nullable=False),
+    sa.Column("job_id", sa.Text, nullable=False),
+    sa.Column("url", sa.Text, nullable=False),
+    sa.Column("document", sa.JSON, nullable=False),
+    sa.Column("created_at", UtcDateTime, nullable=False),
+    sa.Column("attempts", sa.Integer, nullable=False),
     # NULL once delivered or given up.
-    Column("next_attempt_at", UtcDateTime),
-    Column("delivered_at", UtcDateTime),
-    Column("error", Text),
-    PrimaryKeyConstraint("id"),
-    Index(None, "next_attempt_at"),
-    Index(None, "job_id"),
+    sa.Column("next_attempt_at", UtcDateTime),
+    sa.Column("delivered_at", UtcDateTime),
+    sa.Column("error", sa.Text),
+    sa.PrimaryKeyConstraint("id"),
+    sa.Index(None, "next_attempt_at"),
+    sa.Index(None, "job_id"),
 )

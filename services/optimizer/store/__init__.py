@@ -24,11 +24,21 @@ from gaitswarm.services.optimizer.store.tokens import Audit, Tokens
 class Store(Jobs, JobList, Leases, History, Recordings, Audit):
     """A database of jobs. Thread-safe.
 
-    Every method is one transaction, which happens wholly or not at all, unless it says that it uses
-    several. Methods that take an id raise NotFound for an unknown one; those that take a claim
-    raise LeaseLost, and change nothing, if its fencing token is not the job's. All raise
-    StoreUnavailable if the database cannot be used, and writes StoreReplaced if its file was
-    removed or replaced.
+    A method is one transaction, which happens wholly or not at all, unless it says that it uses
+    several. All raise StoreUnavailable if the database cannot be used, and writes StoreReplaced if
+    its file was removed or replaced.
+
+    Arguments of several methods:
+        job_id: of a job; NotFound if there is none.
+        claim: on a job. LeaseLost, and nothing is changed, unless its fencing token is the job's; a
+            lease that has expired but was not taken over is still valid.
+        first, last: index of the first iteration of a range, and index after its last.
+        after: `next` of the page before; InvalidRequest for any other text.
+        limit: maximum number of items of a page; InvalidRequest if it is less than 1.
+        runner: name of a runner, unique to its process.
+        lease_seconds: duration of a lease from now on, at most `LONGEST_LEASE_SECONDS` [s].
+        actor: name of a token, or `LOCAL`, for the audit log.
+        quota: limit on what the owner has unfinished; QuotaExceeded beyond it.
 
     Attributes:
         tokens: access tokens.

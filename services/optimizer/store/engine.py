@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import selectors
 import socket
 import sqlite3
 import threading
@@ -23,7 +22,6 @@ from sqlalchemy.exc import (
     DatabaseError,
     InterfaceError,
     InternalError,
-    InvalidatePoolError,
     OperationalError,
 )
 from sqlalchemy.exc import TimeoutError as PoolTimeout
@@ -469,22 +467,11 @@ def _postgresql_engine(url: sa.URL, options: dict[str, Any], *, unlimited: bool)
     given = given if isinstance(given, str) else " ".join(given)
     # The last of several equal settings counts.
     connect_args["options"] = " ".join([*(f"-c {k}={v}" for k, v in settings.items()), given])
+    # A connection that a restart of the server has cut is replaced before it is used.
+    options = options | {"pool_pre_ping": not unlimited}
     try:
-        engine = sa.create_engine(url, connect_args=connect_args, **options)
+        return sa.create_engine(url, connect_args=connect_args, **options)
     except ModuleNotFoundError as error:
         raise StoreUnavailable(
             f"PostgreSQL needs {error.name}: install gaitswarm[postgres]"
         ) from error
-
-    @sa.event.listens_for(engine, "checkout")
-    def _replace_cut_connection(connection: Any, _record: object, _proxy: object) -> None:
-        # Ping only if something, such as an end, has arrived on the idle connection.
-        try:
-            with selectors.DefaultSelector() as selector:
-                selector.register(connection, selectors.EVENT_READ)
-                if selector.select(0):
-                    engine.dialect.do_ping(connection)
-        except engine.dialect.loaded_dbapi.Error as error:
-            raise InvalidatePoolError from error
-
-    return engine

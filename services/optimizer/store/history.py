@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cache
 from itertools import pairwise
@@ -111,13 +111,7 @@ class History(Aggregate):
         """Return a page of committed iterations, in order.
 
         Args:
-            job_id: of the job.
             after: return only later iterations than this index.
-            limit: maximum number of iterations.
-
-        Raises:
-            NotFound: no such job.
-            InvalidRequest: the limit is less than 1.
         """
         limit = checked_limit(limit)
         table = iterations.c
@@ -150,7 +144,6 @@ class History(Aggregate):
         """Return all designs of a committed iteration, by particle.
 
         Args:
-            job_id: of the job.
             iteration: index of the iteration, from 0.
 
         Raises:
@@ -162,34 +155,12 @@ class History(Aggregate):
         return found
 
     def evaluations_between(self, job_id: str, first: int, last: int) -> tuple[Evaluation, ...]:
-        """Return all designs of a range of iterations, by iteration and particle.
-
-        Args:
-            job_id: of the job.
-            first: index of the first iteration.
-            last: index after the last iteration.
-
-        Raises:
-            NotFound: no such job.
-        """
-        query = select(evaluations).where(*_between(evaluations, job_id, first, last))
-        query = query.order_by(evaluations.c.iteration, evaluations.c.particle)
-        with self._database.read("evaluations_between") as connection:
-            require_job(connection, job_id)
-            rows = connection.execute(query).mappings().all()
-        return tuple(_evaluation(row) for row in rows)
+        """Return all designs of a range of iterations, by iteration and particle."""
+        columns = self.evaluation_columns(job_id, first, last)
+        return () if columns is None else _evaluations(columns)
 
     def evaluation_columns(self, job_id: str, first: int, last: int) -> EvaluationColumns | None:
-        """Return the designs of `evaluations_between` as columns; None if there are none.
-
-        Args:
-            job_id: of the job.
-            first: index of the first iteration.
-            last: index after the last iteration.
-
-        Raises:
-            NotFound: no such job.
-        """
+        """Return the designs of `evaluations_between` as columns; None if there are none."""
         with self._database.read("evaluation_columns") as connection:
             require_job(connection, job_id)
             return _select_columns(connection, job_id, first, last)
@@ -197,15 +168,9 @@ class History(Aggregate):
     def best(self, job_id: str) -> Evaluation | None:
         """Return the design of least fitness in double precision, the earliest of equals.
 
-        Args:
-            job_id: of the job.
-
         Returns:
             The evaluation, with its reevaluation if the job searches in single precision; None if
             every design has failed.
-
-        Raises:
-            NotFound: no such job.
         """
         with self._database.read("best") as connection:
             require_job(connection, job_id)
@@ -213,31 +178,13 @@ class History(Aggregate):
             iteration, particle = connection.execute(place).one()
             if iteration is None:
                 return None
-            row, again = (
-                connection.execute(
-                    select(table).where(
-                        table.c.job_id == job_id,
-                        table.c.iteration == iteration,
-                        table.c.particle == particle,
-                    )
-                )
-                .mappings()
-                .first()
-                for table in (evaluations, reevaluations)
-            )
-        return None if row is None else _evaluation(row, again)
+            columns = _select_columns(connection, job_id, iteration, iteration + 1)
+            again = _select_reevaluations(connection, job_id, iteration, iteration + 1)
+        best = None if columns is None else _evaluations(columns)[particle]
+        return best and replace(best, reevaluation=again[0][1] if again else None)
 
     def asked(self, job_id: str, first: int, last: int) -> tuple[NDArray[np.float64], ...]:
-        """Return the (n, d) positions asked for in a range of committed iterations, by iteration.
-
-        Args:
-            job_id: of the job.
-            first: index of the first iteration.
-            last: index after the last iteration.
-
-        Raises:
-            NotFound: no such job.
-        """
+        """Return the (n, d) positions asked for in a range of committed iterations."""
         query = (
             select(iterations.c.positions)
             .where(*_between(iterations, job_id, first, last))
@@ -254,17 +201,9 @@ class History(Aggregate):
     ) -> tuple[tuple[int, Reevaluation], ...]:
         """Return the reevaluations in double precision of a range of iterations.
 
-        Args:
-            job_id: of the job.
-            first: index of the first iteration.
-            last: index after the last iteration.
-
         Returns:
             Index of the iteration and its reevaluation, in order; empty for a job that searches in
             double precision.
-
-        Raises:
-            NotFound: no such job.
         """
         with self._database.read("reevaluations") as connection:
             require_job(connection, job_id)
@@ -290,24 +229,12 @@ class History(Aggregate):
         return outcomes
 
     def chain_documents(self, job_id: str) -> ChainDocuments:
-        """Return the documents other than iterations that a job's chain depends on, as stored.
-
-        Args:
-            job_id: of the job.
-
-        Raises:
-            NotFound: no such job.
-        """
+        """Return the documents other than iterations that a job's chain depends on, as stored."""
         with self._database.read("chain_documents") as connection:
             return chain_documents(job_row(connection, job_id))
 
     def links(self, job_id: str, first: int, last: int) -> tuple[StoredLink, ...]:
         """Return a range of iterations, including the current one, without evaluations.
-
-        Args:
-            job_id: of the job.
-            first: index of the first iteration.
-            last: index after the last iteration.
 
         Raises:
             ValueError: one is damaged.
@@ -373,7 +300,18 @@ def _select_reevaluations(
     query = select(reevaluations).where(*_between(reevaluations, job_id, first, last))
     query = query.order_by(reevaluations.c.iteration, reevaluations.c.particle)
     rows = connection.execute(query).mappings()
-    return tuple((row["iteration"], _reevaluation(row)) for row in rows)
+    return tuple(
+        (
+            row["iteration"],
+            Reevaluation(
+                particle=row["particle"],
+                objectives=np.array(row["objectives"], dtype=np.float64),
+                statuses=np.array([Status.from_label(s) for s in row["statuses"]], dtype=np.uint8),
+                fitness=math.inf if row["fitness"] is None else row["fitness"],
+            ),
+        )
+        for row in rows
+    )
 
 
 def _select_links(
@@ -397,26 +335,10 @@ def _select_links(
     )
 
 
-def _evaluation(row: Row, reevaluation: Row | None = None) -> Evaluation:
-    return Evaluation(
-        iteration=row["iteration"],
-        particle=row["particle"],
-        design=np.array(row["design"], dtype=np.float64),
-        **_results(row),
-        reevaluation=None if reevaluation is None else _reevaluation(reevaluation),
-    )
-
-
-def _reevaluation(row: Row) -> Reevaluation:
-    return Reevaluation(particle=row["particle"], **_results(row))
-
-
-def _results(row: Row) -> dict[str, Any]:
-    return {
-        "objectives": np.array(row["objectives"], dtype=np.float64),
-        "statuses": np.array([Status.from_label(s) for s in row["statuses"]], dtype=np.uint8),
-        "fitness": math.inf if row["fitness"] is None else row["fitness"],
-    }
+def _evaluations(columns: EvaluationColumns) -> tuple[Evaluation, ...]:
+    rows = (columns.designs, columns.objectives, columns.statuses, columns.fitness.tolist())
+    places = (columns.iteration.tolist(), columns.particle.tolist())
+    return tuple(Evaluation(*row) for row in zip(*places, *rows, strict=True))
 
 
 def _result_columns(

@@ -72,8 +72,6 @@ class JobList(Aggregate):
             search: part of a name, id, note or tag, in any case.
             where: further criteria.
             order: sort order; jobs without a value are last, also in the reverse order.
-            after: `next` of the page before.
-            limit: maximum number of jobs.
             reverse: whether to reverse the order.
 
         Raises:

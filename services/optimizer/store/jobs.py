@@ -110,7 +110,6 @@ class Jobs(Aggregate):
             owner: name of the token of the request.
             notify_url: checked URL that is notified of the job's end.
             seconds: simulated time of the whole budget [s]; None if unknown.
-            quota: of the owner's unfinished jobs.
             priority: within bounds; higher ones are claimed first.
 
         Returns:
@@ -170,8 +169,6 @@ class Jobs(Aggregate):
 
         Args:
             spec: resolved before it is stored.
-            runner: name of the runner.
-            lease_seconds: duration of the lease [s].
             provenance: of the results; None if the runner is to record it.
 
         Returns:
@@ -221,11 +218,7 @@ class Jobs(Aggregate):
         return row
 
     def job(self, job_id: str) -> Job:
-        """Return a job, whether its spec is readable or not.
-
-        Args:
-            job_id: of the job.
-        """
+        """Return a job, whether its spec is readable or not."""
         with self._database.read("job") as connection:
             return read_job(connection, job_id)
 
@@ -244,10 +237,8 @@ class Jobs(Aggregate):
         the lease, so the runner's next write is refused.
 
         Args:
-            job_id: of the job.
             command: to apply.
             accept_changes: whether a resumed job may continue under a changed provenance.
-            actor: for the audit log.
             quota: of the owner's unfinished jobs, if an ended job is queued again.
 
         Returns:
@@ -303,11 +294,8 @@ class Jobs(Aggregate):
         the runner detects it at its next commit.
 
         Args:
-            job_id: of the job.
             iterations: total budget.
-            actor: for the audit log.
             seconds: simulated time of the new budget [s]; None if unknown.
-            quota: of the owner's unfinished jobs.
 
         Returns:
             The changed job, queued if it had succeeded.
@@ -338,9 +326,7 @@ class Jobs(Aggregate):
         """Change the priority of an unfinished job; its runner reads it at the next renewal.
 
         Args:
-            job_id: of the job.
             priority: within bounds; higher ones are claimed first.
-            actor: for the audit log.
 
         Returns:
             The changed job.
@@ -359,9 +345,7 @@ class Jobs(Aggregate):
         """Change a job's labels; results do not depend on them.
 
         Args:
-            job_id: of the job.
             change: new labels.
-            actor: for the audit log.
 
         Returns:
             The changed job.
@@ -381,7 +365,6 @@ class Jobs(Aggregate):
         """Store the reference of a job's best design, unless one is stored or the job is gone.
 
         Args:
-            job_id: of the job.
             reference: published or start design, evaluated in the job's cases.
         """
         unset = update(jobs).where(jobs.c.id == job_id, jobs.c.reference.is_(None))
@@ -392,9 +375,7 @@ class Jobs(Aggregate):
         """Protect a job from deletion, or release it.
 
         Args:
-            job_id: of the job.
             kept: whether it is protected.
-            actor: for the audit log.
 
         Returns:
             The changed job.
@@ -410,10 +391,6 @@ class Jobs(Aggregate):
 
         The job is invisible, and its idempotency key free, once this returns. `purge_deleted`
         removes the rows of a long job, as SQLite has one writer at a time.
-
-        Args:
-            job_id: of the job.
-            actor: for the audit log.
 
         Raises:
             Conflict: it is queued, running, pausing or kept.

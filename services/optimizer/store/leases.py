@@ -70,16 +70,12 @@ class Leases(Aggregate):
         without release counts as a crash until the next commit or resumption.
 
         Args:
-            runner: name of the runner.
             lease_seconds: duration of the lease, at most `LONGEST_LEASE_SECONDS` [s].
             job_id: the only job to claim; None for any.
             quarantine_after: consecutive crashes after which a job fails.
 
         Returns:
             The claim; None if there is no job to claim.
-
-        Raises:
-            NotFound: no such job.
         """
         claim = None
         with self._database.write("claim") as connection:
@@ -116,15 +112,11 @@ class Leases(Aggregate):
         """Prolong a lease.
 
         Args:
-            claim: on the job.
             lease_seconds: duration from now on [s].
             waiting: reason for waiting, shown to users; None if the job does not wait.
 
         Returns:
             The job's state and priority, which users may have changed.
-
-        Raises:
-            LeaseLost: see the class.
         """
         with self._held("renew", claim) as (connection, row):
             expires = self._clock(connection) + timedelta(seconds=lease_seconds)
@@ -141,11 +133,7 @@ class Leases(Aggregate):
         Clears the user's acceptance of changes.
 
         Args:
-            claim: on the job.
             provenance: of the runner.
-
-        Raises:
-            LeaseLost: see the class.
         """
         with self._held("record_provenance", claim) as (connection, row):
             before = provenance_records(row["provenance"])
@@ -158,13 +146,11 @@ class Leases(Aggregate):
         """Store the ask of a new job, or of one that continues after an extension. Idempotent.
 
         Args:
-            claim: on the job.
             ask: designs to evaluate next.
 
         Raises:
             BudgetChanged: the job's budget is not the claim's, on which the ask depends.
             Conflict: the ask is not of the next iteration.
-            LeaseLost: see the class.
         """
         with self._held("begin", claim) as (connection, row):
             if open_ask(connection, row) is None:
@@ -176,7 +162,6 @@ class Leases(Aggregate):
         """Store a completed iteration and the next ask. A repeated commit changes nothing.
 
         Args:
-            claim: on the job.
             done: the iteration.
             following: the next ask; None at the end of the budget.
 
@@ -187,7 +172,6 @@ class Leases(Aggregate):
         Raises:
             BudgetChanged: the job's budget is not the claim's, on which `following` depends.
             Conflict: the iteration was not asked.
-            LeaseLost: see the class.
         """
         with self._held("commit", claim, committed=done.iteration) as (connection, row):
             if done.iteration < row["iterations"]:
@@ -212,12 +196,8 @@ class Leases(Aggregate):
         """Give up a lease.
 
         Args:
-            claim: on the job.
             state: failed, paused, or queued; a pausing job becomes paused instead of queued.
             error: why it failed.
-
-        Raises:
-            LeaseLost: see the class.
         """
         if state not in (JobState.FAILED, JobState.PAUSED, JobState.QUEUED):
             raise ValueError(f"a runner cannot release a job as {state}")

@@ -66,14 +66,7 @@ class Outbox(Aggregate):
             )
 
     def about(self, job_id: str) -> tuple[Notification, ...]:
-        """Return the notifications about a job, oldest first.
-
-        Args:
-            job_id: of the job.
-
-        Raises:
-            NotFound: no such job.
-        """
+        """Return the notifications about a job, oldest first."""
         order = (notifications.c.created_at, notifications.c.id)
         query = select(notifications).where(notifications.c.job_id == job_id).order_by(*order)
         with self._database.read("notification_about") as connection:

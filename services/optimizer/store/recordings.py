@@ -76,11 +76,6 @@ class Recordings(Aggregate):
 
         Args:
             search: part of an id, scenario or controller, in any case.
-            after: `next` of the page before.
-            limit: maximum number of walks.
-
-        Raises:
-            InvalidRequest: the cursor is invalid, or the limit is less than 1.
         """
         limit = checked_limit(limit)
         document, place = recordings.c.document, (recordings.c.created_at, recordings.c.id)

@@ -133,11 +133,6 @@ class Audit(Aggregate):
 
         Args:
             job_id: only entries about this job, which may be deleted.
-            after: `next` of the page before.
-            limit: maximum number of entries.
-
-        Raises:
-            InvalidRequest: the cursor is invalid, or the limit is less than 1.
         """
         limit = checked_limit(limit)
         query = select(audit).order_by(audit.c.id.desc()).limit(limit + 1)

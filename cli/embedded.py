@@ -132,8 +132,8 @@ class Embedded:
     def _opened(self, progress: Progress, stop: threading.Event) -> Evaluator:
         if self._evaluator is None:
             kind, address = self._settings.evaluator, self._settings.ray_address
-            if kind == "ray" and address:
-                progress.remark("connecting to Ray")
+            if kind == "ray" or (kind == "auto" and address):
+                progress.remark("connecting to Ray" if address else "starting Ray")
             self._evaluator = open_evaluator(
                 kind, address=address, cpus=self._settings.cpus, should_stop=stop.is_set
             )

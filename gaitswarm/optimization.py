@@ -93,7 +93,7 @@ def optimize(
     reuse: bool = False,
     accept_changes: bool = False,
     db: str | os.PathLike[str] | None = None,
-    evaluator: EvaluatorKind | Evaluator = "in-process",
+    evaluator: EvaluatorKind | Evaluator = "auto",
     cpus: int | None = None,
     ray_address: str | None = None,
     on_iteration: Callable[[IterationView], None] | None = None,
@@ -115,8 +115,8 @@ def optimize(
             robot, compiler) has changed; the change is recorded with it.
         db: Database to keep the job in: a file, or a URL as for `gaitswarm.open`. None: that of
             the environment (GAITSWARM_DB), else the user's own.
-        evaluator: "in-process": threads of this process; "ray": the same, and Ray in long jobs
-            or at `ray_address`; or an open evaluator, which stays open.
+        evaluator: "in-process": threads of this process; "ray": Ray; "auto": Ray at
+            `ray_address`, else threads; or an open evaluator, which stays open.
         cpus: Simulations to run at once on this machine; default all processors.
         ray_address: A running Ray cluster, for all simulations.
         on_iteration: Called after each iteration is committed, for progress.

@@ -86,14 +86,15 @@ class Settings(BaseModel):
         " data directory.",
     )
     evaluator: EvaluatorKind = Field(
-        default="ray",
-        description="Where simulations run: `in-process` uses threads only.",
+        default="auto",
+        description="Where simulations run: on Ray (`ray`), in threads (`in-process`), or `auto`:"
+        " on the cluster at `ray_address`; without one, servers and runners start a local Ray and"
+        " use threads until it is ready, and `optimize` uses threads.",
     )
     ray_address: str | None = Field(
         default=None,
         description="Ray cluster for all simulations: HOST:PORT of its head, which this machine"
-        " joins, or `auto` on a node. Without one, simulations run in threads, and long"
-        " jobs on a Ray that it starts.",
+        " joins, or `auto` on a node.",
     )
     cpus: int | None = Field(
         default=None,

@@ -132,7 +132,7 @@ def _profile(
 
 
 def _open(evaluator: EvaluatorKind, cpus: int | None) -> InProcessEvaluator | RayEvaluator:
-    if evaluator == "in-process":
+    if evaluator != "ray":
         return InProcessEvaluator(cpus)
     cluster = RayEvaluator(cpus=cpus)
     cluster.wait_until_open(lambda: False)

@@ -29,35 +29,48 @@ if TYPE_CHECKING:
     from gaitswarm.services.monitoring.activity import Activity
     from gaitswarm.services.monitoring.metrics import Metrics
     from gaitswarm.services.monitoring.tracing import Tracing
-    from gaitswarm.services.worker.hybrid import HybridEvaluator
+    from gaitswarm.services.worker.auto import AutoEvaluator
     from gaitswarm.services.worker.in_process import InProcessEvaluator
     from gaitswarm.services.worker.ray_evaluator import RayEvaluator
 
 
 def open_evaluator(
-    kind: EvaluatorKind = "ray",
+    kind: EvaluatorKind = "auto",
     *,
     address: str | None = None,
     cpus: int | None = None,
     should_stop: Callable[[], bool] = lambda: False,
-    patient: bool = False,
-) -> InProcessEvaluator | HybridEvaluator | RayEvaluator:
-    """Create the evaluator of a kind."""
-    from gaitswarm.services.worker.hybrid import HybridEvaluator  # noqa: PLC0415
+    lasting: bool = False,
+) -> InProcessEvaluator | AutoEvaluator | RayEvaluator:
+    """Create the evaluator of a kind.
+
+    Args:
+        kind: Where simulations run.
+        address: Ray cluster.
+        cpus: Number of tasks that run concurrently on this machine.
+        should_stop: Polled while Ray is opened.
+        lasting: Whether it is for a server or runner: `auto` then starts a local Ray, and a
+            cluster that is away is waited for.
+
+    Raises:
+        EvaluatorUnavailable: Ray cannot be opened.
+        EvaluationStopped: `should_stop` returned true.
+    """
+    from gaitswarm.services.worker.auto import AutoEvaluator  # noqa: PLC0415
     from gaitswarm.services.worker.in_process import InProcessEvaluator  # noqa: PLC0415
     from gaitswarm.services.worker.ray_evaluator import RayEvaluator  # noqa: PLC0415
 
     check_address(address)
-    if kind == "in-process":
+    if kind == "in-process" or (kind == "auto" and address is None and not lasting):
         return InProcessEvaluator(cpus)
-    if address is None:
-        return HybridEvaluator(cpus)
-    cluster = RayEvaluator(address, cpus=cpus)
-    if patient:
-        cluster.stay_connected(should_stop)
+    if kind == "auto" and address is None:
+        return AutoEvaluator(cpus)
+    ray = RayEvaluator(address, cpus=cpus)
+    if lasting:
+        ray.stay_connected(should_stop)
     else:
-        cluster.wait_until_open(should_stop)
-    return cluster
+        ray.wait_until_open(should_stop)
+    return ray
 
 
 def check_address(address: str | None) -> None:
@@ -100,7 +113,7 @@ class Runtime:
 def open_runtime(
     database: str,
     *,
-    evaluator: EvaluatorKind | None = "ray",
+    evaluator: EvaluatorKind | None = "auto",
     ray_address: str | None = None,
     cpus: int | None = None,
     concurrent_jobs: int = 2,
@@ -149,7 +162,7 @@ def open_runtime(
             address=ray_address,
             cpus=cpus,
             should_stop=should_stop,
-            patient=True,
+            lasting=True,
         )
         stack.callback(workers.close)
         if metrics is not None:

@@ -276,8 +276,9 @@ class WorkerOptions:
     evaluator: Annotated[
         str | None,
         typer.Option(
-            help="in-process: threads of this process; ray: also Ray, for long jobs or with an"
-            " address. [env: GAITSWARM_EVALUATOR; default: ray]",
+            help="Where simulations run. ray: on Ray; in-process: in threads; auto: on Ray with an"
+            " address and in servers, otherwise in threads. [env: GAITSWARM_EVALUATOR; default:"
+            " auto]",
         ),
     ] = None
     cpus: Annotated[

@@ -104,7 +104,7 @@ class AsyncDatabaseJobs(AsyncJobs):
         self,
         job_id,
         *,
-        evaluator="in-process",
+        evaluator="auto",
         cpus=None,
         ray_address=None,
         accept_changes=False,

@@ -205,7 +205,7 @@ class AsyncDatabaseJobs(AsyncJobs):
         self,
         job_id: str,
         *,
-        evaluator: EvaluatorKind | Evaluator = "in-process",
+        evaluator: EvaluatorKind | Evaluator = "auto",
         cpus: int | None = None,
         ray_address: str | None = None,
         accept_changes: bool = False,

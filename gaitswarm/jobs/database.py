@@ -144,7 +144,7 @@ class DatabaseJobs(Jobs):
         self,
         job: str | Claim,
         *,
-        evaluator: EvaluatorKind | Evaluator = "in-process",
+        evaluator: EvaluatorKind | Evaluator = "auto",
         cpus: int | None = None,
         ray_address: str | None = None,
         accept_changes: bool = False,
@@ -159,8 +159,8 @@ class DatabaseJobs(Jobs):
 
         Args:
             job: Identifier of the job; or the result of `submit_embedded`.
-            evaluator: "in-process": threads of this process; "ray": the same, and Ray in long
-                jobs or at `ray_address`; or an open evaluator, which stays open.
+            evaluator: "in-process": threads of this process; "ray": Ray; "auto": Ray at
+                `ray_address`, else threads; or an open evaluator, which stays open.
             cpus: Simulations to run at once on this machine; default all processors.
             ray_address: A running Ray cluster, for all simulations.
             accept_changes: Whether the job continues although its provenance (code, robot,

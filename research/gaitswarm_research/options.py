@@ -48,7 +48,6 @@ def run_job(
             spec,
             reuse=True,
             db=db,
-            evaluator="ray" if ray_address else "in-process",
             cpus=cpus,
             ray_address=ray_address,
             on_iteration=lambda _: progress.advance(task),

@@ -1,17 +1,19 @@
-"""Walks in threads of this process: the compiled kernel lets other threads run meanwhile."""
+"""Simulations in threads of this process; the compiled kernel runs without Python's lock"""
 
 from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from functools import partial
+from queue import SimpleQueue
 
+from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
-from gaitswarm.services.worker.dispatch import Dispatcher, Work
-from gaitswarm.services.worker.preparation import KernelBuilder
-from gaitswarm.services.worker.tasks import Load, TaskTotals
-from gaitswarm.sim import simulate
+from gaitswarm.services.worker.chunks import Chunk
+from gaitswarm.services.worker.dispatch import Dispatcher, KernelBuilder, Load
+from gaitswarm.services.worker.tasks import Answer, TaskTotals, run_task
 from gaitswarm.sim.outcome import Outcome
 
 
@@ -21,10 +23,10 @@ def available_cpus() -> int:
 
 
 class InProcessEvaluator:
-    """`Evaluator` on a pool of threads.
+    """`Evaluator` on threads.
 
     Args:
-        cpus: Their number, all processors by default.
+        cpus: Number of threads; all processors by default.
 
     Raises:
         ValueError: cpus is less than 1.
@@ -35,7 +37,65 @@ class InProcessEvaluator:
         if slots < 1:
             raise ValueError(f"cpus must be at least 1, it is {slots}")
         self._kernels = KernelBuilder()
-        self._dispatcher = Dispatcher(slots, simulate.lanes, shared=True)
+        self._dispatcher = Dispatcher()
+        self._threads = _Threads(slots)
+
+    @property
+    def slots(self) -> int:
+        """Number of threads."""
+        return self._threads.slots
+
+    @property
+    def totals(self) -> TaskTotals:
+        """Totals of all tasks so far."""
+        return self._dispatcher.totals
+
+    @property
+    def loads(self) -> dict[str, Load]:
+        """Load of the threads."""
+        return {"threads": self._dispatcher.load(self.slots)}
+
+    def evaluate(
+        self, request: EvaluationRequest, should_stop: Callable[[], bool]
+    ) -> tuple[Outcome, ...]:
+        """Simulate in the threads, once the robots' kernels are built."""
+        self._kernels.build(request.cases, should_stop)
+        return self._dispatcher.evaluate(self._threads, request, should_stop)
+
+    def close(self) -> None:
+        """End the threads after their present chunks. Idempotent."""
+        self._threads.close()
+
+
+class _Task(Future[Answer]):
+    """A task in the queue."""
+
+    def __init__(self, request: EvaluationRequest, chunk: Chunk) -> None:
+        super().__init__()
+        self.request, self.chunk, self.abandoned = request, chunk, False
+
+    def run(self, should_stop: Callable[[], bool]) -> None:
+        request, chunk = self.request, self.chunk
+        try:
+            answer = run_task(
+                [request.cases[case] for case in chunk.cases],
+                request.designs[chunk.start : chunk.stop],
+                request.provenance,
+                should_stop,
+            )
+        except Exception as error:  # noqa: BLE001 - raised again in `answer`
+            self.set_exception(error)
+        else:
+            self.set_result(answer)
+
+
+class _Threads:
+    """`Engine` of this process."""
+
+    def __init__(self, slots: int) -> None:
+        self.slots = slots
+        self._closed = False
+        self._queue: SimpleQueue[_Task | None] = SimpleQueue()
         self._threads = [
             threading.Thread(target=self._work, name=f"walks-{k}", daemon=True)
             for k in range(slots)
@@ -43,52 +103,38 @@ class InProcessEvaluator:
         for thread in self._threads:
             thread.start()
 
-    @property
-    def slots(self) -> int:
-        """Number of threads."""
-        return self._dispatcher.slots
+    def submit(self, request: EvaluationRequest, chunk: Chunk, _attempts: int, /) -> _Task:
+        task = _Task(request, chunk)
+        self._queue.put(task)
+        return task
 
-    @property
-    def totals(self) -> TaskTotals:
-        """Of all tasks so far."""
-        return self._dispatcher.totals
+    def wait(self, handles: Sequence[_Task], seconds: float) -> Sequence[_Task]:
+        done = wait(handles, timeout=seconds, return_when=FIRST_COMPLETED).done
+        return [task for task in handles if task in done]
 
-    @property
-    def loads(self) -> dict[str, Load]:
-        """What the threads have to do."""
-        return {"threads": self._dispatcher.load}
+    def answer(self, handle: _Task) -> Answer:
+        return handle.result()
 
-    def evaluate(
-        self, request: EvaluationRequest, should_stop: Callable[[], bool]
-    ) -> tuple[Outcome, ...]:
-        """Have the walks run by the pool, as soon as their robots' kernels are built."""
-        self._kernels.build(request.cases, should_stop)
-        return self._dispatcher.evaluate(request, should_stop)
+    def abandon(self, handles: Sequence[_Task]) -> None:
+        for task in handles:
+            task.abandoned = True
+            task.cancel()
 
-    def trouble(self) -> str | None:
-        """Whether threads are missing."""
-        lost = sum(not thread.is_alive() for thread in self._threads)
-        if not lost:
-            return None
-        return f"{lost} of {len(self._threads)} threads have ended; restart this process"
+    def check(self) -> None:
+        if self._closed:
+            raise EvaluatorUnavailable("the evaluator was closed")
 
     def close(self) -> None:
-        """End the threads; waits for the chunks that are being run."""
-        self._dispatcher.close("the evaluator was closed")
+        self._closed = True
+        for _ in self._threads:
+            self._queue.put(None)
         for thread in self._threads:
             thread.join()
 
     def _work(self) -> None:
-        while not self._dispatcher.closed:
-            work = self._dispatcher.take(timeout=1.0)
-            if work is None:
-                continue
-            try:
-                answer = work.task.run(partial(self._in_vain, work))
-            except Exception as error:  # noqa: BLE001 - it is the caller's, in another thread
-                self._dispatcher.fail(work, error)
-            else:
-                self._dispatcher.complete(work, answer)
+        while (task := self._queue.get()) is not None:
+            if not self._closed and task.set_running_or_notify_cancel():
+                task.run(partial(self._in_vain, task))
 
-    def _in_vain(self, work: Work) -> bool:
-        return work.batch.ended or self._dispatcher.closed
+    def _in_vain(self, task: _Task) -> bool:
+        return task.abandoned or self._closed

@@ -1,43 +1,70 @@
-"""Walks as tasks of Ray, on this machine or on a cluster."""
+"""Simulations as tasks of Ray, on this machine or on a cluster"""
 
 from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Callable
+import time
+from collections import OrderedDict, deque
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
-from contextlib import suppress
-from typing import Final
+from contextlib import contextmanager, suppress
+from typing import Any, Final
 
 from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, EvaluationStopped
-from gaitswarm.services.worker.cluster.nodes import Nodes, OwnNode
-from gaitswarm.services.worker.cluster.pump import Pump
-from gaitswarm.services.worker.cluster.ray_nodes import ClusterNodes
-from gaitswarm.services.worker.dispatch import Dispatcher
-from gaitswarm.services.worker.preparation import KernelBuilder, awaited
-from gaitswarm.services.worker.ray_session import open_ray
-from gaitswarm.services.worker.tasks import Load, TaskTotals
-from gaitswarm.sim import simulate
+from gaitswarm.services.worker.chunks import Chunk
+from gaitswarm.services.worker.dispatch import (
+    MOST_KILLED,
+    Dispatcher,
+    KernelBuilder,
+    Load,
+    TaskLost,
+    WorkerDied,
+    awaited,
+    unlike,
+)
+from gaitswarm.services.worker.ray_session import RaySession, open_ray
+from gaitswarm.services.worker.tasks import (
+    Answer,
+    Failure,
+    Shared,
+    TaskTotals,
+    arithmetic_digest,
+    run_in_worker,
+    warm_up,
+)
 from gaitswarm.sim.outcome import Outcome
 
-_PATIENCE: Final = 10.0
-"""Seconds to wait for a connection that is to be closed, and may be busy being opened."""
+PULSE_SECONDS: Final = 4.0
+"""Interval at which the cluster's head is checked; three failures count as lost."""
 
-_PATIENCE_EMBEDDED: Final = 30.0
-"""The same for a cluster of our own, which opens sooner or later, however busy the machine is."""
+EMPTY_SECONDS: Final = 20.0
+"""Time without CPUs after which requests fail with EvaluatorUnavailable, and their jobs wait."""
+
+_LOOK_SECONDS: Final = 1.0
+"""Interval at which nodes are counted."""
+
+_GRACE_SECONDS: Final = 1.0
+"""Time that an abandoned task has to end before it is cancelled; most end in this time."""
+
+_CLOSE_SECONDS: Final = 30.0
+"""Longest time to wait for a connection that is closed."""
 
 _RECONNECT_SECONDS: Final = 5.0
-"""Between attempts to connect to a cluster that is away, while no job wants walks of it."""
+"""Interval of attempts to reach a cluster that is away."""
+
+_SHARED: Final = 64
+"""Number of jobs whose cases stay in the object store."""
 
 _log = logging.getLogger(__name__)
 
 
 class RayEvaluator:
-    """`Evaluator` on Ray.
+    """`Evaluator` on Ray, which places tasks, retries them and scales.
 
-    Ray is opened in a thread from construction on. A cluster that was lost is opened again by the
-    next `evaluate`, so that a caller who tries again later, as the runner does, outlives it.
+    Ray is opened in the background from construction on. If it is lost, the next `evaluate` opens
+    it again.
 
     Args:
         address: As for `open_ray`.
@@ -48,58 +75,67 @@ class RayEvaluator:
         self._address = address
         self._cpus = cpus
         self._changing = threading.Lock()
-        self._closed = False
         self._closing = threading.Event()
         self._kernels = KernelBuilder()
-        self._link = _Link(address, cpus)
+        self._dispatcher = Dispatcher()
+        self._connection = _Connection(address, cpus)
 
     @property
     def slots(self) -> int:
-        """CPUs of the cluster; waits until it is open."""
-        return self._link.opened.result().slots
+        """CPUs of the cluster. Waits until it is open."""
+        self._connection.opened.result()
+        return self._connection.slots
 
     @property
     def totals(self) -> TaskTotals:
-        """Of all tasks since the cluster was opened; waits until it is."""
-        return self._link.opened.result().totals
+        """Totals of all tasks so far."""
+        return self._dispatcher.totals
 
     @property
     def loads(self) -> dict[str, Load]:
-        """What the cluster has to do; no slots while it is not open."""
-        opened = self._link.opened
-        is_open = opened.done() and opened.exception() is None
-        return {"ray": opened.result().load if is_open else Load()}
+        """Load of the cluster; no slots while it is not open."""
+        return {"ray": self._dispatcher.load(self._connection.slots)}
 
     @property
     def lost(self) -> bool:
         """Whether the connection was lost, or could not be opened."""
-        return self._link.lost
+        return self._connection.lost
 
     def trouble(self) -> str | None:
-        """Whether Ray was lost, or could not be opened; says why."""
-        link = self._link
-        if not link.lost:
+        """Return why Ray cannot be reached; None if it can or is being opened."""
+        connection = self._connection
+        if not connection.lost:
             return None
-        error = link.opened.exception()
+        error = connection.opened.exception()
         if error is not None:
-            return f"it is tried again and again: {error}"
-        return "Ray is out of reach; it is connected again for the next iteration"
+            return f"retrying: {error}"
+        return "Ray is unreachable; it is opened again for the next iteration"
 
-    def wait_until_open(self, should_stop: Callable[[], bool]) -> None:
-        """Return when Ray is open; if it cannot be, or need not be any more, this is closed.
+    def is_warm(self) -> bool:
+        """Return whether Ray is open and its processes have imported what they need.
 
-        Args:
-            should_stop: Polled several times a second.
+        A lost connection begins to be opened again.
 
         Raises:
-            EvaluatorUnavailable: Ray cannot be opened; says what to do.
-            EvaluationStopped: `should_stop` said so. What was begun ends by itself, at the latest
-                with the process.
+            EvaluatorUnavailable: Ray cannot be opened.
+        """
+        connection = self._connection
+        if not connection.opened.done():
+            return False
+        connection.opened.result()
+        return self._living().warm.is_set()
+
+    def wait_until_open(self, should_stop: Callable[[], bool]) -> None:
+        """Return when Ray is open. Closes this evaluator otherwise.
+
+        Raises:
+            EvaluatorUnavailable: Ray cannot be opened.
+            EvaluationStopped: `should_stop` returned true.
         """
         try:
-            awaited(self._link.opened, should_stop)
+            awaited(self._connection.opened, should_stop)
         except EvaluationStopped:
-            # Ray cannot be interrupted while it connects, and whoever stops it need not wait.
+            # Ray cannot be interrupted while it connects.
             threading.Thread(target=self.close, name="ray-closing", daemon=True).start()
             raise
         except BaseException:
@@ -107,144 +143,253 @@ class RayEvaluator:
             raise
 
     def stay_connected(self, should_stop: Callable[[], bool]) -> None:
-        """Return when Ray is open, or known to be away; then it is tried again until it is there.
-
-        Args:
-            should_stop: As for `wait_until_open`.
-
-        Raises:
-            EvaluationStopped: As `wait_until_open`.
-        """
+        """Return when Ray is open or has turned out to be away; keep reconnecting from then on."""
         try:
-            awaited(self._link.opened, should_stop)
+            awaited(self._connection.opened, should_stop)
         except EvaluationStopped:
             threading.Thread(target=self.close, name="ray-closing", daemon=True).start()
             raise
         except EvaluatorUnavailable as error:
-            _log.warning("jobs wait until there are workers: %s", error)
-        threading.Thread(target=self._connect_again, name="ray-reconnect", daemon=True).start()
+            _log.warning("jobs wait for workers: %s", error)
+        threading.Thread(target=self._reconnect, name="ray-reconnect", daemon=True).start()
 
-    def _connect_again(self) -> None:
-        """Until this is closed, whether a job wants walks or not."""
+    def _reconnect(self) -> None:
         was_away = self.lost
         while not self._closing.wait(_RECONNECT_SECONDS):
             if self.lost:
                 was_away = True
                 with suppress(EvaluatorUnavailable):
-                    self._living_link()
-            elif was_away and self._link.opened.done():
+                    self._living()
+            elif was_away and self._connection.opened.done():
                 was_away = False
                 _log.info("Ray is open, with %d slots", self.slots)
-
-    def is_warm(self) -> bool:
-        """Whether Ray is open, and every slot had a process that has imported what walks need.
-
-        A connection that was lost begins to be opened again.
-
-        Raises:
-            EvaluatorUnavailable: Ray cannot be opened; says what to do.
-        """
-        link = self._link
-        if not link.opened.done():
-            return False
-        if link.opened.result().closed:
-            self._living_link()
-            return False
-        return link.warm.is_set()
 
     def evaluate(
         self, request: EvaluationRequest, should_stop: Callable[[], bool]
     ) -> tuple[Outcome, ...]:
-        """Have the walks run by Ray's workers, on a new connection if the last was lost."""
-        # Built here, the kernel lies in the cache when this machine's workers look for it.
+        """Simulate on Ray, on a new connection if the last one was lost."""
+        # Workers of this machine find the kernel in the cache.
         self._kernels.build(request.cases, should_stop)
-        link = self._living_link()
-        dispatcher = awaited(link.opened, should_stop)
-        with link.nodes.result().wanted(request) as ready:
-            awaited(ready, should_stop)
-            return dispatcher.evaluate(request, should_stop)
+        connection = self._living()
+        awaited(connection.opened, should_stop)
+        with connection.used():
+            return self._dispatcher.evaluate(connection, request, should_stop)
 
     def close(self) -> None:
-        """Disconnect; an embedded cluster ends."""
-        with self._changing:
-            self._closed = True
+        """Disconnect; a local cluster ends. Idempotent."""
         self._closing.set()
-        self._link.close()
-
-    def _living_link(self) -> _Link:
-        """A connection that is open, or about to be."""
         with self._changing:
-            if self._closed:
+            self._connection.close()
+
+    def _living(self) -> _Connection:
+        """Return a connection that is open or being opened."""
+        with self._changing:
+            if self._closing.is_set():
                 raise EvaluatorUnavailable("the evaluator was closed")
-            if self._link.lost:
-                self._link = _Link(self._address, self._cpus, after=self._link)
-            return self._link
+            if self._connection.lost:
+                self._connection = _Connection(self._address, self._cpus, after=self._connection)
+            return self._connection
 
 
-class _Link:
-    """One connection to Ray, from opening to loss or closing.
+class _Connection:
+    """One connection to Ray, from opening to loss or closing; an `Engine`.
 
-    An embedded cluster dies with the thread that started it, so one thread does it all. A process
-    has one connection at a time: a second is opened when the one before has been closed.
+    A local cluster ends with the thread that has started it, so one thread opens and closes it. A
+    process has one connection at a time: the next one is opened when the last one is closed.
 
-    opened: what takes the requests, or what kept it from being opened. nodes: to which these go,
-    known when it is open. warm: set when every slot's
-    process has imported what walks need.
+    opened: result None, or why it cannot be opened.
+    warm: set when the processes of a local cluster have imported what they need.
     """
 
     def __init__(
-        self, address: str | None, cpus: int | None, *, after: _Link | None = None
+        self, address: str | None, cpus: int | None, *, after: _Connection | None = None
     ) -> None:
-        self.opened: Future[Dispatcher] = Future()
-        self.nodes: Future[Nodes] = Future()
+        self.opened: Future[None] = Future()
         self.warm = threading.Event()
-        self._patience = _PATIENCE if address else _PATIENCE_EMBEDDED
+        self.slots = 0
+        self.nodes = 0
+        self._ended: str | None = None
+        self._empty_since: float | None = None
         self._closing = threading.Event()
+        self._changed = threading.Condition()
+        self._users = 0
+        self._shared: OrderedDict[str, tuple[Shared, Any]] = OrderedDict()
+        self._abandoned: deque[tuple[float, Any]] = deque()
         self._thread = threading.Thread(
-            target=self._live, args=(address, cpus, after), name="ray-link", daemon=True
+            target=self._live, args=(address, cpus, after), name="ray", daemon=True
         )
         self._thread.start()
 
     @property
     def lost(self) -> bool:
-        """Whether it was lost or closed, or could not be opened. False while it is opened."""
+        """Whether it was lost or closed, or could not be opened; False while it is opened."""
         if not self.opened.done():
             return False
-        return self.opened.exception() is not None or self.opened.result().closed
+        return self.opened.exception() is not None or self._ended is not None
+
+    @contextmanager
+    def used(self) -> Iterator[None]:
+        """Keep the connection open inside the block."""
+        with self._changed:
+            self.check()
+            self._users += 1
+        try:
+            yield
+        finally:
+            with self._changed:
+                self._users -= 1
+                self._changed.notify_all()
 
     def close(self) -> None:
-        """Disconnect, and wait until that is done, within reason. Idempotent."""
+        """Disconnect, and wait until that is done. Idempotent."""
         self._closing.set()
-        self._end()
-        self._thread.join(self._patience)
+        self._thread.join(_CLOSE_SECONDS)
         if self._thread.is_alive():
-            _log.warning("Ray did not let go within %.0f s", self._patience)
+            _log.warning("Ray did not end within %.0f s", _CLOSE_SECONDS)
 
-    def _end(self) -> None:
-        """Let the pump end, if it is to and has begun."""
-        is_open = self.opened.done() and self.opened.exception() is None
-        if is_open and self._closing.is_set():
-            self.opened.result().close("the evaluator was closed")
+    def check(self) -> None:
+        """Raise EvaluatorUnavailable if the connection was lost or has no CPUs."""
+        if self._ended is not None:
+            raise EvaluatorUnavailable(self._ended)
+        empty = self._empty_since
+        if empty is not None and time.monotonic() - empty > EMPTY_SECONDS:
+            raise EvaluatorUnavailable("no node of the Ray cluster has a CPU for simulations")
 
-    def _live(self, address: str | None, cpus: int | None, after: _Link | None) -> None:
+    def submit(self, request: EvaluationRequest, chunk: Chunk, attempts: int, /) -> Any:
+        """Submit a task to Ray, which places it and repeats it if its worker dies."""
+        cases = chunk.cases
+        first = request.cases[cases[0]].name
+        name = f"simulate {first}" + (f" and {len(cases) - 1} more" if len(cases) > 1 else "")
+        options = {"name": name, "max_retries": attempts - 1}
+        designs = request.designs[chunk.start : chunk.stop]
+        return self._remote.options(**options).remote((self._put(request),), cases, designs)
+
+    def wait(self, handles: Sequence[Any], seconds: float) -> Sequence[Any]:
+        """Return all finished tasks, at least one unless the time is over."""
+        waiting = list(handles)
+        done: list[Any]
+        done, _ = self._ray.wait(waiting, num_returns=1, timeout=seconds, fetch_local=False)
+        if done and len(waiting) > 1:
+            done, _ = self._ray.wait(
+                waiting, num_returns=len(waiting), timeout=0.0, fetch_local=False
+            )
+        return done
+
+    def answer(self, handle: Any) -> Answer:
+        """Return the answer of a finished task."""
+        exceptions = self._ray.exceptions
+        try:
+            result: Answer | Failure = self._ray.get(handle)
+        except exceptions.ObjectLostError as error:
+            with self._changed:
+                self._shared.clear()
+            raise TaskLost(str(error)) from error
+        except exceptions.RayTaskError as error:
+            # The simulation's own errors are results: this worker has not got so far.
+            raise unlike("the cluster", f"it cannot run this gaitswarm: {error.cause!r}") from error
+        except (exceptions.WorkerCrashedError, exceptions.OutOfMemoryError) as error:
+            raise WorkerDied from error
+        except exceptions.LocalRayletDiedError as error:
+            self._ended = "Ray was lost: its process on this machine has died"
+            raise EvaluatorUnavailable(self._ended) from error
+        except exceptions.RayError as error:
+            raise TaskLost(f"{type(error).__name__}") from error
+        if isinstance(result, Failure):
+            raise result.error
+        return result
+
+    def abandon(self, handles: Sequence[Any]) -> None:
+        """Cancel tasks soon, unless they end by themselves."""
+        until = time.monotonic() + _GRACE_SECONDS
+        self._abandoned.extend((until, handle) for handle in handles)
+
+    def _put(self, request: EvaluationRequest) -> Any:
+        """Put a job's cases into the object store, unless they are there."""
+        shared = Shared(request.cases, request.provenance, arithmetic_digest())
+        with self._changed:
+            stored = self._shared.pop(request.job_id, None)
+            if stored is None or not _equal(stored[0], shared):
+                stored = shared, self._ray.put(shared)
+            self._shared[request.job_id] = stored
+            # Tasks in progress hold references of their own.
+            while len(self._shared) > _SHARED:
+                self._shared.popitem(last=False)
+            return stored[1]
+
+    def _live(self, address: str | None, cpus: int | None, after: _Connection | None) -> None:
         try:
             if after is not None:
                 after.close()
             session = open_ray(address, cpus=cpus)
+            self._ray = session.ray
+            self._remote = session.ray.remote(num_cpus=1, max_retries=MOST_KILLED - 1)(
+                run_in_worker
+            )
+            self._count(session)
         except BaseException as error:  # noqa: BLE001 - raised again where it is waited for
             self.opened.set_exception(error)
             return
-        is_embedded = session.directory is not None
-        nodes: Nodes = OwnNode(session.slots) if is_embedded else ClusterNodes(session)
-        dispatcher = Dispatcher(session.slots, simulate.lanes)
-        self.nodes.set_result(nodes)
-        self.opened.set_result(dispatcher)
-        self._end()
+        self.opened.set_result(None)
         try:
-            Pump(session, dispatcher, nodes, self.warm).run()
-        except Exception as error:  # noqa: BLE001 - whatever Ray raises when it is going down
+            self._watch(session)
+        except Exception as error:  # noqa: BLE001 - Ray raises anything when it ends
             _log.info("Ray was lost: %s", error)
-            dispatcher.close(f"Ray was lost: {error}")
-        finally:
-            nodes.close("the connection to Ray was closed")
-            session.close()
+            self._ended = f"Ray was lost: {error}"
+        else:
+            self._ended = "the evaluator was closed"
+        # Requests in progress poll `check`.
+        with self._changed:
+            self._changed.wait_for(lambda: not self._users, _CLOSE_SECONDS)
+        session.close()
+
+    def _watch(self, session: RaySession) -> None:
+        """Count nodes, check the head and cancel abandoned tasks until the connection ends."""
+        starting: list[Any] = []
+        if session.directory is not None:
+            start = session.ray.remote(num_cpus=1, max_retries=0)(warm_up)
+            starting = [start.remote() for _ in range(self.slots)]
+        misses, next_look, next_pulse = 0, 0.0, time.monotonic() + PULSE_SECONDS
+        while not self._closing.wait(_LOOK_SECONDS if self.warm.is_set() else 0.1):
+            if not self.warm.is_set():
+                if starting:
+                    _, starting = session.ray.wait(starting, num_returns=len(starting), timeout=0.0)
+                if not starting:
+                    self.warm.set()
+            now = time.monotonic()
+            if now >= next_pulse:
+                next_pulse = now + PULSE_SECONDS
+                misses = 0 if session.head_answers() else misses + 1
+                if misses >= 3:
+                    raise EvaluatorUnavailable("the head of the cluster does not answer")
+            if now >= next_look and not misses:
+                next_look = now + _LOOK_SECONDS
+                self._count(session)
+            self._cancel(session)
+
+    def _count(self, session: RaySession) -> None:
+        with suppress(EvaluatorUnavailable):
+            cpus = [int(node["Resources"].get("CPU", 0)) for node in session.nodes()]
+            self.slots, self.nodes = sum(cpus), sum(count > 0 for count in cpus)
+            if self.slots:
+                self._empty_since = None
+            elif self._empty_since is None:
+                self._empty_since = time.monotonic()
+
+    def _cancel(self, session: RaySession) -> None:
+        now = time.monotonic()
+        due = []
+        while self._abandoned and self._abandoned[0][0] <= now:
+            due.append(self._abandoned.popleft()[1])
+        if due:
+            _, late = session.ray.wait(due, num_returns=len(due), timeout=0.0, fetch_local=False)
+            for handle in late:
+                # By its end: an interruption could come in the midst of an import.
+                session.ray.cancel(handle, force=True)
+
+
+def _equal(a: Shared, b: Shared) -> bool:
+    try:
+        return a == b
+    except ValueError:
+        # Cases with arrays have no equality.
+        return False

@@ -1,4 +1,4 @@
-"""Ray, started inside this process's lifetime or found by its address; quiet in both cases."""
+"""Sessions of Ray: a local cluster that ends with this process, or a connection to a cluster"""
 
 from __future__ import annotations
 
@@ -20,42 +20,41 @@ from typing import Any, Final
 
 from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
 from gaitswarm.services.worker.in_process import available_cpus
-from gaitswarm.services.worker.joining import JoinedNode, comes_here
+from gaitswarm.services.worker.ray_node import OBJECT_STORE_BYTES, JoinedNode, comes_here
 
 _log = logging.getLogger(__name__)
 
-_OBJECT_STORE_BYTES: Final = 80 * 1024 * 1024
-"""Ray's minimum is 75 MiB; designs and results take kilobytes."""
-
 _ANSWER_SECONDS: Final = 2.0
-"""In which a head says which nodes there are."""
+"""Time in which a head lists its nodes."""
 
 _ALIVE: Final = 0
-"""Of Ray's states of nodes."""
+"""State of a node in Ray's tables."""
 
 _PREFIX: Final = "gaitswarm-ray-"
 
 _BEFORE_IMPORT: Final = {
     "RAY_USAGE_STATS_ENABLED": "0",
-    # Ray must not package the checkout and install it anew when we run under `uv run`.
+    # Under `uv run`, Ray would package the checkout and install it again.
     "RAY_ENABLE_UV_RUN_RUNTIME_ENV": "0",
-    # Its handler of signals takes SIGTERM away from us, for good when a connection is closed.
+    # Its handler would take SIGTERM from this process, for good when a connection is closed.
     "RAY_DISABLE_FAILURE_SIGNAL_HANDLER": "1",
-    # The behaviour that later versions have in any case; without it, init warns.
+    # The default of later versions; init warns without it.
     "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
-    # Where nobody asks what became of a task any more, as when we close, nobody is to be told.
+    # Errors of abandoned tasks are of no interest.
     "RAY_IGNORE_UNHANDLED_ERRORS": "1",
+    # A call after the connection has ended must not start another cluster.
+    "RAY_ENABLE_AUTO_CONNECT": "0",
 }
 
 _UNUSED: Final = ("start_api_server", "start_monitor", "start_log_monitor")
-"""What starts processes of a head that an embedded cluster does without."""
+"""Methods that start processes of a head which a local cluster does not need."""
 
 WORKER_ENVIRONMENT: Final = {
     # The slots are the parallelism.
     "OMP_NUM_THREADS": "1",
     "OPENBLAS_NUM_THREADS": "1",
     "MKL_NUM_THREADS": "1",
-    # Each worker asks for its metrics agent otherwise, and there is none.
+    # There is no metrics agent.
     "RAY_enable_metrics_collection": "0",
 }
 
@@ -64,67 +63,43 @@ WORKER_ENVIRONMENT: Final = {
 class RaySession:
     """A connection to Ray.
 
-    Attributes:
-        ray: The module, imported by `open_ray`.
-        slots: CPUs of the cluster, when it was opened.
-        head: Where its control service listens.
-        directory: Files of an embedded cluster.
-        node: This process's own node of a cluster, where no other one runs on this machine.
+    head: address of its control service. directory: files of a local cluster; None on a cluster.
+    node: this process's own node of a cluster, if no other node runs on this machine.
     """
 
     ray: ModuleType
-    slots: int
     head: tuple[str, int]
     directory: Path | None = None
     node: JoinedNode | None = None
 
     def head_answers(self) -> bool:
-        """Whether the control service takes connections.
+        """Return whether the control service accepts connections.
 
-        Ray itself waits a minute for it and then ends the process, without a word to us.
+        Ray itself waits for it for a minute, and then ends the process.
         """
         return listens(*self.head)
 
     def nodes(self) -> list[dict[str, Any]]:
-        """Those that are alive, as `ray.nodes` has them, or an error within two seconds.
-
-        `ray.nodes` waits for a head that goes meanwhile for as long as it takes; after a minute Ray
-        ends the process for that, connected or not.
+        """Return the nodes that are alive, as `ray.nodes`, which would wait for a lost head.
 
         Raises:
-            EvaluatorUnavailable: The head does not answer.
+            EvaluatorUnavailable: The head does not answer within two seconds.
         """
-        return _nodes(self.ray)
-
-    def only_on(self, node_id: str) -> Any:
-        """How a task is scheduled on one node, and fails if that is gone.
-
-        Args:
-            node_id: Ray's.
-
-        Returns:
-            For the option `scheduling_strategy`.
-        """
-        from ray.util import scheduling_strategies  # noqa: PLC0415 - as in `open_ray`
-
-        return scheduling_strategies.NodeAffinitySchedulingStrategy(node_id, soft=False)
-
-    def near_head(self) -> Any:
-        """How an actor is scheduled on the head while there is one, as it outlives other nodes.
-
-        Returns:
-            For the option `scheduling_strategy`.
-        """
-        from ray.util import scheduling_strategies  # noqa: PLC0415 - as in `open_ray`
-
-        heads = [n for n in self.nodes() if "node:__internal_head__" in n["Resources"]]
-        if not heads:
-            return "DEFAULT"
-        head = str(heads[0]["NodeID"])
-        return scheduling_strategies.NodeAffinitySchedulingStrategy(head, soft=True)
+        client = self.ray._private.worker.global_worker.gcs_client  # noqa: SLF001 - with a time-out
+        try:
+            nodes = client.get_all_node_info(timeout=_ANSWER_SECONDS)
+        except self.ray.exceptions.RpcError as error:
+            raise EvaluatorUnavailable(
+                f"the head of the cluster does not list its nodes: {_first_line(error)}"
+            ) from error
+        return [
+            {"NodeID": node_id.hex(), "Resources": dict(info.resources_total)}
+            for node_id, info in nodes.items()
+            if info.state == _ALIVE
+        ]
 
     def close(self) -> None:
-        """Disconnect; an embedded cluster ends, and its files are removed. Idempotent."""
+        """Disconnect; a local cluster ends and its files are removed. Idempotent."""
         with suppress(Exception):
             self.ray.shutdown()
         if self.node is not None:
@@ -134,63 +109,60 @@ class RaySession:
 
 
 def open_ray(address: str | None = None, *, cpus: int | None = None) -> RaySession:
-    """Start an embedded cluster, or connect to the one at an address.
+    """Start a local cluster, or connect to the one at an address.
 
-    An embedded cluster dies with the thread that opened it, so that must be one that stays. The
-    process's signals stay as they are, here and when the session is closed.
+    A local cluster ends with the thread that has opened it. Signal handlers stay as they are.
 
     Args:
-        address: None to embed. `host:port` of a cluster's head; this process becomes a node of the
-            cluster, without CPUs, unless one runs on this machine. `auto` for the cluster that
-            has a node here.
-        cpus: Slots of an embedded cluster; all of this machine's by default.
-
-    Returns:
-        The session; whoever opens it closes it.
+        address: None for a local cluster; `host:port` of a cluster's head, which this process
+            joins as a node without CPUs unless one runs on this machine; `auto` for the cluster
+            that has a node here.
+        cpus: CPUs of a local cluster; all of this machine's by default.
 
     Raises:
-        EvaluatorUnavailable: Neither is possible; says what to do.
+        EvaluatorUnavailable: Ray cannot be started or reached.
     """
     for name, value in _BEFORE_IMPORT.items():
         os.environ.setdefault(name, value)
     if address and (os.environ.get("RAY_AUTH_TOKEN") or os.environ.get("RAY_AUTH_TOKEN_PATH")):
-        # A token is not shown to a cluster unless it is asked for.
+        # Ray does not send a token without this.
         os.environ.setdefault("RAY_AUTH_MODE", "token")
     with _quiet():
         try:
             import ray  # noqa: PLC0415 - its environment had to be set first
         except ImportError as error:
             raise EvaluatorUnavailable(
-                f"Ray cannot be imported: {_first_line(error)}; install it anew, or use the"
-                " in-process evaluator instead"
+                f"Ray cannot be imported: {_first_line(error)}; reinstall it, or use the in-process"
+                " evaluator"
             ) from error
 
         if ray.is_initialized():
             raise EvaluatorUnavailable("this process has a connection to Ray already")
-        # Its own goes in colours to standard output, which is for a command's answers.
+        # By default it prints to standard output, which is for a command's answers.
         printer: Any = ray._private.worker  # noqa: SLF001 - there is no other way
-        printer.print_to_stdstream = _pass_on
+        printer.print_to_stdstream = _log_lines
         return _connect(ray, address) if address else _embed(ray, cpus or available_cpus())
 
 
-def _pass_on(told: Mapping[str, Any], **_: object) -> None:
-    """Log what a raylet tells, of workers that died, say."""
-    for line in told["lines"]:
-        _log.info("%s: %s", told["pid"], line)
+def _log_lines(message: Mapping[str, Any], **_: object) -> None:
+    """Log what a raylet prints, such as the end of a worker."""
+    for line in message["lines"]:
+        _log.info("%s: %s", message["pid"], line)
 
 
 def _connect(ray: ModuleType, address: str) -> RaySession:
     host, _, port = address.rpartition(":")
     host = host.strip("[]")
     if port.isdecimal() and not listens(host, int(port)):
-        # Ray would try for minutes, and so long nobody could see what is wrong.
+        # Ray would try for minutes without a message.
         raise EvaluatorUnavailable(f"no Ray cluster listens at {address!r}; is it up?")
     node = None
     if port.isdecimal() and not comes_here(host, int(port)):
         node = JoinedNode(address)
     try:
         ray.init(address=address, log_to_driver=False, logging_level="ERROR")
-        slots = int(sum(n["Resources"].get("CPU", 0) for n in _nodes(ray)))
+        session = RaySession(ray, _head(ray), node=node)
+        session.nodes()
     except Exception as error:
         with suppress(Exception):
             ray.shutdown()
@@ -200,28 +172,7 @@ def _connect(ray: ModuleType, address: str) -> RaySession:
             f"no Ray cluster answers at {address!r}: {_first_line(error)}; check the address, and"
             " that RAY_AUTH_TOKEN is the cluster's"
         ) from error
-    return RaySession(ray, max(slots, 1), _head(ray), node=node)
-
-
-def _nodes(ray: ModuleType) -> list[dict[str, Any]]:
-    client = ray._private.worker.global_worker.gcs_client  # noqa: SLF001 - with a time-out
-    try:
-        found = client.get_all_node_info(timeout=_ANSWER_SECONDS)
-    except ray.exceptions.RpcError as error:
-        raise EvaluatorUnavailable(
-            f"the head of the cluster does not say which nodes there are: {_first_line(error)}"
-        ) from error
-    return [
-        {
-            "NodeID": node_id.hex(),
-            "NodeManagerHostname": info.node_manager_hostname,
-            "NodeManagerAddress": info.node_manager_address,
-            "NodeManagerPort": info.node_manager_port,
-            "Resources": dict(info.resources_total),
-        }
-        for node_id, info in found.items()
-        if info.state == _ALIVE
-    ]
+    return session
 
 
 def _embed(ray: ModuleType, cpus: int) -> RaySession:
@@ -232,7 +183,7 @@ def _embed(ray: ModuleType, cpus: int) -> RaySession:
         "num_cpus": cpus,
         "num_gpus": 0,
         "include_dashboard": False,
-        "object_store_memory": _OBJECT_STORE_BYTES,
+        "object_store_memory": OBJECT_STORE_BYTES,
         "log_to_driver": False,
         "logging_level": "ERROR",
         "_temp_dir": str(directory),
@@ -247,9 +198,9 @@ def _embed(ray: ModuleType, cpus: int) -> RaySession:
         shutil.rmtree(directory, ignore_errors=True)
         raise EvaluatorUnavailable(
             f"Ray cannot be started on this machine: {_first_line(error)}; use the in-process"
-            " evaluator instead, or a directory for temporary files (TMPDIR) that can be written"
+            " evaluator, or a writable directory for temporary files (TMPDIR)"
         ) from error
-    return RaySession(ray, cpus, _head(ray), directory)
+    return RaySession(ray, _head(ray), directory)
 
 
 def _head(ray: ModuleType) -> tuple[str, int]:
@@ -258,13 +209,7 @@ def _head(ray: ModuleType) -> tuple[str, int]:
 
 
 def listens(host: str, port: int, *, timeout: float = 2.0) -> bool:
-    """Whether anything takes connections at an address.
-
-    Args:
-        host: Name or address of a machine.
-        port: TCP port.
-        timeout: How long an answer may take [s].
-    """
+    """Return whether an address accepts connections."""
     try:
         with socket.create_connection((host, port), timeout=timeout):
             return True
@@ -273,7 +218,7 @@ def listens(host: str, port: int, *, timeout: float = 2.0) -> bool:
 
 
 def _import_path() -> dict[str, str]:
-    """Lets workers find our packages, installed or not."""
+    """Variables with which workers find these packages, installed or not."""
     root = str(Path(__file__).parents[3])
     given = os.environ.get("PYTHONPATH", "")
     return {"PYTHONPATH": os.pathsep.join([root, *filter(None, [given])])}
@@ -281,24 +226,21 @@ def _import_path() -> dict[str, str]:
 
 @cache
 def _token() -> dict[str, str]:
-    """A secret of our own, so that none is looked for, or left, in the home directory.
-
-    One for all clusters of this process, because Ray reads it once.
-    """
+    """A secret of this process, read once by Ray, so that none is kept in the home directory."""
     if os.environ.get("RAY_AUTH_TOKEN") or os.environ.get("RAY_AUTH_TOKEN_PATH"):
         return {}
     return {"RAY_AUTH_TOKEN": secrets.token_hex(32)}
 
 
 def _short_directory() -> str:
-    """Sockets have paths of 107 bytes at most, and Ray appends some seventy."""
+    """A directory for sockets: their paths have 107 bytes, and Ray appends some seventy."""
     chosen = tempfile.gettempdir()
     usable = len(chosen) <= 16 or not os.access("/tmp", os.W_OK)  # noqa: S108 - mkdtemp follows
     return chosen if usable else "/tmp"  # noqa: S108
 
 
 def _sweep() -> None:
-    """Remove what processes left that were killed before they could."""
+    """Remove the files of processes that were killed."""
     for directory in Path(_short_directory()).glob(f"{_PREFIX}*-*"):
         pid = directory.name.removeprefix(_PREFIX).split("-")[0]
         if pid.isdecimal() and not _alive(int(pid)):
@@ -319,7 +261,7 @@ def _alive(pid: int) -> bool:
 
 @contextmanager
 def _environment(values: Mapping[str, str]) -> Iterator[None]:
-    """Set variables for the processes started inside, and put back what was there."""
+    """Set variables for processes started inside the block."""
     before = {name: os.environ.get(name) for name in values}
     os.environ.update(values)
     try:
@@ -334,10 +276,9 @@ def _environment(values: Mapping[str, str]) -> Iterator[None]:
 
 @contextmanager
 def _bare(ray: ModuleType) -> Iterator[None]:
-    """Start no processes that walks have no use for: of the dashboard, of autoscaling, of logs.
+    """Start no dashboard, autoscaler or log monitor: they take as long to start as the workers.
 
-    They take as long to start as the workers. Of `ray.init` no option leaves them out. A Ray that
-    has them by other names starts them.
+    `ray.init` has no options for it. A version with other names starts them.
     """
     node = ray._private.node.Node  # noqa: SLF001 - there is no other way
     unused = {name: vars(node)[name] for name in _UNUSED if name in vars(node)}
@@ -352,7 +293,7 @@ def _bare(ray: ModuleType) -> Iterator[None]:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Ray's import and start warn of things that are not its user's to change."""
+    """Suppress warnings of Ray's import and start that a user cannot act on."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         yield

@@ -1,19 +1,21 @@
-"""One task, as it is sent to a worker, and what comes back."""
+"""Tasks, as they run in a worker, and their answers"""
 
 from __future__ import annotations
 
+import hashlib
 import pickle
 import platform
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
 from gaitswarm.services.optimizer.run.outage import is_infrastructure
-from gaitswarm.services.worker.cutting import Part
 from gaitswarm.sim.case import Case, run_together
 from gaitswarm.sim.controllers.quantisation import timing_tables
 from gaitswarm.sim.errors import SimulationError
@@ -23,114 +25,31 @@ from gaitswarm.sim.provenance import Provenance, provenance_of, simulator_digest
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Task:
-    """Some designs in one case or several, as they are sent to a worker.
-
-    Attributes:
-        cases: What the designs are put to.
-        parts: Which designs are put to which case.
-        designs: (n, v), all that the parts name.
-        provenance: What the outcomes are to have.
-    """
-
-    cases: tuple[Case, ...]
-    parts: tuple[Part, ...]
-    designs: NDArray[np.float64]
-    provenance: Provenance
-
-    @classmethod
-    def of(
-        cls,
-        cases: Sequence[Case],
-        designs: NDArray[np.float64],
-        parts: Sequence[Part],
-        provenance: Provenance,
-    ) -> Task:
-        """The task for some parts of an iteration, without what they do not need of it.
-
-        Args:
-            cases: All cases.
-            designs: All designs.
-            parts: Designs in cases.
-            provenance: What the outcomes are to have.
-
-        Returns:
-            The task, whose outcomes are in the order of the parts.
-        """
-        first = min(part.start for part in parts)
-        last = max(part.stop for part in parts)
-        return cls(
-            cases=tuple(cases[part.case] for part in parts),
-            parts=tuple(
-                Part(index, part.start - first, part.stop - first)
-                for index, part in enumerate(parts)
-            ),
-            designs=np.ascontiguousarray(designs[first:last]),
-            provenance=provenance,
-        )
-
-    def run(self, should_stop: Callable[[], bool] = lambda: False) -> Answer:
-        """Put the designs to the cases, unless this process computes something else.
-
-        Args:
-            should_stop: Whether nobody waits for the outcomes any more; what takes long may then
-                raise.
-
-        Returns:
-            The outcomes, or None in their place, with the provenance of this process.
-        """
-        begun = time.perf_counter()
-        for robots, precision in {(case.robots, case.precision) for case in self.cases}:
-            libraries = tuple(self.provenance.libraries)
-            here = provenance_of(*robots, precision=precision, libraries=libraries)
-            if here != self.provenance:
-                return Answer(here, None, platform.node())
-        kernel_time = KernelTime()
-        with timing_tables() as table_time:
-            outcomes = run_together(
-                [self.cases[part.case] for part in self.parts],
-                [self.designs[part.start : part.stop] for part in self.parts],
-                kernel_time,
-                should_stop,
-            )
-        seconds = time.perf_counter() - begun - kernel_time.waited
-        return Answer(
-            self.provenance, outcomes, platform.node(), seconds, kernel_time, table_time.seconds
-        )
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class Answer:
-    """What a task came to.
+    """Result of a task.
 
     Attributes:
-        provenance: That of the process that ran it.
-        outcomes: Of the parts; None if the provenance is not what the task asks for, so that
-            nothing was computed.
-        host: Name of the machine.
-        seconds: That the task took there, but for waiting for other threads [s].
-        kernel_time: Of these, and how the kernels' lanes were used.
-        table_seconds: Of these, that fuzzy tables took [s].
+        outcomes: By case; None if the process was refused and has computed nothing.
+        provenance: Provenance of the process.
+        host: Name of its machine.
+        seconds: Computing time, without waiting for other threads [s].
+        kernel_time: Time in kernels, and the use of their lanes.
+        table_seconds: Time for fuzzy tables [s].
+        refusal: How the process differs from what the task requires.
     """
 
-    provenance: Provenance
     outcomes: tuple[Outcome, ...] | None
+    provenance: Provenance
     host: str
     seconds: float = 0.0
     kernel_time: KernelTime = field(default_factory=KernelTime)
     table_seconds: float = 0.0
+    refusal: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class TaskTotals:
-    """What tasks took in their workers, all together.
-
-    Attributes:
-        seconds: In tasks [s].
-        kernel_seconds: Of these, in kernels [s].
-        table_seconds: Of these, for fuzzy tables [s].
-        lane_use: Of the kernels.
-    """
+    """Times of tasks in their workers, summed up [s]."""
 
     seconds: float = 0.0
     kernel_seconds: float = 0.0
@@ -138,14 +57,6 @@ class TaskTotals:
     lane_use: LaneUse = field(default_factory=LaneUse)
 
     def plus(self, answer: Answer) -> TaskTotals:
-        """With another task.
-
-        Args:
-            answer: What it came to.
-
-        Returns:
-            The totals.
-        """
         return TaskTotals(
             self.seconds + answer.seconds,
             self.kernel_seconds + answer.kernel_time.seconds,
@@ -154,14 +65,6 @@ class TaskTotals:
         )
 
     def since(self, earlier: TaskTotals) -> TaskTotals:
-        """Without those before.
-
-        Args:
-            earlier: Totals of before.
-
-        Returns:
-            The totals of what came since.
-        """
         return TaskTotals(
             self.seconds - earlier.seconds,
             self.kernel_seconds - earlier.kernel_seconds,
@@ -170,60 +73,84 @@ class TaskTotals:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class Load:
-    """What workers have to do.
+def run_task(
+    cases: Sequence[Case],
+    designs: NDArray[np.float64],
+    expected: Provenance,
+    should_stop: Callable[[], bool] = lambda: False,
+) -> Answer:
+    """Simulate all designs in all cases, unless this process computes something else.
 
-    Attributes:
-        slots: Tasks that can run at the same time.
-        used: Slots that have a task.
-        waiting: Tasks that wait for a slot.
+    should_stop: whether the answer is not needed any more; a long case may then raise.
+    """
+    begun = time.perf_counter()
+    for robots, precision in {(case.robots, case.precision) for case in cases}:
+        libraries = tuple(expected.libraries)
+        here = provenance_of(*robots, precision=precision, libraries=libraries)
+        if here != expected:
+            return Answer(None, here, platform.node(), refusal="; ".join(expected.changes(here)))
+    kernel_time = KernelTime()
+    with timing_tables() as table_time:
+        outcomes = run_together(cases, [designs] * len(cases), kernel_time, should_stop)
+    seconds = time.perf_counter() - begun - kernel_time.waited
+    return Answer(outcomes, expected, platform.node(), seconds, kernel_time, table_time.seconds)
+
+
+@dataclass(frozen=True, slots=True)
+class Shared:
+    """What all tasks of a job need, sent to each process once.
+
+    arithmetic: `arithmetic_digest` of the process that asks.
     """
 
-    slots: int = 0
-    used: int = 0
-    waiting: int = 0
+    cases: tuple[Case, ...]
+    provenance: Provenance
+    arithmetic: str
 
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """What the simulation raised, on its way back from another process.
-
-    Attributes:
-        error: The exception, or one that can be sent in its place.
-    """
+    """Exception of a task, on its way from another process."""
 
     error: Exception
 
 
-def run_in_worker(task: Task) -> Answer | Failure:
-    """The body of a remote task. An error is a result here, not a sign of a broken worker.
+def run_in_worker(
+    place: tuple[Any], cases: tuple[int, ...], designs: NDArray[np.float64]
+) -> Answer | Failure:
+    """Run a task in a process of Ray. Errors of the simulation are returned, not raised.
 
-    Args:
-        task: What is to be run.
-
-    Returns:
-        What it came to, or what it raised.
+    place: reference to the `Shared` object, in a tuple: Ray would read a bare one for every task.
     """
+    # Raises if the object is lost: that is Ray's fault and no result.
+    shared = _shared(place[0])
     try:
-        return task.run()
-    except Exception as error:  # noqa: BLE001 - it is raised again where the result is wanted
+        if shared.arithmetic != arithmetic_digest():
+            refusal = (
+                "its NumPy rounds differently; set NPY_DISABLE_CPU_FEATURES to the same on all"
+                " nodes (docs/cluster.md)"
+            )
+            return Answer(None, shared.provenance, platform.node(), refusal=refusal)
+        chosen = [shared.cases[index] for index in cases]
+        return run_task(chosen, designs, shared.provenance)
+    except Exception as error:  # noqa: BLE001 - raised again in the evaluator
         if is_infrastructure(error):
-            # Told here, as what caused an error does not come along.
+            # Its causes are not sent.
             reason = f"a worker on {platform.node()}: {type(error).__name__}: {error}"
             return Failure(EvaluatorUnavailable(reason))
         return Failure(transportable(error))
 
 
+@lru_cache(maxsize=8)
+def _shared(reference: Any) -> Shared:
+    import ray  # noqa: PLC0415 - only called in a process of Ray
+
+    shared: Shared = ray.get(reference)
+    return shared
+
+
 def transportable(error: Exception) -> Exception:
-    """An error that can be sent to another process.
-
-    Args:
-        error: Any error.
-
-    Returns:
-        The error itself if it survives pickling, else one of its family with the same message.
-    """
+    """Return an error that survives pickling: itself, or one of its family with its message."""
     try:
         pickle.loads(pickle.dumps(error))  # noqa: S301 - written by the line itself
     except Exception:  # noqa: BLE001 - a constructor may raise anything
@@ -233,5 +160,26 @@ def transportable(error: Exception) -> Exception:
 
 
 def warm_up() -> None:
-    """Lets a process import what a walk needs, and take note of the code that it has imported."""
+    """Import what a simulation needs, and note the digest of the imported code."""
     simulator_digest()
+    arithmetic_digest()
+
+
+@lru_cache(maxsize=1)
+def arithmetic_digest() -> str:
+    """Digest of NumPy's functions over their ranges; two processes with the same one round alike.
+
+    Kernels give the same bits at every instruction set. NumPy, with which desired angles and
+    controllers' tables are computed, has separate code for some.
+    """
+    unit = np.linspace(-1.0, 1.0, 2003)
+    wide = unit * 41.0
+    results = (
+        *(function(unit) for function in (np.arccos, np.arcsin, np.arctan)),
+        *(function(wide) for function in (np.sin, np.cos, np.tan, np.exp, np.tanh)),
+        *(function(np.abs(wide) + 0.25) for function in (np.sqrt, np.log)),
+        np.arctan2(wide, np.roll(wide, 700)),
+        np.hypot(wide, np.roll(wide, 700)),
+        np.power(np.abs(wide) + 0.25, unit),
+    )
+    return hashlib.sha256(b"".join(result.tobytes() for result in results)).hexdigest()[:32]

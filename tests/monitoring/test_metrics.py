@@ -17,8 +17,8 @@ from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
 from gaitswarm.services.optimizer.run.execution import RunContext, run_claim
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import Store, open_store
-from gaitswarm.services.worker.cutting import Chunk, Part
-from gaitswarm.services.worker.failures import killed_workers
+from gaitswarm.services.worker.chunks import Chunk
+from gaitswarm.services.worker.dispatch import killed_workers
 from gaitswarm.sim.outcome import Status
 from tests.examples.processes import eventually
 from tests.examples.servers import Server
@@ -186,7 +186,7 @@ def test_a_lease_that_is_taken_over_counts_once_on_either_side(database: Path) -
     [
         ("simulation", ZeroDivisionError("of the test"), HERE),
         ("internal", None, None),
-        ("killed_worker", killed_workers(request(2), Chunk((Part(0, 0, 1),), 1.0), 3), HERE),
+        ("killed_worker", killed_workers(request(2), Chunk((0,), 0, 1, 1.0)), HERE),
         ("provenance", None, HERE.model_copy(update={"optimizer_digest": "another"})),
     ],
 )

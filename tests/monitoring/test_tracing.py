@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -16,15 +14,12 @@ from gaitswarm.services.monitoring.tracing import Tracing
 from gaitswarm.services.optimizer.errors import LeaseLost
 from gaitswarm.services.optimizer.jobs.documents import SPECS
 from gaitswarm.services.optimizer.jobs.job import Command, JobState
-from gaitswarm.services.optimizer.run.evaluator import TaskReport
 from gaitswarm.services.optimizer.run.execution import RunContext, run_claim
 from gaitswarm.services.optimizer.store import Store
 from gaitswarm.services.runtime import open_runtime
-from gaitswarm.services.worker.dispatch import Dispatcher
 from tests.examples.jobs import SMALL_SPEC
 from tests.examples.processes import eventually, loaded_by
 from tests.optimizer.formula import HERE, SPEC, FormulaEvaluator
-from tests.worker.requests import never, request
 
 
 @pytest.fixture
@@ -109,27 +104,6 @@ def test_a_job_that_is_lost_ends_its_span(
     (span,) = named(exporter, "job")
     assert span.status.status_code is StatusCode.ERROR
     assert (span.attributes or {})["gaitswarm.job.state"] == "lost"
-
-
-def test_every_end_of_a_task_is_reported() -> None:
-    reports: list[TaskReport] = []
-    dispatcher = Dispatcher(1, lambda _: 4)
-    asked = replace(request(2), on_task=reports.append)
-    with ThreadPoolExecutor(1) as pool:
-        waiting = pool.submit(dispatcher.evaluate, asked, never)
-        lost = dispatcher.take(timeout=10.0)
-        assert lost is not None
-        dispatcher.again(lost)
-        failed = dispatcher.take(timeout=10.0)
-        assert failed is not None
-        dispatcher.fail(failed, ZeroDivisionError("of the test"))
-        with pytest.raises(ZeroDivisionError):
-            waiting.result()
-    assert [report.error for report in reports] == [
-        "its worker was lost",
-        "ZeroDivisionError: of the test",
-    ]
-    assert all(report.walks > 0 and report.seconds >= 0.0 for report in reports)
 
 
 @pytest.mark.slow

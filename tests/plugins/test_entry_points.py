@@ -9,7 +9,6 @@ from pydantic import ValidationError
 
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.search.registry import METHODS, OPTIMIZERS
-from gaitswarm.services.worker.cluster.handshake import Introduction, fingerprint
 from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.plugins import find_plugins, version_of
 from gaitswarm.views import plugin_views
@@ -125,19 +124,6 @@ def test_its_version_changes_with_any_byte_of_its_code(site: Path) -> None:
         after = version_of("sound-search")
     assert before != after
     assert before.startswith("1.0 (code ") and after.startswith("1.0 (code ")
-
-
-def test_a_worker_with_other_plug_ins_is_refused(site: Path) -> None:
-    with installed(site):
-        without = Introduction.of({"host": "node", "gaitswarm": "1", **fingerprint()})
-    sound(site)
-    with installed(site):
-        here = Introduction.of({"host": "head", "gaitswarm": "1", **fingerprint()})
-    assert here.refusal(here) is None
-    refusal = without.refusal(here)
-    assert refusal is not None
-    assert refusal.startswith("its plug-ins are none, not sound-search 1.0 (code ")
-    assert "install the same" in refusal
 
 
 def test_names_of_gaitswarm_are_answered_without_looking_for_plug_ins() -> None:

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 import yaml
 
-from gaitswarm.services.worker import joining
+from gaitswarm.services.worker import ray_node
 from gaitswarm.settings import Settings, is_loopback
 from tests.examples.api_document import api_document
 from tests.examples.paths import ROOT
@@ -103,7 +103,9 @@ def test_a_node_is_alive_while_its_raylet_is_and_the_head_answers() -> None:
     for name in ("head", "walkers"):
         ready, alive = (OURS[name][kind] for kind in ("readinessProbe", "livenessProbe"))
         assert ready["exec"]["command"] == ["ray", "health-check", f"--address={address}"]
-        asked = f"python -m {joining.__name__} 6379 && ray health-check --address={address}"
+        asked = (
+            f"python -m {ray_node.__name__} --check 6379 && ray health-check --address={address}"
+        )
         assert alive == ready | {"exec": {"command": ["sh", "-c", asked]}}
 
 

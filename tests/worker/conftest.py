@@ -7,7 +7,6 @@ from collections.abc import Iterator
 import pytest
 
 from gaitswarm.services.optimizer.run.evaluator import Evaluator
-from gaitswarm.services.worker.hybrid import HybridEvaluator
 from gaitswarm.services.worker.in_process import InProcessEvaluator
 from gaitswarm.services.worker.ray_evaluator import RayEvaluator
 
@@ -26,14 +25,7 @@ def in_process_evaluator() -> Iterator[InProcessEvaluator]:
     opened.close()
 
 
-@pytest.fixture(scope="session")
-def hybrid_evaluator() -> Iterator[HybridEvaluator]:
-    opened = HybridEvaluator(2)
-    yield opened
-    opened.close()
-
-
-@pytest.fixture(params=["in_process", "hybrid", pytest.param("ray", marks=pytest.mark.slow)])
+@pytest.fixture(params=["in_process", pytest.param("ray", marks=pytest.mark.slow)])
 def evaluator(request: pytest.FixtureRequest) -> Evaluator:
     """Every implementation of the port."""
     opened: Evaluator = request.getfixturevalue(f"{request.param}_evaluator")

@@ -1,4 +1,4 @@
-"""Opens Ray, has robots walk, perhaps kills its cluster, and waits to be killed or to close it."""
+"""Has robots walk in threads and on Ray, kills its Ray, and closes it at a line of its input."""
 
 from __future__ import annotations
 
@@ -6,83 +6,49 @@ import os
 import signal
 import sys
 import threading
-from dataclasses import replace
-from unittest.mock import patch
 
-from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
-from gaitswarm.services.optimizer.run.evaluator import EvaluationStopped
-from gaitswarm.services.worker.ray_evaluator import RayEvaluator
-from gaitswarm.services.worker.ray_session import RaySession, open_ray
-from gaitswarm.sim.case import Walk
-from tests.worker.cluster_runner import Sleep
+from gaitswarm.services.worker import ray_evaluator
+from gaitswarm.services.worker.auto import AutoEvaluator
+from tests.examples.processes import eventually
 from tests.worker.processes import descendants
-from tests.worker.requests import bits, never, request
-
-heard = threading.Event()
+from tests.worker.requests import bits, never, request, walked_at_once
 
 
-def say(line: str) -> None:
-    """Flushed at once, as the reader may then end this process."""
-    sys.stdout.write(f"{line}\n")
-    sys.stdout.flush()
-
-
-def main(ending: str) -> None:
+def main() -> None:
+    heard = threading.Event()
     signal.signal(signal.SIGTERM, lambda *_: heard.set())
-    evaluator = RayEvaluator(cpus=1)
-    walked = bits(evaluator.evaluate(request(2), never))
-    say("walked")
-    if ending == "lose":
-        for process in descendants(os.getpid()):
-            if "gcs_server" in process.title:
-                os.kill(process.pid, signal.SIGKILL)
-        with patch("gaitswarm.services.worker.cluster.pump.PULSE_SECONDS", 0.3):
-            say(until_lost(evaluator))
-        say(told_to_stop_while_reopening(evaluator))
-        assert bits(evaluator.evaluate(request(2), never)) == walked
-        say(terminated())
+    vars(ray_evaluator)["PULSE_SECONDS"] = 0.3
+    wanted = request(20)
+    expected = bits(walked_at_once(wanted))
+    evaluator = AutoEvaluator(1)
+
+    def evaluate(place: str) -> None:
+        assert evaluator.on_ray == (place == "ray")
+        assert bits(evaluator.evaluate(wanted, never)) == expected
+        sys.stdout.write(f"{place}\n")
+        sys.stdout.flush()
+
+    evaluate("threads")
+    eventually(lambda: evaluator.on_ray)
+    evaluate("ray")
+    for process in descendants(os.getpid()):
+        if "gcs_server" in process.title:
+            os.kill(process.pid, signal.SIGKILL)
+
+    def in_threads() -> bool:
+        assert bits(evaluator.evaluate(wanted, never)) == expected
+        return not evaluator.on_ray
+
+    eventually(in_threads)
+    evaluate("threads")
+    eventually(lambda: evaluator.on_ray)
+    evaluate("ray")
     sys.stdin.readline()
+    os.kill(os.getpid(), signal.SIGTERM)
+    if heard.wait(5.0):
+        sys.stdout.write("heard\n")
     evaluator.close()
 
 
-def told_to_stop_while_reopening(evaluator: RayEvaluator) -> str:
-    """What came of a stop that was asked for while Ray took long to be opened."""
-    reopening, may_open = threading.Event(), threading.Event()
-
-    def open_slowly(address: str | None, *, cpus: int | None) -> RaySession:
-        reopening.set()
-        may_open.wait()
-        return open_ray(address, cpus=cpus)
-
-    with patch("gaitswarm.services.worker.ray_evaluator.open_ray", open_slowly):
-        try:
-            evaluator.evaluate(request(2), reopening.is_set)
-        except EvaluationStopped:
-            return "stopped"
-        finally:
-            may_open.set()
-    return "not stopped"
-
-
-def terminated() -> str:
-    """Whether this process hears of SIGTERM as it did before Ray was opened."""
-    os.kill(os.getpid(), signal.SIGTERM)
-    return "heard" if heard.wait(5.0) else "not heard"
-
-
-def until_lost(evaluator: RayEvaluator) -> str:
-    """What is said when the loss is noticed, during a request.
-
-    A loss between two requests is not reported: the next request opens Ray.
-    """
-    (walk, *_) = request(1).cases
-    assert isinstance(walk, Walk)
-    try:
-        evaluator.evaluate(replace(request(1), cases=(Sleep(walk),)), never)
-    except EvaluatorUnavailable as error:
-        return str(error)
-    return "the loss went unnoticed"
-
-
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main()

@@ -76,7 +76,7 @@ def head_alone(spec: dict[str, Any], folder: Path) -> str | None:
 
 @pytest.mark.thorough(
     "test_a_runner_that_waits_for_its_cluster_ends_when_it_is_stopped",
-    "test_a_cluster_that_was_lost_is_noticed_and_opened_again_with_the_same_bits",
+    "test_ray_takes_over_is_lost_and_takes_over_again_with_the_same_bits_and_leaves_nothing",
 )
 def test_a_server_waits_for_its_cluster_and_a_job_whose_head_is_killed_has_the_same_bits(
     host: Process, database: Path, tmp_path: Path
@@ -87,7 +87,7 @@ def test_a_server_waits_for_its_cluster_and_a_job_whose_head_is_killed_has_the_s
     try:
         assert workers(server) == (
             "degraded",
-            f"it is tried again and again: no Ray cluster listens at '127.0.0.1:{port}'; is it up?",
+            f"retrying: no Ray cluster listens at '127.0.0.1:{port}'; is it up?",
         )
         first = server.submit(SMALL_SPEC)
         eventually(lambda: "no Ray cluster listens" in (server.job(first)["waiting"] or ""))
@@ -118,7 +118,7 @@ def test_a_runner_that_waits_for_its_cluster_ends_when_it_is_stopped(
         *(*COMMAND_LINE, "runner", "--db", database, "--evaluator", "ray"),
         *("--ray-address", address),
     )
-    line_with(runner.stderr, f"jobs wait until there are workers: no Ray cluster .*'{address}'")
+    line_with(runner.stderr, f"jobs wait for workers: no Ray cluster .*'{address}'")
     line_with(runner.stderr, "ready: 0 slots")
     runner.send_signal(signal.SIGTERM)
     assert runner.wait(timeout=60.0) == 0

@@ -27,7 +27,7 @@ def folder() -> Iterator[Path]:
 
 def is_alive(port: int) -> bool:
     """As a probe of liveness finds it."""
-    return python("-m", "gaitswarm.services.worker.joining", str(port)).returncode == 0
+    return python("-m", "gaitswarm.services.worker.ray_node", "--check", str(port)).returncode == 0
 
 
 @pytest.mark.slow

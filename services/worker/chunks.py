@@ -1,0 +1,156 @@
+"""Chunks: the tasks into which an iteration is cut"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+_TASKS_PER_SLOT: Final = 3
+"""Chunks of single cases per slot, so that all slots finish at about the same time."""
+
+_LONGEST_SECONDS: Final = 1.0
+"""Of a task; other jobs and a stop wait for so long."""
+
+_OVERHEAD_SHARE: Final = 0.05
+"""Largest share of a task's time that sending it may take."""
+
+_UNMEASURED: Final = (10.0, 256.0)
+"""Smallest and largest cost of a job's first tasks [simulated s]."""
+
+_WEIGHT: Final = 0.5
+"""Of the last iteration in a pace, against all earlier ones."""
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """What one task simulates: designs `start` <= index < `stop` in some cases.
+
+    cost: simulated seconds that the kernel's lanes step through.
+    """
+
+    cases: tuple[int, ...]
+    start: int
+    stop: int
+    cost: float
+
+    def halves(self) -> tuple[Chunk, ...]:
+        """Split into two chunks, by designs and then by cases; empty if there is one of each."""
+        half = 0.5 * self.cost
+        if self.stop - self.start > 1:
+            middle = (self.start + self.stop) // 2
+            return (
+                Chunk(self.cases, self.start, middle, half),
+                Chunk(self.cases, middle, self.stop, half),
+            )
+        if len(self.cases) > 1:
+            middle = len(self.cases) // 2
+            return (
+                Chunk(self.cases[:middle], self.start, self.stop, half),
+                Chunk(self.cases[middle:], self.start, self.stop, half),
+            )
+        return ()
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """Speed of a job's tasks.
+
+    seconds: per simulated second of their cost [s]; None before the first iteration has ended.
+    overhead: time to send a task and its answer [s].
+    """
+
+    seconds: float | None = None
+    overhead: float = 0.0
+
+    def after(self, times: Sequence[tuple[float, float, float]]) -> Pace:
+        """Return the pace after another iteration.
+
+        times: cost [simulated s], computing time and overhead [s] of each of its tasks.
+        """
+        cost = sum(cost for cost, _, _ in times)
+        if cost <= 0.0:
+            return self
+        seconds = sum(seconds for _, seconds, _ in times) / cost
+        # Other tasks may have waited for a free worker.
+        overhead = max(0.0, min(overhead for _, _, overhead in times))
+        if self.seconds is None:
+            return Pace(seconds, overhead)
+        return Pace(
+            (1.0 - _WEIGHT) * self.seconds + _WEIGHT * seconds,
+            (1.0 - _WEIGHT) * self.overhead + _WEIGHT * overhead,
+        )
+
+    def bounds(self) -> tuple[float, float]:
+        """Return the smallest and largest cost of a task [simulated s]."""
+        if not self.seconds:
+            return _UNMEASURED
+        longest = _LONGEST_SECONDS / self.seconds
+        return min(self.overhead / _OVERHEAD_SHARE / self.seconds, longest), longest
+
+
+def cut(
+    durations: Sequence[float],
+    designs: int,
+    *,
+    slots: int,
+    lanes: int,
+    pace: Pace | None = None,
+    together: bool = True,
+) -> tuple[Chunk, ...]:
+    """Cut an iteration into chunks, longest first.
+
+    A chunk has one case, and fills the kernel's lanes. With fewer slots than cases it has some
+    designs in all cases: the kernel packs their simulations into its lanes without gaps.
+
+    Args:
+        durations: Simulated time of each case [s].
+        designs: Number of designs.
+        slots: Number of tasks that run concurrently.
+        lanes: Number of simulations that the kernel steps together.
+        pace: That of the job's earlier iterations.
+        together: Whether one task can simulate several cases.
+    """
+    bounds = (pace or Pace()).bounds()
+    if together and slots < len(durations):
+        # With one simulation per lane, the kernel cannot refill its lanes; with two, few are idle.
+        filled = lanes * max(durations)
+        longest = max(bounds[1], filled, min(2.0 * filled, _UNMEASURED[1]))
+        return _by_designs(durations, designs, slots, longest)
+    return _by_case(durations, designs, slots, lanes, bounds)
+
+
+def _by_designs(
+    durations: Sequence[float], designs: int, slots: int, longest: float
+) -> tuple[Chunk, ...]:
+    cases, duration = tuple(range(len(durations))), sum(durations)
+    pieces = slots * math.ceil(designs * duration / (slots * longest))
+    chunks = (Chunk(cases, a, b, (b - a) * duration) for a, b in _edges(designs, pieces))
+    return tuple(sorted(chunks, key=lambda chunk: (-chunk.cost, chunk.start)))
+
+
+def _by_case(
+    durations: Sequence[float],
+    designs: int,
+    slots: int,
+    lanes: int,
+    bounds: tuple[float, float],
+) -> tuple[Chunk, ...]:
+    blocks = math.ceil(designs / lanes)
+    shortest, longest = bounds
+    even = sum(durations) * blocks * lanes / (_TASKS_PER_SLOT * slots)
+    target = min(max(even, shortest), longest)
+    chunks = [
+        Chunk((case,), a * lanes, min(b * lanes, designs), (b - a) * lanes * duration)
+        for case, duration in enumerate(durations)
+        for a, b in _edges(blocks, math.ceil(blocks / max(1, round(target / (duration * lanes)))))
+    ]
+    return tuple(sorted(chunks, key=lambda chunk: (-chunk.cost, chunk.cases, chunk.start)))
+
+
+def _edges(count: int, pieces: int) -> list[tuple[int, int]]:
+    """Divide `count` into at most `pieces` equal ranges."""
+    edges = [count * piece // pieces for piece in range(pieces + 1)]
+    return [(a, b) for a, b in itertools.pairwise(edges) if b > a]

@@ -1,1 +1,0 @@
-"""Nodes of a Ray cluster, what they are told, and how runners share them."""

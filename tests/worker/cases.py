@@ -1,0 +1,77 @@
+"""Cases that sleep or kill their process, to be sent to workers."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaitswarm.sim.case import Walk
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.outcome import Objective, Outcome
+from gaitswarm.sim.robot import RobotSource
+
+
+@dataclass(frozen=True, slots=True)
+class InPlaceOfWalk:
+    """A case that needs what a walk needs."""
+
+    walk: Walk
+
+    @property
+    def robots(self) -> tuple[RobotSource, ...]:
+        return self.walk.robots
+
+    @property
+    def precision(self) -> Precision:
+        return self.walk.precision
+
+    @property
+    def objectives(self) -> tuple[Objective, ...]:
+        return self.walk.objectives
+
+
+@dataclass(frozen=True, slots=True)
+class Sleep(InPlaceOfWalk):
+    """It takes a minute and has no result."""
+
+    name = "sleep"
+    duration = 1000.0
+
+    def run(self, designs: NDArray[np.float64]) -> Outcome:
+        time.sleep(60.0)
+        raise AssertionError("it was not cancelled")
+
+
+@dataclass(frozen=True, slots=True)
+class Slow(InPlaceOfWalk):
+    """A walk that begins after some time."""
+
+    seconds: float = 0.2
+    name = "slow"
+    duration = 1000.0
+
+    def run(self, designs: NDArray[np.float64]) -> Outcome:
+        time.sleep(self.seconds)
+        return self.walk.run(designs)
+
+
+@dataclass(frozen=True, slots=True)
+class Deadly(InPlaceOfWalk):
+    """A design with a negative gain crashes its process, which is noted in a file."""
+
+    deaths: Path
+    name = "deadly"
+    duration = 1.0
+
+    def run(self, designs: NDArray[np.float64]) -> Outcome:
+        if (designs < 0.0).any():
+            with self.deaths.open("a") as file:
+                file.write(f"{os.getpid()}\n")
+            os.kill(os.getpid(), signal.SIGSEGV)
+        return self.walk.run(designs)

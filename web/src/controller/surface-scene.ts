@@ -13,21 +13,17 @@ import {
   Mesh,
   MeshBasicMaterial,
   MeshLambertMaterial,
-  PerspectiveCamera,
   Scene,
   SphereGeometry,
   SRGBColorSpace,
   Vector3,
-  type WebGLRenderer,
 } from 'three'
-import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js'
 import { formatExact, formatNumber, withUnit } from '../format/number'
 import { currentTheme, themeColour } from '../theme'
-import type { CameraPlace } from '../walk/scene/camera-rig'
-import { disposeTree } from '../walk/scene/dispose'
+import { type CameraPlace, CameraRig } from '../walk/scene/camera-rig'
 import { facingText } from '../walk/scene/label'
 import { palette } from '../walk/scene/palette'
-import { createRenderer } from '../walk/scene/renderer'
+import { createRenderer, disposeScene, disposeTree } from '../walk/scene/renderer'
 import { diverging } from './colour-map'
 import type { Cell, Layer } from './surface'
 
@@ -40,10 +36,9 @@ const NET = 16
 const TEXT = 0.075
 
 export class SurfaceScene {
-  private readonly renderer: WebGLRenderer
+  private readonly renderer = createRenderer()
+  readonly rig = new CameraRig(this.canvas, 1, () => this.request())
   private readonly scene = new Scene()
-  private readonly camera = new PerspectiveCamera(30, 1, 0.1, 20)
-  private readonly controls: OrbitControls
   private readonly marker = new Mesh(new SphereGeometry(0.022, 24, 16), new MeshBasicMaterial())
   private drawn = new Group()
   private requested = 0
@@ -51,22 +46,15 @@ export class SurfaceScene {
   constructor(
     private layer: Layer,
     private cell: Cell,
-    /** Called when the user moves the camera; null for the default view. */
-    private readonly onPlaced: (place: CameraPlace | null) => void,
   ) {
-    this.renderer = createRenderer()
-    this.camera.up.set(0, 0, 1)
+    const { camera, controls } = this.rig
+    camera.fov = 30
+    controls.enablePan = false
+    controls.maxPolarAngle = Math.PI
     const light = new DirectionalLight(0xffffff, 1.1)
     light.position.set(-1, -1.5, 3)
     this.scene.add(new HemisphereLight(0xffffff, 0xb0b8bc, 2.4), light, this.marker)
-    this.controls = new OrbitControls(this.camera, this.canvas)
-    this.controls.enablePan = false
-    this.controls.enableZoom = false
-    this.controls.addEventListener('change', () => this.request())
-    this.controls.addEventListener('end', () => this.onPlaced(this.place))
-    this.canvas.style.touchAction = 'pan-y'
     this.show(layer, cell)
-    this.look(null)
   }
 
   get canvas(): HTMLCanvasElement {
@@ -96,60 +84,33 @@ export class SurfaceScene {
     this.request()
   }
 
-  /** Turn about the vertical axis, and up [rad]. */
-  turn(around: number, up: number): void {
-    const axis = new Vector3(0, 0, 1)
-    this.camera.position.applyAxisAngle(axis, around)
-    const side = new Vector3().crossVectors(this.camera.position, axis).normalize()
-    const lifted = this.camera.position.clone().applyAxisAngle(side, up)
-    const steep = Math.abs(lifted.z) / lifted.length()
-    if (steep < 0.99) this.camera.position.copy(lifted)
-    this.controls.update()
-    this.request()
-    this.onPlaced(this.place)
-  }
-
   resetView(): void {
     this.look(null)
-    this.onPlaced(null)
+    this.rig.onPlaced(null)
   }
 
-  /** Set the camera, or the default view for null, without calling `onPlaced`. */
+  /** Set the camera, or the default view for null. */
   look(place: CameraPlace | null): void {
-    const narrow = Math.min(1, this.camera.aspect / 1.5)
-    this.camera.position.set(-1.35, -2.75, 1.75).multiplyScalar(1 / narrow)
-    this.controls.target.set(0, 0, -0.04)
-    if (place) {
-      this.camera.position.set(...place.position)
-      this.controls.target.set(...place.target)
-    }
-    this.controls.update()
-    this.request()
-  }
-
-  private get place(): CameraPlace {
-    return { position: this.camera.position.toArray(), target: this.controls.target.toArray() }
+    const near = Math.min(1, this.rig.camera.aspect / 1.5)
+    const position = [-1.35 / near, -2.75 / near, 1.75 / near] as const
+    this.rig.place = place ?? { position, target: [0, 0, -0.04] }
   }
 
   resize(width: number, height: number): void {
     this.renderer.setSize(width, height)
-    this.camera.aspect = width / height
-    this.camera.updateProjectionMatrix()
+    this.rig.resize(width, height)
     this.request()
   }
 
   /** Render immediately. */
   render(): void {
-    this.renderer.render(this.scene, this.camera)
+    this.renderer.render(this.scene, this.rig.camera)
   }
 
   dispose(): void {
     cancelAnimationFrame(this.requested)
-    this.controls.dispose()
-    disposeTree(this.scene)
-    this.renderer.dispose()
-    this.renderer.forceContextLoss()
-    this.canvas.remove()
+    this.rig.controls.dispose()
+    disposeScene(this.scene, this.renderer)
   }
 
   private request(): void {

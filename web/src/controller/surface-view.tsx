@@ -8,20 +8,12 @@ import { describeCanvas } from '../export/canvas-source'
 import { quantity, withUnit } from '../format/number'
 import { oneOf, useQueryValue } from '../router/query-value'
 import { useTheme } from '../theme'
+import { TURNS } from '../walk/player/player-keys'
 import { CAMERA } from '../walk/player/view-words'
 import { type Cell, cells, extent, type Layer, layerData } from './surface'
 import type { SurfaceScene } from './surface-scene'
 
-const TURN = Math.PI / 24
-
 const LAYER = oneOf<Layer['key']>(['inference', 'table', 'difference'], 'inference')
-
-const TURNS: Readonly<Record<string, readonly [around: number, up: number]>> = {
-  ArrowLeft: [-TURN, 0],
-  ArrowRight: [TURN, 0],
-  ArrowUp: [0, TURN],
-  ArrowDown: [0, -TURN],
-}
 
 export function SurfaceView({
   layers,
@@ -71,14 +63,14 @@ function Stage({ layer, cell }: { layer: Layer; cell: Cell }) {
     import('./surface-scene')
       .then(({ SurfaceScene }) => {
         if (unmounted) return
-        const { layer, cell } = latest.current
-        const built = new SurfaceScene(layer, cell, (place) => latest.current.setCamera(place))
+        const built = new SurfaceScene(latest.current.layer, latest.current.cell)
         scene.current = built
         box.append(built.canvas)
         describeCanvas(built.canvas, { refresh: () => built.render() })
         const fill = () => box.clientWidth > 0 && built.resize(box.clientWidth, box.clientHeight)
         fill()
         built.look(latest.current.camera)
+        built.rig.onPlaced = (place) => latest.current.setCamera(place)
         observer = new ResizeObserver(fill)
         observer.observe(box)
       })
@@ -97,7 +89,7 @@ function Stage({ layer, cell }: { layer: Layer; cell: Cell }) {
     const turn = TURNS[event.key]
     if (!turn) return
     event.preventDefault()
-    scene.current?.turn(turn[0], turn[1])
+    scene.current?.rig.turn(...turn)
   }
   const [low, high] = extent(layer.values)
   return (

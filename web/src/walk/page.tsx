@@ -109,7 +109,7 @@ function useWalk(design: ResolvedDesign | null, scenario: string | Scenario, rat
 function Recording({ one, other }: { one: Recorded; other: Recorded | null }) {
   const walks = useMemo(() => (other ? [one, other] : [one]), [one, other])
   const shown = useMemo(() => walks.filter(({ replay }) => replay.frames > 0), [walks])
-  const [choices, setChoices] = useQueryValue('view', VIEW, DEFAULT_VIEW)
+  const [options, onOptions] = useQueryValue('view', VIEW, DEFAULT_VIEW)
   const [camera, setCamera] = useQueryValue('camera', CAMERA, null)
   const [requestedTime] = useQueryValue('t', MOMENT, null)
   const writeTime = useDelayedQuery('t')
@@ -126,8 +126,7 @@ function Recording({ one, other }: { one: Recorded; other: Recorded | null }) {
       {shown.length > 0 && (
         <>
           <Player
-            {...{ walks: shown, playback, choices, camera }}
-            onChoose={setChoices}
+            {...{ walks: shown, playback, options, onOptions, camera }}
             onCamera={setCamera}
           />
           <WalkPlots walks={shown} all={walks} playback={playback} />

@@ -1,18 +1,19 @@
 /** Clock of a replay, independent of the browser. */
 
+import { useEffect, useState } from 'preact/hooks'
+
 /** Playback speeds, as multiples of real time. */
 export const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4] as const
-
-type Listener = () => void
 
 /** Tolerance for float32 times, as a share of a frame. */
 const ROUNDING = 1e-3
 
 export class Playback {
-  private at = 0
-  private moving = false
-  private rate = 1
-  private readonly listeners = new Set<Listener>()
+  /** [s] */
+  time = 0
+  playing = false
+  speed = 1
+  private readonly listeners = new Set<() => void>()
 
   constructor(
     /** End of the longest walk [s]. */
@@ -21,76 +22,61 @@ export class Playback {
     readonly frameRate: number,
   ) {}
 
-  /** Current time [s]. */
-  get time(): number {
-    return this.at
-  }
-
-  /** Current frame, from 0. */
   get frame(): number {
-    return Math.floor(this.at * this.frameRate + ROUNDING)
+    return Math.floor(this.time * this.frameRate + ROUNDING)
   }
 
   get lastFrame(): number {
     return Math.floor(this.duration * this.frameRate + ROUNDING)
   }
 
-  get playing(): boolean {
-    return this.moving
-  }
-
-  get speed(): number {
-    return this.rate
-  }
-
   /** Start, from the beginning if at the end. */
   play(): void {
     if (this.duration <= 0) return
-    if (this.at >= this.duration) this.at = 0
-    this.moving = true
+    if (this.time >= this.duration) this.time = 0
+    this.playing = true
     this.changed()
   }
 
   pause(): void {
-    if (!this.moving) return
-    this.moving = false
+    if (!this.playing) return
+    this.playing = false
     this.changed()
   }
 
   toggle(): void {
-    if (this.moving) this.pause()
+    if (this.playing) this.pause()
     else this.play()
   }
 
   setSpeed(speed: number): void {
-    this.rate = Math.min(SPEEDS[SPEEDS.length - 1], Math.max(SPEEDS[0], speed))
+    this.speed = Math.min(SPEEDS[SPEEDS.length - 1], Math.max(SPEEDS[0], speed))
     this.changed()
   }
 
   /** Advance by real time [s]; stops at the end. */
   advance(seconds: number): void {
-    if (!this.moving) return
-    this.at = Math.min(this.duration, this.at + seconds * this.rate)
-    if (this.at >= this.duration) this.moving = false
+    if (!this.playing) return
+    this.time = Math.min(this.duration, this.time + seconds * this.speed)
+    if (this.time >= this.duration) this.playing = false
     this.changed()
   }
 
   /** Seek to a time [s], clamped to the walk. */
   seek(time: number): void {
-    this.at = Math.min(this.duration, Math.max(0, time))
+    this.time = Math.min(this.duration, Math.max(0, time))
     this.changed()
   }
 
   /** Stop, and move by a number of frames. */
   step(frames: number): void {
-    this.moving = false
+    this.playing = false
     const frame = Math.min(this.lastFrame, Math.max(0, this.frame + frames))
-    this.at = Math.min(this.duration, frame / this.frameRate)
-    this.changed()
+    this.seek(frame / this.frameRate)
   }
 
   /** Subscribe to changes; returns the unsubscribe function. */
-  subscribe(listener: Listener): () => void {
+  subscribe(listener: () => void): () => void {
     this.listeners.add(listener)
     return () => {
       this.listeners.delete(listener)
@@ -100,4 +86,27 @@ export class Playback {
   private changed(): void {
     for (const listener of [...this.listeners]) listener()
   }
+}
+
+/** Time, speed and whether it plays; while it plays, the time at most every `milliseconds`. */
+export function usePlayback(playback: Playback, milliseconds: number, active = true) {
+  const { time, playing, speed } = playback
+  const [state, setState] = useState({ time, playing, speed })
+  useEffect(() => {
+    if (!active) return
+    let last = 0
+    const update = () => {
+      const { time, playing, speed } = playback
+      const now = performance.now()
+      setState((shown) => {
+        const same = playing && shown.playing && speed === shown.speed
+        if (same && now - last < milliseconds) return shown
+        last = now
+        return { time, playing, speed }
+      })
+    }
+    update()
+    return playback.subscribe(update)
+  }, [playback, milliseconds, active])
+  return state
 }

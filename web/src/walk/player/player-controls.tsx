@@ -1,76 +1,72 @@
 /** Playback and view controls of a replay. */
 
 import { useId } from 'preact/hooks'
+import { Check } from '../../components/fields/check'
 import { Segmented } from '../../components/fields/segmented'
 import { formatExact } from '../../format/number'
 import type { ViewName } from '../scene/camera-rig'
 import type { SceneOptions } from '../scene/walk-scene'
-import { type Playback, SPEEDS } from './playback'
-import { usePlaybackState, usePlaybackTime } from './use-playback'
+import { type Playback, SPEEDS, usePlayback } from './playback'
 
-export type ViewChoices = SceneOptions
-
-const LOOKS: readonly { readonly view: ViewName; readonly label: string }[] = [
-  { view: 'three-quarter', label: 'Reset view' },
-  { view: 'side', label: 'Side' },
-  { view: 'front', label: 'Front' },
-  { view: 'top', label: 'Top' },
+const LOOKS: readonly (readonly [ViewName, string])[] = [
+  ['three-quarter', 'Reset view'],
+  ['side', 'Side'],
+  ['front', 'Front'],
+  ['top', 'Top'],
 ]
 
-export function PlayerControls({
-  playback,
-  comparing,
-  meshed,
-  choices,
-  onChoose,
-  onLook,
-  onFilm,
-  onPicture,
-}: {
+interface PlayerControlsProps {
   playback: Playback
   /** Whether two walks are compared. */
   comparing: boolean
   /** Whether meshes are available. */
   meshed: boolean
-  choices: ViewChoices
-  onChoose: (choices: ViewChoices) => void
+  options: SceneOptions
+  onOptions: (options: SceneOptions) => void
   onLook: (view: ViewName) => void
   /** Null without a scene. */
   onFilm: (() => void) | null
   onPicture: (() => void) | null
-}) {
-  const set = (changes: Partial<ViewChoices>) => onChoose({ ...choices, ...changes })
+}
+
+export function PlayerControls(props: PlayerControlsProps) {
+  const { playback, comparing, meshed, options, onOptions, onLook, onFilm, onPicture } = props
+  const check = (key: 'forces' | 'trail' | 'meshes', label: string) => (
+    <Check
+      label={label}
+      checked={options[key]}
+      onChange={(shown) => onOptions({ ...options, [key]: shown })}
+    />
+  )
   return (
     <div class="player-controls">
       <Transport playback={playback} />
       <div class="row">
         <Segmented
           label="Camera"
-          value={choices.follow ? 'follow' : 'orbit'}
+          value={options.follow ? 'follow' : 'orbit'}
           options={[
             ['follow', 'Follow'],
             ['orbit', 'Fixed'],
           ]}
-          onChoose={(value) => set({ follow: value === 'follow' })}
+          onChoose={(value) => onOptions({ ...options, follow: value === 'follow' })}
         />
         {comparing && (
           <Segmented
             label="Arrangement"
-            value={choices.arrangement}
+            value={options.arrangement}
             options={[
               ['ghost', 'Ghost'],
               ['side-by-side', 'Side by side'],
             ]}
-            onChoose={(arrangement) => set({ arrangement })}
+            onChoose={(arrangement) => onOptions({ ...options, arrangement })}
           />
         )}
-        <Check label="Forces" on={choices.forces} onChange={(forces) => set({ forces })} />
-        <Check label="Trail" on={choices.trail} onChange={(trail) => set({ trail })} />
-        {meshed && (
-          <Check label="Meshes" on={choices.meshes} onChange={(meshes) => set({ meshes })} />
-        )}
+        {check('forces', 'Forces')}
+        {check('trail', 'Trail')}
+        {meshed && check('meshes', 'Meshes')}
         <span class="row looks">
-          {LOOKS.map(({ view, label }) => (
+          {LOOKS.map(([view, label]) => (
             <button key={view} type="button" class="compact" onClick={() => onLook(view)}>
               {label}
             </button>
@@ -79,17 +75,12 @@ export function PlayerControls({
         <button
           type="button"
           class="compact"
-          disabled={onPicture === null}
+          disabled={!onPicture}
           onClick={onPicture ?? undefined}
         >
           Save as picture
         </button>
-        <button
-          type="button"
-          class="compact"
-          disabled={onFilm === null}
-          onClick={onFilm ?? undefined}
-        >
+        <button type="button" class="compact" disabled={!onFilm} onClick={onFilm ?? undefined}>
           Save as video…
         </button>
       </div>
@@ -98,10 +89,8 @@ export function PlayerControls({
 }
 
 function Transport({ playback }: { playback: Playback }) {
-  const { playing, speed } = usePlaybackState(playback)
-  const time = usePlaybackTime(playback, 60)
-  const frame = playback.frame
-  const seconds = (value: number) => value.toFixed(2)
+  const { playing, speed, time } = usePlayback(playback, 60)
+  const { frame, lastFrame, frameRate, duration } = playback
   return (
     <div class="transport">
       <button
@@ -121,17 +110,15 @@ function Transport({ playback }: { playback: Playback }) {
       <input
         type="range"
         min={0}
-        max={playback.lastFrame}
+        max={lastFrame}
         step={1}
         value={frame}
         aria-label="Time in the walk"
-        aria-valuetext={`${seconds(time)} s, frame ${frame} of ${playback.lastFrame}`}
-        onInput={(event) => {
-          playback.seek(Number(event.currentTarget.value) / playback.frameRate)
-        }}
+        aria-valuetext={`${time.toFixed(2)} s, frame ${frame} of ${lastFrame}`}
+        onInput={(event) => playback.seek(Number(event.currentTarget.value) / frameRate)}
       />
       <output class="moment">
-        {seconds(time)} / {seconds(playback.duration)}&nbsp;s
+        {time.toFixed(2)} / {duration.toFixed(2)}&nbsp;s
       </output>
       <SpeedField playback={playback} speed={speed} />
     </div>
@@ -158,26 +145,5 @@ export function SpeedField({ playback, speed }: { playback: Playback; speed: num
         ))}
       </select>
     </span>
-  )
-}
-
-function Check({
-  label,
-  on,
-  onChange,
-}: {
-  label: string
-  on: boolean
-  onChange: (on: boolean) => void
-}) {
-  return (
-    <label class="check">
-      <input
-        type="checkbox"
-        checked={on}
-        onChange={(event) => onChange(event.currentTarget.checked)}
-      />
-      {label}
-    </label>
   )
 }

@@ -9,11 +9,29 @@ export interface View {
 }
 
 const TURN = Math.PI / 24
+const ZOOM = 1.15
 
 /** Elements that handle the keys themselves. */
 const SPACE_TARGETS = 'button, a, input, select, textarea, summary'
 const ARROW_TARGETS =
   'input, select, textarea, [role="tab"], [role="application"][data-handles-keys]'
+
+const CLOCK: Readonly<Record<string, (playback: Playback) => void>> = {
+  ' ': (playback) => playback.toggle(),
+  ArrowLeft: (playback) => playback.step(-1),
+  ArrowRight: (playback) => playback.step(1),
+  Home: (playback) => playback.seek(0),
+  End: (playback) => playback.seek(playback.duration),
+}
+
+const ZOOMS: Readonly<Record<string, number>> = { '+': ZOOM, '=': ZOOM, '-': 1 / ZOOM }
+
+export const TURNS: Readonly<Record<string, readonly [around: number, up: number]>> = {
+  ArrowLeft: [-TURN, 0],
+  ArrowRight: [TURN, 0],
+  ArrowUp: [0, TURN],
+  ArrowDown: [0, -TURN],
+}
 
 /** Handle a key; returns whether it was handled. */
 export function pressed(
@@ -23,53 +41,10 @@ export function pressed(
   playback: Playback,
   view: View | null,
 ): boolean {
-  if (key === ' ') {
-    if (target.closest(SPACE_TARGETS)) return false
-    playback.toggle()
-    return true
-  }
-  if (target.closest(ARROW_TARGETS)) return false
-  if (shift && view && turned(key, view)) return true
-  switch (key) {
-    case 'ArrowLeft':
-      playback.step(-1)
-      return true
-    case 'ArrowRight':
-      playback.step(1)
-      return true
-    case 'Home':
-      playback.seek(0)
-      return true
-    case 'End':
-      playback.seek(playback.duration)
-      return true
-    case '+':
-    case '=':
-      view?.zoom(1.15)
-      return view !== null
-    case '-':
-      view?.zoom(1 / 1.15)
-      return view !== null
-    default:
-      return false
-  }
-}
-
-function turned(key: string, view: View): boolean {
-  switch (key) {
-    case 'ArrowLeft':
-      view.turn(-TURN, 0)
-      return true
-    case 'ArrowRight':
-      view.turn(TURN, 0)
-      return true
-    case 'ArrowUp':
-      view.turn(0, TURN)
-      return true
-    case 'ArrowDown':
-      view.turn(0, -TURN)
-      return true
-    default:
-      return false
-  }
+  if (target.closest(key === ' ' ? SPACE_TARGETS : ARROW_TARGETS)) return false
+  if (view && shift && key in TURNS) view.turn(...TURNS[key])
+  else if (view && key in ZOOMS) view.zoom(ZOOMS[key])
+  else if (key in CLOCK) CLOCK[key](playback)
+  else return false
+  return true
 }

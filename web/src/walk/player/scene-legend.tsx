@@ -3,20 +3,17 @@
 import { formatExact } from '../../format/number'
 import { lengthInWords } from '../replay/extent'
 import type { Recorded } from '../replay/recorded'
-import type { ViewChoices } from './player-controls'
+import type { SceneOptions } from '../scene/walk-scene'
 
-export function SceneLegend({
-  walks,
-  cell,
-  newtons,
-  choices,
-}: {
+interface SceneLegendProps {
   walks: readonly Recorded[]
-  /** Grid spacing [m]. */
+  /** Grid spacing [m], and the force of an arrow of this length [N]. */
   cell: number
   newtons: number
-  choices: ViewChoices
-}) {
+  options: SceneOptions
+}
+
+export function SceneLegend({ walks, cell, newtons, options }: SceneLegendProps) {
   const { ground, load_kg } = walks[0].replay.header
   return (
     <div class="legend">
@@ -24,27 +21,27 @@ export function SceneLegend({
         <span key={k}>
           <i class={`swatch walk-${k + 1}`} aria-hidden="true" />
           {label}
-          {k > 0 && choices.arrangement === 'ghost' ? ' (ghost)' : ''}
+          {k > 0 && options.arrangement === 'ghost' ? ' (ghost)' : ''}
         </span>
       ))}
       <span>
         <i class="disc" aria-hidden="true" />
         foot on the ground
       </span>
-      {choices.forces && (
-        <span data-force-scale={newtons}>
+      {options.forces && (
+        <span>
           <i class="arrow" aria-hidden="true" />
           ground reaction force, {lengthInWords(cell)} for {formatExact(newtons)}&nbsp;N
         </span>
       )}
-      <span data-grid={cell}>{lengthInWords(cell)} grid</span>
+      <span>{lengthInWords(cell)} grid</span>
       {ground.slope_deg !== 0 && (
-        <span data-slope={ground.slope_deg}>
+        <span>
           {formatExact(Math.abs(ground.slope_deg))}° slope,{' '}
           {ground.slope_deg > 0 ? 'rising' : 'falling'} {towards(ground.slope_direction_deg)}
         </span>
       )}
-      {load_kg > 0 && <span data-load={load_kg}>{formatExact(load_kg)}&nbsp;kg load</span>}
+      {load_kg > 0 && <span>{formatExact(load_kg)}&nbsp;kg load</span>}
     </div>
   )
 }

@@ -2,10 +2,9 @@
 
 import { type Codec, numbersOf } from '../../router/query-value'
 import type { CameraPlace } from '../scene/camera-rig'
-import type { ViewChoices } from './player-controls'
+import type { SceneOptions } from '../scene/walk-scene'
 
-/** The default view. */
-export const DEFAULT_VIEW: ViewChoices = {
+export const DEFAULT_VIEW: SceneOptions = {
   arrangement: 'ghost',
   follow: true,
   forces: true,
@@ -13,8 +12,10 @@ export const DEFAULT_VIEW: ViewChoices = {
   meshes: true,
 }
 
+type Option = keyof SceneOptions
+
 /** Deviations from the default, by word. */
-const WORDS: Readonly<Record<string, Partial<ViewChoices>>> = {
+const WORDS: Readonly<Record<string, Partial<SceneOptions>>> = {
   'side-by-side': { arrangement: 'side-by-side' },
   still: { follow: false },
   'no-forces': { forces: false },
@@ -23,17 +24,16 @@ const WORDS: Readonly<Record<string, Partial<ViewChoices>>> = {
 }
 
 /** `side-by-side,no-trail` */
-export const VIEW: Codec<ViewChoices> = {
+export const VIEW: Codec<SceneOptions> = {
   read: (text) => {
     const words = text.split(',')
     if (!words.every((word) => Object.hasOwn(WORDS, word))) return undefined
     return Object.assign({}, DEFAULT_VIEW, ...words.map((word) => WORDS[word]))
   },
-  write: (choices) => {
-    const differs = (change: Partial<ViewChoices>) =>
-      Object.entries(change).every(([key, value]) => choices[key as keyof ViewChoices] === value)
-    const words = Object.keys(WORDS).filter((word) => differs(WORDS[word]))
-    return words.join(',') || null
+  write: (options) => {
+    const isSet = (word: string) =>
+      Object.entries(WORDS[word]).every(([key, value]) => options[key as Option] === value)
+    return Object.keys(WORDS).filter(isSet).join(',') || null
   },
 }
 

@@ -7,8 +7,7 @@ import { Table } from '../../components/table/table'
 import { useVisible } from '../../components/use-visible'
 import { formatExact, formatNumber, percent, quantity } from '../../format/number'
 import { inWords } from '../../format/words'
-import type { Playback } from '../player/playback'
-import { usePlaybackTime } from '../player/use-playback'
+import { type Playback, usePlayback } from '../player/playback'
 import { stances } from '../replay/contact'
 import type { Recorded } from '../replay/recorded'
 
@@ -25,7 +24,7 @@ interface Row {
 export function GaitChart({ walks, playback }: { walks: readonly Recorded[]; playback: Playback }) {
   const box = useRef<HTMLDivElement>(null)
   const visible = useVisible(box)
-  const time = usePlaybackTime(playback, 60, visible)
+  const { time } = usePlayback(playback, 60, visible)
   const rows = useMemo(() => rowsOf(walks), [walks])
   const end = playback.duration || 1
   const place = (moment: number) => `${(100 * moment) / end}%`

@@ -5,8 +5,7 @@ import { LineCard } from '../../charts/chart-card'
 import type { Series } from '../../charts/lines/line-chart'
 import { useVisible } from '../../components/use-visible'
 import { formatNumber, quantity } from '../../format/number'
-import type { Playback } from '../player/playback'
-import { usePlaybackTime } from '../player/use-playback'
+import { type Playback, usePlayback } from '../player/playback'
 import type { Recorded } from '../replay/recorded'
 import { moments, type PlotSpec, seriesOf } from './plot-specs'
 
@@ -26,7 +25,7 @@ export function PlotCard({
   const series = useMemo(() => seriesOf(spec.curves, walks), [spec, walks])
   const box = useRef<HTMLDivElement>(null)
   const visible = useVisible(box)
-  const time = usePlaybackTime(playback, RENEWED, visible)
+  const { time } = usePlayback(playback, RENEWED, visible)
   const frame = Math.max(...walks.map(({ replay }) => replay.frameAt(time)))
   return (
     <div class="plot" ref={box} data-plot={spec.key}>

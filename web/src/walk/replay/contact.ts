@@ -10,8 +10,7 @@ export function stances(replay: Replay, leg: number): (readonly [from: number, t
   const spans: (readonly [number, number])[] = []
   let from: number | null = null
   for (let frame = 0; frame < replay.frames; frame++) {
-    const force = [0, 1, 2].map((i) => replay.value('foot_force', frame, 3 * leg + i))
-    const stands = Math.hypot(...force) > CONTACT_FORCE
+    const stands = replay.force(frame, leg) > CONTACT_FORCE
     if (stands && from === null) from = replay.time(frame)
     if (!stands && from !== null) {
       spans.push([from, replay.time(frame)])

@@ -1,6 +1,5 @@
 /** Size of the robots in a scene, and scales derived from it. */
 
-import { multiply, rotate } from './pose'
 import type { Replay, Shape } from './replay'
 
 export interface Extent {
@@ -69,11 +68,16 @@ function boxOf(replay: Replay): readonly [number[], number[]] {
     for (const shape of link.shapes) {
       // A load is not part of the robot.
       if (shape.role === 'load') continue
-      const turn = multiply(pose.slice(3), shape.origin.slice(3))
-      const at = rotate(pose.slice(3), shape.origin.slice(0, 3))
+      const turned = (vector: readonly number[]) => rotate(pose.slice(3), vector)
+      const axes = [
+        [1, 0, 0],
+        [0, 1, 0],
+        [0, 0, 1],
+      ].map((axis) => turned(rotate(shape.origin.slice(3), axis)))
+      const half = halfSizes(shape)
       include(
-        at.map((value, i) => value + pose[i]),
-        halfEdges(shape, turn),
+        turned(shape.origin.slice(0, 3)).map((value, i) => value + pose[i]),
+        [0, 1, 2].map((i) => half.reduce((sum, size, n) => sum + size * Math.abs(axes[n][i]), 0)),
       )
     }
   })
@@ -84,18 +88,13 @@ function boxOf(replay: Replay): readonly [number[], number[]] {
   return [low, high]
 }
 
-/** Half the edges of a rotated solid's bounding box [m]. */
-function halfEdges(shape: Shape, turn: readonly number[]): readonly number[] {
-  const axes = [
-    [1, 0, 0],
-    [0, 1, 0],
-    [0, 0, 1],
-  ].map((axis) => rotate(turn, axis))
-  return [0, 1, 2].map((i) =>
-    halfSizes(shape).reduce((sum, half, k) => sum + half * Math.abs(axes[k][i]), 0),
-  )
+/** Rotate a vector by a unit quaternion x y z w. */
+function rotate([x, y, z, w]: readonly number[], [a, b, c]: readonly number[]): number[] {
+  const [p, q, r] = [2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)]
+  return [a + w * p + y * r - z * q, b + w * q + z * p - x * r, c + w * r + x * q - y * p]
 }
 
+/** Half the edges of a solid's bounding box [m]. */
 function halfSizes({ type, size }: Shape): readonly number[] {
   switch (type) {
     case 'box':
@@ -112,23 +111,15 @@ function halfSizes({ type, size }: Shape): readonly number[] {
 /** Length of the largest arrow, as a share of the robot's span. */
 const LONGEST = 0.47
 
-/** Round numbers of newtons per grid cell. */
-const STEPS = [1, 2, 5]
-
 /** Newtons per grid cell, so that forces up to `largest` [N] remain visible. */
 export function newtonsPerCell(largest: number, { cell, span }: Extent): number {
   if (!(largest > 0)) return 10
   const needed = (largest * cell) / (LONGEST * span)
-  let power = 10 ** Math.floor(Math.log10(needed))
-  for (;;) {
-    for (const step of STEPS) if (step * power >= needed) return step * power
-    power *= 10
-  }
+  const power = 10 ** Math.floor(Math.log10(needed))
+  return [1, 2, 5, 10].map((step) => step * power).find((step) => step >= needed)!
 }
 
 /** The 99th percentile of the values [N], which ignores short impacts. */
 export function typicalLargest(norms: Float32Array): number {
-  if (norms.length === 0) return 0
-  const sorted = Float32Array.from(norms).sort()
-  return sorted[Math.min(sorted.length - 1, Math.floor(sorted.length * 0.99))]
+  return norms.slice().sort()[Math.floor(norms.length * 0.99)] ?? 0
 }

@@ -20,10 +20,6 @@ export const RATES = [50, 100, 500] as const
 
 export const DEFAULT_RATE = 100
 
-export function replaysOf(walks: readonly Recorded[]): Replay[] {
-  return walks.map(({ replay }) => replay)
-}
-
 /** Simulate a design in a scenario, given by preset name or in full. */
 export async function recordWalk(
   { label, robot, controller, design, world = {} }: WalkingDesign,

@@ -126,6 +126,37 @@ export class Replay {
     return column
   }
 
+  /** Size of a foot's force in a frame [N]. */
+  force(frame: number, leg: number): number {
+    return Math.hypot(...[0, 1, 2].map((i) => this.value('foot_force', frame, 3 * leg + i)))
+  }
+
+  /** Sizes of all forces of the feet in all frames [N]. */
+  forces(): Float32Array {
+    const legs = this.header.robot.legs.length
+    return Float32Array.from({ length: legs * this.frames }, (_, k) =>
+      this.force(Math.floor(k / legs), k % legs),
+    )
+  }
+
+  /** Values of a channel at a time [s], linear between frames, clamped to the walk. */
+  sample(name: string, time: number, out: Float32Array): void {
+    const { a, b, share } = this.around(name, time)
+    for (let i = 0; i < out.length; i++) {
+      out[i] = this.values[a + i] * (1 - share) + this.values[b + i] * share
+    }
+  }
+
+  /** Offsets of a channel in the frames around a time [s], and its position between them, 0 to 1. */
+  around(name: string, time: number): { a: number; b: number; share: number } {
+    const frame = this.frameAt(time)
+    const next = Math.min(frame + 1, this.frames - 1)
+    const [from, to] = [this.time(frame), this.time(next)]
+    const share = to > from ? Math.min(1, Math.max(0, (time - from) / (to - from))) : 0
+    const offset = this.channels.get(name)?.offset ?? 0
+    return { a: frame * this.stride + offset, b: next * this.stride + offset, share }
+  }
+
   /** The last frame at or before a time [s]. */
   frameAt(time: number): number {
     let low = 0
@@ -144,66 +175,51 @@ export function hasMeshes({ robot }: ReplayHeader): boolean {
   return robot.urdf !== null && robot.links.some(({ meshes }) => meshes.length > 0)
 }
 
-/** Numbers of a channel per frame. */
-function sizeOf(channel: Channel): number {
-  return channel.shape.reduce((product, n) => product * n, 1)
-}
-
 /** Decode a replay. Throws ReplayFormatError. */
 export function parseReplay(bytes: ArrayBuffer): Replay {
-  if (bytes.byteLength < 4) throw new ReplayFormatError('the replay is empty; try again')
-  const length = new DataView(bytes).getUint32(0, true)
-  const start = 4 + length
-  if (start > bytes.byteLength) {
-    throw new ReplayFormatError('the replay is truncated; try again')
+  const check = (valid: boolean, message: string) => {
+    if (!valid) throw new ReplayFormatError(message)
   }
-  const header = parseHeader(new TextDecoder().decode(new Uint8Array(bytes, 4, length)))
+  check(bytes.byteLength >= 4, 'the replay is empty; try again')
+  const start = 4 + new DataView(bytes).getUint32(0, true)
+  check(start <= bytes.byteLength, 'the replay is truncated; try again')
+  const header = parseHeader(new TextDecoder().decode(new Uint8Array(bytes, 4, start - 4)))
+  check(
+    header.version === REPLAY_VERSION,
+    `the replay has version ${header.version}, expected ${REPLAY_VERSION}; reload the page`,
+  )
   const expected = header.frames * widthOf(header.channels) * 4
   const actual = bytes.byteLength - start
-  if (actual !== expected) {
-    throw new ReplayFormatError(
-      `the replay has ${actual} bytes of frames instead of ${expected}; try again`,
-    )
-  }
-  checkChannels(header)
-  return new Replay(header, littleEndian(bytes, start))
+  check(
+    actual === expected,
+    `the replay has ${actual} bytes of frames instead of ${expected}; try again`,
+  )
+  const sizes = new Map(header.channels.map((channel) => [channel.name, sizeOf(channel)]))
+  for (const name of REQUIRED) check(sizes.has(name), `the replay has no channel ${name}`)
+  check(
+    sizes.get('link_pose') === header.robot.links.length * 7,
+    'the replay does not have one pose per link',
+  )
+  // Floats must be aligned; their byte order is that of every browser.
+  return new Replay(
+    header,
+    start % 4 === 0 ? new Float32Array(bytes, start) : new Float32Array(bytes.slice(start)),
+  )
 }
 
 function parseHeader(text: string): ReplayHeader {
-  let header: ReplayHeader
   try {
-    header = JSON.parse(text) as ReplayHeader
+    return JSON.parse(text)
   } catch {
     throw new ReplayFormatError('the header of the replay is not JSON; try again')
   }
-  if (header.version !== REPLAY_VERSION) {
-    throw new ReplayFormatError(
-      `the replay has version ${header.version}, expected ${REPLAY_VERSION}; reload the page`,
-    )
-  }
-  return header
 }
 
-function checkChannels(header: ReplayHeader): void {
-  const sizes = new Map(header.channels.map((channel) => [channel.name, sizeOf(channel)]))
-  for (const name of REQUIRED) {
-    if (!sizes.has(name)) throw new ReplayFormatError(`the replay has no channel ${name}`)
-  }
-  if (sizes.get('link_pose') !== header.robot.links.length * 7) {
-    throw new ReplayFormatError('the replay does not have one pose per link')
-  }
+/** Numbers of a channel per frame. */
+function sizeOf({ shape }: Channel): number {
+  return shape.reduce((product, n) => product * n, 1)
 }
 
 function widthOf(channels: readonly Channel[]): number {
-  return channels.reduce((end, channel) => Math.max(end, channel.offset + sizeOf(channel)), 0)
-}
-
-/** Little-endian values from an offset; copied if alignment or byte order requires it. */
-function littleEndian(bytes: ArrayBuffer, start: number): Float32Array {
-  const native = new Uint8Array(new Uint16Array([1]).buffer)[0] === 1
-  if (native) {
-    return start % 4 === 0 ? new Float32Array(bytes, start) : new Float32Array(bytes.slice(start))
-  }
-  const view = new DataView(bytes, start)
-  return Float32Array.from({ length: view.byteLength / 4 }, (_, k) => view.getFloat32(4 * k, true))
+  return Math.max(0, ...channels.map((channel) => channel.offset + sizeOf(channel)))
 }

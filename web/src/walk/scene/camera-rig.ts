@@ -1,6 +1,6 @@
 /** Orbiting camera that can follow the robot. */
 
-import { PerspectiveCamera, Spherical, Vector3 } from 'three'
+import { PerspectiveCamera, Vector3 } from 'three'
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js'
 
 /** View directions, x forward, y left, z up; relative to the distance. */
@@ -33,7 +33,7 @@ export class CameraRig {
   private following = true
   /** Half the visible height [m]. */
   reach = 1
-  private readonly controls: OrbitControls
+  readonly controls: OrbitControls
   private readonly target = new Vector3()
   private readonly step = new Vector3()
   private aspect = 1
@@ -107,26 +107,14 @@ export class CameraRig {
 
   /** Rotate about the target [rad]. */
   turn(around: number, up: number): void {
-    const offset = this.camera.position.clone().sub(this.controls.target)
-    // Spherical has y up, the scene z.
-    const angles = new Spherical().setFromVector3(new Vector3(offset.x, offset.z, -offset.y))
-    angles.theta += around
-    angles.phi = Math.min(0.56 * Math.PI, Math.max(0.02, angles.phi - up))
-    const turned = new Vector3().setFromSpherical(angles)
-    this.camera.position.copy(this.controls.target).add(new Vector3(turned.x, -turned.z, turned.y))
-    this.controls.update()
+    this.controls.rotateLeft(-around)
+    this.controls.rotateUp(up)
     this.onPlaced(this.place)
   }
 
   /** Zoom in by a factor. */
   zoom(factor: number): void {
-    const offset = this.camera.position.clone().sub(this.controls.target)
-    const length = Math.min(
-      FURTHEST * this.span,
-      Math.max(NEAREST * this.span, offset.length() / factor),
-    )
-    this.camera.position.copy(this.controls.target).add(offset.setLength(length))
-    this.controls.update()
+    this.controls.dollyIn(1 / factor)
     this.onPlaced(this.place)
   }
 
@@ -134,9 +122,5 @@ export class CameraRig {
     this.aspect = width / height
     this.camera.aspect = this.aspect
     this.camera.updateProjectionMatrix()
-  }
-
-  dispose(): void {
-    this.controls.dispose()
   }
 }

@@ -11,7 +11,6 @@ import {
   Vector3,
 } from 'three'
 import { CONTACT_FORCE } from '../replay/contact'
-import { sampleChannel } from '../replay/pose'
 import type { Replay } from '../replay/replay'
 import type { Palette } from './palette'
 
@@ -32,7 +31,7 @@ export class FootMarks {
   // Drawn through the leg, along which most forces point.
   private readonly arrowMaterial = new MeshBasicMaterial({ depthTest: false, transparent: true })
   private readonly force = new Vector3()
-  private withForces = true
+  withForces = true
 
   constructor(
     private readonly replay: Replay,
@@ -57,8 +56,8 @@ export class FootMarks {
 
   /** Show the feet at a time [s]. */
   show(time: number): void {
-    sampleChannel(this.replay, 'foot_position', time, this.positions)
-    sampleChannel(this.replay, 'foot_force', time, this.forces)
+    this.replay.sample('foot_position', time, this.positions)
+    this.replay.sample('foot_force', time, this.forces)
     this.discs.forEach((disc, leg) => {
       const [x, y] = this.positions.subarray(3 * leg, 3 * leg + 2)
       this.force.fromArray(this.forces, 3 * leg)
@@ -68,10 +67,6 @@ export class FootMarks {
       this.arrows[leg].point(x, y, this.height, this.force, size * this.scale)
       this.arrows[leg].object.visible = disc.visible && this.withForces
     })
-  }
-
-  setForces(shown: boolean): void {
-    this.withForces = shown
   }
 
   recolour(colours: Palette, accent: Palette['force']): void {
@@ -87,7 +82,6 @@ class Arrow {
   private readonly head: Mesh
   private readonly turn = new Quaternion()
   private readonly direction = new Vector3()
-
   private readonly headLength: number
 
   constructor(material: MeshBasicMaterial, span: number) {

@@ -15,7 +15,7 @@ import { OBJLoader } from 'three/examples/jsm/loaders/OBJLoader.js'
 import { STLLoader } from 'three/examples/jsm/loaders/STLLoader.js'
 import { get } from '../../api/client'
 import type { LinkMesh, ReplayHeader } from '../replay/replay'
-import { disposeTree } from './dispose'
+import { disposeTree } from './renderer'
 
 export interface LoadedMesh {
   /** Index of its link. */
@@ -105,10 +105,9 @@ function text(bytes: ArrayBuffer): string {
 
 /** Apply the URDF's origin, scale and colour. */
 function placed(object: Object3D, { origin, scale, colour }: LinkMesh): Object3D {
-  const [x, y, z, qx, qy, qz, qw] = origin
-  object.position.set(x, y, z)
-  object.quaternion.set(qx, qy, qz, qw)
-  object.scale.set(scale[0], scale[1], scale[2])
+  object.position.fromArray(origin)
+  object.quaternion.fromArray(origin, 3)
+  object.scale.fromArray(scale)
   object.traverse((part) => {
     if (!(part instanceof Mesh)) return
     part.castShadow = true

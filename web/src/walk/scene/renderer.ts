@@ -1,6 +1,6 @@
-/** WebGL renderer with reduced quality on software rendering. */
+/** WebGL renderer, with reduced quality on software rendering, and release of its memory. */
 
-import { PCFShadowMap, WebGLRenderer } from 'three'
+import { type Material, type Object3D, PCFShadowMap, Texture, WebGLRenderer } from 'three'
 
 /** Names of software renderers. */
 const SOFTWARE = /swiftshader|llvmpipe|software|basic render/i
@@ -23,4 +23,27 @@ function isSoftware(): boolean {
   const name = info ? context.getParameter(info.UNMASKED_RENDERER_WEBGL) : ''
   context.getExtension('WEBGL_lose_context')?.loseContext()
   return SOFTWARE.test(String(name))
+}
+
+/** Dispose of geometries, materials and textures of an object and its descendants. */
+export function disposeTree(root: Object3D): void {
+  root.traverse((object) => {
+    const { geometry, material = [] } = object as {
+      geometry?: { dispose(): void }
+      material?: Material | Material[]
+    }
+    geometry?.dispose()
+    for (const each of [material].flat()) {
+      for (const value of Object.values(each)) if (value instanceof Texture) value.dispose()
+      each.dispose()
+    }
+  })
+}
+
+/** Dispose of a scene with its renderer and canvas. */
+export function disposeScene(scene: Object3D, renderer: WebGLRenderer): void {
+  disposeTree(scene)
+  renderer.dispose()
+  renderer.forceContextLoss()
+  renderer.domElement.remove()
 }

@@ -10,10 +10,11 @@ import {
   Mesh,
   MeshStandardMaterial,
   type Object3D,
+  Quaternion,
   SphereGeometry,
+  Vector3,
 } from 'three'
 import { RoundedBoxGeometry } from 'three/examples/jsm/geometries/RoundedBoxGeometry.js'
-import { POSE, samplePoses } from '../replay/pose'
 import type { Replay, Role, Shape } from '../replay/replay'
 import type { FigurePalette, Palette } from './palette'
 
@@ -29,6 +30,9 @@ const PARTS: Readonly<Record<Role, Part>> = {
   load: 'load',
 }
 
+/** Numbers per pose: x y z [m] and a unit quaternion x y z w. */
+const POSE = 7
+
 /** Opacity of the ghost walk. */
 const GHOST = 0.38
 
@@ -42,7 +46,8 @@ export class RobotFigure {
     joint: new MeshStandardMaterial({ roughness: 0.7, metalness: 0.1 }),
     load: new MeshStandardMaterial({ roughness: 0.8 }),
   }
-  private readonly poses: Float32Array
+  private readonly place = new Vector3()
+  private readonly turn = new Quaternion()
   /** By link: its simplified shapes except loads, and the meshes that replace them. */
   private readonly solids: Object3D[][] = []
   private readonly meshes: Object3D[][] = []
@@ -50,7 +55,6 @@ export class RobotFigure {
 
   constructor(private readonly replay: Replay) {
     const { links } = replay.header.robot
-    this.poses = new Float32Array(links.length * POSE)
     for (const { shapes } of links) {
       const group = new Group()
       const solids: Object3D[] = []
@@ -68,17 +72,19 @@ export class RobotFigure {
 
   /** Move the links to a time [s]. */
   show(time: number): void {
-    samplePoses(this.replay, time, this.poses)
-    this.links.forEach((link, k) => {
-      const [x, y, z, qx, qy, qz, qw] = this.poses.subarray(k * POSE, (k + 1) * POSE)
-      link.position.set(x, y, z)
-      link.quaternion.set(qx, qy, qz, qw)
+    const { values } = this.replay
+    const { a, b, share } = this.replay.around('link_pose', time)
+    this.links.forEach(({ position, quaternion }, k) => {
+      const at = k * POSE
+      position.fromArray(values, a + at).lerp(this.place.fromArray(values, b + at), share)
+      quaternion.fromArray(values, a + at + 3)
+      quaternion.slerp(this.turn.fromArray(values, b + at + 3), share)
     })
   }
 
   /** Position of the body in the world [m]. */
-  get body(): readonly [number, number, number] {
-    return [this.poses[0], this.poses[1], this.poses[2]]
+  get body(): Vector3 {
+    return this.links[0].position
   }
 
   recolour(palette: Palette, colours: FigurePalette): void {
@@ -123,10 +129,9 @@ export class RobotFigure {
   }
 
   private addShape(link: Group, shape: Shape): void {
-    const [x, y, z, qx, qy, qz, qw] = shape.origin
     const solid = this.mesh(solidOf(shape), PARTS[shape.role])
-    solid.position.set(x, y, z)
-    solid.quaternion.set(qx, qy, qz, qw)
+    solid.position.fromArray(shape.origin)
+    solid.quaternion.fromArray(shape.origin, 3)
     link.add(solid)
     if (shape.type === 'box' && shape.role === 'body') this.markFront(solid, shape.size)
     if (shape.type === 'capsule') {

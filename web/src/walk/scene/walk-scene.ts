@@ -1,9 +1,13 @@
 /** Scene with one or two walks. */
 
 import {
+  BufferAttribute,
+  BufferGeometry,
   DirectionalLight,
   Group,
   HemisphereLight,
+  Line,
+  LineBasicMaterial,
   Quaternion,
   Scene,
   Vector3,
@@ -12,14 +16,12 @@ import {
 import type { Extent } from '../replay/extent'
 import { hasMeshes, type Replay } from '../replay/replay'
 import { type CameraPlace, CameraRig, type ViewName } from './camera-rig'
-import { disposeTree } from './dispose'
 import { FootMarks } from './foot-marks'
 import { Ground } from './ground'
 import { palette } from './palette'
-import { createRenderer } from './renderer'
+import { createRenderer, disposeScene } from './renderer'
 import { RobotFigure } from './robot-figure'
 import { type SlopeMark, slopeCorner, slopeMark } from './slope-mark'
-import { Trail } from './trail'
 
 type Arrangement = 'ghost' | 'side-by-side'
 
@@ -63,7 +65,7 @@ interface Lane {
   readonly group: Group
   readonly figure: RobotFigure
   readonly feet: FootMarks
-  readonly trail: Trail
+  readonly trail: Line<BufferGeometry, LineBasicMaterial>
 }
 
 export class WalkScene {
@@ -134,19 +136,14 @@ export class WalkScene {
     return this.renderer.domElement
   }
 
-  /** Geometries in GPU memory; must not grow during playback. */
-  get geometries(): number {
-    return this.renderer.info.memory.geometries
-  }
-
   /** Show a time [s]; a finished walk stays at its end. */
   show(time: number): void {
     this.centre.set(0, 0, 0)
-    for (const { figure, feet, trail, group } of this.lanes) {
+    for (const { replay, figure, feet, trail, group } of this.lanes) {
       figure.show(time)
       feet.show(time)
-      trail.show(time)
-      const [x, y] = figure.body
+      trail.geometry.setDrawRange(0, replay.frameAt(time) + 1)
+      const { x, y } = figure.body
       this.centre.x += x / this.lanes.length
       this.centre.y += (y + group.position.y) / this.lanes.length
     }
@@ -166,8 +163,8 @@ export class WalkScene {
       group.position.y = sideBySide ? (k - 0.5) * this.spacing : 0
       figure.setGhost(k > 0 && !sideBySide)
       figure.showMeshes(options.meshes)
-      feet.setForces(options.forces && (sideBySide || k === 0))
-      trail.object.visible = options.trail
+      feet.withForces = options.forces && (sideBySide || k === 0)
+      trail.visible = options.trail
     })
     const { ground } = this.lanes[0].replay.header
     const room = SLOPE * this.extent.width + (sideBySide ? this.spacing / 2 : 0)
@@ -207,7 +204,7 @@ export class WalkScene {
       const walkColours = colours.walks[k]
       figure.recolour(colours, walkColours)
       feet.recolour(colours, walkColours.accent)
-      trail.recolour(walkColours.accent)
+      trail.material.color.copy(walkColours.accent)
     })
   }
 
@@ -262,13 +259,10 @@ export class WalkScene {
 
   /** Release all resources; the scene cannot be used afterwards. */
   dispose(): void {
-    this.rig.dispose()
-    disposeTree(this.scene)
+    this.rig.controls.dispose()
     this.sun.dispose()
     this.sky.dispose()
-    this.renderer.dispose()
-    this.renderer.forceContextLoss()
-    this.canvas.remove()
+    disposeScene(this.scene, this.renderer)
   }
 
   private fit(): void {
@@ -301,7 +295,21 @@ export class WalkScene {
 function laneOf(replay: Replay, feet: FootMarks): Lane {
   const group = new Group()
   const figure = new RobotFigure(replay)
-  const trail = new Trail(replay)
-  group.add(figure.object, feet.object, trail.object)
+  const trail = trailOf(replay)
+  group.add(figure.object, feet.object, trail)
   return { replay, group, figure, feet, trail }
+}
+
+/** Path of the body. */
+function trailOf(replay: Replay): Lane['trail'] {
+  const points = [0, 1, 2].map((i) => replay.column('link_pose', i))
+  const places = Float32Array.from(
+    { length: 3 * replay.frames },
+    (_, k) => points[k % 3][(k / 3) | 0],
+  )
+  const geometry = new BufferGeometry().setAttribute('position', new BufferAttribute(places, 3))
+  const trail = new Line(geometry, new LineBasicMaterial())
+  // The drawn range changes, and so would the bounds.
+  trail.frustumCulled = false
+  return trail
 }

@@ -30,6 +30,12 @@ describe('a replay', () => {
     expect(replay.frameAt(time)).toBe(frame)
   })
 
+  test('interpolates forces between frames', () => {
+    const force = new Float32Array(3)
+    replay.sample('foot_force', 0.35, force)
+    expect(force[2]).toBeCloseTo(35)
+  })
+
   test('is decoded at any alignment', () => {
     const odd = encoded(header(2, { explanation: 'odd' }), frames(2), false)
     const other = encoded(header(2, { explanation: 'odd!' }), frames(2), false)

@@ -3,18 +3,21 @@
 import { useState } from 'preact/hooks'
 import { post } from '../api/client'
 import { useResource } from '../api/resource'
-import { ErrorNotice, Loading } from '../components/feedback'
+import type { Variable } from '../api/types'
+import { Card, Loaded } from '../components/card'
+import { Table } from '../components/table/table'
 import { Tabs } from '../components/tabs'
-import { formatExact, quantity } from '../format/number'
+import { formatExact, quantity, writtenUnit } from '../format/number'
+import { formatExactValue } from '../format/value'
+import { inWords } from '../format/words'
 import { setQuery } from '../router/navigation'
+import { ofLegGroups, variablesOf } from '../submission/draft/catalogue'
 import { DesignHeading, DesignLinks, DesignPage } from '../walk/design/design-page'
 import { DesignPicker } from '../walk/design/design-picker'
 import { type DesignSource, queryOf, sourceOf, wordOf } from '../walk/design/design-source'
 import { type ResolvedDesign, resolveDesign } from '../walk/design/resolve-design'
 import './controller.css'
-import { DesignCard } from './design-card'
 import { FuzzyPanel } from './fuzzy-panel'
-import { isLinear, LinearCard } from './linear-card'
 import { inputOf, type SurfaceView } from './surface'
 
 /** Points of the grid; odd, so that it includes zero error. */
@@ -30,37 +33,32 @@ export default function ControllerPage() {
 
 function Controller({ source, query }: { source: DesignSource; query: URLSearchParams }) {
   const resolved = useResource(wordOf(source), (signal) => resolveDesign(source, signal))
-  const design = resolved.data
+  const { data } = resolved
   const velocity = Number(query.get('velocity') ?? 0)
   return (
     <div class="stack">
-      <DesignHeading title="Controller" path="/controller" design={design} />
+      <DesignHeading title="Controller" path="/controller" design={data} />
       <div class="card walk-choice">
         <DesignPicker
           label="Design"
-          chosen={design?.source ?? source}
-          chosenLabel={design?.label ?? 'This design'}
+          chosen={data?.source ?? source}
+          chosenLabel={data?.label ?? 'This design'}
           onChoose={(chosen) => setQuery({ ...queryOf(chosen!), velocity: null })}
         />
-        <DesignLinks
-          source={design?.source ?? source}
-          path={design && '/walk'}
-          label="Simulate it"
-        />
+        <DesignLinks source={data?.source ?? source} path={data && '/walk'} label="Simulate it" />
       </div>
-      {resolved.error && (
-        <ErrorNotice
-          what="Could not load the controller."
-          error={resolved.error}
-          retry={resolved.reload}
-        />
-      )}
-      {resolved.loading && !design && <Loading what="the design" />}
-      {design && isLinear(design) && <LinearCard design={design} />}
-      {design && !isLinear(design) && (
-        <Fuzzy design={design} velocity={Number.isFinite(velocity) ? velocity : 0} />
-      )}
-      {design && <DesignCard design={design} />}
+      <Loaded resource={resolved} what="the design" failed="Could not load the controller.">
+        {(design) => (
+          <>
+            {isLinear(design) ? (
+              <ControlLaw design={design} />
+            ) : (
+              <Fuzzy design={design} velocity={Number.isFinite(velocity) ? velocity : 0} />
+            )}
+            <DesignCard design={design} />
+          </>
+        )}
+      </Loaded>
     </div>
   )
 }
@@ -74,17 +72,15 @@ function Fuzzy({ design, velocity }: { design: ResolvedDesign; velocity: number 
       signal,
     }),
   )
-  if (surface.error) {
-    return (
-      <ErrorNotice
-        what="Could not compute the fuzzy surface."
-        error={surface.error}
-        retry={surface.reload}
-      />
-    )
-  }
-  if (!surface.data) return <Loading what="the fuzzy surface" />
-  return <Outputs surface={surface.data} />
+  return (
+    <Loaded
+      resource={surface}
+      what="the fuzzy surface"
+      failed="Could not compute the fuzzy surface."
+    >
+      {(data) => <Outputs surface={data} />}
+    </Loaded>
+  )
 }
 
 function Outputs({ surface }: { surface: SurfaceView }) {
@@ -128,7 +124,9 @@ function VelocityChoice({ surface, velocity }: { surface: SurfaceView; velocity:
           step={(range[1] - range[0]) / (values.length - 1)}
           value={velocity}
           aria-valuetext={quantity(velocity, unit)}
-          onChange={(event) => setQuery({ velocity: formatted(event.currentTarget.value) })}
+          onChange={({ currentTarget: { value } }) =>
+            setQuery({ velocity: Number(value) === 0 ? null : String(Number(value)) })
+          }
         />
         <output for="velocity">{quantity(velocity, unit)}</output>
       </div>
@@ -139,7 +137,75 @@ function VelocityChoice({ surface, velocity }: { surface: SurfaceView; velocity:
   )
 }
 
-/** Query value; null for zero. */
-function formatted(value: string): string | null {
-  return Number(value) === 0 ? null : String(Number(value))
+/** Terms of a linear control law, and their meanings, by gain. */
+const TERMS: Readonly<Record<string, readonly [term: string, meaning: string]>> = {
+  P: ['error', 'responds immediately, in proportion to the angle error'],
+  I: ['∫ error dt', 'grows as long as an error persists, and thus removes it'],
+  D: ['d error / dt', 'responds to the rate of change of the error, and thus damps'],
+}
+
+/** Whether a controller has only gains, and hence no fuzzy surface. */
+function isLinear({ controller }: ResolvedDesign): boolean {
+  return controller.variables.every(({ name }) => name in TERMS)
+}
+
+function ControlLaw({ design: { controller, design } }: { design: ResolvedDesign }) {
+  const gains = Object.keys(TERMS).filter((gain) => gain in design)
+  return (
+    <Card
+      title="Control law"
+      note="This controller is linear: it has no rules, hence no fuzzy surface and no table. Its output does not depend on the motor current."
+      data={{ 'data-linear': controller.name }}
+    >
+      <p class="law">
+        PWM ={' '}
+        {gains.map((gain, k) => (
+          <span key={gain}>
+            {k > 0 && ' + '}
+            <b>{formatExactValue(design[gain])}</b> · {TERMS[gain][0]}
+          </span>
+        ))}
+      </p>
+      <ul>
+        {gains.map((gain) => (
+          <li key={gain}>
+            <b>{gain}</b> = {formatExactValue(design[gain])}{' '}
+            <span class="unit">{controller.variables.find(({ name }) => name === gain)?.unit}</span>
+            : {TERMS[gain][1]}.
+          </li>
+        ))}
+      </ul>
+      <p class="muted">
+        To see a surface, choose a fuzzy design above, for example{' '}
+        <a href="/controller?controller=fuzzy-pi&published=A">the published optimum A</a>.
+      </p>
+    </Card>
+  )
+}
+
+/** The design's values with their meanings and search bounds. */
+function DesignCard({ design: { controller, design } }: { design: ResolvedDesign }) {
+  const common = variablesOf(controller)
+  const variables = [...common, ...ofLegGroups(common, Object.keys(design))]
+  return (
+    <Card title="Design" note={controller.description}>
+      <Table<Variable>
+        caption="Design values"
+        columns={[
+          { key: 'variable', header: true, value: ({ name }) => name },
+          { key: 'value', numeric: true, cell: ({ name }) => formatExactValue(design[name]) },
+          { key: 'unit', cell: ({ unit }) => (unit === '1' ? '' : writtenUnit(unit)) },
+          { key: 'search bounds', numeric: true, minor: true, cell: searched },
+          { key: 'meaning', cell: ({ description }) => description },
+        ]}
+        rows={variables.filter(({ name }) => name in design)}
+      />
+    </Card>
+  )
+}
+
+/** Bounds, or choices. */
+function searched({ low, high, choices = [] }: Variable): string {
+  if (choices.length > 0) return choices.map(inWords).join(', ')
+  return `${formatExact(low)} to ${formatExact(high)}`
 }

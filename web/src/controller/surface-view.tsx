@@ -2,9 +2,9 @@
 
 import { useEffect, useRef, useState } from 'preact/hooks'
 import { messageOf } from '../api/problem'
+import { describeCanvas } from '../charts/canvas'
 import { ChartCard } from '../charts/chart-card'
 import { Segmented } from '../components/fields/segmented'
-import { describeCanvas } from '../export/canvas-source'
 import { quantity, withUnit } from '../format/number'
 import { oneOf, useQueryValue } from '../router/query-value'
 import { useTheme } from '../theme'

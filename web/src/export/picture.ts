@@ -1,13 +1,12 @@
 /** A card as an SVG picture: text, bars and legends in their positions, charts as vectors. */
 
+import { sourceOf } from '../charts/canvas'
 import { themeColour } from '../theme'
-import { sourceOf } from './canvas-source'
-import { SvgContext } from './svg-context'
-import { type Attributes, element, escaped, paint } from './svg-text'
+import { element, escaped, paint, SvgContext } from './svg'
 
-export interface Picture {
+/** An SVG and its size [CSS px]. */
+interface Picture {
   readonly svg: string
-  /** [CSS px] */
   readonly width: number
   readonly height: number
 }
@@ -15,6 +14,11 @@ export interface Picture {
 /** Excluded: controls except column headers, text for screen readers only, pointer readouts. */
 const LEFT_OUT =
   '[data-not-drawn], .visually-hidden, button:not(th > button), select, input, details, .readout, .u-select, [class*="u-cursor"]'
+
+/** Style properties of copied drawings. */
+const COPIED = 'fill fill-opacity stroke stroke-width stroke-dasharray vector-effect opacity'.split(
+  ' ',
+)
 
 const ROOM = 12
 
@@ -127,7 +131,7 @@ class Writer {
     const { fontBoundingBoxAscent: up, fontBoundingBoxDescent: down } = this.ruler.measureText('x')
     for (const { text, box } of linesOf(node)) {
       const { x, y, height } = this.boxOf(box)
-      const attributes: Attributes = {
+      const attributes = {
         x,
         y: y + (height * up) / (up + down),
         'font-family': style.fontFamily,
@@ -141,37 +145,26 @@ class Writer {
 
   private canvas(canvas: HTMLCanvasElement, box: Box): void {
     const { draw, refresh } = sourceOf(canvas)
-    if (draw) {
-      const context = new SvgContext(box, this.ruler)
-      draw(context as unknown as CanvasRenderingContext2D)
-      const transform = `translate(${box.x} ${box.y})`
-      this.parts.push(element('g', { transform }, context.parts.join('\n')))
+    if (!draw) {
+      refresh?.()
+      const href = canvas.toDataURL('image/png')
+      this.parts.push(element('image', { ...box, href, preserveAspectRatio: 'none' }))
       return
     }
-    refresh?.()
-    const href = canvas.toDataURL('image/png')
-    this.parts.push(element('image', { ...box, href, preserveAspectRatio: 'none' }))
+    const context = new SvgContext(this.ruler)
+    draw(context as unknown as CanvasRenderingContext2D)
+    const transform = `translate(${box.x} ${box.y})`
+    this.parts.push(element('g', { transform }, context.parts.join('\n')))
   }
 
   /** Copy an SVG of the page with the colours of its style sheets. */
   private drawing(node: SVGSVGElement, box: Box): void {
     const copy = node.cloneNode(true) as SVGSVGElement
-    const [all, copies] = [node.querySelectorAll('*'), copy.querySelectorAll('*')]
-    for (const [k, each] of [...all].entries()) {
-      const style = getComputedStyle(each)
-      const target = copies[k]
-      target.removeAttribute('style')
-      for (const name of [
-        'fill',
-        'fill-opacity',
-        'stroke',
-        'stroke-width',
-        'stroke-dasharray',
-        'vector-effect',
-        'opacity',
-      ]) {
-        target.setAttribute(name, style.getPropertyValue(name))
-      }
+    const copies = copy.querySelectorAll('*')
+    for (const [k, part] of node.querySelectorAll('*').entries()) {
+      const style = getComputedStyle(part)
+      copies[k].removeAttribute('style')
+      for (const name of COPIED) copies[k].setAttribute(name, style.getPropertyValue(name))
     }
     for (const [name, value] of Object.entries(box)) copy.setAttribute(name, String(value))
     for (const name of ['class', 'role', 'aria-label']) copy.removeAttribute(name)

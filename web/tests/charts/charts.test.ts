@@ -1,15 +1,13 @@
 import { describe, expect, test } from 'vitest'
-import { linearTicks, logRange, logTicks } from '../../src/charts/log-axis'
 import {
   bestRows,
   buildModel,
   FAILED,
   marksOf,
-  placeOf,
   selectRows,
   stretchOf,
-  valueAt,
 } from '../../src/charts/parallel/parallel-model'
+import { linearTicks, logRange, logTicks, shareOf, valueAt } from '../../src/charts/scale'
 import { decodeParticles } from '../../src/job/designs/particles'
 import { grouped } from '../../src/job/overview/model'
 
@@ -75,8 +73,8 @@ describe('parallel coordinates', () => {
     expect(model.axes[1].places[2]).toBeNaN()
   })
 
-  test('valueAt inverts placeOf', () => {
-    expect(valueAt(model.axes[1], placeOf(model.axes[1], 2))).toBeCloseTo(2, 12)
+  test('valueAt inverts shareOf', () => {
+    expect(valueAt(model.axes[1], shareOf(model.axes[1], 2))).toBeCloseTo(2, 12)
   })
 
   test('label an axis with its bounds or its choices', () => {

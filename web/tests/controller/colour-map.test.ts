@@ -43,5 +43,5 @@ describe.each(['light', 'dark'] as const)('in %s colours', (theme) => {
 })
 
 test('the legend spans the whole range', () => {
-  expect(gradient('light')).toMatch(/^linear-gradient\(to right, rgb\(14, 73, 140\) 0%/)
+  expect(gradient('light')).toMatch(/^linear-gradient\(to right, #0e498c, .*, #ad4904\)$/)
 })

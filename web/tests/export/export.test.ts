@@ -1,7 +1,6 @@
 import { describe, expect, test } from 'vitest'
 import { csvOf, fileStem } from '../../src/export/csv'
-import { SvgContext } from '../../src/export/svg-context'
-import { element, paint } from '../../src/export/svg-text'
+import { element, paint, SvgContext } from '../../src/export/svg'
 import { decodeParticles, particlesTable } from '../../src/job/designs/particles'
 
 describe('comma-separated values', () => {
@@ -45,7 +44,7 @@ describe('an SVG drawing', () => {
   }
 
   test('has transformed lines and rectangles', () => {
-    const context = new SvgContext({ width: 10, height: 10 }, ruler)
+    const context = new SvgContext(ruler)
     context.save()
     context.translate(5, 0)
     context.scale(2, 2)
@@ -65,7 +64,7 @@ describe('an SVG drawing', () => {
   })
 
   test('has escaped text', () => {
-    const context = new SvgContext({ width: 10, height: 10 }, ruler)
+    const context = new SvgContext(ruler)
     context.font = '600 12px serif'
     context.fillText('a < b & c', 1, 1)
     expect(context.parts[0]).toContain('font-weight="600"')

@@ -3,11 +3,11 @@
 import { useEffect, useRef } from 'preact/hooks'
 import uPlot from 'uplot'
 import 'uplot/dist/uPlot.min.css'
-import { describeCanvas } from '../../export/canvas-source'
 import { formatExact, formatNumber, withUnit } from '../../format/number'
 import { RANGE, useQueryValue } from '../../router/query-value'
 import { themeColour, useTheme } from '../../theme'
-import { logRange, logTicks } from '../log-axis'
+import { chartFont, describeCanvas, remPixels, useWidth, withAlpha } from '../canvas'
+import { logRange, logTicks } from '../scale'
 import { drawLines, drawMarker } from './line-drawing'
 
 export interface Series {
@@ -84,15 +84,15 @@ export function LineChart(props: LineChartProps) {
     writeZoom(range)
   }
   const theme = useTheme()
-  const height = remPixels((props.height ?? 260) / 14)
+  const height = Math.round(((props.height ?? 260) / 14) * remPixels())
+  const width = Math.max(120, useWidth(box))
 
   useEffect(() => {
-    const parent = box.current!
-    const width = Math.max(120, parent.clientWidth)
+    const size = { width: Math.max(120, box.current!.clientWidth), height }
     const drawn = new uPlot(
-      { ...options(latest, zoom, onZoom, readout.current!), width, height },
+      { ...options(latest, zoom, onZoom, readout.current!), ...size },
       dataOf(latest.current),
-      parent,
+      box.current!,
     )
     plot.current = drawn
     const requested = zoom.current
@@ -105,13 +105,7 @@ export function LineChart(props: LineChartProps) {
     describeCanvas(drawn.ctx.canvas, {
       draw: (context) => drawLines(context, drawn, latest.current),
     })
-    const observer = new ResizeObserver(() => {
-      const now = Math.max(120, parent.clientWidth)
-      if (now !== drawn.width) drawn.setSize({ width: now, height })
-    })
-    observer.observe(parent)
     return () => {
-      observer.disconnect()
       drawn.destroy()
       plot.current = null
     }
@@ -120,6 +114,9 @@ export function LineChart(props: LineChartProps) {
   useEffect(() => {
     if (plot.current) renew(plot.current, dataOf(latest.current), zoom.current)
   }, [props.x, props.series, props.yRange?.join()])
+  useEffect(() => {
+    if (plot.current && plot.current.width !== width) plot.current.setSize({ width, height })
+  }, [width])
   useEffect(() => plot.current?.redraw(false), [props.marker, props.paint, props.paintOver])
 
   return (
@@ -133,19 +130,9 @@ export function LineChart(props: LineChartProps) {
 type Zoom = readonly [number, number] | null
 
 /** Everything that requires a new plot; other changes are data. */
-function shapeOf({
-  series,
-  bands,
-  logarithmic,
-  xLogarithmic,
-  fromZero,
-  xLabel,
-  yLabel,
-  xUnit,
-  yUnit,
-  yRange,
-}: LineChartProps) {
-  const lines = series.map((s) => [s.label, s.colour, s.width, s.dash, s.stepped])
+function shapeOf(props: LineChartProps) {
+  const lines = props.series.map((s) => [s.label, s.colour, s.width, s.dash, s.stepped])
+  const { bands, logarithmic, xLogarithmic, fromZero, xLabel, yLabel, xUnit, yUnit, yRange } = props
   const axes = [logarithmic, xLogarithmic, fromZero, Boolean(yRange), xLabel, yLabel, xUnit, yUnit]
   return JSON.stringify([lines, bands, axes])
 }
@@ -183,27 +170,28 @@ function options(
   requested: { readonly current: Zoom },
   onZoom: (range: Zoom) => void,
   readout: HTMLElement,
-) {
+): Omit<uPlot.Options, 'width' | 'height'> {
   const { series, bands = [], logarithmic, sync, counted, xMargin = 0 } = props.current
   const { xLabel, xUnit = '1', xLogarithmic, yLabel, yUnit = '1' } = props.current
+  const rem = (size: number) => Math.round(size * remPixels())
   const axis: uPlot.Axis = {
     stroke: themeColour('--text-muted'),
-    font: `${remPixels(0.857)}px ${bodyFont()}`,
-    labelFont: `${remPixels(0.857)}px ${bodyFont()}`,
+    font: chartFont(rem(0.857)),
+    labelFont: chartFont(rem(0.857)),
     grid: { stroke: themeColour('--grid'), width: 1 },
     ticks: { stroke: themeColour('--line'), width: 1, size: 4 },
     gap: 4,
     labelGap: 0,
-    labelSize: remPixels(1.5),
+    labelSize: rem(1.5),
   }
   const logarithmicAxis: Partial<uPlot.Axis> = {
     splits: (_: uPlot, __: number, low: number, high: number) => logTicks(low, high),
     filter: (_: uPlot, splits: number[]) => splits,
   }
   const values = (_: uPlot, splits: number[]) => splits.map((v) => formatExact(v, 5))
-  const result: Omit<uPlot.Options, 'width' | 'height'> = {
+  return {
     legend: { show: false },
-    padding: [remPixels(1.4), remPixels(0.7), 0, 0],
+    padding: [rem(1.4), rem(0.7), 0, 0],
     cursor: {
       points: { size: 6 },
       drag: { x: true, y: false, uni: 20 },
@@ -223,7 +211,7 @@ function options(
         ...axis,
         label: withUnit(xLabel, xUnit),
         values,
-        size: remPixels(2.2),
+        size: rem(2.2),
         incrs: counted ? WHOLE_STEPS : undefined,
         ...(xLogarithmic && logarithmicAxis),
       },
@@ -283,16 +271,20 @@ function options(
       ],
     },
   }
-  return result
 }
 
 function scaleOfY(props: { current: LineChartProps }): uPlot.Scale {
   const { logarithmic, fromZero, yRange } = props.current
-  const explicitRange = (low: number, high: number): [number, number] | null =>
-    props.current.yRange ? [...props.current.yRange] : logarithmic ? logRange(low, high) : null
-  if (logarithmic) return { distr: 3, range: (_, low, high) => explicitRange(low, high)! }
-  if (yRange) return { range: (_, low, high) => explicitRange(low, high) ?? [low, high] }
-  return fromZero ? { range: (_, __, high) => [0, high > 0 ? high * 1.05 : 1] } : {}
+  if (!logarithmic && !yRange) {
+    return fromZero ? { range: (_, __, high) => [0, high > 0 ? high * 1.05 : 1] } : {}
+  }
+  return {
+    distr: logarithmic ? 3 : 1,
+    range: (_, low, high) => {
+      const { yRange } = props.current
+      return yRange ? [...yRange] : logarithmic ? logRange(low, high) : [low, high]
+    },
+  }
 }
 
 function showReadout(u: uPlot, props: LineChartProps, element: HTMLElement) {
@@ -312,20 +304,5 @@ function showReadout(u: uPlot, props: LineChartProps, element: HTMLElement) {
 /** Space for the longest tick label [px]. */
 function axisWidth(texts: string[] | null): number {
   const longest = Math.max(3, ...(texts ?? []).map((text) => text.length))
-  return Math.ceil(longest * remPixels(0.5) + remPixels(0.8))
-}
-
-function remPixels(rem: number): number {
-  return Math.round(rem * Number.parseFloat(getComputedStyle(document.documentElement).fontSize))
-}
-
-function bodyFont(): string {
-  return getComputedStyle(document.body).fontFamily
-}
-
-/** Add an opacity to a colour `rgb(...)`. */
-export function withAlpha(colour: string, opacity: number): string {
-  return colour.replace(/^rgb\((.*)\)$/, (_, channels: string) =>
-    channels.includes(',') ? `rgba(${channels}, ${opacity})` : `rgb(${channels} / ${opacity})`,
-  )
+  return Math.ceil((longest * 0.5 + 0.8) * remPixels())
 }

@@ -1,21 +1,32 @@
 /** Redraws a line chart as vector graphics, at the current zoom. */
 
 import type uPlot from 'uplot'
-import { formatExact, withUnit } from '../../format/number'
+import { withUnit } from '../../format/number'
 import { themeColour } from '../../theme'
-import { linearTicks, logTicks } from '../log-axis'
+import { type Context, drawAxes, remPixels, strokeLine, withAlpha } from '../canvas'
+import { type Tick, ticksOf } from '../scale'
 import type { Band, LineChartProps, Series } from './line-chart'
-import { withAlpha } from './line-chart'
-
-type Context = CanvasRenderingContext2D
 
 /** context: in CSS pixels, origin at the upper left corner of the chart's canvas. */
 export function drawLines(context: Context, plot: uPlot, props: LineChartProps): void {
+  const { xLabel, xUnit = '1', yLabel, yUnit = '1' } = props
   const ratio = devicePixelRatio
+  const em = ratio * remPixels()
   context.save()
   // uPlot positions are in device pixels.
   context.scale(1 / ratio, 1 / ratio)
-  drawAxes(context, plot, props, ratio)
+  context.lineWidth = ratio
+  const most = Math.min(10, plot.bbox.width / (5 * em))
+  const ticks = ticksIn(plot.scales.x, props.xLogarithmic, most).filter(
+    ([, text]) => !props.counted || !text.includes('.'),
+  )
+  const x = { title: withUnit(xLabel, xUnit), ticks }
+  const rows = Math.min(8, plot.bbox.height / (2.5 * em))
+  const y = {
+    title: withUnit(yLabel, yUnit),
+    ticks: ticksIn(plot.scales.y, props.logarithmic, rows),
+  }
+  drawAxes(context, plot.bbox, em, x, y)
   const drawn: uPlot = Object.create(plot, { ctx: { value: context } })
   context.save()
   context.beginPath()
@@ -42,60 +53,17 @@ export function drawMarker(context: Context, plot: uPlot, marker: number | null,
   context.strokeStyle = themeColour('--text')
   context.lineWidth = ratio
   context.setLineDash([])
-  context.beginPath()
-  context.moveTo(x, top)
-  context.lineTo(x, top + height)
-  context.stroke()
+  strokeLine(context, [x, top], [x, top + height])
   context.restore()
 }
 
-function drawAxes(context: Context, plot: uPlot, props: LineChartProps, ratio: number): void {
-  const { left, top, width, height } = plot.bbox
-  const em = ratio * Number.parseFloat(getComputedStyle(document.documentElement).fontSize)
-  const { xLabel, xUnit = '1', yLabel, yUnit = '1', counted, xLogarithmic, logarithmic } = props
-  context.font = `${0.857 * em}px ${getComputedStyle(document.body).fontFamily}`
-  context.fillStyle = themeColour('--text-muted')
-  context.strokeStyle = themeColour('--grid')
-  context.lineWidth = ratio
-  context.textAlign = 'center'
-  context.textBaseline = 'top'
-  const line = (x1: number, y1: number, x2: number, y2: number) => {
-    context.beginPath()
-    context.moveTo(x1, y1)
-    context.lineTo(x2, y2)
-    context.stroke()
-  }
-  let free = Number.NEGATIVE_INFINITY
-  for (const tick of ticksOf(plot.scales.x, xLogarithmic, Math.min(10, width / (5 * em)))) {
-    if (counted && !Number.isInteger(tick)) continue
-    const at = plot.valToPos(tick, 'x', true)
-    line(at, top, at, top + height)
-    const text = formatExact(tick, 5)
-    const half = context.measureText(text).width / 2
-    // Labels of a narrow chart would overlap.
-    if (at - half < free) continue
-    context.fillText(text, at, top + height + 0.4 * em)
-    free = at + half + 0.5 * em
-  }
-  context.fillText(withUnit(xLabel, xUnit), left + width / 2, top + height + 2.1 * em)
-  context.textAlign = 'right'
-  context.textBaseline = 'middle'
-  for (const tick of ticksOf(plot.scales.y, logarithmic, Math.min(8, height / (2.5 * em)))) {
-    const at = plot.valToPos(tick, 'y', true)
-    line(left, at, left + width, at)
-    context.fillText(formatExact(tick, 5), left - 0.5 * em, at)
-  }
-  context.save()
-  context.translate(0.7 * em, top + height / 2)
-  context.rotate(-Math.PI / 2)
-  context.textAlign = 'center'
-  context.fillText(withUnit(yLabel, yUnit), 0, 0)
-  context.restore()
-}
-
-function ticksOf({ min, max }: uPlot.Scale, logarithmic: boolean | undefined, count: number) {
-  if (min === undefined || max === undefined || !(max > min)) return []
-  return logarithmic ? logTicks(min, max) : linearTicks(min, max, Math.max(2, count))
+function ticksIn(
+  { min, max }: uPlot.Scale,
+  logarithmic: boolean | undefined,
+  count: number,
+): Tick[] {
+  if (min === undefined || max === undefined) return []
+  return ticksOf({ low: min, high: max, logarithmic: logarithmic === true }, Math.max(2, count))
 }
 
 function drawSeries(

@@ -3,6 +3,7 @@
 import type uPlot from 'uplot'
 import { formatNumber } from '../../format/number'
 import { themeColour } from '../../theme'
+import { chartFont, strokeLine } from '../canvas'
 
 /** The fitness that a job is compared with. */
 export interface ReferenceLine {
@@ -15,24 +16,17 @@ export function lineLabel({ label, fitness }: ReferenceLine): string {
   return `${label} ${formatNumber(fitness)}`
 }
 
-export function chartFont(): string {
-  return `${Math.round(12 * devicePixelRatio)}px ${getComputedStyle(document.body).fontFamily}`
-}
-
 /** Draw the line if it is in the visible range. */
 export function paintReference(plot: uPlot, reference: ReferenceLine): void {
   const { ctx, bbox } = plot
   const y = plot.valToPos(reference.fitness, 'y', true)
   if (y < bbox.top || y > bbox.top + bbox.height) return
   ctx.save()
-  ctx.font = chartFont()
+  ctx.font = chartFont(Math.round(12 * devicePixelRatio))
   ctx.strokeStyle = ctx.fillStyle = themeColour('--text-muted')
   ctx.lineWidth = devicePixelRatio
   ctx.setLineDash([6 * devicePixelRatio, 4 * devicePixelRatio])
-  ctx.beginPath()
-  ctx.moveTo(bbox.left, y)
-  ctx.lineTo(bbox.left + bbox.width, y)
-  ctx.stroke()
+  strokeLine(ctx, [bbox.left, y], [bbox.left + bbox.width, y])
   ctx.textAlign = 'right'
   const above = y - bbox.top > 20 * devicePixelRatio
   ctx.textBaseline = above ? 'bottom' : 'top'

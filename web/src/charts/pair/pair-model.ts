@@ -1,19 +1,16 @@
 /** Two axes of parallel coordinates: points, cells and drag selection. */
 
-import { exactQuantity, formatCount, formatExact, formatNumber } from '../../format/number'
+import { exactQuantity, formatCount, formatNumber } from '../../format/number'
 import { inWords } from '../../format/words'
-import { linearTicks, logTicks } from '../log-axis'
 import {
   type Axis,
   type Brush,
   BUCKETS,
   FAILED,
-  marksOf,
   type ParallelModel,
-  placeOf,
   stretchOf,
-  valueAt,
 } from '../parallel/parallel-model'
+import { nearest, shareOf, type Tick, ticksOf, valueAt } from '../scale'
 
 /** Rows considered; the first of the shuffled order, a fair sample. */
 export const SAMPLE = 4000
@@ -66,10 +63,11 @@ export function dragged(
   from: readonly [number, number],
   to: readonly [number, number],
 ): readonly [Brush, Brush] {
-  const stretch = (k: 0 | 1): Brush => [
-    clamped(Math.min(from[k], to[k])),
-    clamped(Math.max(from[k], to[k])),
-  ]
+  const clamped = (place: number) => Math.min(1, Math.max(0, place))
+  const stretch = (k: 0 | 1): Brush => {
+    const [a, b] = [clamped(from[k]), clamped(to[k])]
+    return a < b ? [a, b] : [b, a]
+  }
   return [stretch(0), stretch(1)]
 }
 
@@ -82,24 +80,14 @@ export function nearestRow(
   reach: number,
 ): number | null {
   const [xs, ys] = [model.axes[x].places, model.axes[y].places]
-  let [nearest, least]: [number | null, number] = [null, reach]
-  for (const row of sampleOf(rows)) {
-    const distance = Math.hypot(xs[row] - at[0], ys[row] - at[1])
-    if (distance < least) [nearest, least] = [row, distance]
-  }
-  return nearest
+  const points = Array.from(sampleOf(rows), (row) => [row, xs[row], ys[row]] as const)
+  return nearest(points, at, reach)
 }
 
 /** Ticks of an axis: round numbers, or the names of choices. */
-export function ticksOf(axis: Axis): readonly { readonly place: number; readonly text: string }[] {
-  if (axis.choices.length > 0) {
-    return marksOf(axis).map((name, k) => ({ place: placeOf(axis, k), text: inWords(`${name}`) }))
-  }
-  const { low, high } = axis
-  const values = axis.logarithmic ? logTicks(low, high) : linearTicks(low, high, 5)
-  return values
-    .map((value) => ({ place: placeOf(axis, value), text: formatExact(value, 4) }))
-    .filter(({ place }) => place >= 0 && place <= 1)
+export function axisTicks(axis: Axis): Tick[] {
+  if (axis.choices.length === 0) return ticksOf(axis, 5)
+  return axis.choices.map((name, k) => [shareOf(axis, k), inWords(name)])
 }
 
 /** Description of the nearest design or the cell at a position; null if there is none. */
@@ -125,12 +113,8 @@ export function placeInWords(
       cell.bucket === null
         ? 'all failed'
         : `mean rank ${formatNumber(cell.bucket + 1, 3)} of ${BUCKETS}`
-    return [
-      across,
-      up,
-      cell.designs === 1 ? '1 design' : `${formatCount(cell.designs)} designs`,
-      rank,
-    ].join('  ·  ')
+    const designs = cell.designs === 1 ? '1 design' : `${formatCount(cell.designs)} designs`
+    return [across, up, designs, rank].join('  ·  ')
   }
   const row = nearestRow(model, rows, pair, at, reach)
   if (row === null) return null
@@ -144,8 +128,4 @@ export function placeInWords(
 
 function cellAt(place: number): number | null {
   return place >= 0 && place <= 1 ? Math.min(CELLS - 1, Math.floor(place * CELLS)) : null
-}
-
-function clamped(place: number): number {
-  return Math.min(1, Math.max(0, place))
 }

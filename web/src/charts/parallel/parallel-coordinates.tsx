@@ -1,16 +1,17 @@
 /** Parallel coordinates; dragging along an axis selects a range. */
 
-import { useEffect, useLayoutEffect, useMemo, useRef, useState } from 'preact/hooks'
+import { useEffect, useMemo, useRef } from 'preact/hooks'
 import { BrokenName } from '../../components/broken-name'
 import { formatExact, writtenUnit } from '../../format/number'
 import { themeColour, useTheme } from '../../theme'
+import { useWidth } from '../canvas'
 import { type Palette, ProgressivePainter } from '../progressive-painter'
+import { shareOf } from '../scale'
 import {
   type Brush,
   BUCKETS,
   marksOf,
   type ParallelModel,
-  placeOf,
   selectRows,
   stretchOf,
 } from './parallel-model'
@@ -21,33 +22,23 @@ export type Brushes = ReadonlyMap<number, Brush>
 /** Shorter drags, as a share of the axis, count as clicks, which clear the selection. */
 const LEAST_STROKE = 0.01
 const AXIS_WIDTH_PX = 74
+const HEIGHT_PX = 380
 
-export function ParallelCoordinates({
-  model,
-  brushes,
-  onBrush,
-  label,
-  height = 380,
-}: {
+interface ParallelCoordinatesProps {
   model: ParallelModel
   brushes: Brushes
   onBrush: (brushes: Brushes) => void
   label: string
-  height?: number
-}) {
+}
+
+export function ParallelCoordinates({ model, brushes, onBrush, label }: ParallelCoordinatesProps) {
   const canvas = useRef<HTMLCanvasElement>(null)
   const painter = useRef<ProgressivePainter | null>(null)
   const box = useRef<HTMLDivElement>(null)
-  const [width, setWidth] = useState(0)
+  const width = useWidth(box)
   const theme = useTheme()
   const palette = useMemo(() => themePalette(), [theme])
   const selected = useMemo(() => selectRows(model, brushes), [model, brushes])
-
-  useLayoutEffect(() => {
-    const observer = new ResizeObserver(() => setWidth(box.current!.clientWidth))
-    observer.observe(box.current!)
-    return () => observer.disconnect()
-  }, [])
 
   useEffect(() => {
     painter.current = new ProgressivePainter(canvas.current!, (drawn, of) => {
@@ -60,13 +51,13 @@ export function ParallelCoordinates({
   useEffect(() => {
     if (width === 0) return
     const element = canvas.current!
-    const [w, h] = [Math.round(width * devicePixelRatio), Math.round(height * devicePixelRatio)]
+    const [w, h] = [Math.round(width * devicePixelRatio), Math.round(HEIGHT_PX * devicePixelRatio)]
     if (element.width !== w || element.height !== h) {
       element.width = w
       element.height = h
     }
     painter.current!.paint(model, selected, palette)
-  }, [model, selected, palette, width, height])
+  }, [model, selected, palette, width])
 
   const least = model.axes.length * AXIS_WIDTH_PX
   return (
@@ -86,7 +77,7 @@ export function ParallelCoordinates({
             </span>
           ))}
         </div>
-        <div class="parallel-plot" style={{ height: `${height}px` }}>
+        <div class="parallel-plot" style={{ height: `${HEIGHT_PX}px` }}>
           <canvas ref={canvas} role="img" aria-label={label} />
           {model.axes.map((axis, index) =>
             // The first and the last choice are labelled below and above the axis.
@@ -96,7 +87,7 @@ export function ParallelCoordinates({
                 class="axis-mark small muted"
                 style={{
                   left: `${((index + 0.5) / model.axes.length) * 100}%`,
-                  bottom: `${placeOf(axis, k + 1) * 100}%`,
+                  bottom: `${shareOf(axis, k + 1) * 100}%`,
                 }}
               >
                 <Mark mark={choice} />

@@ -2,6 +2,7 @@
 
 import { formatExact } from '../../format/number'
 import { inWords } from '../../format/words'
+import { type Scale, shareOf, valueAt } from '../scale'
 
 export interface AxisSource {
   readonly name: string
@@ -15,18 +16,13 @@ export interface AxisSource {
   readonly values: Float32Array
 }
 
-export interface Axis {
+export interface Axis extends Scale {
   readonly name: string
   readonly unit: string
-  readonly low: number
-  readonly high: number
-  readonly logarithmic: boolean
   readonly choices: readonly string[]
   /** Position of each row, 0 at the low end and 1 at the high end; NaN for none. */
   readonly places: Float32Array
 }
-
-type Scale = Pick<Axis, 'low' | 'high' | 'logarithmic'>
 
 /** A range of positions on an axis. */
 export type Brush = readonly [low: number, high: number]
@@ -66,22 +62,12 @@ export function marksOf(
 export function stretchOf(axis: Axis, [low, high]: Brush): string {
   if (axis.choices.length > 0) {
     const inside = axis.choices.filter((_, k) => {
-      const place = placeOf(axis, k)
+      const place = shareOf(axis, k)
       return place >= low && place <= high
     })
     return inside.map(inWords).join(', ') || 'none'
   }
   return [low, high].map((place) => formatExact(valueAt(axis, place), 4)).join(' to ')
-}
-
-/** Value at a position of an axis. */
-export function valueAt({ low, high, logarithmic }: Axis, place: number): number {
-  return logarithmic ? low * (high / low) ** place : low + place * (high - low)
-}
-
-/** Position of a value on an axis. */
-export function placeOf({ low, high, logarithmic }: Scale, value: number): number {
-  return logarithmic ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low)
 }
 
 /** Rows inside every brush, in the model's order. brushes: by index of the axis. */
@@ -138,7 +124,7 @@ function axisOf(source: AxisSource): Axis {
   let high = source.high ?? (Number.isFinite(greatest) ? greatest : 1)
   if (!(high > low)) high = low + (Math.abs(low) || 1) * 1e-6
   const scale = { name, unit, low, high, choices, logarithmic: source.logarithmic && low > 0 }
-  return { ...scale, places: values.map((value) => placeOf(scale, value)) }
+  return { ...scale, places: values.map((value) => shareOf(scale, value)) }
 }
 
 /** Buckets of equal size, so that a few very bad rows do not take up all colours. */

@@ -1,31 +1,13 @@
-/** Positions of points, ticks and labels of a scatter chart. */
+/** Scales and labels of a scatter chart. */
 
-import { linearTicks, logRange, logTicks } from '../log-axis'
-
-/** Values by point. */
-export type Values = ArrayLike<number>
-
-/** Range, scale and ticks of an axis. */
-export interface Axis {
-  readonly low: number
-  readonly high: number
-  readonly logarithmic: boolean
-  readonly ticks: readonly number[]
-}
-
-/** A rectangle [px]. */
-export interface Box {
-  readonly left: number
-  readonly top: number
-  readonly width: number
-  readonly height: number
-}
+import type { Box } from '../canvas'
+import { logRange, type Scale } from '../scale'
 
 /** Margin before the first and after the last value, as a share of the range. */
 const ROOM = 0.05
 
-/** An axis for all finite values; logarithmic only if all are positive. */
-export function axisOf(columns: readonly Values[], logarithmic: boolean): Axis {
+/** A scale for all finite values; logarithmic only if all are positive. */
+export function scaleOf(columns: readonly ArrayLike<number>[], logarithmic: boolean): Scale {
   let [low, high] = [Number.POSITIVE_INFINITY, Number.NEGATIVE_INFINITY]
   for (const values of columns) {
     for (let k = 0; k < values.length; k++) {
@@ -34,43 +16,17 @@ export function axisOf(columns: readonly Values[], logarithmic: boolean): Axis {
       high = Math.max(high, values[k])
     }
   }
-  if (!(low <= high)) return { low: 0, high: 1, logarithmic: false, ticks: linearTicks(0, 1) }
+  if (!(low <= high)) return { low: 0, high: 1, logarithmic: false }
   if (logarithmic && low > 0) {
     const [from, to] = logRange(low, high)
-    return { low: from, high: to, logarithmic: true, ticks: logTicks(from, to) }
+    return { low: from, high: to, logarithmic }
   }
   const room = (high - low) * ROOM || Math.abs(high) * ROOM || 1
-  const [from, to] = [low - room, high + room]
-  return { low: from, high: to, logarithmic: false, ticks: linearTicks(from, to) }
-}
-
-/** Position of a value on an axis, 0 to 1. */
-export function shareOf({ low, high, logarithmic }: Axis, value: number): number {
-  if (logarithmic) return Math.log(value / low) / Math.log(high / low)
-  return (value - low) / (high - low)
-}
-
-/** Position of a point in a box [px], y upwards. */
-export function placeIn(box: Box, x: Axis, y: Axis, px: number, py: number): [number, number] {
-  return [box.left + shareOf(x, px) * box.width, box.top + (1 - shareOf(y, py)) * box.height]
-}
-
-/** The point nearest to a position, within reach [px]; null if there is none. */
-export function nearest(
-  places: readonly (readonly [number, number])[],
-  at: readonly [number, number],
-  reach: number,
-): number | null {
-  let [closest, least]: [number | null, number] = [null, reach]
-  for (const [index, [x, y]] of places.entries()) {
-    const distance = Math.hypot(x - at[0], y - at[1])
-    if (distance <= least) [closest, least] = [index, distance]
-  }
-  return closest
+  return { low: low - room, high: high + room, logarithmic: false }
 }
 
 /** A label to place near a point. */
-export interface Name {
+interface Name {
   readonly at: readonly [number, number]
   /** Width of the text [px]. */
   readonly width: number
@@ -80,12 +36,7 @@ export interface Name {
  * Positions of labels [px], left and middle of each: next to, above or below the point, inside the box
  * and not overlapping earlier labels; null if there is no such position.
  */
-export function placeNames(
-  names: readonly Name[],
-  box: Box,
-  height: number,
-  gap: number,
-): readonly (readonly [number, number] | null)[] {
+export function placeNames(names: readonly Name[], box: Box, height: number, gap: number) {
   const occupied: Box[] = []
   return names.map(({ at: [x, y], width }) => {
     const candidates = [
@@ -98,13 +49,13 @@ export function placeNames(
       [x - gap - width, y - height],
       [x - gap - width, y + height],
     ] as const
-    for (const [left, middle] of candidates) {
+    const chosen = candidates.find(([left, middle]) => {
       const rect = { left, top: middle - height / 2, width, height }
-      if (!isWithin(rect, box) || occupied.some((other) => overlap(rect, other))) continue
+      if (!isWithin(rect, box) || occupied.some((other) => overlap(rect, other))) return false
       occupied.push(rect)
-      return [left, middle] as const
-    }
-    return null
+      return true
+    })
+    return chosen ?? null
   })
 }
 

@@ -1,7 +1,8 @@
 /** Selections on axes as query values: `FI1R:1500:3000,fitness:10:12`. */
 
 import type { Brushes } from '../../charts/parallel/parallel-coordinates'
-import { type Axis, type Brush, placeOf, valueAt } from '../../charts/parallel/parallel-model'
+import type { Axis, Brush } from '../../charts/parallel/parallel-model'
+import { shareOf, valueAt } from '../../charts/scale'
 
 /** Write brushes by value, not by position, so that links stay valid when bounds change. */
 export function brushWords(axes: readonly Axis[], brushes: Brushes): string | null {
@@ -23,7 +24,7 @@ export function brushesOf(
     const parts = word.split(':')
     const [high, low] = [parts.pop(), parts.pop()].map((part) => Number(part || Number.NaN))
     const index = axes.findIndex(({ name }) => name === parts.join(':'))
-    const places = index < 0 ? [Number.NaN] : [low, high].map((v) => placeOf(axes[index], v))
+    const places = index < 0 ? [Number.NaN] : [low, high].map((v) => shareOf(axes[index], v))
     if (places.some(Number.isNaN) || places[0] > places[1]) unknown.push(word)
     else brushes.set(index, places.map((p) => Math.min(1, Math.max(0, p))) as unknown as Brush)
   }

@@ -1,8 +1,8 @@
 /** Draws designs, the reference, marks and a label on the convergence chart. */
 
 import type uPlot from 'uplot'
-import { withAlpha } from '../../charts/lines/line-chart'
-import { chartFont, paintReference, type ReferenceLine } from '../../charts/lines/reference-line'
+import { chartFont, withAlpha } from '../../charts/canvas'
+import { paintReference, type ReferenceLine } from '../../charts/lines/reference-line'
 import { themeColour } from '../../theme'
 import type { Dots } from './model'
 
@@ -36,7 +36,7 @@ export function paintOver(plot: uPlot, painted: Painted): void {
   const { ctx } = plot
   if (painted.reference) paintReference(plot, painted.reference)
   ctx.save()
-  ctx.font = chartFont()
+  ctx.font = chartFont(Math.round(12 * devicePixelRatio))
   paintAbove(plot, painted.above)
   paintEnd(plot, painted.end)
   ctx.restore()

@@ -1,7 +1,7 @@
 /** What the charts of the overview draw: axis range, single designs, strips and bars. */
 
 import type { DistributionItem, Variable } from '../../api/types'
-import { logRange } from '../../charts/log-axis'
+import { logRange } from '../../charts/scale'
 import type { Design, Value } from '../../format/value'
 import { columnNamed, type Particles } from '../designs/particles'
 

@@ -1,12 +1,8 @@
 /** Numeric fields for the selection, for keyboards and exact bounds. */
 
 import { type Brushes, withBrush } from '../../charts/parallel/parallel-coordinates'
-import {
-  type Axis,
-  type ParallelModel,
-  placeOf,
-  valueAt,
-} from '../../charts/parallel/parallel-model'
+import type { Axis, ParallelModel } from '../../charts/parallel/parallel-model'
+import { shareOf, valueAt } from '../../charts/scale'
 import { BrokenName } from '../../components/broken-name'
 import { Select } from '../../components/fields/controls'
 import { NumberField } from '../../components/fields/number-field'
@@ -30,7 +26,7 @@ export function BrushFields({
         {model.axes.map((axis, index) => {
           const [low, high] = brushes.get(index) ?? [0, 1]
           const change = (end: 'low' | 'high', text: string) => {
-            const place = text === '' ? (end === 'low' ? 0 : 1) : placeOf(axis, Number(text))
+            const place = text === '' ? (end === 'low' ? 0 : 1) : shareOf(axis, Number(text))
             if (Number.isNaN(place)) return
             // Bounds in the wrong order are swapped.
             const ends = end === 'low' ? [place, high] : [low, place]

@@ -2,7 +2,7 @@
 
 import { useMemo, useRef } from 'preact/hooks'
 import { ChartCard } from '../../charts/chart-card'
-import { linearTicks } from '../../charts/log-axis'
+import { linearTicks } from '../../charts/scale'
 import { Table } from '../../components/table/table'
 import { useVisible } from '../../components/use-visible'
 import { formatExact, formatNumber, percent, quantity } from '../../format/number'

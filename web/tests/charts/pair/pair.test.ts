@@ -1,11 +1,11 @@
 import { describe, expect, test } from 'vitest'
 import {
+  axisTicks,
   CELLS,
   cellsOf,
   dragged,
   nearestRow,
   placeInWords,
-  ticksOf,
 } from '../../../src/charts/pair/pair-model'
 import { buildModel, selectRows } from '../../../src/charts/parallel/parallel-model'
 
@@ -37,14 +37,21 @@ describe('two axes', () => {
   })
 
   test('have ticks at round numbers, or at the names of choices', () => {
-    expect(ticksOf(model.axes[0]).map(({ text }) => text)).toEqual(['0', '2', '4', '6', '8', '10'])
+    expect(axisTicks(model.axes[0]).map(([, text]) => text)).toEqual([
+      '0',
+      '2',
+      '4',
+      '6',
+      '8',
+      '10',
+    ])
     const laws = { ...model.axes[0], high: 1, choices: ['dead_zone', 'stick'] }
-    expect(ticksOf(laws)).toEqual([
-      { place: 0, text: 'dead zone' },
-      { place: 1, text: 'stick' },
+    expect(axisTicks(laws)).toEqual([
+      [0, 'dead zone'],
+      [1, 'stick'],
     ])
     const decades = { ...model.axes[0], low: 3, high: 300, logarithmic: true }
-    expect(ticksOf(decades).every(({ place }) => place >= 0 && place <= 1)).toBe(true)
+    expect(axisTicks(decades).every(([place]) => place >= 0 && place <= 1)).toBe(true)
   })
 
   test('describe the nearest design or the cell at a position', () => {

@@ -1,50 +1,38 @@
 import { describe, expect, test } from 'vitest'
-import {
-  axisOf,
-  nearest,
-  placeIn,
-  placeNames,
-  shareOf,
-} from '../../../src/charts/scatter/scatter-model'
+import { nearest, shareOf } from '../../../src/charts/scale'
+import { placeNames, scaleOf } from '../../../src/charts/scatter/scatter-model'
 
 const BOX = { left: 10, top: 20, width: 100, height: 200 }
 
 describe('an axis of a scatter chart', () => {
   test('spans all finite values with a margin', () => {
-    const axis = axisOf([[2, Number.NaN], Float32Array.from([4, 3])], false)
+    const axis = scaleOf([[2, Number.NaN], Float32Array.from([4, 3])], false)
     expect([axis.low, axis.high]).toEqual([1.9, 4.1])
-    expect(axis.ticks).toContain(3)
   })
 
   test('is logarithmic only if all values are positive', () => {
-    const axis = axisOf([[1, 100]], true)
+    const axis = scaleOf([[1, 100]], true)
     expect(axis.logarithmic).toBe(true)
     expect(shareOf(axis, 10)).toBeCloseTo(0.5)
-    expect(axisOf([[0, 100]], true).logarithmic).toBe(false)
+    expect(scaleOf([[0, 100]], true).logarithmic).toBe(false)
   })
 
   test('is defined for one value and for none', () => {
-    const one = axisOf([[5]], false)
+    const one = scaleOf([[5]], false)
     expect(one.low).toBeLessThan(5)
     expect(one.high).toBeGreaterThan(5)
-    expect(axisOf([[Number.NaN]], true)).toMatchObject({ low: 0, high: 1 })
+    expect(scaleOf([[Number.NaN]], true)).toMatchObject({ low: 0, high: 1 })
   })
-})
-
-test('greater values are further right and up', () => {
-  const axis = { low: 0, high: 10, logarithmic: false, ticks: [] }
-  expect(placeIn(BOX, axis, axis, 0, 0)).toEqual([10, 220])
-  expect(placeIn(BOX, axis, axis, 10, 10)).toEqual([110, 20])
 })
 
 test('a click chooses the nearest point within reach', () => {
   const places = [
-    [0, 0],
-    [10, 0],
+    [5, 0, 0],
+    [6, 10, 0],
   ] as const
-  expect(nearest(places, [7, 0], 24)).toBe(1)
+  expect(nearest(places, [7, 0], 24)).toBe(6)
   expect(nearest(places, [40, 0], 24)).toBeNull()
-  expect(nearest([[Number.NaN, 0]], [0, 0], 24)).toBeNull()
+  expect(nearest([[0, Number.NaN, 0]], [0, 0], 24)).toBeNull()
 })
 
 describe('labels of points', () => {

@@ -1,26 +1,44 @@
-/** The part of CanvasRenderingContext2D that charts use, writing SVG. */
+/** SVG elements as text, and the part of CanvasRenderingContext2D that charts use, writing them. */
 
-import { element, paint, short } from './svg-text'
+type Attributes = Readonly<Record<string, string | number | null | undefined>>
+
+/** `<name a="1">content</name>`; attributes without a value are omitted. */
+export function element(name: string, attributes: Attributes, content = ''): string {
+  const written = Object.entries(attributes)
+    .filter(([, value]) => value !== null && value !== undefined)
+    .map(
+      ([key, value]) => ` ${key}="${typeof value === 'number' ? short(value) : escaped(value!)}"`,
+    )
+  return `<${name}${written.join('')}${content === '' ? '/>' : `>${content}</${name}>`}`
+}
+
+export function escaped(text: string): string {
+  const entities: Readonly<Record<string, string>> = {
+    '&': '&amp;',
+    '<': '&lt;',
+    '>': '&gt;',
+    '"': '&quot;',
+  }
+  return text.replace(/[&<>"]/g, (character) => entities[character])
+}
+
+/** Round to a hundredth of a pixel. */
+function short(value: number): string {
+  return String(Math.round(value * 100) / 100)
+}
+
+/** `fill` or `stroke` with a separate opacity, since some programs cannot read `rgba()`. */
+export function paint(kind: 'fill' | 'stroke', colour: string, opacity = 1): Attributes {
+  const [red, green, blue, alpha = 1] = (colour.match(/[\d.]+/g) ?? []).map(Number)
+  const isRgb = colour.startsWith('rgb')
+  const share = isRgb ? alpha * opacity : opacity
+  return {
+    [kind]: isRgb ? `rgb(${red},${green},${blue})` : colour,
+    [`${kind}-opacity`]: share < 1 ? share : null,
+  }
+}
 
 type Matrix = readonly [number, number, number, number, number, number]
-
-const STATE = [
-  'fillStyle',
-  'strokeStyle',
-  'lineWidth',
-  'globalAlpha',
-  'font',
-  'textAlign',
-  'textBaseline',
-  'lineJoin',
-] as const
-
-interface SavedState {
-  readonly values: Readonly<Record<string, unknown>>
-  readonly matrix: Matrix
-  readonly dash: readonly number[]
-  readonly clipped: string | null
-}
 
 const ANCHORS: Readonly<Record<string, string>> = { center: 'middle', right: 'end', end: 'end' }
 
@@ -40,40 +58,36 @@ export class SvgContext {
   private path = ''
   private matrix: Matrix = [1, 0, 0, 1, 0, 0]
   private dash: readonly number[] = []
-  private clipped: string | null = null
-  private readonly saved: SavedState[] = []
+  private clipPath: string | null = null
+  private readonly saved: object[] = []
 
-  constructor(
-    /** Size of the canvas [CSS px]. */
-    readonly canvas: { readonly width: number; readonly height: number },
-    private readonly ruler: Pick<CanvasRenderingContext2D, 'font' | 'measureText'>,
-  ) {}
+  constructor(private readonly ruler: Pick<CanvasRenderingContext2D, 'font' | 'measureText'>) {}
 
   save(): void {
-    const values = Object.fromEntries(STATE.map((key) => [key, this[key]]))
-    this.saved.push({ values, matrix: this.matrix, dash: this.dash, clipped: this.clipped })
+    this.saved.push({ ...this })
   }
 
   restore(): void {
-    const saved = this.saved.pop()
-    if (!saved) return
-    Object.assign(this, saved.values)
-    this.matrix = saved.matrix
-    this.dash = saved.dash
-    this.clipped = saved.clipped
+    Object.assign(this, this.saved.pop())
   }
 
   translate(x: number, y: number): void {
-    this.transform([1, 0, 0, 1, x, y])
+    this.transform(1, 0, 0, 1, x, y)
   }
 
   scale(x: number, y: number): void {
-    this.transform([x, 0, 0, y, 0, 0])
+    this.transform(x, 0, 0, y, 0, 0)
   }
 
   rotate(angle: number): void {
     const [c, s] = [Math.cos(angle), Math.sin(angle)]
-    this.transform([c, s, -s, c, 0, 0])
+    this.transform(c, s, -s, c, 0, 0)
+  }
+
+  private transform(a: number, b: number, c: number, d: number, e: number, f: number): void {
+    const [A, B, C, D, E, F] = this.matrix
+    const linear = [A * a + C * b, B * a + D * b, A * c + C * d, B * c + D * d] as const
+    this.matrix = [...linear, A * e + C * f + E, B * e + D * f + F]
   }
 
   setLineDash(dash: readonly number[]): void {
@@ -97,8 +111,11 @@ export class SvgContext {
   }
 
   rect(x: number, y: number, width: number, height: number): void {
-    const corners = [this.at(x, y), this.at(x + width, y), this.at(x + width, y + height)]
-    this.path += `M${[...corners, this.at(x, y + height)].join('L')}Z`
+    this.moveTo(x, y)
+    this.lineTo(x + width, y)
+    this.lineTo(x + width, y + height)
+    this.lineTo(x, y + height)
+    this.closePath()
   }
 
   /** Full circles, the only arcs that charts draw. */
@@ -109,25 +126,23 @@ export class SvgContext {
   }
 
   fill(): void {
-    this.add(element('path', { d: this.path, ...paint('fill', this.fillStyle, this.globalAlpha) }))
+    this.add('path', { d: this.path, ...paint('fill', this.fillStyle, this.globalAlpha) })
   }
 
   stroke(): void {
-    this.add(element('path', { d: this.path, fill: 'none', ...this.pen() }))
+    this.add('path', { d: this.path, fill: 'none', ...this.pen() })
   }
 
   clip(): void {
     const id = `clip-${++clips}`
     this.parts.push(element('clipPath', { id }, element('path', { d: this.path })))
-    this.clipped = id
+    this.clipPath = `url(#${id})`
   }
 
   fillRect(x: number, y: number, width: number, height: number): void {
-    const before = this.path
-    this.path = ''
+    this.beginPath()
     this.rect(x, y, width, height)
     this.fill()
-    this.path = before
   }
 
   fillText(text: string, x: number, y: number): void {
@@ -143,18 +158,18 @@ export class SvgContext {
     return this.ruler.measureText(text)
   }
 
-  private text(text: string, x: number, y: number, colours: Readonly<Record<string, unknown>>) {
+  private text(text: string, x: number, y: number, colours: Attributes): void {
     const [, weight, size, family] = /^(?:(\d+|bold) )?([\d.]+)px (.*)$/.exec(this.font) ?? []
     const { fontBoundingBoxAscent: up, fontBoundingBoxDescent: down } = this.measureText(text)
+    // Editors position text by its baseline only.
     const shifts: Readonly<Record<string, number>> = {
       top: up,
       middle: (up - down) / 2,
       bottom: -down,
     }
-    const shift = shifts[this.textBaseline] ?? 0
     const attributes = {
       x,
-      y: y + shift,
+      y: y + (shifts[this.textBaseline] ?? 0),
       transform: `matrix(${this.matrix.map(short).join(' ')})`,
       'font-family': family,
       'font-size': size,
@@ -162,12 +177,10 @@ export class SvgContext {
       'text-anchor': ANCHORS[this.textAlign],
       ...colours,
     }
-    this.add(
-      element('text', attributes as never, text.replaceAll('&', '&amp;').replaceAll('<', '&lt;')),
-    )
+    this.add('text', attributes, escaped(text))
   }
 
-  private pen() {
+  private pen(): Attributes {
     return {
       ...paint('stroke', this.strokeStyle, this.globalAlpha),
       'stroke-width': this.lineWidth * this.size,
@@ -176,10 +189,9 @@ export class SvgContext {
     }
   }
 
-  private add(part: string): void {
-    this.parts.push(
-      this.clipped ? element('g', { 'clip-path': `url(#${this.clipped})` }, part) : part,
-    )
+  private add(name: string, attributes: Attributes, content = ''): void {
+    const part = element(name, attributes, content)
+    this.parts.push(this.clipPath ? element('g', { 'clip-path': this.clipPath }, part) : part)
   }
 
   private at(x: number, y: number): string {
@@ -190,17 +202,5 @@ export class SvgContext {
   /** Scale factor of lengths. */
   private get size(): number {
     return Math.hypot(this.matrix[0], this.matrix[1])
-  }
-
-  private transform([a, b, c, d, e, f]: Matrix): void {
-    const [A, B, C, D, E, F] = this.matrix
-    this.matrix = [
-      A * a + C * b,
-      B * a + D * b,
-      A * c + C * d,
-      B * c + D * d,
-      A * e + C * f + E,
-      B * e + D * f + F,
-    ]
   }
 }

@@ -1,12 +1,13 @@
 /** Isolines of the mean rank over the cells of two axes, by marching squares. */
 
 import { CELLS, type Cell } from './pair-model'
+import './isolines.css'
 
 /** Position as shares of both axes, from the lower left. */
 type Place = readonly [x: number, y: number]
 
 /** All segments of one level. */
-export interface Isoline {
+interface Isoline {
   readonly level: number
   readonly pieces: readonly (readonly [from: Place, to: Place])[]
 }
@@ -48,15 +49,11 @@ function piecesIn(corners: readonly Corner[], level: number): (readonly [Place, 
   // A saddle: the mean decides which two corners are connected.
   const middle = corners.reduce((sum, { value }) => sum + value, 0) / 4
   const together = middle >= level === above[0]
-  return together
-    ? [
-        [a, b],
-        [c, d],
-      ]
-    : [
-        [d, a],
-        [b, c],
-      ]
+  const [first, second] = together ? [a, c] : [d, b]
+  return [
+    [first, together ? b : a],
+    [second, together ? d : c],
+  ]
 }
 
 /** Position between two corners at which a level is crossed. */
@@ -64,4 +61,42 @@ function crossing(from: Corner, to: Corner, level: number): Place {
   const share = (level - from.value) / (to.value - from.value)
   const between = (k: 0 | 1) => from.at[k] + share * (to.at[k] - from.at[k])
   return [between(0), between(1)]
+}
+
+/** Size of the view box; the map's width and height are scaled to it. */
+const SIDE = 1000
+
+/** Isolines over a map, labelled with their levels, counted from 1. */
+export function IsolineLayer({ lines }: { lines: readonly Isoline[] }) {
+  if (lines.length === 0) {
+    return (
+      <p class="isolines-none small" role="status">
+        No isolines: they need four adjacent cells with designs.
+      </p>
+    )
+  }
+  return (
+    <div class="isolines" aria-hidden="true">
+      <svg viewBox={`0 0 ${SIDE} ${SIDE}`} preserveAspectRatio="none" data-isolines={lines.length}>
+        {lines.map(({ level, pieces }) => (
+          <path
+            key={level}
+            d={pieces.map(([from, to]) => `M${placed(from)}L${placed(to)}`).join('')}
+          />
+        ))}
+      </svg>
+      {lines.map(({ level, pieces }) => {
+        const [[x, y]] = pieces[pieces.length >> 1]
+        return (
+          <span key={level} style={{ left: `${100 * x}%`, bottom: `${100 * y}%` }}>
+            {level + 1}
+          </span>
+        )
+      })}
+    </div>
+  )
+}
+
+function placed([x, y]: readonly [number, number]): string {
+  return `${(SIDE * x).toFixed(1)} ${(SIDE * (1 - y)).toFixed(1)}`
 }

@@ -18,7 +18,7 @@ from pathlib import Path
 from benchmarks.large_store import fill
 from gaitswarm.services.optimizer.analysis.distribution import distribution
 from gaitswarm.services.optimizer.analysis.history import HistoryCache
-from gaitswarm.services.optimizer.analysis.ranking import rank
+from gaitswarm.services.optimizer.analysis.ranking import RankingRequest, rank
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.job import Job, JobOrder
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, judge
@@ -42,7 +42,7 @@ def variants(store: Store, job: Job) -> dict[str, tuple[Callable[[], object], fl
         "read as columns": (lambda: HistoryCache(store).columns(job), 1.0),
         "read again": (lambda: cache.columns(job), 1.0),
         "judge one by one": (lambda: judge(part.objectives, part.failed, preference), scale),
-        "rank all at once": (lambda: rank(columns, preference, top=20), 1.0),
+        "rank all at once": (lambda: rank(columns, job.spec, RankingRequest(preference="B")), 1.0),
         "distribution": (lambda: distribution(columns, space), 1.0),
         "list 200 jobs": (lambda: store.jobs(limit=200), 1.0),
         "list by name, search": (

@@ -51,10 +51,13 @@ if TYPE_CHECKING:
     from gaitswarm.requests.firmware import FirmwareOptions
     from gaitswarm.requests.robustness import RobustnessOptions
     from gaitswarm.services.optimizer.analysis.front import FrontView
+    from gaitswarm.services.optimizer.analysis.importance import ImportanceView
     from gaitswarm.services.optimizer.analysis.preferences import (
         PreferenceForView,
         RobustPreferencesView,
     )
+    from gaitswarm.services.optimizer.analysis.ranking import RankingView
+    from gaitswarm.services.optimizer.analysis.scenario_families import ScenarioFamiliesView
     from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
     from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
     from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
@@ -90,10 +93,9 @@ if TYPE_CHECKING:
         IterationView,
         JobSummaryView,
         JobView,
-        RankingView,
         StateView,
     )
-    from gaitswarm.views.analysis import ImportanceView, ScenarioFamiliesView, SurfaceView
+    from gaitswarm.views.analysis import SurfaceView
     from gaitswarm.views.calibration import TargetsView
     from gaitswarm.views.certificate import CertificateView
     from gaitswarm.views.comparison import JobComparisonView
@@ -229,13 +231,13 @@ _MODULES: Final = {
     "gaitswarm.tables": ("EvaluationTable", "Table"),
     "gaitswarm.views": (
         "BestView", "EvaluationView", "HistoryIterationView", "IterationView", "JobSummaryView",
-        "JobView", "RankingView", "StateView",
+        "JobView", "StateView",
     ),
     "gaitswarm.views.calibration": ("TargetsView",),
     "gaitswarm.views.comparison": ("JobComparisonView",),
     "gaitswarm.views.firmware": ("FirmwareView",),
     "gaitswarm.views.certificate": ("CertificateView",),
-    "gaitswarm.views.analysis": ("ImportanceView", "ScenarioFamiliesView", "SurfaceView"),
+    "gaitswarm.views.analysis": ("SurfaceView",),
     "gaitswarm.views.identification": ("IdentifiabilityView",),
     "gaitswarm.views.replay": ("WalkReplay",),
     "gaitswarm.views.robustness": ("RobustnessView",),
@@ -244,6 +246,9 @@ _MODULES: Final = {
         "PreferenceForView", "RobustPreferencesView",
     ),
     "gaitswarm.services.optimizer.analysis.front": ("FrontView",),
+    "gaitswarm.services.optimizer.analysis.ranking": ("RankingView",),
+    "gaitswarm.services.optimizer.analysis.importance": ("ImportanceView",),
+    "gaitswarm.services.optimizer.analysis.scenario_families": ("ScenarioFamiliesView",),
     "gaitswarm.services.optimizer.jobs.kinds.calibration": ("CalibrationSpec",),
     "gaitswarm.services.optimizer.jobs.kinds.certificate": ("CertificateSpec",),
     "gaitswarm.services.optimizer.jobs.labels": ("JobFilter",),

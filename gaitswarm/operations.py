@@ -30,12 +30,7 @@ from typing import (
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
-from gaitswarm.requests.analysis import (
-    TOLERANCE,
-    run_certificate,
-    run_importance,
-    run_scenario_families,
-)
+from gaitswarm.requests.analysis import run_certificate
 from gaitswarm.requests.comparison import MOST_JOBS, run_comparison, run_convergences
 from gaitswarm.requests.design import resolved
 from gaitswarm.requests.firmware import (
@@ -57,12 +52,16 @@ from gaitswarm.robots import RobotDraftRequest, run_robot_draft
 from gaitswarm.robots import check_robot as checked_robot
 from gaitswarm.services.monitoring.activity import Activity
 from gaitswarm.services.optimizer.analysis.certificate import MOST_WORST
+from gaitswarm.services.optimizer.analysis.distribution import DistributionView
 from gaitswarm.services.optimizer.analysis.front import FRONT_DESIGNS, MOST_FRONT_DESIGNS, FrontView
+from gaitswarm.services.optimizer.analysis.importance import ImportanceView
 from gaitswarm.services.optimizer.analysis.preferences import (
     PreferenceForView,
     PreferencesRequest,
     RobustPreferencesView,
 )
+from gaitswarm.services.optimizer.analysis.ranking import RankingRequest, RankingView
+from gaitswarm.services.optimizer.analysis.scenario_families import TOLERANCE, ScenarioFamiliesView
 from gaitswarm.services.optimizer.analysis.targets import LeaveOut
 from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
 from gaitswarm.services.optimizer.jobs.audit import LOCAL
@@ -84,7 +83,6 @@ from gaitswarm.views import (
     CaseView,
     CatalogueView,
     ControllerView,
-    DistributionView,
     EstimateView,
     EvaluationView,
     ExtensionRequest,
@@ -96,8 +94,6 @@ from gaitswarm.views import (
     PluginView,
     PreferenceView,
     PriorityRequest,
-    RankingRequest,
-    RankingView,
     ResumeRequest,
     RobotView,
     ScenarioView,
@@ -113,11 +109,7 @@ from gaitswarm.views import (
     robot_views,
     scenario_views,
 )
-from gaitswarm.views.analysis import (
-    ImportanceView,
-    ScenarioFamiliesView,
-    SurfaceView,
-)
+from gaitswarm.views.analysis import SurfaceView
 from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.catalogue import JobReferenceView
 from gaitswarm.views.certificate import CertificateView
@@ -705,9 +697,7 @@ def get_distribution(
     service: JobService, job_id: str, query: DistributionQuery
 ) -> DistributionView:
     """Return quantiles of the fitness and the diversity of the designs by iteration."""
-    job = service.job(job_id)
-    distribution, more = service.distribution(job, after=query.after, limit=query.limit)
-    return DistributionView.from_distribution(distribution, more=more)
+    return service.distribution(job_id, after=query.after, limit=query.limit)
 
 
 class ParticlesQuery(Query):
@@ -769,8 +759,7 @@ def rank_designs(service: JobService, job_id: str, request: RankingRequest) -> R
 
     For jobs that tune a drive; a job that identifies parameters has no preference.
     """
-    ranked = service.rank(service.job(job_id), request.resolved_preference(), top=request.top)
-    return RankingView.from_ranked_job(request, ranked)
+    return service.ranking(job_id, request)
 
 
 class ScenariosQuery(Query):
@@ -798,7 +787,7 @@ def get_scenario_families(
     """Return the best designs that a job would have had with fewer scenarios: without each of them,
     and for families of every size. From stored objectives; nothing is simulated.
     """
-    return run_scenario_families(service, job_id, query.tolerance)
+    return service.scenarios(job_id, tolerance=query.tolerance)
 
 
 @_operation(
@@ -815,7 +804,7 @@ def get_importance(service: JobService, job_id: str) -> ImportanceView:
 
     From stored objectives; nothing is simulated.
     """
-    return run_importance(service, job_id)
+    return service.importance(job_id)
 
 
 class FrontQuery(Query):

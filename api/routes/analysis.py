@@ -22,33 +22,25 @@ from gaitswarm.api.dependencies import (
 )
 from gaitswarm.api.documentation import binary, problems
 from gaitswarm.api.responses import BinaryResponse, json_response
-from gaitswarm.requests.analysis import (
-    TOLERANCE,
-    run_certificate,
-    run_importance,
-    run_scenario_families,
-)
+from gaitswarm.requests.analysis import run_certificate
 from gaitswarm.requests.comparison import MOST_JOBS, run_comparison, run_convergences
 from gaitswarm.requests.identification import run_targets
 from gaitswarm.requests.robustness import sampled_indices
 from gaitswarm.services.optimizer.analysis.certificate import MOST_WORST
+from gaitswarm.services.optimizer.analysis.distribution import DistributionView
 from gaitswarm.services.optimizer.analysis.front import FRONT_DESIGNS, MOST_FRONT_DESIGNS, FrontView
+from gaitswarm.services.optimizer.analysis.importance import ImportanceView
 from gaitswarm.services.optimizer.analysis.preferences import (
     PreferenceForView,
     PreferencesRequest,
     RobustPreferencesView,
 )
+from gaitswarm.services.optimizer.analysis.ranking import RankingRequest, RankingView
+from gaitswarm.services.optimizer.analysis.scenario_families import TOLERANCE, ScenarioFamiliesView
 from gaitswarm.services.optimizer.analysis.targets import LeaveOut
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.job import Job
-from gaitswarm.views import (
-    PREFIX,
-    DistributionView,
-    RankingRequest,
-    RankingView,
-    encoded_particles,
-)
-from gaitswarm.views.analysis import ImportanceView, ScenarioFamiliesView
+from gaitswarm.views import PREFIX, encoded_particles
 from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.catalogue import JobReferenceView
 from gaitswarm.views.certificate import CertificateView
@@ -85,8 +77,7 @@ def get_distribution(
     ] = 1000,
 ) -> Response:
     """Return quantiles of the fitness and the diversity of the designs by iteration."""
-    distribution, more = service.distribution(job, after=after, limit=limit)
-    return json_response(DistributionView.from_distribution(distribution, more=more))
+    return json_response(service.distribution(job.id, after=after, limit=limit))
 
 
 @router.get(
@@ -150,8 +141,7 @@ def rank_designs(request: RankingRequest, job: ExistingJob, service: Service) ->
 
     For jobs that tune a drive; a job that identifies parameters has no preference.
     """
-    ranked = service.rank(job, request.resolved_preference(), top=request.top)
-    return json_response(RankingView.from_ranked_job(request, ranked))
+    return json_response(service.ranking(job.id, request))
 
 
 @router.get(
@@ -173,7 +163,7 @@ def get_scenario_families(
     """Return the best designs that a job would have had with fewer scenarios: without each of them,
     and for families of every size. From stored objectives; nothing is simulated.
     """
-    return json_response(run_scenario_families(service, job_id, tolerance))
+    return json_response(service.scenarios(job_id, tolerance=tolerance))
 
 
 @router.get(
@@ -190,7 +180,7 @@ def get_importance(job_id: JobId, service: Service) -> Response:
 
     From stored objectives; nothing is simulated.
     """
-    return json_response(run_importance(service, job_id))
+    return json_response(service.importance(job_id))
 
 
 @router.get(

@@ -27,20 +27,23 @@ if TYPE_CHECKING:
         FrontWinnerView,
         NormalisedDesignView,
     )
+    from gaitswarm.services.optimizer.analysis.importance import (
+        ImportanceView,
+        IndexIntervalView,
+        VariableImportanceView,
+    )
     from gaitswarm.services.optimizer.analysis.preferences import (
         PreferenceFitView,
         PreferenceForView,
         RobustPreferencesView,
     )
-    from gaitswarm.sim.kernel.walk import Precision as PhysicsPrecision
-    from gaitswarm.views import RankingView, SimulationView
-    from gaitswarm.views.analysis import (
-        ImportanceView,
-        IndexIntervalView,
+    from gaitswarm.services.optimizer.analysis.ranking import RankingView
+    from gaitswarm.services.optimizer.analysis.scenario_families import (
         LossView,
         ScenarioFamiliesView,
-        VariableImportanceView,
     )
+    from gaitswarm.sim.kernel.walk import Precision as PhysicsPrecision
+    from gaitswarm.views import SimulationView
 
 
 def rank(

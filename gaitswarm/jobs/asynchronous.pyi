@@ -7,10 +7,13 @@ from gaitswarm.jobs.base import JobEvent, Jobs
 from gaitswarm.requests.firmware import FirmwareOptions
 from gaitswarm.requests.robustness import RobustnessOptions
 from gaitswarm.services.optimizer.analysis.front import FrontView
+from gaitswarm.services.optimizer.analysis.importance import ImportanceView
 from gaitswarm.services.optimizer.analysis.preferences import (
     PreferenceForView,
     RobustPreferencesView,
 )
+from gaitswarm.services.optimizer.analysis.ranking import RankingView
+from gaitswarm.services.optimizer.analysis.scenario_families import ScenarioFamiliesView
 from gaitswarm.services.optimizer.analysis.targets import LeaveOut
 from gaitswarm.services.optimizer.jobs.job import Command, JobOrder, JobState
 from gaitswarm.services.optimizer.jobs.labels import JobFilter
@@ -36,9 +39,8 @@ from gaitswarm.views import (
     IterationView,
     JobSummaryView,
     JobView,
-    RankingView,
 )
-from gaitswarm.views.analysis import ImportanceView, ScenarioFamiliesView, SurfaceView
+from gaitswarm.views.analysis import SurfaceView
 from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.certificate import CertificateView
 from gaitswarm.views.comparison import JobComparisonView

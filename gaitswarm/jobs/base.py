@@ -24,10 +24,13 @@ from gaitswarm.requests.firmware import (
 )
 from gaitswarm.requests.robustness import RobustnessOptions
 from gaitswarm.services.optimizer.analysis.front import FrontView
+from gaitswarm.services.optimizer.analysis.importance import ImportanceView
 from gaitswarm.services.optimizer.analysis.preferences import (
     PreferenceForView,
     RobustPreferencesView,
 )
+from gaitswarm.services.optimizer.analysis.ranking import RankingView
+from gaitswarm.services.optimizer.analysis.scenario_families import ScenarioFamiliesView
 from gaitswarm.services.optimizer.analysis.targets import LeaveOut
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
 from gaitswarm.services.optimizer.jobs.job import Command, JobOrder, JobState
@@ -59,14 +62,9 @@ from gaitswarm.views import (
     JobSummaryView,
     JobView,
     PageView,
-    RankingView,
     StateView,
 )
-from gaitswarm.views.analysis import (
-    ImportanceView,
-    ScenarioFamiliesView,
-    SurfaceView,
-)
+from gaitswarm.views.analysis import SurfaceView
 from gaitswarm.views.calibration import TargetsView
 from gaitswarm.views.certificate import CertificateView
 from gaitswarm.views.comparison import JobComparisonView

@@ -12,14 +12,8 @@ from gaitswarm.services.optimizer.analysis.evaluations import (
     encoded_evaluations,
     evaluation_views,
 )
+from gaitswarm.services.optimizer.analysis.ranking import RankingView
 from gaitswarm.services.optimizer.views import PageView, View, finite
-from gaitswarm.views.analysis import (
-    DistributionItemView,
-    DistributionView,
-    RankedDesignView,
-    RankingRequest,
-    RankingView,
-)
 from gaitswarm.views.base import (
     PREFIX,
     FieldErrorView,
@@ -74,8 +68,6 @@ __all__ = [
     "CaseView",
     "CatalogueView",
     "ControllerView",
-    "DistributionItemView",
-    "DistributionView",
     "EstimateView",
     "EvaluationView",
     "ExtensionRequest",
@@ -94,8 +86,6 @@ __all__ = [
     "PreferenceView",
     "PriorityRequest",
     "ProblemView",
-    "RankedDesignView",
-    "RankingRequest",
     "RankingView",
     "ResumeRequest",
     "RobotView",

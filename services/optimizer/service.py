@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaitswarm.services.optimizer.analysis.distribution import (
-    Distribution,
+    DistributionView,
     distribution,
-    iteration_starts,
 )
 from gaitswarm.services.optimizer.analysis.fork import (
     Parent,
@@ -37,6 +36,7 @@ from gaitswarm.services.optimizer.analysis.identifiability import (
     check_comparable,
     identifiability,
 )
+from gaitswarm.services.optimizer.analysis.importance import ImportanceView, importance
 from gaitswarm.services.optimizer.analysis.preferences import (
     Index,
     PreferenceForView,
@@ -45,9 +45,15 @@ from gaitswarm.services.optimizer.analysis.preferences import (
     preference_for,
     robust_preferences,
 )
-from gaitswarm.services.optimizer.analysis.ranking import RankedJob, rank, tuning_of
+from gaitswarm.services.optimizer.analysis.ranking import RankingRequest, RankingView, rank
 from gaitswarm.services.optimizer.analysis.reference import with_reference
+from gaitswarm.services.optimizer.analysis.scenario_families import (
+    TOLERANCE,
+    ScenarioFamiliesView,
+    scenario_families,
+)
 from gaitswarm.services.optimizer.analysis.utilities import (
+    log_utilities,
     objective_vectors,
     require_success,
     tuning_spec,
@@ -72,7 +78,6 @@ from gaitswarm.services.optimizer.jobs.job import Claim, Command, Job, JobOrder,
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.labels import ANY_JOB, FacetCounts, JobFilter, LabelsChange
 from gaitswarm.services.optimizer.jobs.listing import Page, RecordingEntry
-from gaitswarm.services.optimizer.jobs.preference import Preference
 from gaitswarm.services.optimizer.jobs.priority import check_priority
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from gaitswarm.services.optimizer.jobs.quota import Quota
@@ -354,13 +359,38 @@ class JobService:
         return self.store.reevaluations(job.id)
 
     def distribution(
-        self, job: Job, *, after: int | None = None, limit: int
-    ) -> tuple[Distribution, bool]:
-        """Return the spread of designs by iteration, and whether more iterations follow."""
+        self, job_id: str, *, after: int | None = None, limit: int
+    ) -> DistributionView:
+        """Return the spread of designs by iteration."""
+        job = self.job(job_id)
         columns = self.columns(job).after(after)
-        following = iteration_starts(columns)[limit:]
-        page = columns.rows(slice(int(following[0]) if len(following) else None))
-        return distribution(page, job.spec.design_space()), len(following) > 0
+        return distribution(columns, job.spec.design_space(), limit=limit)
+
+    def scenarios(self, job_id: str, *, tolerance: float = TOLERANCE) -> ScenarioFamiliesView:
+        """Judge a tuning job's designs by fewer scenarios."""
+        if not 0.0 <= tolerance < math.inf:
+            raise InvalidRequest("must be at least 0", field="tolerance")
+        spec, columns = self._tuning(job_id, "scenarios")
+        judged = log_utilities(columns, spec.resolved_preference())
+        if spec.worlds is not None:
+            judged = spec.worlds.aggregated(judged)
+        require_success(job_id, judged)
+        names = [scenario.name for scenario in spec.resolved_scenarios()]
+        return scenario_families(columns, judged, names, tolerance=tolerance)
+
+    def importance(self, job_id: str) -> ImportanceView:
+        """Estimate which variables of a job matter."""
+        job = self.job(job_id)
+        if job.spec.kind == "certificate":
+            raise InvalidRequest(
+                f"job {job_id} is of kind {job.spec.kind}; only a job that tunes a drive or fits"
+                " parameters has variables that may matter",
+                field="job_id",
+            )
+        columns = self.columns(job)
+        if not len(columns):
+            raise Conflict(f"job {job_id} has no design yet; try again after its first iteration")
+        return importance(job.spec, columns, self.best(job_id))
 
     def front(self, job_id: str, *, most: int = FRONT_DESIGNS) -> FrontView:
         """Find the Pareto front of a tuning job over f1 to f5; `most` designs of it are listed."""
@@ -398,10 +428,16 @@ class JobService:
         job = self.job(job_id)
         return tuning_spec(job_id, job.spec, has), self.columns(job)
 
-    def rank(self, job: Job, preference: Preference, *, top: int) -> RankedJob:
-        """Rank all designs by another preference, from stored objectives."""
-        spec, columns = tuning_of(job), self.columns(job)
-        return RankedJob(spec, columns, rank(columns, preference, top=top, worlds=spec.worlds))
+    def ranking(self, job_id: str, request: RankingRequest) -> RankingView:
+        """Rank all designs of a tuning job by another preference, from stored objectives."""
+        job = self.job(job_id)
+        if not isinstance(job.spec, JobSpec):
+            raise InvalidRequest(
+                f"job {job_id} is of kind {job.spec.kind}; only tuning jobs are judged by a"
+                " preference",
+                field="preference",
+            )
+        return rank(self.columns(job), job.spec, request)
 
     def identifiability(self, jobs: Sequence[Job]) -> Identifiability:
         """Determine the parameters on which several runs of one problem agree."""

@@ -47,6 +47,13 @@ DesignValues = Annotated[
     ),
 ]
 JobName = Annotated[str, Field(description="Identifier of the job.", examples=["k2q7zr5dm9xw"])]
+NextPage = Annotated[
+    str | None,
+    Field(
+        description="Give it as `after` to get the following page; null on the last page.",
+        examples=["24"],
+    ),
+]
 
 
 def listing_name(params: tuple[type[Any], ...], kind: str) -> str:
@@ -65,10 +72,7 @@ class PageView(View, Generic[T]):
     )
 
     items: list[T] = Field(description="The items, in the list's order.")
-    next: str | None = Field(
-        description="Give it as `after` to get the following page; null on the last page.",
-        examples=["24"],
-    )
+    next: NextPage
 
     @classmethod
     def model_parametrized_name(cls, params: tuple[Any, ...]) -> str:

@@ -33,23 +33,30 @@ def test_quantiles_are_numpys_over_the_finite_values(values: list[float], failed
 
 def test_failed_designs_are_counted_and_left_out() -> None:
     found = distribution(fitness_only((4.0, INF, 2.0), (INF, INF, INF)), SPACE)
-    assert found.index.tolist() == [0, 1]
-    assert found.failed.tolist() == [1, 3]
-    assert found.mean[0] == 3.0 and math.isnan(found.mean[1])
-    assert found.fitness[0, [0, 3, 6]].tolist() == [2.0, 3.0, 4.0]
-    assert np.isnan(found.fitness[1]).all()
+    assert [(item.index, item.failed, item.mean) for item in found.items] == [
+        (0, 1, 3.0),
+        (1, 3, None),
+    ]
+    assert found.items[0].fitness[::3] == [2.0, 3.0, 4.0]
+    assert set(found.items[1].fitness) == {None}
+    assert found.next is None
+
+
+def test_a_page_ends_before_the_iterations_that_follow() -> None:
+    found = distribution(fitness_only((4.0,), (3.0,), (2.0,)), DesignSpace((A,), (), (A,)), limit=2)
+    assert [item.mean for item in found.items] == [4.0, 3.0]
+    assert found.next == "1"
 
 
 def test_diversity_is_a_share_of_the_range_of_what_is_searched() -> None:
     designs = np.array([[0.0, 3.0], [10.0, 3.0], [4.0, 3.0], [4.0, 3.0]])
     columns = columns_of(np.ones((4, 1, 6)), particles=2, designs=designs)
-    assert distribution(columns, SPACE).diversity.tolist() == [0.5, 0.0]
+    assert [item.diversity for item in distribution(columns, SPACE).items] == [0.5, 0.0]
 
 
 def test_no_iteration_has_no_distribution() -> None:
     found = distribution(columns_of(np.empty((0, 1, 6)), designs=np.empty((0, 2))), SPACE)
-    assert len(found.index) == len(found.mean) == 0
-    assert found.fitness.shape == (0, len(QUANTILES))
+    assert found.items == []
 
 
 def test_few_evaluations_are_not_thinned() -> None:

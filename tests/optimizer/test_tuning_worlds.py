@@ -11,6 +11,7 @@ import pytest
 from pydantic import ValidationError
 
 from gaitswarm.services.optimizer.analysis.certificate import conditional_value_at_risk
+from gaitswarm.services.optimizer.analysis.ranking import RankingRequest
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.documents import SPECS
 from gaitswarm.services.optimizer.jobs.job import JobState
@@ -115,10 +116,10 @@ def test_it_is_ranked_by_another_preference_over_its_worlds(
     ids = [service.submit(robust().model_copy(update={"preference": p}))[0].id for p in "AB"]
     for job_id in ids:
         run_embedded(store, evaluator, job_id)
-    ranked = service.rank(service.job(ids[0]), PREFERENCES["B"], top=8).ranking
-    first = min(ranked.top, key=lambda design: design.row)
+    ranked = service.ranking(ids[0], RankingRequest(preference="B", top=8))
+    first = min(ranked.top, key=lambda design: (design.iteration, design.particle))
     by_b = store.evaluations_between(ids[1], 0, 1)
-    assert first.row == 0
+    assert (first.iteration, first.particle) == (0, 0)
     # The first iteration of both jobs is the same swarm.
     assert first.fitness == pytest.approx(next(iter(by_b)).fitness, rel=1e-12)
 

@@ -2,74 +2,85 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
+from gaitswarm.services.optimizer.views import Finite, IterationIndex, NextPage, View
 
 Floats = NDArray[np.float64]
 
 QUANTILES: Final = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Distribution:
-    """The designs of each of I iterations.
+class DistributionItemView(View):
+    """Distribution of the designs of one iteration."""
 
-    Attributes:
-        index: (I,) from 0.
-        fitness: (I, 7) `QUANTILES` of finite fitness, NaN if there is none.
-        mean: (I,) of finite fitness.
-        failed: (I,) number of designs without finite fitness.
-        diversity: (I,) standard deviation of the designs as a share of each searched variable's
-            range, averaged over these variables [1]; 0 for a converged search, NaN for a single
-            design.
-    """
-
-    index: NDArray[np.int64]
-    fitness: Floats
-    mean: Floats
-    failed: NDArray[np.int64]
-    diversity: Floats
-
-
-def distribution(columns: EvaluationColumns, space: DesignSpace) -> Distribution:
-    starts = iteration_starts(columns)
-    sizes = np.diff(starts, append=len(columns))
-    result = Distribution(
-        index=columns.iteration[starts],
-        fitness=np.empty((len(starts), len(QUANTILES))),
-        mean=np.empty(len(starts)),
-        failed=np.empty(len(starts), dtype=np.int64),
-        diversity=np.empty(len(starts)),
+    index: IterationIndex
+    fitness: list[Finite] = Field(
+        description="One fitness for each of `quantiles`; null where every design failed.",
+        examples=[[20.9, 21.0, 21.4, 22.3, 24.0, 29.1, 41.7]],
     )
-    searched = len(space.variables)
-    share = space.box.to_unit(columns.designs[:, :searched])
+    mean: Finite = Field(description="Mean of its finite fitnesses.", examples=[23.2])
+    failed: int = Field(description="Designs that failed in at least one scenario.")
+    diversity: Finite = Field(
+        description="Standard deviation of the designs as a share of each searched variable's"
+        " range, mean over these variables [1]: 0 when the search has converged; null for an"
+        " iteration of a single design.",
+        examples=[0.12],
+    )
+
+
+class DistributionView(View):
+    """A page of the designs' distribution. The list is complete when `next` is null."""
+
+    quantiles: list[float] = Field(
+        description="Shares of the designs that `fitness` is given for.", examples=[list(QUANTILES)]
+    )
+    items: list[DistributionItemView] = Field(description="Iterations, in order.")
+    next: NextPage
+
+
+def distribution(
+    columns: EvaluationColumns, space: DesignSpace, *, limit: int | None = None
+) -> DistributionView:
+    """Describe the first `limit` iterations."""
+    starts = iteration_starts(columns)
+    more = limit is not None and limit < len(starts)
+    columns = columns.rows(slice(int(starts[limit]) if more else None))
+    starts = starts[:limit]
+    sizes = np.diff(starts, append=len(columns))
+    quantiles = np.empty((len(starts), len(QUANTILES)))
+    mean, diversity, failed = np.empty((3, len(starts)))
+    share = space.box.to_unit(columns.designs[:, : len(space.variables)])
     # By size: most methods have iterations of one or two sizes.
     for size in np.unique(sizes):
         chosen = sizes == size
         rows = starts[chosen][:, np.newaxis] + np.arange(size)
-        _describe(result, chosen, columns.fitness[rows], share[rows])
-    return result
-
-
-def _describe(
-    result: Distribution, chosen: NDArray[np.bool_], fitness: Floats, share: Floats
-) -> None:
-    """Fill in iterations of n designs: fitness (i, n), share of the variables' ranges (i, n, d)."""
-    size = fitness.shape[1]
-    finite = np.isfinite(fitness)
-    count = finite.sum(axis=1)
-    # A mean of huge values may overflow.
-    with np.errstate(over="ignore", invalid="ignore"):
-        result.mean[chosen] = np.where(finite, fitness, 0.0).sum(axis=1) / count
-    result.fitness[chosen] = finite_quantiles(fitness, QUANTILES)
-    result.failed[chosen] = size - count
-    result.diversity[chosen] = share.std(axis=1).mean(axis=1) if size > 1 else np.nan
+        fitness = columns.fitness[rows]
+        finite = np.isfinite(fitness)
+        count = finite.sum(axis=1)
+        # A mean of huge values may overflow.
+        with np.errstate(over="ignore", invalid="ignore"):
+            mean[chosen] = np.where(finite, fitness, 0.0).sum(axis=1) / count
+        quantiles[chosen] = finite_quantiles(fitness, QUANTILES)
+        failed[chosen] = size - count
+        diversity[chosen] = share[rows].std(axis=1).mean(axis=1) if size > 1 else np.nan
+    described = (columns.iteration[starts], quantiles, mean, failed.astype(int), diversity)
+    names = tuple(DistributionItemView.model_fields)
+    items = [
+        DistributionItemView.model_validate(dict(zip(names, row, strict=True)))
+        for row in zip(*(column.tolist() for column in described), strict=True)
+    ]
+    return DistributionView(
+        quantiles=list(QUANTILES),
+        items=items,
+        next=str(items[-1].index) if more else None,
+    )
 
 
 def iteration_starts(columns: EvaluationColumns) -> NDArray[np.intp]:

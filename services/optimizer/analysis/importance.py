@@ -15,19 +15,23 @@ designs that were tried, correlated variables share their index, and indices do 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Final
+from collections.abc import Iterator, Sequence
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
-from gaitswarm.services.optimizer.analysis.statistics import (
-    Interval,
-    average_ranks,
-    percentile_interval,
-)
+from gaitswarm.services.optimizer.analysis.distribution import thinned
+from gaitswarm.services.optimizer.analysis.statistics import average_ranks, percentile_interval
+from gaitswarm.services.optimizer.analysis.utilities import NORMALISED_NAMES, objective_vectors
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.iteration import Evaluation
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers
+from gaitswarm.services.optimizer.views import View
 from gaitswarm.sim.variables import Variable
 
 Floats = NDArray[np.float64]
@@ -43,21 +47,194 @@ _MOST_CLASSES: Final = 24
 _RESAMPLE: Final = 0x1337
 
 
-@dataclass(frozen=True, slots=True)
-class Companion:
-    """The variable most strongly correlated with another one.
+NEAR: Final = 0.01
+"""Share of a variable's range within which a winner lies at the bound [1]."""
 
-    Attributes:
-        correlation: Spearman's rank correlation among the designs [1].
+_STEPS: Final = (0.5, 0.25, 0.1)
+"""Shares of the range by which a bound may move; the first that can be simulated is used."""
+
+
+class IndexIntervalView(View):
+    """A first-order Sobol' index [1] with its interval."""
+
+    value: float = Field(
+        description="Share of the variance of the output's rank explained by this variable alone.",
+        examples=[0.41],
+    )
+    low: float = Field(description="Lower end of the interval of 95 %.", examples=[0.35])
+    high: float = Field(description="Upper end.", examples=[0.47])
+
+
+class WidenedView(View):
+    """Wider bounds for a variable whose best value lies at a bound."""
+
+    low: float = Field(description="Lower bound, in the variable's unit.", examples=[500.0])
+    high: float = Field(description="Upper bound.", examples=[14750.0])
+
+
+class VariableImportanceView(View):
+    """Influence of one variable on the results."""
+
+    name: str = Field(description="Name of the variable.", examples=["FI1R"])
+    unit: str = Field(description="Its unit.", examples=["counts"])
+    low: float = Field(description="Lower bound of the search.", examples=[1500.0])
+    high: float = Field(description="Upper bound.", examples=[6000.0])
+    fitness: IndexIntervalView | None = Field(
+        description="Index for the fitness, among designs that succeed in every case; null if"
+        " there are too few, or all are equal."
+    )
+    failing: IndexIntervalView | None = Field(
+        description="Index for failure, among all designs; null if none fails, all do, or there"
+        " are too few."
+    )
+    objectives: dict[str, IndexIntervalView | None] = Field(
+        description="Index for each objective over all scenarios, among designs that succeed in"
+        " every scenario; empty for a job that tunes no drive."
+    )
+    moved_with: str | None = Field(
+        description="Variable of the greatest correlation with it among all designs: an effect of"
+        " one may be due to the other.",
+        examples=["FI2R"],
+    )
+    correlation: float | None = Field(
+        description="Spearman's rank correlation of the two [1].", examples=[0.62]
+    )
+    winner: float | None = Field(
+        description="Value in the job's best design, of a categorical variable the index of the"
+        " choice; null without one.",
+        examples=[5950.0],
+    )
+    at: Literal["low", "high"] | None = Field(
+        description="Bound at which the winner lies, within a hundredth of the range."
+    )
+    widened: WidenedView | None = Field(
+        description="Wider bounds that can be simulated, by half the range or less; null if the"
+        " winner is inside, the job tunes no drive, or the controller sets the bound.",
+    )
+
+
+class ImportanceView(View):
+    """Which variables of a job matter, from what it has stored; nothing is simulated.
+
+    First-order Sobol' indices of the outputs' ranks among the designs that were tried: a search
+    does not draw at random, so variables that moved together share their indices.
     """
 
-    name: str
-    correlation: float
+    designs: int = Field(description="Designs that succeed in every case.", examples=[613])
+    failed: int = Field(description="Designs that do not.", examples=[12])
+    sampled: int = Field(description="Designs used for the indices; a long job is thinned.")
+    objectives: list[str] = Field(description="Names of the objectives, for a job that tunes.")
+    iteration: int | None = Field(description="Iteration of the best design; null without one.")
+    particle: int | None = Field(description="Number of the best design in its iteration.")
+    variables: list[VariableImportanceView] = Field(description="Searched variables, in order.")
+
+
+Indices = Sequence[IndexIntervalView | None]
+
+
+def importance(spec: Spec, columns: EvaluationColumns, best: Evaluation | None) -> ImportanceView:
+    """Estimate which variables of a job with evaluations matter."""
+    succeeded = int(np.isfinite(columns.fitness).sum())
+    sampled = columns.rows(thinned(columns, MOST_DESIGNS))
+    return ImportanceView(
+        designs=succeeded,
+        failed=len(columns) - succeeded,
+        sampled=len(sampled),
+        objectives=list(NORMALISED_NAMES) if isinstance(spec, JobSpec) else [],
+        iteration=None if best is None else best.iteration,
+        particle=None if best is None else best.particle,
+        variables=list(_variables(spec, sampled, None if best is None else best.design)),
+    )
+
+
+def _variables(
+    spec: Spec, columns: EvaluationColumns, winner: Floats | None
+) -> Iterator[VariableImportanceView]:
+    variables = spec.design_space().variables
+    designs = columns.designs[:, : len(variables)]
+    succeeded = np.isfinite(columns.fitness)
+
+    def indices(output: Floats, among: NDArray[np.bool_]) -> Indices:
+        estimates = first_order_indices(designs[among], variables, output[among])
+        return (None,) * len(variables) if estimates is None else estimates
+
+    fitness = indices(columns.fitness, succeeded)
+    failing = indices((~succeeded).astype(np.float64), np.ones_like(succeeded))
+    objectives = {}
+    if isinstance(spec, JobSpec):
+        vectors = objective_vectors(columns, worlds=spec.worlds)
+        complete = succeeded & np.isfinite(vectors).all(axis=1)
+        for column, name in enumerate(NORMALISED_NAMES):
+            objectives[name] = indices(vectors[:, column], complete)
+    moved = companions(designs, variables)
+    for k, variable in enumerate(variables):
+        value = None if winner is None else float(winner[k])
+        at = None if value is None else _bound_at(variable, value)
+        companion, correlation = moved[k] or (None, None)
+        yield VariableImportanceView(
+            name=variable.name,
+            unit=variable.unit,
+            low=variable.low,
+            high=variable.high,
+            fitness=fitness[k],
+            failing=failing[k],
+            objectives={name: estimates[k] for name, estimates in objectives.items()},
+            moved_with=companion,
+            correlation=correlation,
+            winner=value,
+            at=at,
+            widened=None if at is None else _widened(spec, variable, at),
+        )
+
+
+def _bound_at(variable: Variable, value: float) -> Literal["low", "high"] | None:
+    # Every value of a categorical variable, or of one of two integers, is at an end.
+    span = variable.high - variable.low
+    if variable.kind == "categorical" or (variable.kind == "integer" and span < 2):
+        return None
+    if value <= variable.low + NEAR * span:
+        return "low"
+    return "high" if value >= variable.high - NEAR * span else None
+
+
+def _widened(spec: Spec, variable: Variable, at: Literal["low", "high"]) -> WidenedView | None:
+    """The widest bounds that can be simulated; None if none can."""
+    if not isinstance(spec, JobSpec):
+        return None
+    for low, high in _wider(variable, at):
+        wider = variable.model_copy(update={"low": low, "high": high})
+        chosen = [wider if v.name == variable.name else v for v in spec.design_space().variables]
+        try:
+            spec.model_copy(update={"variables": tuple(chosen)}).check_can_be_simulated()
+        except InvalidRequest:
+            continue
+        return WidenedView(low=low, high=high)
+    return None
+
+
+def _wider(variable: Variable, at: Literal["low", "high"]) -> Iterator[tuple[float, float]]:
+    low, high = variable.low, variable.high
+    for step in _STEPS:
+        further = step * (high - low)
+        if variable.kind == "integer":
+            further = max(1.0, round(further))
+        if at == "high":
+            yield low, _rounded(variable, high + further)
+        # Positive variables stay positive.
+        elif low <= 0.0 or low - further > 0.0:
+            yield _rounded(variable, low - further), high
+    if at == "low" and low > 0.0 and variable.kind != "integer":
+        yield _rounded(variable, 0.5 * low), high
+
+
+def _rounded(variable: Variable, bound: float) -> float:
+    """Round a bound to six digits."""
+    return bound if variable.kind == "integer" else float(f"{bound:.6g}")
 
 
 def first_order_indices(
     designs: Floats, variables: Sequence[Variable], output: Floats
-) -> tuple[Interval, ...] | None:
+) -> list[IndexIntervalView] | None:
     """Estimate every variable's first-order Sobol' index for an output (r,), by its order alone.
 
     None for too few designs or a constant output.
@@ -76,26 +253,27 @@ def first_order_indices(
         # Resamples repeat designs, which increases their ratios: subtract that shift.
         resampled = ratios[1:] - (np.mean(ratios[1:]) - ratios[0])
         index, *around = np.clip([ratios[0], *resampled], 0.0, 1.0)
-        result.append(percentile_interval(float(index), np.array(around)))
-    return tuple(result)
+        interval = percentile_interval(float(index), np.array(around))
+        result.append(IndexIntervalView.model_validate(interval))
+    return result
 
 
-def companions(designs: Floats, variables: Sequence[Variable]) -> tuple[Companion | None, ...]:
-    """Return for every variable the one most strongly correlated with it."""
+def companions(designs: Floats, variables: Sequence[Variable]) -> list[tuple[str, float] | None]:
+    """Return for every variable the most strongly correlated one, with Spearman's correlation."""
     ranks = np.apply_along_axis(average_ranks, 0, designs)
     ranks -= ranks.mean(axis=0)
     size = np.sqrt((ranks**2).sum(axis=0))
     with np.errstate(divide="ignore", invalid="ignore"):
         correlation = (ranks.T @ ranks) / np.outer(size, size)
     np.fill_diagonal(correlation, np.nan)
-    result: list[Companion | None] = []
+    result: list[tuple[str, float] | None] = []
     for row in correlation:
         if np.isnan(row).all():
             result.append(None)
             continue
         other = int(np.nanargmax(np.abs(row)))
-        result.append(Companion(variables[other].name, float(np.clip(row[other], -1.0, 1.0))))
-    return tuple(result)
+        result.append((variables[other].name, float(np.clip(row[other], -1.0, 1.0))))
+    return result
 
 
 def _bootstrap_weights(rows: int) -> Floats:

@@ -2,96 +2,111 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
-from gaitswarm.services.optimizer.analysis.statistics import spearman
+from gaitswarm.services.optimizer.analysis.evaluations import EvaluationView, evaluation_views
+from gaitswarm.services.optimizer.analysis.statistics import rank_correlation
 from gaitswarm.services.optimizer.analysis.utilities import fitness_by
-from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
-from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.iteration import Evaluation
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
-from gaitswarm.services.optimizer.jobs.preference import Preference
+from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice
+from gaitswarm.services.optimizer.views import Finite, IterationIndex, Request, View
 
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class RankedDesign:
-    """One of the best designs.
+class RankingRequest(Request):
+    """Preference by which to rank the designs of a job."""
 
-    Attributes:
-        rank: by the new preference, from 1; ties by age.
-        rank_before: by the job's own preference; None if the design failed.
-    """
+    preference: PreferenceChoice = Field(
+        description="How objectives are weighed: A, B, C of table 4.5, chapter-3 for eq. 3.1, or"
+        " your own.",
+        examples=["B"],
+    )
+    top: int = Field(default=20, ge=1, le=1000, description="How many of the best to list.")
 
-    row: int
-    rank: int
-    rank_before: int | None
-    fitness: float
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Ranking:
-    """All evaluations under one preference; fitness is minimized.
-
-    Attributes:
-        present_best: new fitness of the job's own best design, None without one.
-        best_so_far: (iterations,), +inf until a design succeeds.
-        correlation: Spearman's, between old and new finite fitness; None if undefined.
-    """
-
-    top: tuple[RankedDesign, ...]
-    present_best: float | None
-    best_so_far: Floats
-    correlation: float | None
+    def resolved_preference(self) -> Preference:
+        """The preference in full."""
+        return PREFERENCES[self.preference] if isinstance(self.preference, str) else self.preference
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class RankedJob:
-    """A job's designs by another preference."""
+class RankedDesignView(EvaluationView):
+    """A design and its ranks; among equals the earliest comes first."""
 
-    spec: JobSpec
-    columns: EvaluationColumns
-    ranking: Ranking
-
-
-def tuning_of(job: Job) -> JobSpec:
-    """Return the spec of a job whose designs can be ranked."""
-    if not isinstance(job.spec, JobSpec):
-        raise InvalidRequest(
-            f"job {job.id} is of kind {job.spec.kind}; only tuning jobs are judged by a preference",
-            field="preference",
-        )
-    return job.spec
+    fitness: float = Field(description="Under the requested preference [1].", examples=[20.8])
+    rank: int = Field(description="Rank under the requested preference, from 1.")
+    rank_before: int | None = Field(
+        description="Rank under the job's own preference, from 1; null if it has none."
+    )
+    fitness_before: Finite = Field(description="By the job's own preference [1].")
 
 
-def rank(
-    columns: EvaluationColumns,
-    preference: Preference,
-    *,
-    top: int,
-    worlds: TuningWorlds | None = None,
-) -> Ranking:
-    fitness, before = fitness_by(columns, preference, worlds=worlds), columns.fitness
+class BestSoFarView(View):
+    """Best fitness so far under the requested preference."""
+
+    index: IterationIndex
+    fitness: Finite = Field(description="Least fitness of this and all earlier iterations [1].")
+
+
+class RankingView(View):
+    """A job's designs ranked by another preference, without simulation."""
+
+    preference: PreferenceChoice = Field(description="The requested preference.")
+    evaluations: int = Field(description="Designs that were ranked.")
+    fitness_of_present_best: Finite = Field(
+        description="By the requested preference, of the job's own best design [1].",
+        examples=[23.1],
+    )
+    correlation: float | None = Field(
+        description="Spearman's rank correlation of both rankings, over the designs in"
+        " both [1]; null where it is undefined.",
+        examples=[0.83],
+    )
+    top: list[RankedDesignView] = Field(description="The best designs, best first.")
+    best_so_far: list[BestSoFarView] = Field(description="One entry an iteration, in order.")
+
+
+def rank(columns: EvaluationColumns, spec: JobSpec, request: RankingRequest) -> RankingView:
+    """Rank all designs by their stored objectives."""
+    preference = request.resolved_preference()
+    fitness, before = fitness_by(columns, preference, worlds=spec.worlds), columns.fitness
     present, ordered = _best_first(before, 1), np.sort(before)
-    return Ranking(
-        top=tuple(
-            RankedDesign(
-                row=row,
-                rank=place,
-                rank_before=_place(row, before, ordered),
-                fitness=float(fitness[row]),
-            )
-            for place, row in enumerate(_best_first(fitness, top).tolist(), start=1)
-        ),
-        present_best=float(fitness[present[0]]) if len(present) else None,
-        best_so_far=best_so_far(columns.iteration, fitness),
+    rows = _best_first(fitness, request.top).tolist()
+    evaluations = [
+        Evaluation(
+            iteration=int(columns.iteration[row]),
+            particle=int(columns.particle[row]),
+            design=columns.designs[row],
+            objectives=columns.objectives[row],
+            statuses=columns.statuses[row],
+            fitness=float(fitness[row]),
+        )
+        for row in rows
+    ]
+    views = evaluation_views(evaluations, spec.model_copy(update={"preference": preference}))
+    return RankingView(
+        preference=request.preference,
+        evaluations=len(columns),
+        fitness_of_present_best=float(fitness[present[0]]) if len(present) else None,
         correlation=rank_correlation(fitness, before),
+        top=[
+            RankedDesignView.model_validate(
+                {
+                    **dict(view),
+                    "rank": place,
+                    "rank_before": _place(row, before, ordered),
+                    "fitness_before": before[row],
+                }
+            )
+            for place, (row, view) in enumerate(zip(rows, views, strict=True), start=1)
+        ],
+        best_so_far=[
+            BestSoFarView(index=index, fitness=value)
+            for index, value in enumerate(best_so_far(columns.iteration, fitness).tolist())
+        ],
     )
 
 
@@ -122,12 +137,3 @@ def _place(row: int, fitness: Floats, ordered: Floats) -> int | None:
     if not np.isfinite(value):
         return None
     return int(np.searchsorted(ordered, value) + np.count_nonzero(fitness[:row] == value)) + 1
-
-
-def rank_correlation(now: Floats, before: Floats) -> float | None:
-    """Spearman's rank correlation over rows that are finite in both; None if undefined."""
-    both = np.isfinite(now) & np.isfinite(before)
-    if not both.any():
-        return None
-    correlation = spearman(now[both], before[both])
-    return None if math.isnan(correlation) else correlation

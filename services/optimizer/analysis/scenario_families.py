@@ -8,19 +8,28 @@ other designs, so results should be verified by a job.
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from itertools import combinations
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
-from gaitswarm.services.optimizer.analysis.ranking import rank_correlation
-from gaitswarm.services.optimizer.analysis.statistics import Interval, percentile_interval
+from gaitswarm.services.optimizer.analysis.statistics import (
+    Interval,
+    percentile_interval,
+    rank_correlation,
+)
+from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.search.random_stream import RandomNumbers, uniform
+from gaitswarm.services.optimizer.views import Finite, IterationIndex, Particle, View
 
 Floats = NDArray[np.float64]
+
+TOLERANCE: Final = 0.01
+"""Regret of the smallest family, by default [1]."""
 
 _RESAMPLES: Final = 400
 _LEAST_RESAMPLES: Final = 40
@@ -38,90 +47,137 @@ _MOST_FAMILIES: Final = 64
 _RESAMPLE, _DRAW = 0xFA71, 0xFA72
 
 
-@dataclass(frozen=True, slots=True)
-class Family:
-    """A non-empty subset of a job's scenarios.
+class LossView(View):
+    """By how much a design is worse than the job's best, as a share [1]; null where it fails."""
 
-    Attributes:
-        scenarios: indices, ascending.
-        correlation: Spearman's, between the fitness over them and over all, among designs that
-            succeed in all; None if undefined.
-        winner: row of the best design by them.
-        regret: relative excess of the winner's fitness over all scenarios above the job's best;
-            +inf for a winner that fails.
-    """
-
-    scenarios: tuple[int, ...]
-    correlation: float | None
-    winner: int
-    regret: Interval
+    value: Finite = Field(description="The estimate.", examples=[0.012])
+    low: Finite = Field(description="Lower end of the interval of 95 %.", examples=[0.0])
+    high: Finite = Field(description="Upper end.", examples=[0.031])
 
 
-@dataclass(frozen=True, slots=True)
-class LeftOut:
-    """All scenarios but one.
+class FamilyView(View):
+    """A subset of a job's scenarios, and the design that is best in them."""
 
-    Attributes:
-        scenario: index of the omitted one.
-        loss: relative excess of the family's winner above the job's best in the omitted scenario;
-            negative if it is better.
-        similar: index of the scenario with the most similar ranking; None if undefined.
-        similarity: Spearman's correlation of the two.
-    """
-
-    scenario: int
-    family: Family
-    loss: Interval
-    similar: int | None
-    similarity: float | None
+    scenarios: list[str] = Field(description="Their names, in the job's order.")
+    correlation: float | None = Field(
+        description="Spearman's rank correlation of the fitness over these and over all scenarios,"
+        " among designs that succeed in all [1]; null where it is undefined.",
+        examples=[0.97],
+    )
+    iteration: IterationIndex
+    particle: Particle
+    regret: LossView = Field(
+        description="Excess of that design's fitness over all scenarios above the job's best."
+    )
 
 
-@dataclass(frozen=True, slots=True)
-class ScenarioFamilies:
-    """Results of judging by fewer scenarios.
+class LeftOutView(View):
+    """Effect of leaving out one scenario."""
 
-    Attributes:
-        left_out: one entry for each scenario; empty for a single scenario.
-        families: of every smaller size, all of them or a sample, smaller ones first.
-        smallest: smallest family whose interval of regret ends within the tolerance, of these the
-            one of least regret; None if there is none.
-    """
-
-    designs: int
-    failed: int
-    left_out: tuple[LeftOut, ...]
-    families: tuple[Family, ...]
-    tolerance: float
-    smallest: Family | None
+    scenario: str = Field(description="Name of the scenario left out.", examples=["loaded-fast"])
+    family: FamilyView = Field(description="The others.")
+    loss: LossView = Field(
+        description="Excess of the others' winner above the job's best in this scenario; negative"
+        " if it is better."
+    )
+    similar: str | None = Field(
+        description="The scenario whose utilities are most like it in rank; null if there is none."
+    )
+    similarity: float | None = Field(description="Spearman's rank correlation of the two [1].")
 
 
-def scenario_families(log_utilities: Floats, *, tolerance: float) -> ScenarioFamilies:
+class FamilySizeView(View):
+    """Families of one size."""
+
+    size: int = Field(description="Scenarios of each.", examples=[3])
+    families: int = Field(description="Families of this size that were evaluated.", examples=[20])
+    median: Finite = Field(description="Of their regrets [1]; null if half of the winners fail.")
+    worst: Finite = Field(description="Greatest of their regrets [1]; null if a winner fails.")
+    within: int = Field(description="Families whose interval of regret is within the tolerance.")
+
+
+class ScenarioFamiliesView(View):
+    """Which scenarios of a job matter, from what it has stored; nothing is simulated."""
+
+    scenarios: list[str] = Field(description="Of the job, in order.", examples=[["normal-fast"]])
+    designs: int = Field(description="Designs that succeed in all of them.", examples=[618])
+    failed: int = Field(description="Designs that do not.", examples=[7])
+    tolerance: float = Field(description="Largest regret of a smallest family [1].")
+    left_out: list[LeftOutView] = Field(description="Each scenario left out in turn.")
+    sizes: list[FamilySizeView] = Field(
+        description="Families by size; of more than 64, a sample of 64."
+    )
+    smallest: FamilyView | None = Field(
+        description="The family of fewest scenarios whose interval of regret is within the"
+        " tolerance, of these the one of least regret; null if there is none."
+    )
+
+
+def scenario_families(
+    columns: EvaluationColumns, log_utilities: Floats, names: Sequence[str], *, tolerance: float
+) -> ScenarioFamiliesView:
     """Judge designs by fewer scenarios.
 
     log_utilities: (r, K), +inf for a failure; at least one row is finite.
     """
-    judged = _Judged.of(log_utilities)
     count = log_utilities.shape[1]
-    families = tuple(judged.family(chosen) for chosen in _families(count))
-    whole = [family for family in families if len(family.scenarios) == count - 1]
-    within = [family for family in families if family.regret.high <= tolerance]
-    return ScenarioFamilies(
-        designs=len(judged.complete),
-        failed=len(log_utilities) - len(judged.complete),
-        left_out=tuple(sorted(map(judged.left_out, whole), key=lambda left: left.scenario)),
-        families=families,
+    total = log_utilities.mean(axis=1)
+    complete = np.flatnonzero(np.isfinite(total))
+    drawn = _resampled(len(total))
+    bests = _winners(total, drawn)
+    left_out: dict[int, LeftOutView] = {}
+    regrets = defaultdict[int, list[float]](list)
+    within: list[tuple[tuple[float, ...], FamilyView]] = []
+    for chosen in families_of(count):
+        fitness = log_utilities[:, chosen].mean(axis=1)
+        winners = _winners(fitness, drawn)
+        regret = _loss(total[winners], total[bests])
+        family = FamilyView(
+            scenarios=[names[k] for k in chosen],
+            correlation=rank_correlation(fitness[complete], total[complete]),
+            iteration=int(columns.iteration[winners[0]]),
+            particle=int(columns.particle[winners[0]]),
+            regret=LossView.model_validate(regret),
+        )
+        regrets[len(chosen)].append(regret.value)
+        if regret.high <= tolerance:
+            correlation = -math.inf if family.correlation is None else family.correlation
+            order = (len(chosen), regret.high, regret.value, -correlation)
+            within.append((order, family))
+        if len(chosen) == count - 1:
+            (absent,) = set(range(count)) - set(chosen)
+            utility = log_utilities[:, absent]
+            similar, similarity = _most_similar(log_utilities[complete], absent, chosen)
+            left_out[absent] = LeftOutView(
+                scenario=names[absent],
+                family=family,
+                loss=LossView.model_validate(_loss(utility[winners], utility[bests])),
+                similar=None if similar is None else names[similar],
+                similarity=similarity,
+            )
+    sizes = [order[0] for order, _ in within]
+    return ScenarioFamiliesView(
+        scenarios=list(names),
+        designs=len(complete),
+        failed=len(total) - len(complete),
         tolerance=tolerance,
-        smallest=min(within, key=_order, default=None),
+        left_out=[left_out[k] for k in sorted(left_out)],
+        sizes=[
+            FamilySizeView(
+                size=size,
+                families=len(values),
+                median=_median(values),
+                worst=max(values),
+                within=sizes.count(size),
+            )
+            for size, values in regrets.items()
+        ],
+        smallest=min(within, key=lambda entry: entry[0])[1] if within else None,
     )
 
 
-def _order(family: Family) -> tuple[float, ...]:
-    correlation = -math.inf if family.correlation is None else family.correlation
-    return (len(family.scenarios), family.regret.high, family.regret.value, -correlation)
-
-
-def _families(count: int) -> Iterator[tuple[int, ...]]:
-    """Subsets of scenario indices, always including single scenarios and all but one."""
+def families_of(count: int) -> Iterator[tuple[int, ...]]:
+    """Yield subsets of scenario indices, always including single scenarios and all but one."""
     for size in range(1, count):
         number = math.comb(count, size)
         if number <= _MOST_FAMILIES or size in (1, count - 1):
@@ -138,70 +194,36 @@ def _drawn(count: int, size: int) -> Iterable[tuple[int, ...]]:
     return sorted(drawn)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Judged:
-    """log_utilities: (r, K); fitness: (r,) its mean; complete: rows that succeed in all scenarios;
-    drawn: (1 + B, r) whether a row is present, first in the whole, then in each resample; bests:
-    (1 + B,) best row of each by the fitness over all.
+def _resampled(rows: int) -> NDArray[np.bool_]:
+    """(1 + B, r): whether a row is present, first in the whole, then in each resample.
+
+    Multiplicities do not affect winners; a mask takes an eighth of their memory.
     """
+    count = min(_RESAMPLES, max(_LEAST_RESAMPLES, _RESAMPLED_ROWS // rows))
+    drawn = np.zeros((1 + count, rows), dtype=np.bool_)
+    drawn[0] = True
+    for k in range(count):
+        numbers = uniform(0, _RESAMPLE, iteration=0, particle=k, count=rows)
+        drawn[1 + k, (numbers * rows).astype(np.intp)] = True
+    return drawn
 
-    log_utilities: Floats
-    fitness: Floats
-    complete: NDArray[np.intp]
-    drawn: NDArray[np.bool_]
-    bests: NDArray[np.intp]
 
-    @classmethod
-    def of(cls, log_utilities: Floats) -> _Judged:
-        rows = len(log_utilities)
-        fitness = log_utilities.mean(axis=1)
-        count = min(_RESAMPLES, max(_LEAST_RESAMPLES, _RESAMPLED_ROWS // rows))
-        # Multiplicities do not affect winners; a mask takes an eighth of their memory.
-        drawn = np.zeros((1 + count, rows), dtype=np.bool_)
-        drawn[0] = True
-        for k in range(count):
-            numbers = uniform(0, _RESAMPLE, iteration=0, particle=k, count=rows)
-            drawn[1 + k, (numbers * rows).astype(np.intp)] = True
-        return cls(
-            log_utilities,
-            fitness,
-            np.flatnonzero(np.isfinite(fitness)),
-            drawn,
-            _winners(fitness, drawn),
-        )
+def _most_similar(
+    rows: Floats, absent: int, others: Sequence[int]
+) -> tuple[int | None, float | None]:
+    """The scenario whose ranking is most similar to an absent one's, and their correlation."""
+    correlations = {k: rank_correlation(rows[:, k], rows[:, absent]) for k in others}
+    defined = [(value, -k) for k, value in correlations.items() if value is not None]
+    if not defined:
+        return None, None
+    value, negative = max(defined)
+    return -negative, value
 
-    def family(self, chosen: tuple[int, ...]) -> Family:
-        fitness = self.log_utilities[:, chosen].mean(axis=1)
-        winners = _winners(fitness, self.drawn)
-        return Family(
-            scenarios=chosen,
-            correlation=rank_correlation(fitness[self.complete], self.fitness[self.complete]),
-            winner=int(winners[0]),
-            regret=_loss(self.fitness[winners], self.fitness[self.bests]),
-        )
 
-    def left_out(self, family: Family) -> LeftOut:
-        count = self.log_utilities.shape[1]
-        (scenario,) = set(range(count)) - set(family.scenarios)
-        utility = self.log_utilities[:, scenario]
-        fitness = self.log_utilities[:, family.scenarios].mean(axis=1)
-        similar = self._similar(scenario, family.scenarios)
-        return LeftOut(
-            scenario=scenario,
-            family=family,
-            loss=_loss(utility[_winners(fitness, self.drawn)], utility[self.bests]),
-            similar=similar[0],
-            similarity=similar[1],
-        )
-
-    def _similar(self, own: int, others: Sequence[int]) -> tuple[int | None, float | None]:
-        rows = self.log_utilities[self.complete]
-        found = {other: rank_correlation(rows[:, other], rows[:, own]) for other in others}
-        known = {other: value for other, value in found.items() if value is not None}
-        if not known:
-            return None, None
-        most = max(known, key=lambda other: known[other])
-        return most, known[most]
+def _median(values: Sequence[float]) -> float:
+    if math.inf in values:
+        return float(np.quantile(values, 0.5, method="higher"))
+    return float(np.median(values))
 
 
 def _winners(fitness: Floats, drawn: NDArray[np.bool_]) -> NDArray[np.intp]:

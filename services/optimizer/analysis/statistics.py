@@ -1,15 +1,24 @@
-"""Ranks, medians and confidence intervals"""
+"""Ranks, correlations and confidence intervals"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+
+CONFIDENCE: Final = 0.95
+
+
+class Interval(NamedTuple):
+    """An estimate with its interval at the level `CONFIDENCE`."""
+
+    value: float
+    low: float
+    high: float
 
 
 def spearman(first: Floats, second: Floats) -> float:
@@ -27,19 +36,16 @@ def average_ranks(values: Floats) -> Floats:
     return np.asarray(means[places])
 
 
-CONFIDENCE: Final = 0.95
+def rank_correlation(first: Floats, second: Floats) -> float | None:
+    """Spearman's rank correlation over rows that are finite in both; None if undefined."""
+    both = np.isfinite(first) & np.isfinite(second)
+    if not both.any():
+        return None
+    correlation = spearman(first[both], second[both])
+    return None if math.isnan(correlation) else correlation
 
 
-@dataclass(frozen=True, slots=True)
-class Interval:
-    """An estimate with its interval at the level `CONFIDENCE`."""
-
-    value: float
-    low: float
-    high: float
-
-
-def percentile_interval(value: float, resampled: NDArray[np.float64]) -> Interval:
+def percentile_interval(value: float, resampled: Floats) -> Interval:
     """Interval between two quantiles of (B,) resampled estimates (Efron 1979); NaN is ignored."""
     defined = resampled[~np.isnan(resampled)]
     if not len(defined):

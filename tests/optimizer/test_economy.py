@@ -10,16 +10,17 @@ import pytest
 
 from gaitswarm.services.optimizer.errors import StoreUnavailable
 from gaitswarm.services.optimizer.jobs.iteration import CachedOutcome
-from gaitswarm.services.optimizer.jobs.job import Job, JobState
+from gaitswarm.services.optimizer.jobs.job import Claim, Job, JobState
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
 from gaitswarm.services.optimizer.run.coordinator import walk_keys
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
 from gaitswarm.services.optimizer.run.execution import RunContext, evaluate_uncached, run_claim
+from gaitswarm.services.optimizer.run.journal import Journal
 from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.outcome import Outcome
 from tests.examples.jobs import history
-from tests.optimizer.formula import HERE, SPEC, FormulaEvaluator, walk
+from tests.optimizer.formula import HERE, SPEC, FormulaEvaluator, job, walk
 
 
 class CountingEvaluator(FormulaEvaluator):
@@ -65,6 +66,10 @@ def keys_of(asked: EvaluationRequest) -> tuple[bytes, ...]:
 
 def bits(outcomes: tuple[Outcome, ...]) -> list[tuple[bytes, bytes]]:
     return [(outcome.objectives.tobytes(), outcome.statuses.tobytes()) for outcome in outcomes]
+
+
+def through(evaluator: CountingEvaluator) -> Journal:
+    return Journal(Claim(job(), "runner", 1, None), Knows({}), evaluator)
 
 
 class Knows(Store):
@@ -161,7 +166,7 @@ def test_a_design_that_is_asked_for_twice_walks_once() -> None:
     asked = request([[0.5, 0.1], [0.2, 0.3], [0.5, 0.1], [0.5, 0.1]])
     evaluator = CountingEvaluator()
     keys = keys_of(asked)
-    outcomes, walked = evaluate_uncached(evaluator, Knows({}), asked, keys, lambda: False)
+    outcomes, walked = evaluate_uncached(through(evaluator), Knows({}), asked, keys, lambda: False)
     assert evaluator.walked == 2
     assert walked == (keys[0], keys[1], None, None)
     assert bits(outcomes) == bits(walk(asked))
@@ -176,7 +181,7 @@ def test_known_and_unknown_designs_come_in_the_order_of_the_request() -> None:
     )
     evaluator = CountingEvaluator()
     found, walked = evaluate_uncached(
-        evaluator, Knows({keys[1]: known}), asked, keys, lambda: False
+        through(evaluator), Knows({keys[1]: known}), asked, keys, lambda: False
     )
     assert (evaluator.walked, walked) == (2, (keys[0], None, keys[2]))
     assert bits(found) == bits(outcomes)
@@ -190,7 +195,7 @@ def test_an_outcome_that_lost_a_number_when_it_was_stored_is_walked_again() -> N
         known = CachedOutcome(damaged, np.zeros(2, dtype=np.uint8))
         evaluator = CountingEvaluator()
         outcomes, _ = evaluate_uncached(
-            evaluator, Knows({key: known}), asked, (key,), lambda: False
+            through(evaluator), Knows({key: known}), asked, (key,), lambda: False
         )
         assert evaluator.walked == 1
         assert bits(outcomes) == bits(walk(asked))
@@ -203,14 +208,14 @@ def test_a_store_that_does_not_answer_knows_nothing() -> None:
 
     asked = request([[0.5, 0.1], [0.2, 0.3]])
     outcomes, walked = evaluate_uncached(
-        CountingEvaluator(), Gone({}), asked, keys_of(asked), lambda: False
+        through(CountingEvaluator()), Gone({}), asked, keys_of(asked), lambda: False
     )
     assert (bits(outcomes), walked) == (bits(walk(asked)), keys_of(asked))
 
 
 def test_walks_without_keys_are_all_walked() -> None:
     asked, evaluator = request([[0.5, 0.1], [0.5, 0.1]]), CountingEvaluator()
-    assert evaluate_uncached(evaluator, Knows({}), asked, (), lambda: False)[1] == ()
+    assert evaluate_uncached(through(evaluator), Knows({}), asked, (), lambda: False)[1] == ()
     assert evaluator.walked == 2
 
 

@@ -127,7 +127,7 @@ def test_a_database_of_the_first_revision_is_upgraded_with_what_jobs_are_searche
     with closing(open_store(fresh_url)) as store:
         job, _ = store.create_job(spec(name="Größe"))
         store.label(job.id, LabelsChange(note="Look HERE", tags=("thesis",)))
-    # The first revision has neither these columns nor an index with them.
+    # The first revision has neither the journal, nor these columns and an index with them.
     with (
         closing(Database(fresh_url, for_migration=True)) as database,
         database.write() as connection,
@@ -135,6 +135,7 @@ def test_a_database_of_the_first_revision_is_upgraded_with_what_jobs_are_searche
         if connection.dialect.name == "sqlite":
             connection.execute(text("DROP INDEX ix_jobs_entries"))
             connection.execute(text("CREATE INDEX ix_jobs_entries ON jobs (id)"))
+        connection.execute(text("DROP TABLE journal"))
         for column in ("sort_name", "search_text"):
             connection.execute(text(f"ALTER TABLE jobs DROP COLUMN {column}"))
         connection.execute(text("UPDATE alembic_version SET version_num = '0020'"))

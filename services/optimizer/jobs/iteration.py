@@ -116,6 +116,21 @@ class CachedOutcome:
     statuses: NDArray[np.uint8]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class JournalEntry:
+    """Outcomes of a task of an iteration that is not committed yet.
+
+    Attributes:
+        case: index of the case.
+        keys: of the designs, see `walk_keys`.
+        outcome: of these designs in the case.
+    """
+
+    case: int
+    keys: tuple[bytes, ...]
+    outcome: Outcome
+
+
 @dataclass(frozen=True, slots=True)
 class CompletedIteration:
     """All that one transaction commits of an iteration.

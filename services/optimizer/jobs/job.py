@@ -11,7 +11,7 @@ from typing import Final
 from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest, Unreadable
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.fork import Lineage
-from gaitswarm.services.optimizer.jobs.iteration import Answered, Ask
+from gaitswarm.services.optimizer.jobs.iteration import Answered, Ask, JournalEntry
 from gaitswarm.services.optimizer.jobs.labels import Labels
 from gaitswarm.services.optimizer.jobs.provenance import (
     JobProvenance,
@@ -270,6 +270,7 @@ class Claim:
         ask: the stored ask to continue with; None for a new job or one extended after its budget
             was spent.
         answered: the last committed ask, if there is no open one.
+        journal: what an earlier run has stored of the ask's evaluation.
         taken_from: previous runner, whose lease had expired; None for a queued job.
     """
 
@@ -280,6 +281,7 @@ class Claim:
     recordings: Recordings = field(default_factory=dict)
     answered: Answered | None = None
     taken_from: str | None = None
+    journal: tuple[JournalEntry, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -34,6 +34,9 @@ class TaskReport:
 
 OnTask = Callable[[TaskReport], None]
 
+OnOutcome = Callable[[int, int, Outcome], None]
+"""Called with the index of a case, the index of the first design, and outcomes from there on."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EvaluationRequest:
@@ -45,6 +48,8 @@ class EvaluationRequest:
         provenance: of this process; the workers must match it.
         iterations_left: estimated number of later iterations.
         on_task: called after every task; must return at once.
+        on_outcome: called for every case of a task with a result; must return at once, and not
+            modify the arrays.
         weight: share of the workers relative to a job of weight 1.
     """
 
@@ -55,6 +60,7 @@ class EvaluationRequest:
     iterations_left: int = 0
     iteration: int = 0
     on_task: OnTask | None = None
+    on_outcome: OnOutcome | None = None
     weight: float = 1.0
 
 

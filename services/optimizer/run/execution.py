@@ -26,7 +26,7 @@ from gaitswarm.services.optimizer.errors import (
     StoreUnavailable,
     Unavailable,
 )
-from gaitswarm.services.optimizer.jobs.iteration import CachedOutcome, CompletedIteration
+from gaitswarm.services.optimizer.jobs.iteration import Ask, CachedOutcome, CompletedIteration
 from gaitswarm.services.optimizer.jobs.job import Claim, Job, JobState
 from gaitswarm.services.optimizer.jobs.priority import weight
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
@@ -62,6 +62,7 @@ from gaitswarm.services.optimizer.run.evaluator import (
     Evaluator,
 )
 from gaitswarm.services.optimizer.run.heartbeat import Heartbeat
+from gaitswarm.services.optimizer.run.journal import JOURNAL_SECONDS, Journal
 from gaitswarm.services.optimizer.run.outage import Backoff, Outage, is_infrastructure
 from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.outcome import Outcome, Status
@@ -74,7 +75,7 @@ _log = logging.getLogger(__name__)
 
 
 def evaluate_uncached(
-    evaluator: Evaluator,
+    journal: Journal,
     store: Store | None,
     request: EvaluationRequest,
     keys: Sequence[bytes],
@@ -86,15 +87,16 @@ def evaluate_uncached(
     and case alone. An unavailable store has nothing cached.
     """
     if store is None or not keys:
-        return evaluator.evaluate(request, should_stop), tuple(keys)
+        return journal.evaluate(request, keys, should_stop), tuple(keys)
     first = {key: index for index, key in reversed(list(enumerate(keys)))}
     cached = _cached(store, request, tuple(first))
     new = sorted(index for key, index in first.items() if key not in cached)
     if len(new) == len(keys):
-        return evaluator.evaluate(request, should_stop), tuple(keys)
+        return journal.evaluate(request, keys, should_stop), tuple(keys)
     evaluated: tuple[Outcome, ...] | None = None
     if new:
-        evaluated = evaluator.evaluate(replace(request, designs=request.designs[new]), should_stop)
+        part = replace(request, designs=request.designs[new])
+        evaluated = journal.evaluate(part, [keys[index] for index in new], should_stop)
     row_of = {index: row for row, index in enumerate(new)}
     rows = np.array([row_of.get(first[key], _CACHED) for key in keys])
     outcomes = []
@@ -160,6 +162,7 @@ class RunContext:
         backoff: pauses while workers are unreachable.
         provenance: provenance of what this process computes for a spec.
         cache: whether to reuse outcomes of other jobs.
+        journal_seconds: duration from which on iterations are journaled [s].
         clock: monotonic time [s], injectable in tests.
         sleep: injectable in tests.
     """
@@ -173,6 +176,7 @@ class RunContext:
     provenance: Callable[[Spec], JobProvenance] = job_provenance
     accepts_changes: bool = False
     cache: bool = False
+    journal_seconds: float = JOURNAL_SECONDS
     clock: Callable[[], float] = time.monotonic
     sleep: Callable[[float], None] = time.sleep
 
@@ -221,6 +225,7 @@ class _Run:
     claim: Claim
     context: RunContext
     heartbeat: Heartbeat
+    journal: Journal
     stop: threading.Event
     drain: threading.Event
     worker_outage: Outage
@@ -231,14 +236,22 @@ class _Run:
         cls, claim: Claim, context: RunContext, stop: threading.Event, drain: threading.Event
     ) -> _Run:
         worker_outage, store_outage = Outage(context.clock), Outage(context.clock)
+        journal = Journal(
+            claim,
+            context.store,
+            context.evaluator,
+            after_seconds=context.journal_seconds,
+            clock=context.clock,
+        )
         heartbeat = Heartbeat(
             context.store,
             claim,
             lease_seconds=context.lease_seconds,
             waiting=lambda: worker_outage.reason,
             outage=store_outage,
+            after_beat=journal.store_finished,
         )
-        return cls(claim, context, heartbeat, stop, drain, worker_outage, store_outage)
+        return cls(claim, context, heartbeat, journal, stop, drain, worker_outage, store_outage)
 
     def begin(self) -> Decision:
         """Decide on the first actions; a job whose robot cannot be read fails."""
@@ -297,7 +310,7 @@ class _Run:
             case Evaluate(request=request, keys=keys):
                 return self._evaluate(request, keys)
             case Commit(done=done, following=following):
-                state = self._stored(lambda: self.context.store.commit(self.claim, done, following))
+                state = self._commit(done, following)
                 if self.context.on_commit is not None:
                     self.context.on_commit(done, state)
                 if state is JobState.RUNNING and self.drain.is_set():
@@ -309,6 +322,14 @@ class _Run:
                 self._stored(lambda: self.context.store.release(self.claim, state, error=error))
                 return LeaseWasLost()
 
+    def _commit(self, done: CompletedIteration, following: Ask | None) -> JobState:
+        journaled = self.journal.close()
+        state = self._stored(
+            lambda: self.context.store.commit(self.claim, done, following, journaled=journaled)
+        )
+        self.journal.clear()
+        return state
+
     def _evaluate(self, request: EvaluationRequest, keys: tuple[bytes, ...]) -> Event:
         if self._should_stop():
             raise EvaluationStopped
@@ -316,7 +337,7 @@ class _Run:
         begun = self.context.clock()
         try:
             outcomes, walked = evaluate_uncached(
-                self.context.evaluator,
+                self.journal,
                 self.context.store if self.context.cache else None,
                 replace(request, weight=weight(self.heartbeat.priority)),
                 keys,

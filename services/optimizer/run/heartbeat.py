@@ -36,12 +36,14 @@ class Heartbeat:
         lease_seconds: float,
         waiting: Callable[[], str | None] = lambda: None,
         outage: Outage | None = None,
+        after_beat: Callable[[], None] = lambda: None,
     ) -> None:
         self._store = store
         self._claim = claim
         self._lease_seconds = lease_seconds
         self._waiting = waiting
         self._outage = outage or Outage()
+        self._after_beat = after_beat
         self._interval = min(lease_seconds / _BEATS_PER_LEASE, _LONGEST_INTERVAL)
         self._ended = threading.Event()
         self._lost = threading.Event()
@@ -91,6 +93,7 @@ class Heartbeat:
                     self._claim, lease_seconds=self._lease_seconds, waiting=self._waiting()
                 )
                 self._state, self._priority = renewal.state, renewal.priority
+                self._after_beat()
             except LeaseLost as error:
                 # A commit that ends the job releases the lease between two beats.
                 if not self._ended.is_set():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from datetime import datetime, timedelta
 from typing import Any
@@ -12,7 +12,7 @@ from sqlalchemy import ColumnElement, Connection, and_, not_, or_, select
 
 from gaitswarm.services.optimizer.errors import BudgetChanged, LeaseLost, NotFound, Unreadable
 from gaitswarm.services.optimizer.jobs.estimate import recent_pace
-from gaitswarm.services.optimizer.jobs.iteration import Ask, CompletedIteration
+from gaitswarm.services.optimizer.jobs.iteration import Ask, CompletedIteration, JournalEntry
 from gaitswarm.services.optimizer.jobs.job import (
     LONGEST_LEASE_SECONDS,
     QUARANTINE_AFTER,
@@ -40,6 +40,7 @@ from gaitswarm.services.optimizer.store.job_rows import (
     unreadable,
     update_job,
 )
+from gaitswarm.services.optimizer.store.journal import clear_journal, insert_entries, journal_of
 from gaitswarm.services.optimizer.store.recordings import load_recordings
 from gaitswarm.services.optimizer.store.tables import Row, jobs
 
@@ -158,12 +159,29 @@ class Leases(Aggregate):
                 now = self._clock(connection)
                 insert_ask(connection, row, ask, expected=row["iterations"], now=now)
 
-    def commit(self, claim: Claim, done: CompletedIteration, following: Ask | None) -> JobState:
+    def journal(self, claim: Claim, entries: Sequence[JournalEntry]) -> None:
+        """Store outcomes of the open ask's finished tasks; later claims bring them.
+
+        Args:
+            entries: of different tasks.
+        """
+        with self._held("journal", claim) as (connection, row):
+            insert_entries(connection, row, entries)
+
+    def commit(
+        self,
+        claim: Claim,
+        done: CompletedIteration,
+        following: Ask | None,
+        *,
+        journaled: bool = False,
+    ) -> JobState:
         """Store a completed iteration and the next ask. A repeated commit changes nothing.
 
         Args:
             done: the iteration.
             following: the next ask; None at the end of the budget.
+            journaled: whether to clear the journal.
 
         Returns:
             The job's state afterwards: succeeded at the end of the budget; paused, without a
@@ -179,6 +197,8 @@ class Leases(Aggregate):
             now = self._clock(connection)
             _require_budget(claim, row)
             head = complete_iteration(connection, row, done, now)
+            if journaled:
+                clear_journal(connection, row)
             if following is not None:
                 insert_ask(connection, row, following, expected=done.iteration + 1, now=now)
             state = JobState(row["state"])
@@ -301,6 +321,7 @@ def take_job(
         walks = load_recordings(connection, spec.recording_ids)
         ask = open_ask(connection, row)
         answered = answered_ask(connection, row) if ask is None else None
+        journal = () if ask is None else journal_of(connection, row)
     except NotFound as error:
         raise unreadable(str(error)) from error
     except (ValueError, TypeError, LookupError) as error:
@@ -315,7 +336,7 @@ def take_job(
     }
     job = to_job(update_job(connection, row, changes))
     taken_from = None if owner == runner else owner
-    return Claim(job, runner, token, ask, walks, answered, taken_from)
+    return Claim(job, runner, token, ask, walks, answered, taken_from, journal)
 
 
 def _require_budget(claim: Claim, row: Row) -> None:

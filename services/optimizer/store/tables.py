@@ -231,6 +231,23 @@ reevaluations: Final = sa.Table(
     ),
 )
 
+# Outcomes of finished tasks of open asks, so that a crash loses little of a long iteration.
+journal: Final = sa.Table(
+    "journal",
+    metadata,
+    sa.Column("id", sa.BigInteger().with_variant(sa.Integer, "sqlite"), autoincrement=True),
+    sa.Column("job_id", sa.Text, nullable=False),
+    sa.Column("iteration", sa.Integer, nullable=False),
+    sa.Column("case_index", sa.Integer, nullable=False),
+    # n keys of designs; (n, m) float64, little-endian; n statuses.
+    sa.Column("keys", sa.LargeBinary, nullable=False),
+    sa.Column("objectives", sa.LargeBinary, nullable=False),
+    sa.Column("statuses", sa.LargeBinary, nullable=False),
+    sa.PrimaryKeyConstraint("id"),
+    sa.ForeignKeyConstraint(["job_id", "iteration"], ["iterations.job_id", "iterations.iteration"]),
+    sa.Index(None, "job_id"),
+)
+
 recordings: Final = sa.Table(
     "recordings",
     metadata,

@@ -1,0 +1,135 @@
+"""The journal: outcomes of a long iteration, stored while the rest of it is evaluated"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaitswarm.services.optimizer.jobs.iteration import JournalEntry
+from gaitswarm.services.optimizer.jobs.job import Claim
+from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, Evaluator
+from gaitswarm.services.optimizer.store import Store
+from gaitswarm.sim.outcome import Outcome
+
+JOURNAL_SECONDS: Final = 10.0
+"""Iterations that take longer, as the previous one did or as this one does, are journaled [s]."""
+
+
+class Journal:
+    """Evaluates the requests of a claimed job, without what an earlier run of it has stored.
+
+    Used by the job's thread, except for `store_finished`.
+    """
+
+    def __init__(
+        self,
+        claim: Claim,
+        store: Store,
+        evaluator: Evaluator,
+        *,
+        after_seconds: float = JOURNAL_SECONDS,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._claim = claim
+        self._store = store
+        self._evaluator = evaluator
+        self._after_seconds = after_seconds
+        self._clock = clock
+        self._known: dict[tuple[int, bytes], tuple[NDArray[np.float64], int]] = {}
+        for entry in claim.journal:
+            self._know(entry)
+        self._finished: list[JournalEntry] = []
+        self._is_stored = bool(claim.journal)
+        self._begun: float | None = None
+        self._was_long = False
+        self._writing = threading.Lock()
+
+    def evaluate(
+        self, request: EvaluationRequest, keys: Sequence[bytes], should_stop: Callable[[], bool]
+    ) -> tuple[Outcome, ...]:
+        """Evaluate as `Evaluator.evaluate`; designs are identified by their keys."""
+        if not keys:
+            return self._evaluator.evaluate(request, should_stop)
+        if self._begun is None:
+            self._begun = self._clock()
+        numbers, count = range(len(request.cases)), len(keys)
+        if not self._known:
+            return self._run(request, numbers, keys, should_stop)
+        with self._writing:
+            known = dict(self._known)
+        missing = np.array([[(number, key) not in known for number in numbers] for key in keys])
+        outcomes = [
+            Outcome(np.empty((count, len(case.objectives))), np.empty(count, dtype=np.uint8))
+            for case in request.cases
+        ]
+        for row, number in np.argwhere(~missing).tolist():
+            outcome = outcomes[number]
+            outcome.objectives[row], outcome.statuses[row] = known[number, keys[row]]
+        # Designs that are missing in the same cases make up a request.
+        for pattern in np.unique(missing[missing.any(axis=1)], axis=0):
+            rows = np.flatnonzero((missing == pattern).all(axis=1)).tolist()
+            cases = np.flatnonzero(pattern).tolist()
+            part = replace(
+                request,
+                cases=tuple(request.cases[number] for number in cases),
+                designs=request.designs[rows],
+            )
+            found = self._run(part, cases, [keys[row] for row in rows], should_stop)
+            for number, outcome in zip(cases, found, strict=True):
+                outcomes[number].objectives[rows] = outcome.objectives
+                outcomes[number].statuses[rows] = outcome.statuses
+        return tuple(outcomes)
+
+    def _run(
+        self,
+        request: EvaluationRequest,
+        cases: Sequence[int],
+        keys: Sequence[bytes],
+        should_stop: Callable[[], bool],
+    ) -> tuple[Outcome, ...]:
+        def on_outcome(case: int, first: int, outcome: Outcome) -> None:
+            of = tuple(keys[first : first + len(outcome.statuses)])
+            self._finished.append(JournalEntry(cases[case], of, outcome))
+
+        return self._evaluator.evaluate(replace(request, on_outcome=on_outcome), should_stop)
+
+    def store_finished(self) -> None:
+        """Store what tasks have finished, if the iteration is a long one. Thread-safe."""
+        with self._writing:
+            begun, count = self._begun, len(self._finished)
+            if begun is None or not count:
+                return
+            if self._was_long or self._clock() - begun > self._after_seconds:
+                entries = self._finished[:count]
+                self._is_stored = True
+                self._store.journal(self._claim, entries)
+                del self._finished[:count]
+                for entry in entries:
+                    self._know(entry)
+
+    def close(self) -> bool:
+        """Store nothing more of the iteration; return whether any of it is stored."""
+        with self._writing:
+            if self._begun is not None:
+                self._was_long = self._clock() - self._begun > self._after_seconds
+                self._begun = None
+            return self._is_stored
+
+    def clear(self) -> None:
+        """Forget the iteration, which was committed."""
+        self._known.clear()
+        self._finished.clear()
+        self._is_stored = False
+
+    def _know(self, entry: JournalEntry) -> None:
+        rows = zip(
+            entry.keys, entry.outcome.objectives, entry.outcome.statuses.tolist(), strict=True
+        )
+        for key, objectives, status in rows:
+            self._known[entry.case, key] = objectives, status

@@ -7,7 +7,7 @@ import logging
 import threading
 import time
 from collections import OrderedDict
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from functools import partial
 from http.cookies import CookieError, SimpleCookie
 from ipaddress import IPv6Address, ip_address
@@ -19,6 +19,7 @@ from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from gaitswarm.api.dependencies import ExistingJob, ServerSettings
+from gaitswarm.api.events import Revocation
 from gaitswarm.api.problems import problem, too_many_requests, unauthorized
 from gaitswarm.services.monitoring.exposition import REFUSAL
 from gaitswarm.services.optimizer.access import Scope as TokenScope
@@ -67,8 +68,6 @@ _MISSING: Final = (
     "this server requires a token: send `Authorization: Bearer TOKEN`, or set GAITSWARM_TOKEN; an"
     " administrator creates one with `gaitswarm token create NAME`"
 )
-
-Revocation = Callable[[], Awaitable[None]]
 
 
 class TokenCache:
@@ -334,6 +333,14 @@ def check_may_prioritize(token: Token | None, priority: int) -> None:
             f"the token {token.name!r} of scope `{token.scope}` may not set a priority above"
             f" {DEFAULT}; use one of scope `admin`"
         )
+
+
+async def priority_check(token: RequestToken) -> Callable[[int], None]:
+    """Return a check of the priority that a token may set."""
+    return partial(check_may_prioritize, token)
+
+
+PriorityCheck = Annotated[Callable[[int], None], Depends(priority_check)]
 
 
 async def job_priority(

@@ -10,6 +10,7 @@ from fastapi import FastAPI, Request, Response
 from fastapi_offline import FastAPIOffline
 from starlette.middleware.gzip import DEFAULT_EXCLUDED_CONTENT_TYPES, GZipMiddleware
 
+from gaitswarm.api import health, routes, session
 from gaitswarm.api.access import METRICS_PATH, AccessMiddleware, TokenGuesses
 from gaitswarm.api.dependencies import Component, lifespan
 from gaitswarm.api.documentation import ASSETS, DESCRIPTION, TAGS, add_documentation
@@ -23,20 +24,7 @@ from gaitswarm.api.middleware import (
 )
 from gaitswarm.api.page import MANUAL_FOLDER, PAGE_FOLDER, add_manual, add_page
 from gaitswarm.api.problems import add_problem_handlers
-from gaitswarm.api.routes import (
-    analysis,
-    catalogue,
-    commands,
-    events,
-    firmware,
-    health,
-    history,
-    identification,
-    jobs,
-    robots,
-    session,
-    simulations,
-)
+from gaitswarm.operations import record_measured_walk
 from gaitswarm.services.monitoring.activity import Activity
 from gaitswarm.services.monitoring.collectors import QueueCollector
 from gaitswarm.services.monitoring.hosts import HostNames
@@ -44,6 +32,7 @@ from gaitswarm.services.monitoring.metrics import Metrics
 from gaitswarm.services.optimizer.jobs.provenance import installed_version
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.settings import Settings
+from gaitswarm.views import PREFIX
 
 # Event streams must not wait for a full block; binary numbers and long downloads gain little.
 _UNCOMPRESSED: Final = (
@@ -83,21 +72,8 @@ def create_app(
     app.state.service = service
     app.state.guesses = guesses = TokenGuesses()
     # Routes are added directly: `include_router` would build each of them twice.
-    for module in (
-        jobs,
-        commands,
-        history,
-        events,
-        analysis,
-        firmware,
-        identification,
-        simulations,
-        catalogue,
-        robots,
-        session,
-        health,
-    ):
-        app.router.routes.extend(module.router.routes)
+    for router in (routes.router, session.router, health.router):
+        app.router.routes.extend(router.routes)
     health.add_short_paths(app)
     _add_metrics(app, metrics)
     add_documentation(app)
@@ -108,7 +84,7 @@ def create_app(
     app.add_middleware(
         BodyLimitMiddleware,
         max_bytes=settings.api_max_body_bytes,
-        larger={identification.MEASURED: settings.api_max_log_bytes},
+        larger={PREFIX + record_measured_walk.path: settings.api_max_log_bytes},
     )
     app.add_middleware(
         GZipMiddleware,

@@ -6,22 +6,26 @@ import asyncio
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dataclasses import dataclass
+from pathlib import Path as FilePath
 from typing import Annotated, Final, TypedDict, TypeVar, cast
 
 from anyio import CapacityLimiter
 from anyio.to_thread import run_sync
-from fastapi import Depends, FastAPI, Path, Query, Request
-from pydantic import Field
+from fastapi import Depends, FastAPI, Path, Request
 
-from gaitswarm.api.topics import Topics
+from gaitswarm.api.events import Topics
+from gaitswarm.operations import JobIdText, Limits
 from gaitswarm.services.monitoring.activity import Activity
 from gaitswarm.services.monitoring.metrics import Metrics
-from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, InvalidRequest
+from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.settings import Settings
 
 T = TypeVar("T")
+
+MOST_RANKED: Final = 20_000_000
+"""Evaluations times preferences of one request, which take some seconds."""
 
 _VALIDATIONS: Final = 2
 """Bodies validated at the same time; more threads would starve the event loop of the GIL."""
@@ -54,22 +58,12 @@ class ComputingCapacity:
 
     async def run(self, work: Callable[[], T]) -> T:
         """Compute in a thread when there is capacity."""
-        self._check_queue()
-        return await run_sync(work, limiter=self.limiter)
-
-    @asynccontextmanager
-    async def slot(self) -> AsyncIterator[None]:
-        """Occupy capacity inside the block."""
-        self._check_queue()
-        async with self.limiter:
-            yield
-
-    def _check_queue(self) -> None:
         is_busy = self.limiter.available_tokens <= 0
         if is_busy and self.limiter.statistics().tasks_waiting >= self.queue:
             raise EvaluatorUnavailable(
                 "too many requests are waiting to compute; try again in a few seconds"
             )
+        return await run_sync(work, limiter=self.limiter)
 
 
 class State(TypedDict):
@@ -139,15 +133,6 @@ async def activity(request: Request) -> Activity | None:
     return cast("Activity | None", request.state.activity)
 
 
-async def _analyzing(request: Request) -> AsyncIterator[None]:
-    async with cast(ComputingCapacity, request.state.computing).slot():
-        yield
-
-
-Analyzing = Depends(_analyzing, scope="function")
-"""Dependency of routes that read whole histories: they occupy computing capacity."""
-
-
 async def stopping(request: Request) -> asyncio.Event:
     """Return the event that is set when the server begins to stop."""
     return cast(asyncio.Event, request.state.stopping)
@@ -163,6 +148,21 @@ async def metrics(request: Request) -> Metrics:
     return cast(Metrics, request.state.metrics)
 
 
+async def limits(settings: Annotated[Settings, Depends(settings)]) -> Limits:
+    """Return the limits of one request."""
+    return Limits(
+        simulated=settings.api_max_simulated_seconds,
+        logged=settings.api_max_logged_seconds,
+        sampled=settings.api_max_sampled_seconds,
+        ranked=MOST_RANKED,
+    )
+
+
+async def robot_folders(settings: Annotated[Settings, Depends(settings)]) -> Sequence[FilePath]:
+    """Return the folders in which to look for meshes."""
+    return settings.robots
+
+
 Service = Annotated[JobService, Depends(service)]
 ServerSettings = Annotated[Settings, Depends(settings)]
 Computing = Annotated[ComputingCapacity, Depends(computing)]
@@ -170,20 +170,8 @@ JobActivities = Annotated[Activity | None, Depends(activity)]
 Stopping = Annotated[asyncio.Event, Depends(stopping)]
 FollowedJobs = Annotated[Topics, Depends(topics)]
 ServerMetrics = Annotated[Metrics, Depends(metrics)]
-
-LARGEST_INDEX: Final = 2**31 - 1
-"""Largest index of an iteration in the database."""
-
-AfterIteration = Annotated[
-    int | None,
-    Query(ge=0, le=LARGEST_INDEX, description="Only iterations with a greater index."),
-]
-
-After = Annotated[str | None, Query(max_length=1000, description="`next` of the previous page.")]
-
-JobIdText = Annotated[
-    str, Field(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9_-]+$", examples=["k2q7zr5dm9xw"])
-]
+ServerLimits = Annotated[Limits, Depends(limits)]
+RobotFolders = Annotated[Sequence[FilePath], Depends(robot_folders)]
 
 JobId = Annotated[JobIdText, Path(description="Id of the job, as POST /v1/jobs returned it.")]
 
@@ -194,25 +182,3 @@ def existing_job(job_id: JobId, service: Service) -> Job:
 
 
 ExistingJob = Annotated[Job, Depends(existing_job)]
-
-
-def check_length(settings: Settings, seconds: float, *, logged: bool, field: str) -> None:
-    """Reject simulations whose total time exceeds the limit."""
-    limit = settings.api_max_logged_seconds if logged else settings.api_max_simulated_seconds
-    if seconds > limit:
-        raise InvalidRequest(
-            f"the simulations last {seconds:g} s in total, more than the {limit:g} s allowed"
-            f"{' with logs' if logged else ''}; choose fewer scenarios or cycles",
-            field=field,
-        )
-
-
-def check_sampled_length(settings: Settings, seconds: float) -> None:
-    """Reject samples of designs whose total simulated time exceeds the limit."""
-    limit = settings.api_max_sampled_seconds
-    if seconds > limit:
-        raise InvalidRequest(
-            f"the simulations of all designs last {seconds:g} s in total, more than the"
-            f" {limit:g} s allowed; choose fewer samples or scenarios",
-            field="samples",
-        )

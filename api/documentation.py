@@ -38,15 +38,16 @@ the server's log contains; clients may send their own.
 """
 
 TAGS: Final[list[dict[str, str]]] = [
-    {"name": "jobs", "description": "Optimizations: submit, follow, pause, resume, cancel."},
-    {"name": "history", "description": "Committed iterations and evaluations of a job."},
-    {"name": "analysis", "description": "Analyses of all evaluations of a job."},
-    {"name": "recordings", "description": "Measured walks, for identification of a robot."},
-    {"name": "simulations", "description": "Simulations of one design, outside jobs."},
-    {"name": "robots", "description": "Drafts and checks of custom robots."},
-    {"name": "catalogue", "description": "Options for jobs and simulations."},
-    {"name": "session", "description": "Sessions of browsers."},
-    {"name": "health", "description": "For load balancers and container engines."},
+    {"name": "core", "description": "Jobs: submit, follow, control, and get the best design."},
+    {"name": "analysis", "description": "Evaluations of jobs, and simulations of single designs."},
+    {
+        "name": "robots",
+        "description": "Custom robots, measured walks, and the options of jobs and simulations.",
+    },
+    {
+        "name": "operations",
+        "description": "Forks, labels and deletion of jobs; sessions, audit log and health.",
+    },
 ]
 
 ASSETS: Final = "/docs-assets"

@@ -192,7 +192,7 @@ def test_a_foreign_last_event_id_is_refused(client: httpx2.Client, job: Job) -> 
 def test_an_idle_stream_is_kept_alive_by_comments(
     client: httpx2.Client, job: Job, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gaitswarm.api.routes.events.KEEP_ALIVE_SECONDS", 0.05)
+    monkeypatch.setattr("gaitswarm.api.events.KEEP_ALIVE_SECONDS", 0.05)
 
     with client.stream("GET", f"/v1/jobs/{job.id}/events") as answer:
         assert any(line.startswith(":") for line in answer.iter_lines())

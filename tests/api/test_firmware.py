@@ -40,7 +40,6 @@ def test_the_archive_holds_the_folder_and_is_the_same_every_time(
     assert [answer.status_code for answer in answers] == [200, 200]
     assert answers[0].headers["Content-Type"] == "application/zip"
     assert answers[0].headers["Content-Disposition"] == 'attachment; filename="firmware.zip"'
-    assert answers[0].headers["ETag"] == answers[1].headers["ETag"]
     assert answers[0].content == answers[1].content
     write_firmware(PI, tmp_path / "f", controller="pi", scenarios=SHORT_WALK, label="mine")
     assert members(answers[0].content) == written(tmp_path / "f")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from typing import Any
@@ -13,7 +13,7 @@ import httpx2
 import numpy as np
 import pytest
 
-from gaitswarm.api.dependencies import check_length
+from gaitswarm.api.dependencies import ComputingCapacity
 from gaitswarm.requests.simulations import SimulationRequest, run_simulation
 from gaitswarm.sim.outcome import OBJECTIVE_NAMES, Status
 from gaitswarm.sim.scenario import find_scenario
@@ -159,12 +159,14 @@ def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[Gate]:
         assert gate.opened.wait(20.0)
         return run_simulation(request)
 
-    def arriving(*arguments: Any, **options: Any) -> None:
-        check_length(*arguments, **options)
-        gate.arrived.release()
+    run = ComputingCapacity.run
 
-    monkeypatch.setattr("gaitswarm.api.routes.simulations.check_length", arriving)
-    monkeypatch.setattr("gaitswarm.api.routes.simulations.run_simulation", held)
+    async def arriving(capacity: ComputingCapacity, work: Callable[[], Any]) -> Any:
+        gate.arrived.release()
+        return await run(capacity, work)
+
+    monkeypatch.setattr(ComputingCapacity, "run", arriving)
+    monkeypatch.setattr("gaitswarm.operations.run_simulation", held)
     yield gate
     gate.opened.set()
 

@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable
 
 import pytest
 
-from gaitswarm.api.topics import News, Topic, Topics
+from gaitswarm.api.events import News, Topic, Topics
 from gaitswarm.services.optimizer.errors import StoreUnavailable
 from gaitswarm.services.optimizer.jobs.job import Command, Job
 from gaitswarm.services.optimizer.service import JobService

@@ -15,7 +15,7 @@ from gaitswarm.services.optimizer.access import Scope, Token
 from gaitswarm.services.optimizer.errors import Unauthorized
 from gaitswarm.views import PREFIX, View
 
-router = APIRouter(prefix=PREFIX, tags=["session"])
+router = APIRouter(prefix=PREFIX, tags=["operations"])
 
 _MAX_AGE_SECONDS = 30 * 24 * 3600
 

@@ -19,7 +19,7 @@ from gaitswarm.views import PREFIX, FieldErrorView, View
 
 _log = logging.getLogger("gaitswarm.api")
 
-router = APIRouter(prefix=PREFIX, tags=["health"])
+router = APIRouter(prefix=PREFIX, tags=["operations"])
 
 
 class HealthView(View):

@@ -1,24 +1,67 @@
-"""Jobs that event streams follow: each is watched and read once for all its streams."""
+"""Event streams of jobs: each followed job is watched and read once for all its streams."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
+import json
+from collections.abc import AsyncGenerator, Awaitable, Callable, Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Final
 
+import anyio
 from anyio.to_thread import run_sync
-from fastapi.sse import format_sse_event
+from fastapi.responses import StreamingResponse
+from fastapi.sse import KEEPALIVE_COMMENT, format_sse_event
+from starlette.types import Receive, Scope, Send
 
+from gaitswarm.operations import LARGEST_INDEX, EventsQuery
+from gaitswarm.services.monitoring.metrics import Metrics, OpenStream
+from gaitswarm.services.optimizer.errors import NotFound, StoreUnavailable
 from gaitswarm.services.optimizer.jobs.iteration import Iteration
-from gaitswarm.services.optimizer.jobs.job import Job
+from gaitswarm.services.optimizer.jobs.job import Job, JobState
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.views import IterationView, StateView
 
+Revocation = Callable[[], Awaitable[None]]
+"""Returns when the token of a request was revoked."""
+
 PAGE: Final = 200
 """Maximum number of iterations per read."""
+
+KEEP_ALIVE_SECONDS: Final = 15.0
+"""Silence after which a comment is sent, for proxies that close idle connections [s]."""
+
+_RECONNECT: Final = 1000
+"""Time after which a client reconnects to a stopped server [ms]."""
+
+_REVOKED: Final = format_sse_event(comment="the token was revoked")
+
+EXAMPLE: Final = """\
+event: iteration
+data: {"index":24,"designs":25,"best":21.3,"mean":25.2,"median":23.9,"worst":41.7,\
+"best_so_far":20.9,"failed":2,"evaluate_seconds":1.23,"committed_at":"2026-01-01T12:00:00Z"}
+id: 24
+
+event: state
+data: {"id":"k2q7zr5dm9xw","state":"succeeded","error":null,"iterations":25,"evaluations":625,\
+"waiting":null}
+
+"""
+
+EVENT_SCHEMA: Final = {
+    "type": "object",
+    "properties": {
+        "data": {"type": "string"},
+        "event": {"type": "string"},
+        "id": {"type": "string"},
+        "retry": {"type": "integer", "minimum": 0},
+    },
+}
+"""Schema of one event (OpenAPI 3.2)."""
+
+_HEADERS: Final = {"Cache-Control": "no-cache", "X-Accel-Buffering": "no"}
 
 _LONGEST_WAIT: Final = 60.0
 """Time after which a job is read again without a notification [s]."""
@@ -197,3 +240,118 @@ class Topics:
         await stopping.wait()
         for topic in self._topics.values():
             topic.end()
+
+
+class EventStream(StreamingResponse):
+    """A stream of encoded events that ends with its events, its client, or its token."""
+
+    media_type = "text/event-stream"
+
+    def __init__(self, events: AsyncGenerator[bytes, None], until_revoked: Revocation) -> None:
+        self._texts = _kept_alive(events, until_revoked)
+        super().__init__(self._texts, headers=_HEADERS)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Handle one ASGI exchange."""
+        try:
+            await super().__call__(scope, receive, send)
+        finally:
+            await self._texts.aclose()
+
+
+async def _kept_alive(
+    events: AsyncGenerator[bytes, None], until_revoked: Revocation
+) -> AsyncGenerator[bytes, None]:
+    """Yield events, and comments during long silences, until the token is revoked."""
+    following: asyncio.Task[bytes | None] | None = None
+    revoked = asyncio.ensure_future(until_revoked())
+    try:
+        while True:
+            following = following or asyncio.ensure_future(anext(events, None))
+            await asyncio.wait(
+                [following, revoked],
+                timeout=KEEP_ALIVE_SECONDS,
+                return_when=asyncio.FIRST_COMPLETED,
+            )
+            if revoked.done():
+                revoked.result()
+                yield _REVOKED
+                return
+            if not following.done():
+                yield KEEPALIVE_COMMENT
+                continue
+            text, following = following.result(), None
+            if text is None:
+                return
+            yield text
+    finally:
+        waiting = [revoked] if following is None else [revoked, following]
+        for task in waiting:
+            task.cancel()
+        await asyncio.wait(waiting)
+        await events.aclose()
+
+
+async def job_events(
+    followed: AbstractContextManager[Topic],
+    job_id: str,
+    query: EventsQuery,
+    metrics: Metrics,
+    stopping: asyncio.Event,
+    *,
+    pause_seconds: float,
+) -> AsyncGenerator[bytes, None]:
+    """Yield committed iterations, then changes of the state, then wait for the next change.
+
+    The events of one read are one text. No transaction is open while waiting. Ends after a terminal
+    state, after `query.limit` iterations, when the server stops, when the job is deleted, or after
+    the committed iterations unless `query.follow`.
+    """
+    with followed as topic, metrics.open_stream() as stream:
+        async for text in _events(topic, job_id, stream, query, stopping, pause_seconds):
+            yield text
+
+
+async def _events(
+    topic: Topic,
+    job_id: str,
+    stream: OpenStream,
+    query: EventsQuery,
+    stopping: asyncio.Event,
+    pause_seconds: float,
+) -> AsyncGenerator[bytes, None]:
+    after = query.after
+    sent_state: tuple[JobState, str | None] | None = None
+    version: int | None = None
+    left = LARGEST_INDEX if query.limit is None else query.limit
+    while not stopping.is_set():
+        try:
+            news = await topic.news(after, known=version)
+        except StoreUnavailable:
+            # Committed iterations will still be there when the database is back.
+            version = None
+            with anyio.move_on_after(pause_seconds):
+                await stopping.wait()
+            continue
+        except NotFound:
+            yield format_sse_event(event="deleted", data_str=json.dumps({"id": job_id}))
+            return
+        if news is None:
+            break
+        sent = news.iterations[:left]
+        texts = list(news.events[:left])
+        left -= len(sent)
+        for iteration in sent:
+            after = iteration.index
+            stream.sent(iteration.committed_at)
+        caught_up = left > 0 and len(news.iterations) < PAGE
+        job = news.job
+        if caught_up and (job.state, job.waiting) != sent_state:
+            sent_state = (job.state, job.waiting)
+            texts.append(news.state)
+        if texts:
+            yield b"".join(texts)
+        if left == 0 or (caught_up and (job.state.terminal or not query.follow)):
+            return
+        version = news.version if caught_up else None
+    yield format_sse_event(comment="the server is stopping", retry=_RECONNECT)

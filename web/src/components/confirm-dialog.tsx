@@ -1,24 +1,20 @@
-/** Confirmation dialog. */
+/** Confirmation dialog, open while it is rendered. */
 
 import type { ComponentChildren } from 'preact'
 import { useEffect, useId, useRef } from 'preact/hooks'
 
 export function ConfirmDialog({
-  open,
   title,
-  confirm,
-  dismiss = 'Back',
+  confirm = title,
   dangerous = false,
   disabled = false,
   onConfirm,
   onDismiss,
   children,
 }: {
-  open: boolean
   title: string
   /** Label of the confirming button. */
-  confirm: string
-  dismiss?: string
+  confirm?: string
   dangerous?: boolean
   disabled?: boolean
   onConfirm: () => void
@@ -28,13 +24,13 @@ export function ConfirmDialog({
   const dialog = useRef<HTMLDialogElement>(null)
   const heading = useId()
   useEffect(() => {
-    const element = dialog.current
-    if (!element) return
-    if (open && !element.open) element.showModal()
-    if (!open && element.open) element.close()
-  }, [open])
+    const element = dialog.current!
+    element.showModal()
+    // Returns the focus to where it was.
+    return () => element.close()
+  }, [])
   return (
-    <dialog ref={dialog} aria-labelledby={heading} onClose={() => open && onDismiss()}>
+    <dialog ref={dialog} aria-labelledby={heading} onClose={onDismiss}>
       <form
         method="dialog"
         onSubmit={(event) => {
@@ -46,7 +42,7 @@ export function ConfirmDialog({
         <div class="stack-tight">{children}</div>
         <div class="actions">
           <button type="button" onClick={onDismiss}>
-            {dismiss}
+            Back
           </button>
           <button type="submit" class={dangerous ? 'danger' : 'primary'} disabled={disabled}>
             {confirm}

@@ -7,6 +7,8 @@ export const PRIORITY_HELP =
   'Queued jobs start in order of priority. Among running jobs, each step doubles the share of the' +
   ' workers. Results do not depend on it.'
 
+export const PRIORITY_ERROR = `must be an integer from ${LOWEST} to ${HIGHEST}`
+
 /** Whether a text is a valid priority. */
 export function isPriority(text: string): boolean {
   const priority = Number(text)

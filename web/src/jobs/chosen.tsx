@@ -87,18 +87,18 @@ export function Chosen({
       )}
       {error !== null && <ErrorNotice what="The command failed." error={error} />}
       {deletion !== null && <DeletionNote deletion={deletion} onClose={() => setDeletion(null)} />}
-      <ConfirmDialog
-        open={preview !== null}
-        title={`Delete ${jobsInWords(preview?.deletable.length ?? 0)} and their results?`}
-        confirm={`Delete ${jobsInWords(preview?.deletable.length ?? 0)}`}
-        dismiss="Back"
-        dangerous
-        disabled={preview === null || preview.deletable.length === 0}
-        onConfirm={() => preview && during(deleteJobs(preview.deletable))}
-        onDismiss={() => setPreview(null)}
-      >
-        {preview && <PreviewNote preview={preview} />}
-      </ConfirmDialog>
+      {preview && (
+        <ConfirmDialog
+          title={`Delete ${jobsInWords(preview.deletable.length)} and their results?`}
+          confirm={`Delete ${jobsInWords(preview.deletable.length)}`}
+          dangerous
+          disabled={preview.deletable.length === 0}
+          onConfirm={() => during(deleteJobs(preview.deletable))}
+          onDismiss={() => setPreview(null)}
+        >
+          <PreviewNote preview={preview} />
+        </ConfirmDialog>
+      )}
     </>
   )
 }

@@ -6,17 +6,13 @@ import type { JobSpec } from '../api/types'
 import { errorsByField, specOf, withKinds } from './draft/build-spec'
 import { type Catalogue, variablesOf } from './draft/catalogue'
 import type { Draft } from './draft/draft'
-import { useFirstProblem } from './first-problem'
 import { JsonForm } from './json-form'
 import { RobotSection } from './robot/section'
-import { CaseSection } from './sections/case-section'
-import { JobSection } from './sections/job-section'
-import { OptimizerSection } from './sections/optimizer-section'
 import { PreferenceSection } from './sections/preference-section'
 import { ScenariosSection } from './sections/scenarios-section'
+import { CaseSection, JobSection, OptimizerSection, WorldsSection } from './sections/settings'
 import { StartSection } from './sections/start-section'
 import { VariablesSection } from './sections/variables-section'
-import { WorldsSection } from './sections/worlds-section'
 import { SubmitPanel } from './submit-panel'
 import { useSubmission } from './use-submission'
 
@@ -30,7 +26,6 @@ export function JobForm({ catalogue, initial }: { catalogue: Catalogue; initial:
     () => errorsByField(problem instanceof ApiProblem ? problem.errors : [], draft),
     [problem, draft],
   )
-  useFirstProblem(submission.attempts)
   if (asJson) return <JsonForm spec={spec} onBack={() => setAsJson(false)} />
   const parts = {
     draft,

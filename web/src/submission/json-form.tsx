@@ -2,6 +2,8 @@
 
 import { useState } from 'preact/hooks'
 import type { AnySpec } from '../api/types'
+import { Card } from '../components/card'
+import { TextField } from '../components/fields/field'
 import { SubmitPanel } from './submit-panel'
 import { useSubmission } from './use-submission'
 
@@ -28,34 +30,26 @@ export function JsonForm({ spec, onBack }: { spec: AnySpec; onBack?: () => void 
         if (mistake === '') submission.submit()
       }}
     >
-      <section class="card" aria-labelledby="part-json">
-        <header class="row spread">
-          <h2 id="part-json">Spec as JSON</h2>
-          {onBack && (
+      <Card
+        title="Spec as JSON"
+        tools={
+          onBack && (
             <button type="button" class="compact" onClick={onBack}>
               Back to the form, discarding changes
             </button>
-          )}
-        </header>
-        <div class="field">
-          <label class="visually-hidden" for="spec-text">
-            Spec as JSON
-          </label>
-          <textarea
-            id="spec-text"
-            class="spec-text"
-            spellcheck={false}
-            value={text}
-            aria-invalid={mistake !== ''}
-            onInput={(event) => write(event.currentTarget.value)}
-          />
-          {mistake !== '' && (
-            <span class="wrong" role="alert">
-              {mistake}
-            </span>
-          )}
-        </div>
-      </section>
+          )
+        }
+      >
+        <TextField
+          label={<span class="visually-hidden">Spec as JSON</span>}
+          class="spec-text"
+          rows={34}
+          spellcheck={false}
+          value={text}
+          error={mistake || undefined}
+          onChange={write}
+        />
+      </Card>
       <SubmitPanel spec={valid} submission={submission} />
     </form>
   )

@@ -4,7 +4,7 @@ import { get } from '../api/client'
 import { readableJob } from '../api/readable'
 import { useResource } from '../api/resource'
 import type { Job, JobSpec } from '../api/types'
-import { ErrorNotice, Loading } from '../components/feedback'
+import { Loaded } from '../components/card'
 import { preferenceIn } from '../job/preference'
 import { ALL_JOBS, Breadcrumbs, type Crumb } from '../router/breadcrumbs'
 import { usePlace } from '../router/navigation'
@@ -63,20 +63,15 @@ function NewTuning({ query }: { query: URLSearchParams }) {
           )}
         </div>
       </header>
-      {start.error && (
-        <ErrorNotice what="Could not load the form." error={start.error} retry={start.reload} />
-      )}
-      {start.loading && <Loading what="the catalogue" />}
-      {start.data &&
-        (from && isDocument(from, start.data.catalogue) ? (
-          <JsonForm key={String(query)} spec={from.spec} />
-        ) : (
-          <JobForm
-            key={String(query)}
-            catalogue={start.data.catalogue}
-            initial={start.data.draft}
-          />
-        ))}
+      <Loaded resource={start} what="the catalogue" failed="Could not load the form.">
+        {({ catalogue, draft }) =>
+          from && isDocument(from, catalogue) ? (
+            <JsonForm key={String(query)} spec={from.spec} />
+          ) : (
+            <JobForm key={String(query)} catalogue={catalogue} initial={draft} />
+          )
+        }
+      </Loaded>
     </>
   )
 }

@@ -4,10 +4,10 @@ import { ApiProblem } from '../api/problem'
 import type { AnySpec } from '../api/types'
 import { CopyButton } from '../components/copy-button'
 import { ErrorNotice } from '../components/feedback'
+import { TextField } from '../components/fields/field'
 import { formatCount } from '../format/number'
 import { formatDuration } from '../format/time'
-import { HIGHEST, isPriority, LOWEST, PRIORITY_HELP } from '../job/priority'
-import { TextField } from './fields/text-field'
+import { HIGHEST, isPriority, LOWEST, PRIORITY_ERROR, PRIORITY_HELP } from '../job/priority'
 import { NOTIFY, type Submission } from './use-submission'
 
 export function SubmitPanel({
@@ -29,13 +29,20 @@ export function SubmitPanel({
         {estimate ? (
           <>
             <dl class="estimate" data-walks={estimate.walks}>
-              <Row label="Evaluations" value={formatCount(estimate.evaluations)} />
-              <Row label="Simulations" value={formatCount(estimate.walks)} />
-              <Row label="Simulated time" value={formatDuration(estimate.simulated_seconds)} />
-              <Row
-                label="Duration (approx.)"
-                value={estimate.seconds === null ? 'unknown' : formatDuration(estimate.seconds)}
-              />
+              {[
+                ['Evaluations', formatCount(estimate.evaluations)],
+                ['Simulations', formatCount(estimate.walks)],
+                ['Simulated time', formatDuration(estimate.simulated_seconds)],
+                [
+                  'Duration (approx.)',
+                  estimate.seconds === null ? 'unknown' : formatDuration(estimate.seconds),
+                ],
+              ].map(([label, value]) => (
+                <div key={label}>
+                  <dt>{label}</dt>
+                  <dd>{value}</dd>
+                </div>
+              ))}
             </dl>
             <p class="muted small">{estimate.basis}</p>
           </>
@@ -44,7 +51,15 @@ export function SubmitPanel({
         )}
         {problem !== null && <ErrorNotice what={advice(problem)} error={problem} />}
       </div>
-      <PriorityField submission={submission} />
+      <TextField
+        label="Priority"
+        inputMode="numeric"
+        value={submission.priority}
+        title={PRIORITY_HELP}
+        hint={`${LOWEST} to ${HIGHEST}; higher runs first`}
+        error={isPriority(submission.priority) ? undefined : PRIORITY_ERROR}
+        onChange={submission.setPriority}
+      />
       <TextField
         label="Webhook"
         value={submission.notify}
@@ -75,43 +90,10 @@ export function SubmitPanel({
   )
 }
 
-function PriorityField({ submission }: { submission: Submission }) {
-  const { priority, setPriority } = submission
-  const valid = isPriority(priority)
-  return (
-    <div class="field">
-      <label for="submit-priority">
-        Priority <span class="unit">[1]</span>
-      </label>
-      <input
-        id="submit-priority"
-        inputMode="numeric"
-        value={priority}
-        aria-invalid={!valid}
-        aria-describedby="submit-priority-hint"
-        title={PRIORITY_HELP}
-        onInput={(event) => setPriority(event.currentTarget.value)}
-      />
-      <span id="submit-priority-hint" class={valid ? 'hint' : 'wrong'}>
-        {LOWEST} to {HIGHEST}; higher runs first
-      </span>
-    </div>
-  )
-}
-
 /** Message of the server for a field. */
 function problemOf(problem: unknown, field: string): string | undefined {
   const errors = problem instanceof ApiProblem ? problem.errors : []
   return errors.find((error) => error.field === field)?.message
-}
-
-function Row({ label, value }: { label: string; value: string }) {
-  return (
-    <div>
-      <dt>{label}</dt>
-      <dd>{value}</dd>
-    </div>
-  )
 }
 
 function advice(problem: unknown): string {

@@ -19,8 +19,6 @@ export interface Submission {
   /** Why the server rejects the spec; null if it does not, or is unknown. */
   readonly problem: unknown
   readonly sending: boolean
-  /** Number of rejected submissions. */
-  readonly attempts: number
   /** Priority as typed. */
   readonly priority: string
   readonly setPriority: (text: string) => void
@@ -33,7 +31,6 @@ export interface Submission {
 export function useSubmission(spec: AnySpec): Submission {
   const [rejected, setRejected] = useState<{ text: string; error: unknown } | null>(null)
   const [sending, setSending] = useState(false)
-  const [attempts, setAttempts] = useState(0)
   const [priority, setPriority] = useState('0')
   const [notify, setNotify] = useState('')
   const text = JSON.stringify(spec)
@@ -60,17 +57,24 @@ export function useSubmission(spec: AnySpec): Submission {
           // A response invalidates the key. Without one the job may exist, so a retry must reuse the key.
           if (error instanceof ApiProblem && error.status !== 0) key.current.text = ''
           setRejected({ text, error })
-          setAttempts((n) => n + 1)
+          requestAnimationFrame(showFirstProblem)
         },
       )
       .finally(() => setSending(false))
   }
   return {
-    ...{ estimate: problem === null ? estimate.data : null, problem, sending, attempts },
+    ...{ estimate: problem === null ? estimate.data : null, problem, sending },
     ...{ priority, setPriority, notify, setNotify, submit },
   }
 }
 
 function randomKey(): string {
   return [...crypto.getRandomValues(new Uint32Array(4))].map((n) => n.toString(36)).join('')
+}
+
+/** Focus the first invalid field, or show the message if there is none. */
+function showFirstProblem(): void {
+  const field = document.querySelector<HTMLElement>('.submission [aria-invalid="true"]')
+  if (field) field.focus()
+  else document.querySelector('.submission [role="alert"]')?.scrollIntoView({ block: 'center' })
 }

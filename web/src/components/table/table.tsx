@@ -14,6 +14,8 @@ export interface Column<R> {
   readonly label?: string
   /** Shown in brackets in the header; `1` is omitted. */
   readonly unit?: string
+  /** Title of the header. */
+  readonly help?: string
   readonly numeric?: boolean
   /** Digits of a numeric column. */
   readonly digits?: number
@@ -180,6 +182,7 @@ function Header<R>({
     <th
       scope="col"
       class={classes(column)}
+      title={column.help}
       aria-sort={active ? (order.descending ? 'descending' : 'ascending') : undefined}
     >
       {sortable ? (

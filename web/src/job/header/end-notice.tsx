@@ -27,21 +27,16 @@ export function EndNotice({ job }: { job: StoredJob }) {
       setEnabled(answer === 'granted')
     })
   }
-  return <NoticeToggle state={noticeState(permission, enabled)} onToggle={toggle} />
-}
-
-function NoticeToggle({ state, onToggle }: { state: NoticeState; onToggle: () => void }) {
-  if (state.hint !== null && state.label === null) {
-    return <span class="muted small">{state.hint}</span>
-  }
+  const { label, on, hint } = noticeState(permission, enabled)
+  if (label === null) return <span class="muted small">{hint}</span>
   return (
     <span class="row">
-      <button type="button" class="compact" aria-pressed={state.on} onClick={onToggle}>
-        {state.label}
+      <button type="button" class="compact" aria-pressed={on} onClick={toggle}>
+        {label}
       </button>
-      {state.hint !== null && (
+      {hint !== null && (
         <span class="muted small" role="status">
-          {state.hint}
+          {hint}
         </span>
       )}
     </span>

@@ -1,12 +1,21 @@
 /** Name, state, figures and commands of a job. */
 
+import { get } from '../../api/client'
 import { isReadable } from '../../api/readable'
-import { useNow } from '../../api/resource'
-import type { StoredJob } from '../../api/types'
+import { useNow, useResource } from '../../api/resource'
+import type { Job, JobSummary, StoredJob, TuningWorlds } from '../../api/types'
 import { Progress } from '../../components/progress'
 import { STATE_TONES, StateBadge } from '../../components/state-badge'
-import { change, formatCount, formatNumber, percent, quantity } from '../../format/number'
+import {
+  change,
+  formatCount,
+  formatExact,
+  formatNumber,
+  percent,
+  quantity,
+} from '../../format/number'
 import { formatAge, formatClock, formatDuration, formatMoment } from '../../format/time'
+import { jobPath } from '../../router/routes'
 import { budgetSpent } from '../budget'
 import { caseWords, fitnessUnit } from '../fitness'
 import type { Gain } from '../gain'
@@ -14,9 +23,7 @@ import type { LiveJob } from '../live/use-job'
 import { startDesigns } from '../start'
 import { JobActions } from './actions'
 import { EndNotice } from './end-notice'
-import { Forks, Parent } from './lineage'
 import { WalkPreview } from './walk-preview'
-import { WorldsNote } from './worlds-note'
 import './header.css'
 
 export function JobHeader({ live, job, gain }: { live: LiveJob; job: StoredJob; gain: Gain }) {
@@ -91,60 +98,51 @@ export function JobHeader({ live, job, gain }: { live: LiveJob; job: StoredJob; 
 
 function Figures({ job, gain, committed }: { job: StoredJob; gain: Gain; committed: number }) {
   const unit = fitnessUnit(job)
-  const merit = job.best?.figure_of_merit ?? null
-  const search = job.best?.search ?? null
+  const { search = null, figure_of_merit: merit = null } = job.best ?? {}
   const started = isReadable(job) ? startDesigns(job).length : 0
+  const { reference, share, reason } = gain
+  const planned =
+    budgetSpent(job).unit === 'iterations'
+      ? ` of ${formatCount(job.iterations_planned)}`
+      : `, at most ${formatCount(job.particles)} designs each`
+  const figures: readonly (readonly [label: string, value: string] | false)[] = [
+    [
+      search ? 'Best fitness (double precision)' : 'Best fitness',
+      quantity(job.best_fitness, unit, search ? 7 : 5),
+    ],
+    reference !== null && [
+      `Gain over ${reference.label}`,
+      `${percent(share, 3)}, from ${quantity(reference.fitness, unit, 5)}`,
+    ],
+    reference === null && reason !== null && job.kind === 'tuning' && ['Gain', `none: ${reason}`],
+    search !== null && [
+      `Fitness in the search (${search.precision} precision)`,
+      `${quantity(search.fitness, unit, 7)} (${change(100 * search.difference, '%', 2)})`,
+    ],
+    merit !== null && ['Figure of merit F (eq. 3.1)', formatNumber(merit, 5)],
+    ['Iterations', formatCount(committed) + planned],
+    ['Best in iteration', formatCount(job.best_iteration)],
+    ['Evaluations', `${formatCount(job.evaluations)} of ${formatCount(job.evaluations_planned)}`],
+    job.evaluations_saved > 0 && [
+      'Reused evaluations',
+      `${formatCount(job.evaluations_saved)} (${percent(job.evaluations_saved / job.evaluations, 2)})`,
+    ],
+    started > 0 && ['Start designs', formatCount(started)],
+    ['Evaluation rate', quantity(job.evaluations_per_second, '1/s', 3)],
+    ['Simulation rate', quantity(job.simulations_per_second, '1/s', 3)],
+    ['Time left', timeLeft(job)],
+    ['Computing time', formatDuration(job.compute_seconds)],
+  ]
   return (
     <dl class="figures">
-      <Figure
-        label={search ? 'Best fitness (double precision)' : 'Best fitness'}
-        value={quantity(job.best_fitness, unit, search ? 7 : 5)}
-      />
-      {gain.reference && (
-        <Figure
-          label={`Gain over ${gain.reference.label}`}
-          value={`${percent(gain.share, 3)}, from ${quantity(gain.reference.fitness, unit, 5)}`}
-        />
-      )}
-      {gain.reference === null && gain.reason !== null && job.kind === 'tuning' && (
-        <Figure label="Gain" value={`none: ${gain.reason}`} />
-      )}
-      {search && (
-        <Figure
-          label={`Fitness in the search (${search.precision} precision)`}
-          value={`${quantity(search.fitness, unit, 7)} (${change(100 * search.difference, '%', 2)})`}
-        />
-      )}
-      {merit !== null && (
-        <Figure label="Figure of merit F (eq. 3.1)" value={formatNumber(merit, 5)} />
-      )}
-      <Figure
-        label="Iterations"
-        value={
-          budgetSpent(job).unit === 'iterations'
-            ? `${formatCount(committed)} of ${formatCount(job.iterations_planned)}`
-            : `${formatCount(committed)}, at most ${formatCount(job.particles)} designs each`
-        }
-      />
-      <Figure
-        label="Best in iteration"
-        value={job.best_iteration === null ? '–' : formatCount(job.best_iteration)}
-      />
-      <Figure
-        label="Evaluations"
-        value={`${formatCount(job.evaluations)} of ${formatCount(job.evaluations_planned)}`}
-      />
-      {job.evaluations_saved > 0 && (
-        <Figure
-          label="Reused evaluations"
-          value={`${formatCount(job.evaluations_saved)} (${percent(job.evaluations_saved / job.evaluations, 2)})`}
-        />
-      )}
-      {started > 0 && <Figure label="Start designs" value={formatCount(started)} />}
-      <Figure label="Evaluation rate" value={quantity(job.evaluations_per_second, '1/s', 3)} />
-      <Figure label="Simulation rate" value={quantity(job.simulations_per_second, '1/s', 3)} />
-      <Figure label="Time left" value={timeLeft(job)} />
-      <Figure label="Computing time" value={formatDuration(job.compute_seconds)} />
+      {figures
+        .filter((figure) => figure !== false)
+        .map(([label, value]) => (
+          <div key={label}>
+            <dt>{label}</dt>
+            <dd>{value}</dd>
+          </div>
+        ))}
     </dl>
   )
 }
@@ -153,15 +151,6 @@ function timeLeft(job: StoredJob): string {
   if (job.state === 'succeeded') return 'done'
   if (job.state === 'running' && job.eta_seconds === null) return job.eta_basis
   return formatDuration(job.eta_seconds)
-}
-
-function Figure({ label, value }: { label: string; value: string }) {
-  return (
-    <div>
-      <dt>{label}</dt>
-      <dd>{value}</dd>
-    </div>
-  )
 }
 
 /** Connection status of the live data. */
@@ -197,4 +186,76 @@ function Subtitle({ job }: { job: StoredJob }) {
   const priority = job.priority === 0 ? [] : [`priority ${job.priority}`]
   const submitted = `submitted ${formatMoment(job.created_at)}, ${formatAge(job.created_at, now)} ago`
   return <p class="muted small">{[job.id, ...settings, ...priority, submitted].join(' · ')}</p>
+}
+
+/** Summary of a robust job's worlds. */
+function WorldsNote({ job }: { job: Job }) {
+  const worlds = job.spec.kind === 'tuning' ? job.spec.worlds : null
+  if (!worlds) return null
+  const { count, seed, ranges } = worlds
+  return (
+    <p class="small" data-worlds={count}>
+      <strong>Robust job</strong>: every design is simulated in {formatCount(count)} world
+      {count === 1 ? '' : 's'} with perturbed models
+      {ranges && ` (${formatCount(ranges.length)} perturbations)`}, seed {seed}. The utility of a
+      scenario is {judgedBy(worlds)}.
+    </p>
+  )
+}
+
+/** Description of the aggregation over worlds. */
+function judgedBy({ aggregate, level = 0.75 }: TuningWorlds): string {
+  if (aggregate === 'mean' || aggregate === 'worst') return `the ${aggregate} over all worlds`
+  if (aggregate === 'quantile') return `the ${percent(level, 2)} quantile over all worlds`
+  const share = formatExact((1 - level) * 100, 3)
+  return `the conditional value at risk of its utilities: the mean of the worst ${share} %`
+}
+
+/** Most forks shown; the list of jobs has all of them. */
+const SHOWN = 12
+
+type Lineage = NonNullable<StoredJob['lineage']>
+
+/** Placed last, so that its late arrival does not move buttons. */
+function Forks({ job }: { job: StoredJob }) {
+  const forks = useResource(job.id, (signal) =>
+    get('/v1/jobs', { query: { parent: job.id, limit: SHOWN + 1 }, signal }).then(
+      (page) => page.items,
+    ),
+  )
+  const forkList = forks.data ?? []
+  return forkList.length === 0 ? null : (
+    <p class="small" data-forks={forkList.length}>
+      Forks:{' '}
+      {forkList.slice(0, SHOWN).map((fork, index) => (
+        <span key={fork.id}>
+          {index > 0 && ', '}
+          <a href={jobPath(fork.id)}>{fork.id}</a> <span class="muted">{forkWords(fork)}</span>
+        </span>
+      ))}
+      {forkList.length > SHOWN && ' and more'}
+    </p>
+  )
+}
+
+function Parent({ lineage }: { lineage: Lineage }) {
+  return (
+    <p class="small" data-parent={lineage.parent}>
+      Fork of <a href={jobPath(lineage.parent)}>{lineage.parent}</a>
+      {lineage.carried === 'search'
+        ? `: continues from iteration ${lineage.from_iteration}${changedWords(lineage)}.`
+        : `: a new search${changedWords(lineage)} from the best designs before iteration ${
+            lineage.from_iteration
+          }, because ${lineage.reason}.`}
+    </p>
+  )
+}
+
+/** What differs: " with another preference". */
+function changedWords({ changed }: Lineage): string {
+  return changed.length > 0 ? ` with another ${changed.join(', ')}` : ''
+}
+
+function forkWords({ lineage }: JobSummary): string {
+  return lineage ? `from iteration ${lineage.from_iteration}${changedWords(lineage)}` : ''
 }

@@ -15,7 +15,7 @@ import { type Codec, flag, ORDER, PAGE_NUMBER, useQueryValue } from '../../route
 import { jobPath, withQuery } from '../../router/routes'
 import { searchedVariables } from '../designs/variables'
 import { caseWords, fitnessUnit } from '../fitness'
-import { canFork, ForkButton } from '../header/fork-dialog'
+import { canFork, ForkButton } from '../header/dialogs'
 import type { PanelProps } from '../page'
 
 const NEWEST = { column: 'index', descending: true }

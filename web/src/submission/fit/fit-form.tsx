@@ -3,17 +3,25 @@
 import type { ComponentChildren } from 'preact'
 import { useState } from 'preact/hooks'
 import { ApiProblem } from '../../api/problem'
-import type { AnySpec } from '../../api/types'
+import type { AnySpec, Variable } from '../../api/types'
+import { Card } from '../../components/card'
+import { ChoiceField, Problems, TextField } from '../../components/fields/field'
+import { inWords } from '../../format/words'
+import type { FieldErrors } from '../draft/build-spec'
 import type { Catalogue } from '../draft/catalogue'
-import { ChoiceField, Problems } from '../fields/number-field'
-import { TextField } from '../fields/text-field'
-import { useFirstProblem } from '../first-problem'
+import type { VariableDraft, VariableMode } from '../draft/draft'
 import { JsonForm } from '../json-form'
+import { VariableTable } from '../sections/variables-section'
 import { SubmitPanel } from '../submit-panel'
 import { useSubmission } from '../use-submission'
 import { errorsByPart, type FitDraft, hasParticles } from './fit'
-import { type Parameters, parameterErrors } from './parameters'
-import { ParametersTable } from './parameters-table'
+import {
+  allEdited,
+  fittedNames,
+  type Parameters,
+  parameterDrafts,
+  parameterErrors,
+} from './parameters'
 
 export function FitForm({
   title,
@@ -45,9 +53,6 @@ export function FitForm({
   const fieldErrors = problem instanceof ApiProblem ? problem.errors : []
   const errors = errorsByPart(fieldErrors)
   const byParameter = parameterErrors(fieldErrors, parameters)
-  // Errors that concern all parameters, or one missing in the table.
-  const unassigned = byParameter.size === 0 && errors.variables ? [errors.variables] : []
-  useFirstProblem(submission.attempts)
   if (asJson) return <JsonForm spec={spec} onBack={() => setAsJson(false)} />
   const field = (
     name: Exclude<keyof FitDraft, 'method' | 'edited'>,
@@ -71,9 +76,8 @@ export function FitForm({
         submission.submit()
       }}
     >
-      <section class="card stack" aria-labelledby="part-fit">
-        <h2 id="part-fit">{title}</h2>
-        <Problems messages={parts.flatMap((part) => (errors[part] ? [errors[part]] : []))} />
+      <Card class="stack" title={title}>
+        <Problems messages={parts.map((part) => errors[part])} />
         {before}
         <div class="fields">
           {field('name', 'Name', 'shown in the list of jobs')}
@@ -90,14 +94,76 @@ export function FitForm({
           {field('iterations', 'Iterations', 'of the search')}
           {field('seed', 'Seed', 'runs with different seeds show which parameters can be trusted')}
         </div>
-        <Problems messages={unassigned} />
+        {/* Errors that concern all parameters, or one missing in the table. */}
+        <Problems messages={byParameter.size === 0 ? [errors.variables] : []} />
         <ParametersTable
           parameters={parameters}
           errors={byParameter}
           onEdit={(edited) => onDraft({ edited })}
         />
-      </section>
+      </Card>
       <SubmitPanel spec={spec} submission={submission} onJson={() => setAsJson(true)} />
     </form>
   )
+}
+
+const MODES: readonly VariableMode[] = ['default', 'searched']
+
+/** Parameters to select for fitting, with bounds. */
+function ParametersTable({
+  parameters,
+  errors,
+  onEdit,
+}: {
+  parameters: Parameters
+  errors: FieldErrors
+  onEdit: (edited: Readonly<Record<string, VariableDraft>>) => void
+}) {
+  const { fittable, edited } = parameters
+  const drafts = parameterDrafts(parameters)
+  const fitted = fittedNames(parameters).length
+  return (
+    <details open={fittable.length > 0}>
+      <summary>
+        Parameters: {fitted} of {fittable.length} fitted
+      </summary>
+      <div class="stack-tight">
+        <div class="row">
+          <button
+            type="button"
+            class="compact"
+            onClick={() => onEdit(allEdited(parameters, 'searched'))}
+          >
+            Fit all
+          </button>
+          <button
+            type="button"
+            class="compact"
+            onClick={() => onEdit(allEdited(parameters, 'default'))}
+          >
+            Fit none
+          </button>
+        </div>
+        <div class="fit-parameters-list">
+          <VariableTable
+            title="Fitted"
+            variables={fittable}
+            modes={MODES}
+            words={wordsOf}
+            drafts={drafts}
+            errors={errors}
+            onChange={(name, changes) =>
+              onEdit({ ...edited, [name]: { ...drafts[name], ...changes } })
+            }
+          />
+        </div>
+      </div>
+    </details>
+  )
+}
+
+function wordsOf(mode: VariableMode, { default: value, choices }: Variable): string {
+  if (mode === 'searched') return 'fitted'
+  if (value === undefined || value === null) return 'unchanged'
+  return `unchanged: ${inWords(choices?.[value] ?? String(value))}`
 }

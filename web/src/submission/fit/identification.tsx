@@ -2,8 +2,8 @@
 
 import { useMemo, useState } from 'preact/hooks'
 import type { IdentificationSpec, OptimizerPreset, RobotSource } from '../../api/types'
+import { TextField } from '../../components/fields/field'
 import { number } from '../draft/build-spec'
-import { TextField } from '../fields/text-field'
 import { EMPTY_FIT, type FitDraft, fitOf, words } from './fit'
 import { FitForm } from './fit-form'
 import type { FitProps } from './page'

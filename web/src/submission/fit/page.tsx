@@ -1,10 +1,10 @@
 /** New identification or calibration: measured log, recordings and form. */
 
-import { useMemo, useRef, useState } from 'preact/hooks'
+import { useMemo, useState } from 'preact/hooks'
 import { get, post } from '../../api/client'
 import { useResource } from '../../api/resource'
 import type { RobotPreset, RobotSource } from '../../api/types'
-import { ErrorNotice, Loading } from '../../components/feedback'
+import { Loaded } from '../../components/card'
 import { ALL_JOBS, Breadcrumbs } from '../../router/breadcrumbs'
 import { setQuery } from '../../router/navigation'
 import { idsOf } from '../../router/query-value'
@@ -15,7 +15,7 @@ import { emptyDraft, type RobotDraft } from '../draft/draft'
 import { RobotSection } from '../robot/section'
 import { CalibrationForm } from './calibration'
 import { IdentificationForm } from './identification'
-import { ChosenCard } from './recordings/chosen-card'
+import { RecordingsCard } from './recordings/recordings-card'
 import { UploadCard } from './recordings/upload-card'
 
 export type FitKind = 'identification' | 'calibration'
@@ -59,15 +59,9 @@ export function FitPage({ kind, query }: { kind: FitKind; query: URLSearchParams
           <OtherKinds kind={kind} recordings={ids} />
         </div>
       </header>
-      {catalogue.error && (
-        <ErrorNotice
-          what="Could not load the form."
-          error={catalogue.error}
-          retry={catalogue.reload}
-        />
-      )}
-      {catalogue.loading && <Loading what="the catalogue" />}
-      {catalogue.data && <Fit kind={kind} catalogue={catalogue.data} ids={ids} />}
+      <Loaded resource={catalogue} what="the catalogue" failed="Could not load the form.">
+        {(data) => <Fit kind={kind} catalogue={data} ids={ids} />}
+      </Loaded>
     </>
   )
 }
@@ -84,19 +78,21 @@ function Fit({
   const [draft, setDraft] = useState(() => emptyDraft(catalogue))
   const robot = useMemo(() => robotOf(draft) as RobotSource, [draft.robot])
   const fittable = useFittableParameters(draft.robot, catalogue)
-  const recordings = useResource(ids.length === 0 ? null : ids.join(), (signal) =>
-    Promise.all(
-      ids.map((id) =>
-        get('/v1/recordings/{recording_id}/summary', { path: { recording_id: id }, signal }),
+  // The previous ones stay while others load, so that typed values are kept.
+  const recordings = useResource(
+    ids.length === 0 ? null : ids.join(),
+    (signal) =>
+      Promise.all(
+        ids.map((id) =>
+          get('/v1/recordings/{recording_id}/summary', { path: { recording_id: id }, signal }),
+        ),
       ),
-    ),
+    { keep: true },
   )
-  const choose = (chosen: readonly string[]) => {
-    const text = idsOf(chosen.join()).join()
-    setQuery({ recordings: text === '' ? null : text })
-  }
+  const select = (selected: readonly string[]) =>
+    setQuery({ recordings: idsOf(selected.join()).join() || null })
   const parts = { catalogue, robot, fittable, ids }
-  const shown = useLast(recordings.data)?.filter(({ id }) => ids.includes(id)) ?? []
+  const shown = (recordings.data ?? []).filter(({ id }) => ids.includes(id))
   return (
     <div class="stack">
       <RobotSection
@@ -105,8 +101,8 @@ function Fit({
         errors={NO_ERRORS}
         onChange={(changes) => setDraft((old) => ({ ...old, ...changes }))}
       />
-      <UploadCard {...parts} onRead={({ recording }) => choose([...chosenNow(), recording.id])} />
-      <ChosenCard ids={ids} recordings={recordings} onChange={choose} />
+      <UploadCard {...parts} onRead={({ recording }) => select([...selectedNow(), recording.id])} />
+      <RecordingsCard ids={ids} recordings={recordings} onChange={select} />
       {/* Without recordings, there is nothing to estimate. */}
       {ids.length > 0 && kind === 'identification' && <IdentificationForm {...parts} />}
       {kind === 'calibration' && shown.length > 0 && (
@@ -144,15 +140,8 @@ export function OtherKinds({
   )
 }
 
-/** Previous data during loading, so that typed values are kept. */
-function useLast<T>(data: T | null): T | null {
-  const last = useRef(data)
-  if (data !== null) last.current = data
-  return last.current
-}
-
 /** Selection in the address at this moment, which may have changed since the request. */
-function chosenNow(): string[] {
+function selectedNow(): string[] {
   return idsOf(new URLSearchParams(location.search).get('recordings'))
 }
 

@@ -1,7 +1,9 @@
 /** Editable table of a calibration's targets. */
 
 import type { RecordingView } from '../../api/types'
-import { inWords } from '../../format/words'
+import { type Option, Select } from '../../components/fields/controls'
+import { type Column, Table } from '../../components/table/table'
+import { capitalized, inWords } from '../../format/words'
 import type { Catalogue } from '../draft/catalogue'
 import { nextKey, type TargetDraft, walkName } from './targets'
 
@@ -32,6 +34,64 @@ export function TargetsTable({
         use: 'fit',
       },
     ])
+  const set = ({ key }: TargetDraft, changes: Partial<TargetDraft>) =>
+    onChange((all) => all.map((old) => (old.key === key ? { ...old, ...changes } : old)))
+  const place = (target: TargetDraft) => targets.indexOf(target) + 1
+  const select = (name: 'recording' | 'quantity' | 'use', label: string, options: Option[]) => ({
+    key: label,
+    cell: (target: TargetDraft) => (
+      <Select
+        hidden
+        label={`${capitalized(label)} of target ${place(target)}`}
+        value={target[name]}
+        options={options}
+        onChoose={(value) => set(target, { [name]: value })}
+      />
+    ),
+  })
+  const input = (name: 'value' | 'tolerance') => ({
+    key: name,
+    cell: (target: TargetDraft) => (
+      <input
+        class="short"
+        inputMode="decimal"
+        aria-label={`${capitalized(name)} of target ${place(target)}`}
+        value={target[name]}
+        onInput={(event) => set(target, { [name]: event.currentTarget.value })}
+      />
+    ),
+  })
+  const columns: readonly Column<TargetDraft>[] = [
+    select(
+      'recording',
+      'walk',
+      recordings.map(({ id, scenario }, k) => [id, `${walkName(k)} (${scenario})`]),
+    ),
+    select(
+      'quantity',
+      'quantity',
+      quantities.map((name) => [name, inWords(name)]),
+    ),
+    input('value'),
+    input('tolerance'),
+    select('use', 'use', [
+      ['fit', 'fitted'],
+      ['predict', 'predicted'],
+    ]),
+    {
+      key: 'remove',
+      cell: (target) => (
+        <button
+          type="button"
+          class="compact"
+          aria-label={`Remove target ${place(target)}`}
+          onClick={() => onChange((all) => all.filter(({ key }) => key !== target.key))}
+        >
+          Remove
+        </button>
+      ),
+    },
+  ]
   return (
     <section class="stack-tight" aria-labelledby="part-targets">
       <h3 id="part-targets">Targets</h3>
@@ -40,31 +100,15 @@ export function TargetsTable({
         Tolerances are relative (0.1 is 10&nbsp;%), except for height loss (in metres). Predicted
         targets are reported but not fitted.
       </p>
-      <div class="table-scroll">
-        <table class="variables">
-          <caption class="visually-hidden">Targets</caption>
-          <thead>
-            <tr>
-              {['Walk', 'Quantity', 'Value', 'Tolerance', 'Use', ''].map((label) => (
-                <th key={label} scope="col">
-                  {label || <span class="visually-hidden">Remove</span>}
-                </th>
-              ))}
-            </tr>
-          </thead>
-          <tbody>
-            {targets.map((target, index) => (
-              <TargetRow
-                key={target.key}
-                target={target}
-                index={index}
-                recordings={recordings}
-                quantities={quantities}
-                onChange={onChange}
-              />
-            ))}
-          </tbody>
-        </table>
+      <div class="variables">
+        <Table<TargetDraft>
+          caption="Targets"
+          rows={targets}
+          rowKey={({ key }) => String(key)}
+          rowData={({ quantity }) => ({ 'data-target': quantity })}
+          columns={columns}
+          pageSize={Number.POSITIVE_INFINITY}
+        />
       </div>
       <div class="row">
         <button type="button" class="compact" onClick={add}>
@@ -72,85 +116,5 @@ export function TargetsTable({
         </button>
       </div>
     </section>
-  )
-}
-
-function TargetRow({
-  target,
-  index,
-  recordings,
-  quantities,
-  onChange,
-}: {
-  target: TargetDraft
-  index: number
-  recordings: readonly RecordingView[]
-  quantities: readonly string[]
-  onChange: (change: Change) => void
-}) {
-  const { key } = target
-  const place = index + 1
-  const set = (changes: Partial<TargetDraft>) =>
-    onChange((all) => all.map((old) => (old.key === key ? { ...old, ...changes } : old)))
-  const input = (name: 'value' | 'tolerance') => (
-    <input
-      class="short"
-      inputMode="decimal"
-      aria-label={`${name === 'value' ? 'Value' : 'Tolerance'} of target ${place}`}
-      value={target[name]}
-      onInput={(event) => set({ [name]: event.currentTarget.value })}
-    />
-  )
-  return (
-    <tr data-target={target.quantity}>
-      <td>
-        <select
-          aria-label={`Walk of target ${place}`}
-          value={target.recording}
-          onChange={(event) => set({ recording: event.currentTarget.value })}
-        >
-          {recordings.map(({ id, scenario }, k) => (
-            <option key={id} value={id}>
-              {walkName(k)} ({scenario})
-            </option>
-          ))}
-        </select>
-      </td>
-      <td>
-        <select
-          aria-label={`Quantity of target ${place}`}
-          value={target.quantity}
-          onChange={(event) => set({ quantity: event.currentTarget.value })}
-        >
-          {quantities.map((name) => (
-            <option key={name} value={name}>
-              {inWords(name)}
-            </option>
-          ))}
-        </select>
-      </td>
-      <td>{input('value')}</td>
-      <td>{input('tolerance')}</td>
-      <td>
-        <select
-          aria-label={`Use of target ${place}`}
-          value={target.use}
-          onChange={(event) => set({ use: event.currentTarget.value as TargetDraft['use'] })}
-        >
-          <option value="fit">fitted</option>
-          <option value="predict">predicted</option>
-        </select>
-      </td>
-      <td>
-        <button
-          type="button"
-          class="compact"
-          aria-label={`Remove target ${place}`}
-          onClick={() => onChange((all) => all.filter((old) => old.key !== key))}
-        >
-          Remove
-        </button>
-      </td>
-    </tr>
   )
 }

@@ -1,16 +1,16 @@
 /** Custom robot from a URDF; guessed settings are shown and can be edited. */
 
-import { useId } from 'preact/hooks'
 import { NOT_PUBLISHED } from '../../api/robots'
+import type { CheckedLeg, RobotCheck } from '../../api/types'
 import { ErrorNotice } from '../../components/feedback'
+import { ChoiceField, FileField, TextField } from '../../components/fields/field'
+import { type Column, Table } from '../../components/table/table'
+import { exactQuantity, formatExact, quantity } from '../../format/number'
 import { useManual } from '../../session/session'
 import { specOf } from '../draft/build-spec'
 import { variablesOf } from '../draft/catalogue'
-import { ChoiceField } from '../fields/number-field'
-import type { SectionProps } from '../sections/section'
-import { FileField } from './file-field'
-import { Findings } from './findings'
-import { startDesign } from './start-design'
+import type { SectionProps } from '../sections/settings'
+import { startDesign } from './job'
 import { StartWalk } from './start-walk'
 import { type ActuatorChoice, useCustomRobot } from './use-custom-robot'
 
@@ -36,8 +36,8 @@ export function CustomRobotForm({ draft, catalogue, onChange }: SectionProps) {
         <FileField
           label="URDF"
           accept=".urdf,.xml"
-          hint={state.urdf?.name ?? (robot.urdf === '' ? 'required' : 'from the job')}
-          missing={robot.urdf === ''}
+          hint={state.urdf?.name ?? 'from the job'}
+          error={robot.urdf === '' ? 'required' : undefined}
           onFile={state.chooseUrdf}
         />
         <ChoiceField
@@ -73,7 +73,21 @@ export function CustomRobotForm({ draft, catalogue, onChange }: SectionProps) {
           </p>
         </>
       )}
-      <Toml text={robot.toml} onText={(toml) => onChange({ robot: { ...robot, toml } })} />
+      {robot.toml !== '' && (
+        <details open>
+          <summary>
+            robot.toml: settings missing in the URDF, with comments on guessed values
+          </summary>
+          <TextField
+            label={<span class="visually-hidden">Text of robot.toml</span>}
+            class="robot-text"
+            rows={14}
+            spellcheck={false}
+            value={robot.toml}
+            onChange={(toml) => onChange({ robot: { ...robot, toml } })}
+          />
+        </details>
+      )}
       <div class="row">
         <button
           type="button"
@@ -106,25 +120,49 @@ export function CustomRobotForm({ draft, catalogue, onChange }: SectionProps) {
   )
 }
 
-function Toml({ text, onText }: { text: string; onText: (text: string) => void }) {
-  const id = useId()
-  if (text === '') return null
+const LEG_COLUMNS: readonly Column<CheckedLeg>[] = [
+  { key: 'leg', value: ({ name }) => name, header: true },
+  { key: 'joints', cell: ({ joints }) => joints.join(', '), minor: true },
+  { key: 'foot', value: ({ foot }) => foot },
+  { key: 'length', unit: 'm', digits: 3, value: ({ length }) => length },
+  { key: 'reach', unit: 'm', digits: 3, value: ({ reach }) => reach },
+]
+
+/** Results of a robot's check: mass, legs, stance, warnings and guesses. */
+function Findings({ check, guesses }: { check: RobotCheck; guesses: readonly string[] }) {
+  const { standing } = check
+  const fixedJoints = Object.entries(check.held)
   return (
-    <details open>
-      <summary>robot.toml: settings missing in the URDF, with comments on guessed values</summary>
-      <div class="field">
-        <label class="visually-hidden" for={id}>
-          Text of robot.toml
-        </label>
-        <textarea
-          id={id}
-          class="robot-text"
-          rows={14}
-          spellcheck={false}
-          value={text}
-          onInput={(event) => onText(event.currentTarget.value)}
-        />
-      </div>
-    </details>
+    <section class="stack" aria-label="Check results" data-warnings={check.warnings.length}>
+      <p>
+        <strong>{check.name}</strong>: {check.legs.length} legs, {check.joints} joints,{' '}
+        {quantity(check.mass, 'kg')}. After standing for {exactQuantity(standing.seconds, 's')}, its
+        soles carry {quantity(standing.normal_forces, 'N')} of {quantity(standing.weight, 'N')}; its
+        body is at {quantity(standing.height, 'm', 3)}.
+        {fixedJoints.length > 0 &&
+          ` Fixed joints: ${fixedJoints.map(([name, at]) => `${name} at ${formatExact(at)} rad`).join(', ')}.`}
+      </p>
+      {check.warnings.length > 0 && (
+        <div class="notice" data-tone="warn">
+          <strong>Warnings (the job can still be submitted)</strong>
+          <ul>
+            {check.warnings.map((warning) => (
+              <li key={warning}>{warning}</li>
+            ))}
+          </ul>
+        </div>
+      )}
+      <Table caption="Legs" columns={LEG_COLUMNS} rows={check.legs} />
+      {guesses.length > 0 && (
+        <div>
+          <p>Guessed values, to be verified in robot.toml:</p>
+          <ul>
+            {guesses.map((guess) => (
+              <li key={guess}>{guess}</li>
+            ))}
+          </ul>
+        </div>
+      )}
+    </section>
   )
 }

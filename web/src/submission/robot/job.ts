@@ -1,9 +1,10 @@
-/** Job settings of a robot folder: `job.json`, as written by `gaitswarm robot init`. */
+/** Files of a custom robot, and the settings in its `job.json`, as written by `gaitswarm robot init`. */
 
-import type { JobSpec } from '../../api/types'
+import type { JobSpec, Variable } from '../../api/types'
+import type { Design } from '../../format/value'
 import { specOf } from '../draft/build-spec'
 import type { Catalogue } from '../draft/catalogue'
-import { type Draft, draftOf } from '../draft/draft'
+import { type Draft, draftOf, middle } from '../draft/draft'
 
 /** Apply a job.json to the draft, except name and robot. Throws a message for the user. */
 export function withRobotJob(draft: Draft, catalogue: Catalogue, text: string): Draft {
@@ -38,4 +39,47 @@ function objectIn(text: string): Partial<JobSpec> {
   }
   if (typeof value === 'object' && value !== null && !Array.isArray(value)) return value
   throw new Error('job.json must hold one JSON object')
+}
+
+/** Size limit for any file [B]; the API has lower limits and reports them. */
+const MOST_BYTES = 4_000_000
+
+/** Read a text file. Throws a message for the user. */
+export async function textOf(file: File): Promise<string> {
+  if (file.size > MOST_BYTES) {
+    throw new Error(
+      `${file.name} has ${(file.size / 1e6).toFixed(1)} MB; robot files are text of at most 0.8 MB.` +
+        ' Choose the URDF itself; meshes are not needed',
+    )
+  }
+  let bytes: ArrayBuffer
+  try {
+    bytes = await file.arrayBuffer()
+  } catch {
+    throw new Error(`cannot read ${file.name}; it may have changed: choose it again`)
+  }
+  try {
+    return new TextDecoder('utf-8', { fatal: true }).decode(bytes)
+  } catch {
+    throw new Error(`${file.name} is not UTF-8 text; choose another file, or save it as UTF-8`)
+  }
+}
+
+/** Name of a robot derived from its file name, restricted to allowed characters. */
+export function robotName(file: string): string {
+  const stem = file.replace(/\.[^.]*$/, '')
+  const allowed = stem.replace(/[^\p{L}\p{N}_. -]/gu, '').replace(/^[^\p{L}\p{N}_]+/u, '')
+  return allowed.slice(0, 100).trim() || 'robot'
+}
+
+/** Middle of the search space: fixed values stay; categorical variables take their first choice. variables: all of the controller. */
+export function startDesign(spec: JobSpec, variables: readonly Variable[]): Design {
+  const kinds = new Map(variables.map((variable) => [variable.name, variable]))
+  const searched = (spec.variables ?? []).map((entry) => {
+    const variable =
+      typeof entry === 'string' ? kinds.get(entry) : { ...kinds.get(entry.name), ...entry }
+    const name = typeof entry === 'string' ? entry : entry.name
+    return [name, variable ? middle(variable as Variable) : Number.NaN] as const
+  })
+  return { ...Object.fromEntries(searched), ...spec.fixed } as Design
 }

@@ -1,10 +1,12 @@
 /** Robot of the job: shipped, a variant, or custom. */
 
+import { Card } from '../../components/card'
+import { ChoiceField, Problems } from '../../components/fields/field'
 import { Segmented } from '../../components/fields/segmented'
 import { errorsUnder } from '../draft/build-spec'
 import { emptyDraft, type RobotDraft } from '../draft/draft'
-import { ChoiceField, NumberField, Problems } from '../fields/number-field'
-import type { SectionProps } from '../sections/section'
+import { SchemaInput } from '../fields/schema-input'
+import type { SectionProps } from '../sections/settings'
 import { CustomRobotForm } from './custom-robot'
 import { ofKind } from './job'
 
@@ -22,9 +24,18 @@ export function RobotSection(props: SectionProps) {
   const { variant } = catalogue.fields
   const shipped = catalogue.robots.find(({ name }) => name === robot.name)
   const change = (changes: Partial<RobotDraft>) => onChange({ robot: { ...robot, ...changes } })
+  const choice = (name: 'contact_law' | 'planned_soles', label: string) => (
+    <ChoiceField
+      label={label}
+      choices={['', ...(variant.get(name)?.choices ?? [])]}
+      value={robot[name]}
+      error={errors.get(`robot.${name}`)}
+      hint={variant.get(name)?.description}
+      onChange={(value) => change({ [name]: value })}
+    />
+  )
   return (
-    <section class="card" aria-labelledby="part-robot">
-      <h2 id="part-robot">Robot</h2>
+    <Card title="Robot">
       <div class="stack">
         <Segmented
           roomy
@@ -44,24 +55,10 @@ export function RobotSection(props: SectionProps) {
         )}
         {robot.kind === 'variant' && (
           <div class="fields">
-            <ChoiceField
-              label="Contact law"
-              choices={['', ...(variant.get('contact_law')?.choices ?? [])]}
-              value={robot.contact_law}
-              error={errors.get('robot.contact_law')}
-              hint={variant.get('contact_law')?.description}
-              onChange={(contact_law) => change({ contact_law })}
-            />
-            <ChoiceField
-              label="Planned soles"
-              choices={['', ...(variant.get('planned_soles')?.choices ?? [])]}
-              value={robot.planned_soles}
-              error={errors.get('robot.planned_soles')}
-              hint={variant.get('planned_soles')?.description}
-              onChange={(planned_soles) => change({ planned_soles })}
-            />
+            {choice('contact_law', 'Contact law')}
+            {choice('planned_soles', 'Planned soles')}
             {LINKS.map((link, index) => (
-              <NumberField
+              <SchemaInput
                 key={link}
                 label={`Backlash of the ${link}`}
                 field={{ ...variant.get('backlash')!, unit: 'deg' }}
@@ -83,6 +80,6 @@ export function RobotSection(props: SectionProps) {
           )}
         />
       </div>
-    </section>
+    </Card>
   )
 }

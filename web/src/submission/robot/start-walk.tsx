@@ -2,13 +2,13 @@
 
 import { useRef, useState } from 'preact/hooks'
 import type { JobSpec, Scenario } from '../../api/types'
+import { ChoiceField } from '../../components/fields/field'
 import { useVisible } from '../../components/use-visible'
 import { type Design, formatValue } from '../../format/value'
 import { sentence } from '../../format/words'
 import { RATE, WalkStage } from '../../walk/player/walk-stage'
 import { recordWalk } from '../../walk/replay/recorded'
 import type { ReplayHeader } from '../../walk/replay/replay'
-import { ChoiceField } from '../fields/number-field'
 
 export function StartWalk({
   robot,

@@ -5,8 +5,7 @@ import { post } from '../../api/client'
 import type { RobotCheck, RobotDraftRequest } from '../../api/types'
 import type { Catalogue } from '../draft/catalogue'
 import type { Draft, RobotDraft } from '../draft/draft'
-import { robotName, textOf } from './files'
-import { withJob, withRobotJob } from './job'
+import { robotName, textOf, withJob, withRobotJob } from './job'
 
 export type ActuatorChoice = NonNullable<RobotDraftRequest['actuator']>
 

@@ -1,29 +1,51 @@
 /** Weights of the objectives: a published preference or custom values. */
 
+import { Card } from '../../components/card'
+import { Problems } from '../../components/fields/field'
 import { Segmented } from '../../components/fields/segmented'
+import { Table } from '../../components/table/table'
 import { formatExact } from '../../format/number'
 import { inWords } from '../../format/words'
 import { weighed } from '../../job/preference'
-import { type PreferenceDraft, preferenceDraft } from '../draft/draft'
-import { Problems } from '../fields/number-field'
-import type { SectionProps } from './section'
+import { preferenceDraft } from '../draft/draft'
+import type { SectionProps } from './settings'
 
 export function PreferenceSection({ draft, catalogue, errors, onChange }: SectionProps) {
   const { preference } = draft
-  const names = catalogue.preferences.map(({ name }) => name)
-  const change = (part: 'bias' | 'exponent', index: number, value: string) => {
-    const values = preference[part].map((old, k) => (k === index ? value : old))
-    onChange({ preference: { ...preference, [part]: values } })
+  const objectives = weighed(preference)
+  const weight = (part: 'bias' | 'exponent', objective: string) => {
+    const index = objectives.indexOf(objective)
+    const value = preference[part][index]
+    if (preference.kind !== 'custom') return formatExact(Number(value))
+    const error = errors.get(`preference.${part}.${index}`)
+    const change = (text: string) => {
+      const values = preference[part].map((old, k) => (k === index ? text : old))
+      onChange({ preference: { ...preference, [part]: values } })
+    }
+    return (
+      <>
+        <input
+          class="short"
+          inputMode="decimal"
+          aria-label={`${part} of ${inWords(objective)}`}
+          aria-invalid={error !== undefined}
+          value={value}
+          onInput={(event) => change(event.currentTarget.value)}
+        />
+        {error !== undefined && <span class="wrong"> {error}</span>}
+      </>
+    )
   }
   return (
-    <section class="card" aria-labelledby="part-preference">
-      <h2 id="part-preference">Preference</h2>
+    <Card title="Preference">
       <div class="stack">
         <Segmented
           roomy
           label="Preference"
           value={preference.kind}
-          options={[...names, 'custom'].map((name) => [name, name] as const)}
+          options={[...catalogue.preferences.map(({ name }) => name), 'custom'].map(
+            (name) => [name, name] as const,
+          )}
           onChoose={(kind) =>
             onChange({
               preference:
@@ -31,75 +53,21 @@ export function PreferenceSection({ draft, catalogue, errors, onChange }: Sectio
             })
           }
         />
-        <Problems messages={errors.has('preference') ? [errors.get('preference')!] : []} />
-        <div class="table-scroll">
-          <table class="variables">
-            <caption class="visually-hidden">Biases and exponents of the objectives</caption>
-            <thead>
-              <tr>
-                <th scope="col">Objective f</th>
-                <th scope="col">Bias b, in the unit of f</th>
-                <th scope="col">Exponent e</th>
-              </tr>
-            </thead>
-            <tbody>
-              {weighed(preference).map((objective, index) => (
-                <tr key={objective}>
-                  <th scope="row">{inWords(objective)}</th>
-                  {(['bias', 'exponent'] as const).map((part) => (
-                    <td key={part}>
-                      <Weight
-                        preference={preference}
-                        part={part}
-                        index={index}
-                        label={`${part} of ${inWords(objective)}`}
-                        error={errors.get(`preference.${part}.${index}`)}
-                        onChange={(value) => change(part, index, value)}
-                      />
-                    </td>
-                  ))}
-                </tr>
-              ))}
-            </tbody>
-          </table>
-        </div>
+        <Problems messages={[errors.get('preference')]} />
+        <Table<string>
+          caption="Biases and exponents of the objectives"
+          rows={objectives}
+          columns={[
+            { key: 'objective f', header: true, cell: inWords },
+            { key: 'bias b, in the unit of f', cell: (objective) => weight('bias', objective) },
+            { key: 'exponent e', cell: (objective) => weight('exponent', objective) },
+          ]}
+        />
         <p class="muted small">
           A scenario’s utility is the product of (b + f)<sup>e</sup>; the fitness is the geometric
           mean over the scenarios.
         </p>
       </div>
-    </section>
-  )
-}
-
-function Weight({
-  preference,
-  part,
-  index,
-  label,
-  error,
-  onChange,
-}: {
-  preference: PreferenceDraft
-  part: 'bias' | 'exponent'
-  index: number
-  label: string
-  error: string | undefined
-  onChange: (value: string) => void
-}) {
-  const value = preference[part][index]
-  if (preference.kind !== 'custom') return <>{formatExact(Number(value))}</>
-  return (
-    <>
-      <input
-        class="short"
-        inputMode="decimal"
-        aria-label={label}
-        aria-invalid={error !== undefined}
-        value={value}
-        onInput={(event) => onChange(event.currentTarget.value)}
-      />
-      {error !== undefined && <span class="wrong"> {error}</span>}
-    </>
+    </Card>
   )
 }

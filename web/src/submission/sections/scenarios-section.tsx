@@ -2,14 +2,18 @@
 
 import { useRef, useState } from 'preact/hooks'
 import type { ScenarioPreset } from '../../api/types'
+import { Card } from '../../components/card'
+import { Check, Select } from '../../components/fields/controls'
+import { Problems, TextField } from '../../components/fields/field'
+import { type Column, Table } from '../../components/table/table'
 import { formatExact } from '../../format/number'
 import { inWords } from '../../format/words'
 import type { FieldErrors } from '../draft/build-spec'
 import type { Catalogue } from '../draft/catalogue'
 import { scenarioDraft } from '../draft/draft'
-import { ChoiceField, NumberField, Problems } from '../fields/number-field'
 import type { SchemaField } from '../fields/schema-fields'
-import type { SectionProps } from './section'
+import { SchemaInput } from '../fields/schema-input'
+import type { SectionProps } from './settings'
 
 type CustomDraft = Readonly<Record<string, string>>
 
@@ -19,12 +23,10 @@ const COMMON: ReadonlySet<string> = new Set(['cycle_time', 'load', 'slope', 'tur
 export function ScenariosSection({ draft, catalogue, errors, onChange }: SectionProps) {
   const { presets, custom } = draft
   const hasPresets = draft.robot.kind !== 'files' || presets.length > 0
-  const toggle = (name: string) => {
-    const names = presets.includes(name) ? presets.filter((p) => p !== name) : [...presets, name]
-    // In the catalogue's order.
-    const order = catalogue.scenarios.map((s) => s.name).filter((n) => names.includes(n))
-    onChange({ presets: order })
-  }
+  const names = catalogue.scenarios.map(({ name }) => name)
+  // In the catalogue's order.
+  const toggle = (name: string) =>
+    onChange({ presets: names.filter((each) => presets.includes(each) !== (each === name)) })
   const replace = (index: number, scenario: CustomDraft | null) => {
     const rest = custom.map((old, k) => (k === index ? scenario : old))
     onChange({ custom: rest.filter((s) => s !== null) })
@@ -35,12 +37,16 @@ export function ScenariosSection({ draft, catalogue, errors, onChange }: Section
     onChange({ custom: [...custom, scenarioDraft(catalogue.fields.scenario, preset, name)] })
   }
   return (
-    <section class="card" aria-labelledby="part-scenarios">
-      <h2 id="part-scenarios">Scenarios</h2>
+    <Card title="Scenarios">
       <div class="stack">
-        <Problems messages={errors.has('scenarios') ? [errors.get('scenarios')!] : []} />
+        <Problems messages={[errors.get('scenarios')]} />
         {hasPresets ? (
-          <PresetTable catalogue={catalogue} chosen={presets} onToggle={toggle} />
+          <Table
+            caption="Preset scenarios"
+            rows={catalogue.scenarios}
+            rowKey={({ name }) => name}
+            columns={presetColumns(catalogue, presets, toggle)}
+          />
         ) : (
           <p class="muted">
             The presets apply to Szabadka-II only. Add scenarios for this robot below, or load its
@@ -59,90 +65,61 @@ export function ScenariosSection({ draft, catalogue, errors, onChange }: Section
           />
         ))}
         <div class="row">
-          <label class="row">
-            <span class="label">Add a custom scenario</span>
-            <select
-              value=""
-              onChange={(event) => {
-                add(event.currentTarget.value)
-                event.currentTarget.value = ''
-              }}
-            >
-              <option value="" disabled>
-                starting from…
-              </option>
-              {catalogue.scenarios.map(({ name }) => (
-                <option key={name} value={name}>
-                  {name}
-                </option>
-              ))}
-            </select>
-          </label>
+          <Select
+            // Shows its first option again after each scenario added.
+            key={custom.length}
+            label="Add a custom scenario"
+            value=""
+            options={[['', 'starting from…', true], ...names.map((name) => [name, name] as const)]}
+            onChoose={add}
+          />
         </div>
       </div>
-    </section>
+    </Card>
   )
 }
 
-/** Presets with the fields in which they differ. */
-function PresetTable({
-  catalogue,
-  chosen,
-  onToggle,
-}: {
-  catalogue: Catalogue
-  chosen: readonly string[]
-  onToggle: (name: string) => void
-}) {
-  const differs = (field: SchemaField) =>
-    new Set(catalogue.scenarios.map((scenario) => value(scenario, field))).size > 1
-  const value = (scenario: ScenarioPreset, field: SchemaField) =>
-    scenario[field.name as keyof ScenarioPreset]
-  const fields = [...catalogue.fields.scenario.values()].filter(
-    (field) => field.name !== 'name' && differs(field),
+/** Selection, and the fields in which the presets differ. */
+function presetColumns(
+  { scenarios, fields }: Catalogue,
+  selected: readonly string[],
+  onToggle: (name: string) => void,
+): readonly Column<ScenarioPreset>[] {
+  const value = (scenario: ScenarioPreset, { name }: SchemaField) =>
+    scenario[name as keyof ScenarioPreset]
+  const differing = [...fields.scenario.values()].filter(
+    (field) =>
+      field.name !== 'name' && new Set(scenarios.map((each) => value(each, field))).size > 1,
   )
-  return (
-    <div class="table-scroll">
-      <table>
-        <caption class="visually-hidden">Preset scenarios</caption>
-        <thead>
-          <tr>
-            <th scope="col">Scenario</th>
-            {fields.map((field) => (
-              <th key={field.name} scope="col" class="numeric" title={field.description}>
-                {inWords(field.name)}
-                {field.unit !== '1' && <span class="unit"> [{field.unit}]</span>}
-              </th>
-            ))}
-          </tr>
-        </thead>
-        <tbody>
-          {catalogue.scenarios.map((scenario) => (
-            <tr key={scenario.name}>
-              <th scope="row">
-                <label class="check nowrap">
-                  <input
-                    type="checkbox"
-                    checked={chosen.includes(scenario.name)}
-                    onChange={() => onToggle(scenario.name)}
-                  />
-                  {scenario.number} {scenario.name}
-                </label>
-              </th>
-              {fields.map((field) => {
-                const shown = value(scenario, field)
-                return (
-                  <td key={field.name} class="numeric">
-                    {typeof shown === 'number' ? formatExact(shown) : inWords(String(shown ?? ''))}
-                  </td>
-                )
-              })}
-            </tr>
-          ))}
-        </tbody>
-      </table>
-    </div>
-  )
+  return [
+    {
+      key: 'scenario',
+      header: true,
+      cell: ({ name, number }) => (
+        <span class="nowrap">
+          <Check
+            small={false}
+            label={`${number} ${name}`}
+            checked={selected.includes(name)}
+            onChange={() => onToggle(name)}
+          />
+        </span>
+      ),
+    },
+    ...differing.map(
+      (field): Column<ScenarioPreset> => ({
+        key: field.name,
+        label: inWords(field.name),
+        unit: field.unit,
+        help: field.description,
+        numeric: true,
+        cell: (scenario) => {
+          const shown = value(scenario, field)
+          return typeof shown === 'number' ? formatExact(shown) : inWords(String(shown ?? ''))
+        },
+      }),
+    ),
+  ]
 }
 
 function CustomScenario({
@@ -173,41 +150,27 @@ function CustomScenario({
   // Stays open when a field in it is emptied.
   const opened = useRef(false)
   opened.current ||= !allDefault || further.some(({ name }) => error(name) !== undefined)
-  const input = (field: SchemaField) =>
-    field.choices ? (
-      <ChoiceField
-        key={field.name}
-        label={inWords(field.name)}
-        choices={field.choices}
-        value={scenario[field.name]}
-        error={error(field.name)}
-        onChange={change(field.name)}
-      />
-    ) : (
-      <NumberField
-        key={field.name}
-        label={inWords(field.name)}
-        field={field}
-        value={scenario[field.name] ?? ''}
-        error={error(field.name)}
-        onChange={change(field.name)}
-      />
-    )
+  const input = (field: SchemaField) => (
+    <SchemaInput
+      key={field.name}
+      field={field}
+      label={inWords(field.name)}
+      value={scenario[field.name]}
+      error={error(field.name)}
+      onChange={change(field.name)}
+    />
+  )
   return (
     <fieldset class="custom-scenario" data-custom={index}>
       <legend>Custom scenario</legend>
-      <Problems messages={errors.has(at) ? [errors.get(at)!] : []} />
+      <Problems messages={[errors.get(at)]} />
       <div class="fields">
-        <div class="field">
-          <label for={`${at}-name`}>name</label>
-          <input
-            id={`${at}-name`}
-            value={scenario.name}
-            aria-invalid={error('name') !== undefined}
-            onInput={(event) => change('name')(event.currentTarget.value)}
-          />
-          {error('name') !== undefined && <span class="wrong">{error('name')}</span>}
-        </div>
+        <TextField
+          label="name"
+          value={scenario.name}
+          error={error('name')}
+          onChange={change('name')}
+        />
         {fields.filter(isFirst).map(input)}
       </div>
       <details open={opened.current}>

@@ -1,26 +1,23 @@
 /** Start designs: the best of earlier jobs, or those of a cloned job. */
 
-import { useId } from 'preact/hooks'
 import { get } from '../../api/client'
 import { jobSearch } from '../../api/job-search'
 import { useResource } from '../../api/resource'
+import { Card } from '../../components/card'
 import { ChosenList } from '../../components/fields/chosen-list'
 import { Combobox } from '../../components/fields/combobox'
+import { Problems, TextField } from '../../components/fields/field'
 import { formatCount, formatNumber } from '../../format/number'
 import { errorsUnder } from '../draft/build-spec'
 import { NO_START, type StartDraft } from '../draft/start'
-import { Problems } from '../fields/number-field'
-import type { SectionProps } from './section'
+import type { SectionProps } from './settings'
 
 export function StartSection({ draft, errors, onChange }: SectionProps) {
-  const id = useId()
   const { start } = draft
   const problems = errorsUnder(errors, 'start')
-  const invalid = problems.length > 0
   const change = (changes: Partial<StartDraft>) => onChange({ start: { ...start, ...changes } })
   return (
-    <section class="card stack-tight" aria-labelledby="part-start">
-      <h2 id="part-start">Start</h2>
+    <Card class="stack-tight" title="Start">
       <ChosenList ids={start.jobs} onChange={(jobs) => change({ jobs })}>
         {(job) => <JobWords id={job} />}
       </ChosenList>
@@ -30,7 +27,7 @@ export function StartSection({ draft, errors, onChange }: SectionProps) {
           chosenLabel=""
           placeholder={start.jobs.length === 0 ? 'none' : 'add another job'}
           hint="Their best designs are evaluated first, as part of the budget."
-          invalid={invalid}
+          invalid={problems.length > 0}
           remote={{
             label: 'Jobs, newest first',
             search: jobSearch('tuning', {
@@ -42,16 +39,12 @@ export function StartSection({ draft, errors, onChange }: SectionProps) {
           onChoose={(job) => change({ jobs: [...start.jobs, job] })}
         />
         {start.jobs.length > 0 && (
-          <div class="field">
-            <label for={`${id}-count`}>Number of designs</label>
-            <input
-              id={`${id}-count`}
-              inputMode="numeric"
-              value={start.count}
-              aria-invalid={invalid}
-              onInput={(event) => change({ count: event.currentTarget.value })}
-            />
-          </div>
+          <TextField
+            label="Number of designs"
+            inputMode="numeric"
+            value={start.count}
+            onChange={(count) => change({ count })}
+          />
         )}
       </div>
       {start.designs.length > 0 && start.jobs.length === 0 && (
@@ -66,7 +59,7 @@ export function StartSection({ draft, errors, onChange }: SectionProps) {
         </p>
       )}
       <Problems messages={problems} />
-    </section>
+    </Card>
   )
 }
 

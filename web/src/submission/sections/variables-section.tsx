@@ -2,6 +2,11 @@
 
 import { useState } from 'preact/hooks'
 import type { Variable } from '../../api/types'
+import { Card } from '../../components/card'
+import { Check, Select } from '../../components/fields/controls'
+import { ChoiceField, Problems } from '../../components/fields/field'
+import { type Column, Table } from '../../components/table/table'
+import { NONE } from '../../format/number'
 import { inWords } from '../../format/words'
 import { errorsUnder, type FieldErrors } from '../draft/build-spec'
 import { ofLegGroups } from '../draft/catalogue'
@@ -11,8 +16,7 @@ import {
   type VariableMode,
   variableDraft,
 } from '../draft/draft'
-import { ChoiceField, Problems } from '../fields/number-field'
-import type { SectionProps } from './section'
+import type { SectionProps } from './settings'
 
 export function VariablesSection({ draft, catalogue, errors, onChange }: SectionProps) {
   const controller = catalogue.controllers.find(({ name }) => name === draft.controller)
@@ -33,8 +37,7 @@ export function VariablesSection({ draft, catalogue, errors, onChange }: Section
     />
   )
   return (
-    <section class="card" aria-labelledby="part-controller">
-      <h2 id="part-controller">Controller and variables</h2>
+    <Card title="Controller and variables">
       <div class="stack">
         <div class="controller-choice">
           <ChoiceField
@@ -48,9 +51,7 @@ export function VariablesSection({ draft, catalogue, errors, onChange }: Section
             }
           />
         </div>
-        <Problems
-          messages={[errors.get('variables'), errors.get('fixed')].filter((m) => m !== undefined)}
-        />
+        <Problems messages={[errors.get('variables'), errors.get('fixed')]} />
         {controller && (
           <>
             {table('Controller', controller.variables, ['searched', 'fixed'])}
@@ -78,7 +79,7 @@ export function VariablesSection({ draft, catalogue, errors, onChange }: Section
           </>
         )}
       </div>
-    </section>
+    </Card>
   )
 }
 
@@ -95,18 +96,14 @@ function AddGroup({
   const [added] = ofLegGroups(variables, [`${name}[${group.trim()}]`])
   return (
     <div class="row">
-      <label class="row">
-        <span class="label">Add</span>
-        <select value={name} onChange={(event) => setName(event.currentTarget.value)}>
-          {variables.map((variable) => (
-            <option key={variable.name} value={variable.name}>
-              {inWords(variable.name)}
-            </option>
-          ))}
-        </select>
-      </label>
-      <label class="row">
-        <span class="label">for legs</span>
+      <Select
+        label="Add"
+        value={name}
+        options={variables.map((variable) => [variable.name, inWords(variable.name)] as const)}
+        onChoose={setName}
+      />
+      <label class="row small">
+        <span>for legs</span>
         <input
           class="short"
           value={group}
@@ -153,149 +150,117 @@ export function VariableTable({
   errors: FieldErrors
   onChange: (name: string, changes: Partial<VariableDraft>) => void
 }) {
-  return (
-    <div class="table-scroll">
-      <table class="variables">
-        <caption class="visually-hidden">{title} variables</caption>
-        <thead>
-          <tr>
-            <th scope="col">Variable</th>
-            <th scope="col">Treatment</th>
-            <th scope="col">Low or value</th>
-            <th scope="col">High</th>
-            <th scope="col">Unit</th>
-          </tr>
-        </thead>
-        <tbody>
-          {variables.map((variable) => {
-            const draft = drafts[variable.name]
-            if (!draft) return null
-            const change = (changes: Partial<VariableDraft>) => onChange(variable.name, changes)
-            return (
-              <VariableRow
-                key={variable.name}
-                variable={variable}
-                draft={draft}
-                modes={modes}
-                words={words}
-                problems={errorsUnder(errors, `variables.${variable.name}`)}
-                onChange={change}
-              />
-            )
-          })}
-        </tbody>
-      </table>
-    </div>
-  )
-}
-
-function VariableRow({
-  variable,
-  draft,
-  modes,
-  words,
-  problems,
-  onChange,
-}: {
-  variable: Variable
-  draft: VariableDraft
-  modes: readonly VariableMode[]
-  words: (mode: VariableMode, variable: Variable) => string
-  problems: readonly string[]
-  onChange: (changes: Partial<VariableDraft>) => void
-}) {
-  const { name, choices = [] } = variable
-  const categorical = variable.kind === 'categorical'
-  const input = (part: 'low' | 'high' | 'value', label: string) => (
+  const problemsOf = (name: string) => errorsUnder(errors, `variables.${name}`)
+  const input = ({ name }: Variable, part: 'low' | 'high' | 'value', label: string) => (
     <input
       class="short"
       inputMode="decimal"
       aria-label={`${label} of ${name}`}
-      aria-invalid={problems.length > 0}
-      value={draft[part]}
-      onInput={(event) => onChange({ [part]: event.currentTarget.value })}
+      aria-invalid={problemsOf(name).length > 0}
+      value={drafts[name][part]}
+      onInput={(event) => onChange(name, { [part]: event.currentTarget.value })}
     />
   )
-  return (
-    <tr data-variable={name}>
-      <th scope="row">
-        {name}
-        <span class="muted small description">{variable.description}</span>
-        {problems.map((problem) => (
-          <span key={problem} class="wrong description">
-            {problem}
-          </span>
-        ))}
-      </th>
-      <td>
-        <select
-          aria-label={`Treatment of ${name}`}
-          value={draft.mode}
-          onChange={(event) => onChange({ mode: event.currentTarget.value as VariableMode })}
-        >
-          {modes.map((mode) => (
-            <option key={mode} value={mode}>
-              {words(mode, variable)}
-            </option>
+  const columns: readonly Column<Variable>[] = [
+    {
+      key: 'variable',
+      header: true,
+      cell: ({ name, description }) => (
+        <>
+          {name}
+          <span class="muted small description">{description}</span>
+          {problemsOf(name).map((problem) => (
+            <span key={problem} class="wrong description">
+              {problem}
+            </span>
           ))}
-        </select>
-      </td>
-      <td>
-        {draft.mode === 'searched' && categorical && (
-          <Choices variable={variable} chosen={draft.choices} onChange={onChange} />
-        )}
-        {draft.mode === 'searched' && !categorical && input('low', 'Lower bound')}
-        {draft.mode === 'fixed' && categorical && (
-          <select
-            aria-label={`Value of ${name}`}
-            value={draft.value}
-            onChange={(event) => onChange({ value: event.currentTarget.value })}
-          >
-            {choices.map((choice) => (
-              <option key={choice} value={choice}>
-                {inWords(choice)}
-              </option>
+        </>
+      ),
+    },
+    {
+      key: 'treatment',
+      cell: (variable) => (
+        <Select
+          hidden
+          label={`Treatment of ${variable.name}`}
+          value={drafts[variable.name].mode}
+          options={modes.map((mode) => [mode, words(mode, variable)] as const)}
+          onChoose={(mode) => onChange(variable.name, { mode })}
+        />
+      ),
+    },
+    {
+      key: 'low or value',
+      cell: (variable) => {
+        const { name, kind, choices = [] } = variable
+        const { mode, value, choices: searched } = drafts[name]
+        if (mode === 'default') return null
+        if (kind !== 'categorical') {
+          return mode === 'searched'
+            ? input(variable, 'low', 'Lower bound')
+            : input(variable, 'value', 'Value')
+        }
+        if (mode === 'fixed') {
+          return (
+            <Select
+              hidden
+              label={`Value of ${name}`}
+              value={value}
+              options={(choices ?? []).map((choice) => [choice, inWords(choice)] as const)}
+              onChoose={(choice) => onChange(name, { value: choice })}
+            />
+          )
+        }
+        return (
+          <fieldset class="row" aria-label={`Choices of ${name}`}>
+            {(choices ?? []).map((choice) => (
+              <span key={choice} class="nowrap">
+                <Check
+                  small={false}
+                  label={inWords(choice)}
+                  checked={searched.includes(choice)}
+                  onChange={() =>
+                    onChange(name, {
+                      // In the variable's order.
+                      choices: (choices ?? []).filter(
+                        (each) => searched.includes(each) !== (each === choice),
+                      ),
+                    })
+                  }
+                />
+              </span>
             ))}
-          </select>
-        )}
-        {draft.mode === 'fixed' && !categorical && input('value', 'Value')}
-      </td>
-      <td>{draft.mode === 'searched' && !categorical && input('high', 'Upper bound')}</td>
-      <td class="unit">
-        {variable.unit === '1' ? '–' : variable.unit}
-        {variable.kind === 'integer' && ' (integer)'}
-      </td>
-    </tr>
-  )
-}
-
-/** Searched choices of a categorical variable. */
-function Choices({
-  variable: { name, choices = [] },
-  chosen,
-  onChange,
-}: {
-  variable: Variable
-  chosen: readonly string[]
-  onChange: (changes: Partial<VariableDraft>) => void
-}) {
-  const toggle = (choice: string) =>
-    onChange({
-      // In the variable's order.
-      choices: choices.filter((c) => chosen.includes(c) !== (c === choice)),
-    })
+          </fieldset>
+        )
+      },
+    },
+    {
+      key: 'high',
+      cell: (variable) =>
+        drafts[variable.name].mode === 'searched' &&
+        variable.kind !== 'categorical' &&
+        input(variable, 'high', 'Upper bound'),
+    },
+    {
+      key: 'unit',
+      cell: ({ unit, kind }) => (
+        <span class="unit">
+          {unit === '1' ? NONE : unit}
+          {kind === 'integer' && ' (integer)'}
+        </span>
+      ),
+    },
+  ]
   return (
-    <fieldset class="row" aria-label={`Choices of ${name}`}>
-      {choices.map((choice) => (
-        <label key={choice} class="check nowrap">
-          <input
-            type="checkbox"
-            checked={chosen.includes(choice)}
-            onChange={() => toggle(choice)}
-          />
-          {inWords(choice)}
-        </label>
-      ))}
-    </fieldset>
+    <div class="variables">
+      <Table
+        caption={`${title} variables`}
+        rows={variables.filter(({ name }) => name in drafts)}
+        rowKey={({ name }) => name}
+        rowData={({ name }) => ({ 'data-variable': name })}
+        columns={columns}
+        pageSize={Number.POSITIVE_INFINITY}
+      />
+    </div>
   )
 }

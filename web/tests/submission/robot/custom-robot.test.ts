@@ -1,7 +1,6 @@
 import { describe, expect, test } from 'vitest'
 import type { JobSpec, Variable } from '../../../src/api/types'
-import { robotName, textOf } from '../../../src/submission/robot/files'
-import { startDesign } from '../../../src/submission/robot/start-design'
+import { robotName, startDesign, textOf } from '../../../src/submission/robot/job'
 
 describe('a file of a robot', () => {
   test('is read as text', async () => {

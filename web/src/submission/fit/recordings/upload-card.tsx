@@ -1,13 +1,14 @@
 /** Form to upload a measured log with a description of its walk. */
 
-import { useId, useState } from 'preact/hooks'
+import { useState } from 'preact/hooks'
 import { post } from '../../../api/client'
 import { ApiProblem } from '../../../api/problem'
 import type { MeasuredWalk, RobotSource } from '../../../api/types'
 import { ErrorNotice } from '../../../components/feedback'
+import { ChoiceField, FileField, Problems, TextField } from '../../../components/fields/field'
+import { Table } from '../../../components/table/table'
+import { formatCount, formatNumber } from '../../../format/number'
 import type { Catalogue } from '../../draft/catalogue'
-import { ChoiceField, Problems } from '../../fields/number-field'
-import { TextField } from '../../fields/text-field'
 import {
   emptyWalk,
   measuredRequest,
@@ -15,7 +16,6 @@ import {
   type WalkDraft,
   walkErrors,
 } from './measured-walk'
-import { ReadLog } from './read-log'
 
 export function UploadCard({
   catalogue,
@@ -31,7 +31,6 @@ export function UploadCard({
   const [read, setRead] = useState<MeasuredWalk | null>(null)
   const [problem, setProblem] = useState<unknown>(null)
   const [reading, setReading] = useState(false)
-  const id = useId()
   const change = (changes: Partial<WalkDraft>) => setDraft((old) => ({ ...old, ...changes }))
   const controller = catalogue.controllers.find(({ name }) => name === draft.controller)
   const fieldErrors = problem instanceof ApiProblem ? problem.errors : []
@@ -66,22 +65,15 @@ export function UploadCard({
       }}
     >
       <h2 id="part-measured">Measured walk</h2>
-      <Problems messages={errors.robot === undefined ? [] : [errors.robot]} />
+      <Problems messages={[errors.robot]} />
       <div class="fields">
-        <div class="field">
-          <label for={`${id}-log`}>Log</label>
-          <input
-            id={`${id}-log`}
-            type="file"
-            accept=".csv,text/csv"
-            aria-invalid={errors.log !== undefined}
-            aria-describedby={`${id}-log-hint`}
-            onChange={(event) => setFile(event.currentTarget.files?.[0] ?? null)}
-          />
-          <span id={`${id}-log-hint`} class={errors.log === undefined ? 'hint' : 'wrong'}>
-            {errors.log ?? 'CSV with 500 rows per second and units in the column headings'}
-          </span>
-        </div>
+        <FileField
+          label="Log"
+          accept=".csv,text/csv"
+          hint="CSV with 500 rows per second and units in the column headings"
+          error={errors.log}
+          onFile={setFile}
+        />
         <ChoiceField
           label="Scenario"
           choices={catalogue.scenarios.map(({ name }) => name)}
@@ -115,21 +107,16 @@ export function UploadCard({
             onChange={(study) => change({ design: publishedDesign(controller, study) })}
           />
         )}
-        <div class="field wide">
-          <label for={`${id}-design`}>Design as JSON</label>
-          <textarea
-            id={`${id}-design`}
-            rows={4}
-            spellcheck={false}
-            value={draft.design}
-            aria-invalid={errors.design !== undefined}
-            aria-describedby={`${id}-design-hint`}
-            onInput={(event) => change({ design: event.currentTarget.value })}
-          />
-          <span id={`${id}-design-hint`} class={errors.design === undefined ? 'hint' : 'wrong'}>
-            {errors.design ?? 'the controller’s variables, and gait variables such as stride'}
-          </span>
-        </div>
+        <TextField
+          wide
+          label="Design as JSON"
+          rows={4}
+          spellcheck={false}
+          value={draft.design}
+          hint="the controller’s variables, and gait variables such as stride"
+          error={errors.design}
+          onChange={(design) => change({ design })}
+        />
       </div>
       <div class="row">
         <button type="submit" disabled={reading}>
@@ -148,4 +135,44 @@ export function UploadCard({
 function studyOf(controller: Catalogue['controllers'][number], design: string): string {
   const studies = Object.keys(controller.published)
   return studies.find((study) => publishedDesign(controller, study) === design) ?? ''
+}
+
+/** Correlation of desired angles below which the log probably shows another walk. */
+const SAME_WALK = 0.95
+
+/** Summary of an uploaded log. */
+function ReadLog({ read }: { read: MeasuredWalk }) {
+  const { recording } = read
+  return (
+    <section class="stack-tight" aria-label="Log summary" data-recording={recording.id}>
+      <p role="status">
+        {recording.synthetic ? 'Synthetic log, simulated rather than measured: ' : 'Log: '}
+        {formatNumber(read.seconds, 4)} s in {formatCount(read.rows)} rows. The walk starts{' '}
+        {formatNumber(Math.abs(read.offset), 3)} s {read.offset < 0 ? 'before' : 'into'} the log.{' '}
+        {formatCount(read.cycles)} complete {read.cycles === 1 ? 'cycle' : 'cycles'} of{' '}
+        {formatNumber(read.cycle_time, 3)} s are compared, {formatNumber(recording.seconds, 4)} s in
+        total. Mean current: {formatNumber(recording.mean_current, 3)} A.
+      </p>
+      <p class={read.correlation < SAME_WALK ? 'wrong' : undefined}>
+        Correlation of its desired angles with the simulated ones:{' '}
+        {formatNumber(read.correlation, 4)}
+        {read.correlation < SAME_WALK && '. This is low: check scenario, cycles and design'}.
+      </p>
+      <Table
+        caption="Signals of the log"
+        rows={read.signals}
+        columns={[
+          { key: 'signal', header: true, value: ({ name }) => name },
+          { key: 'description', minor: true, value: ({ description }) => description },
+          { key: 'unit', value: ({ unit }) => unit },
+          {
+            key: 'channels',
+            numeric: true,
+            value: ({ channels }) => channels,
+            cell: ({ channels }) => (channels === 0 ? 'not measured' : channels),
+          },
+        ]}
+      />
+    </section>
+  )
 }

@@ -2,13 +2,13 @@
 
 import type { Resource } from '../../../api/resource'
 import type { RecordingView } from '../../../api/types'
-import { ErrorNotice, Loading } from '../../../components/feedback'
+import { Card, Loaded } from '../../../components/card'
 import { ChosenList } from '../../../components/fields/chosen-list'
 import { Combobox } from '../../../components/fields/combobox'
 import { formatNumber } from '../../../format/number'
 import { idsIn, recordingSearch, shortId } from './recording-search'
 
-export function ChosenCard({
+export function RecordingsCard({
   ids,
   recordings,
   onChange,
@@ -18,19 +18,11 @@ export function ChosenCard({
   onChange: (ids: readonly string[]) => void
 }) {
   return (
-    <section class="card stack" aria-labelledby="part-recordings">
-      <h2 id="part-recordings">Recordings to fit</h2>
+    <Card class="stack" title="Recordings to fit">
       {ids.length === 0 && (
         <p class="muted">None yet: upload a log above, or select a stored recording.</p>
       )}
-      {recordings.loading && <Loading what="the recordings" />}
-      {recordings.error && (
-        <ErrorNotice
-          what="Could not load a recording."
-          error={recordings.error}
-          retry={recordings.reload}
-        />
-      )}
+      <Loaded resource={recordings} what="the recordings" failed="Could not load a recording." />
       <ChosenList ids={ids} short={shortId} onChange={onChange}>
         {(id) => inWords(recordings.data?.find((recording) => recording.id === id))}
       </ChosenList>
@@ -49,7 +41,7 @@ export function ChosenCard({
           }}
         />
       </div>
-    </section>
+    </Card>
   )
 }
 

@@ -1,0 +1,219 @@
+/** Dialogs of a job's commands. */
+
+import { useState } from 'preact/hooks'
+import { get, patch, post, put } from '../../api/client'
+import { useResource } from '../../api/resource'
+import type { Job, StoredJob } from '../../api/types'
+import { ConfirmDialog } from '../../components/confirm-dialog'
+import { ErrorNotice } from '../../components/feedback'
+import { Check } from '../../components/fields/controls'
+import { ChoiceField, TextField } from '../../components/fields/field'
+import { formatCount } from '../../format/number'
+import { navigate } from '../../router/navigation'
+import { jobPath } from '../../router/routes'
+import { budgetSpent, iterationsSpent, spentInWords } from '../budget'
+import { HIGHEST, isPriority, LOWEST, PRIORITY_ERROR, PRIORITY_HELP } from '../priority'
+
+export interface DialogProps {
+  readonly job: StoredJob
+  /** Run a command that returns the job, and close the dialog. */
+  readonly onCommand: (send: () => Promise<StoredJob>) => void
+  readonly onDismiss: () => void
+}
+
+export function PriorityDialog({ job, onCommand, onDismiss }: DialogProps) {
+  const [priority, setPriority] = useState(String(job.priority))
+  const valid = isPriority(priority)
+  const body = { priority: Number(priority) }
+  return (
+    <ConfirmDialog
+      title="Change the priority"
+      confirm="Change priority"
+      disabled={!valid}
+      onConfirm={() =>
+        onCommand(() => put('/v1/jobs/{job_id}/priority', { path: { job_id: job.id }, body }))
+      }
+      onDismiss={onDismiss}
+    >
+      <p>{PRIORITY_HELP}</p>
+      <TextField
+        label="Priority"
+        type="number"
+        min={LOWEST}
+        max={HIGHEST}
+        step={1}
+        value={priority}
+        error={valid ? undefined : PRIORITY_ERROR}
+        onChange={setPriority}
+      />
+    </ConfirmDialog>
+  )
+}
+
+export function ExtendDialog({ job, onCommand, onDismiss }: DialogProps) {
+  const [budget, setBudget] = useState(String(job.iterations_planned + 25))
+  const [spent, least] = [budgetSpent(job), iterationsSpent(job)]
+  const iterations = Number(budget)
+  const valid = Number.isInteger(iterations) && iterations > least
+  const options = { path: { job_id: job.id }, body: { iterations } }
+  return (
+    <ConfirmDialog
+      title="Extend the budget"
+      confirm={`Run ${valid ? formatCount(iterations) : '…'} iterations in total`}
+      disabled={!valid}
+      onConfirm={() => onCommand(() => post('/v1/jobs/{job_id}/extend', options))}
+      onDismiss={onDismiss}
+    >
+      <p>
+        {spentInWords(spent)} {spent.unit} are done.
+        {spent.unit === 'designs' &&
+          ` The budget counts iterations of ${formatCount(job.particles)} designs each.`}
+      </p>
+      <TextField
+        label="Iterations in total"
+        type="number"
+        min={least + 1}
+        step={1}
+        value={budget}
+        error={valid ? undefined : `must be an integer above ${formatCount(least)}`}
+        onChange={setBudget}
+      />
+    </ConfirmDialog>
+  )
+}
+
+export function LabelDialog({ job, onCommand, onDismiss }: DialogProps) {
+  const [name, setName] = useState(job.name)
+  const [note, setNote] = useState(job.note ?? '')
+  const [tags, setTags] = useState((job.tags ?? []).join(','))
+  const [archived, setArchived] = useState(job.archived ?? false)
+  const save = () => {
+    const tagList = tags.split(',').map((tag) => tag.trim())
+    const body = { name, note, archived, tags: tagList.filter((tag) => tag !== '') }
+    onCommand(() => patch('/v1/jobs/{job_id}', { path: { job_id: job.id }, body }))
+  }
+  return (
+    <ConfirmDialog
+      title="Name, note and tags"
+      confirm="Save"
+      onConfirm={save}
+      onDismiss={onDismiss}
+    >
+      <div class="stack-tight">
+        <TextField label="Name" maxLength={200} value={name} onChange={setName} />
+        <TextField label="Tags, comma-separated" value={tags} onChange={setTags} />
+        <TextField label="Note" rows={4} maxLength={10_000} value={note} onChange={setNote} />
+        <Check
+          small={false}
+          label="archived: hidden in lists, but not deleted"
+          checked={archived}
+          onChange={setArchived}
+        />
+        <p class="muted small">Labels do not affect results.</p>
+      </div>
+    </ConfirmDialog>
+  )
+}
+
+/** Whether the server allows a fork from this iteration. */
+export function canFork(job: Pick<Job, 'links' | 'iterations'>, from: number): boolean {
+  return 'fork' in job.links && from >= 1 && from <= job.iterations
+}
+
+interface ForkProps {
+  readonly job: StoredJob
+  /** First iteration that the fork does not copy. */
+  readonly from: number
+}
+
+/** A button that opens the dialog. */
+export function ForkButton({ compact = false, ...props }: ForkProps & { compact?: boolean }) {
+  const [open, setOpen] = useState(false)
+  return (
+    <>
+      <button type="button" class={compact ? 'compact' : ''} onClick={() => setOpen(true)}>
+        Fork…
+      </button>
+      {open && <ForkDialog {...props} onDismiss={() => setOpen(false)} />}
+    </>
+  )
+}
+
+const AS_PARENT = 'same as parent'
+
+function ForkDialog({ job, from, onDismiss }: ForkProps & { onDismiss: () => void }) {
+  const [first, setFirst] = useState(String(from))
+  const [budget, setBudget] = useState(String(job.iterations_planned))
+  const [name, setName] = useState(job.name)
+  const [preference, setPreference] = useState(AS_PARENT)
+  const [method, setMethod] = useState(AS_PARENT)
+  const [sending, setSending] = useState(false)
+  const [error, setError] = useState<unknown>(null)
+  const preferences = useResource('preferences', (signal) => get('/v1/preferences', { signal }))
+  const optimizers = useResource('optimizers', (signal) => get('/v1/optimizers', { signal }))
+  const [start, iterations] = [Number(first), Number(budget)]
+  const startValid = Number.isInteger(start) && start >= 1 && start <= job.iterations
+  const valid = startValid && Number.isInteger(iterations) && iterations > start
+  const last = formatCount(job.iterations)
+  const changed = (value: string) => (value === AS_PARENT ? null : value)
+  const fork = () => {
+    setSending(true)
+    setError(null)
+    const body = {
+      from_iteration: start,
+      iterations,
+      name,
+      start_count: 5,
+      accept_changes: false,
+      preference: changed(preference) as 'A' | null,
+      optimizer: changed(method) as 'pso' | null,
+    }
+    post('/v1/jobs/{job_id}/fork', { path: { job_id: job.id }, body })
+      .then((forked) => navigate(jobPath(forked.id)), setError)
+      .finally(() => setSending(false))
+  }
+  return (
+    <ConfirmDialog
+      title="Fork the job"
+      disabled={!valid || sending}
+      onConfirm={fork}
+      onDismiss={onDismiss}
+    >
+      <p>
+        The fork copies the iterations before the chosen one. With the same preference and method,
+        the search continues unchanged. Otherwise the method either replays the copied iterations or
+        starts from their best designs.
+      </p>
+      <TextField
+        label="First new iteration"
+        value={first}
+        hint={startValid && `1 to ${last}; earlier ones are copied`}
+        error={startValid ? undefined : `must be an integer from 1 to ${last}`}
+        onChange={setFirst}
+      />
+      <TextField
+        label="Iterations in total"
+        value={budget}
+        hint="including the copied ones"
+        error={valid || !startValid ? undefined : `must be an integer above ${formatCount(start)}`}
+        onChange={setBudget}
+      />
+      <TextField label="Name" value={name} onChange={setName} />
+      {job.kind === 'tuning' && (
+        <ChoiceField
+          label="Preference"
+          choices={[AS_PARENT, ...(preferences.data?.items ?? []).map((each) => each.name)]}
+          value={preference}
+          onChange={setPreference}
+        />
+      )}
+      <ChoiceField
+        label="Method"
+        choices={[AS_PARENT, ...(optimizers.data?.items ?? []).map((each) => each.settings.name)]}
+        value={method}
+        onChange={setMethod}
+      />
+      {error !== null && <ErrorNotice what="Could not fork the job." error={error} />}
+    </ConfirmDialog>
+  )
+}

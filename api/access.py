@@ -11,7 +11,7 @@ from collections.abc import Callable
 from functools import partial
 from http.cookies import CookieError, SimpleCookie
 from ipaddress import IPv6Address, ip_address
-from typing import Annotated, Final, cast
+from typing import TYPE_CHECKING, Annotated, Final, cast
 
 from anyio.to_thread import run_sync
 from fastapi import Depends, Header, Request, Response
@@ -28,8 +28,10 @@ from gaitswarm.services.optimizer.errors import Forbidden, StoreUnavailable, Too
 from gaitswarm.services.optimizer.jobs.audit import LOCAL
 from gaitswarm.services.optimizer.jobs.priority import DEFAULT, HIGHEST, LOWEST
 from gaitswarm.services.optimizer.jobs.quota import Quota
-from gaitswarm.services.optimizer.store.tokens import Tokens
 from gaitswarm.views import PREFIX
+
+if TYPE_CHECKING:
+    from gaitswarm.services.optimizer.store.tokens import Tokens
 
 _log = logging.getLogger("gaitswarm.api")
 

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from prometheus_client.metrics_core import GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
 from gaitswarm.services.monitoring.metrics import FAILURE_CAUSES, failure_cause
 from gaitswarm.services.optimizer.errors import StoreUnavailable
-from gaitswarm.services.optimizer.store import Store
+
+if TYPE_CHECKING:
+    from gaitswarm.services.optimizer.store import Store
 
 
 class QueueCollector(Collector):

@@ -10,14 +10,16 @@ from http import HTTPStatus
 from socket import AF_INET6
 from socketserver import ThreadingMixIn
 from threading import Thread
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 from wsgiref.simple_server import WSGIRequestHandler, WSGIServer, make_server
 
 from gaitswarm.services.monitoring.hosts import HostNames
 from gaitswarm.services.monitoring.metrics import Metrics
 from gaitswarm.services.optimizer.access import secret_digest
 from gaitswarm.services.optimizer.errors import EvaluatorUnavailable, StoreUnavailable
-from gaitswarm.services.optimizer.store.tokens import Tokens
+
+if TYPE_CHECKING:
+    from gaitswarm.services.optimizer.store.tokens import Tokens
 
 _log = logging.getLogger(__name__)
 

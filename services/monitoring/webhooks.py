@@ -14,13 +14,15 @@ import logging
 import threading
 import time
 from collections.abc import Collection
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import httpx2
 
 from gaitswarm.services.optimizer.errors import StoreUnavailable
 from gaitswarm.services.optimizer.jobs.notification import Notification, refused_url
-from gaitswarm.services.optimizer.store import Store
+
+if TYPE_CHECKING:
+    from gaitswarm.services.optimizer.store import Store
 
 _TIMEOUT: Final = 10.0
 """Of a receiver [s]."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,8 +84,10 @@ from gaitswarm.services.optimizer.jobs.quota import Quota
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.run.embedded import EMBEDDED_LEASE_SECONDS
 from gaitswarm.services.optimizer.run.runner import runner_name
-from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.identification.recorded_walk import RecordedWalk
+
+if TYPE_CHECKING:
+    from gaitswarm.services.optimizer.store import Store
 
 _RECENT_JOBS: Final = 50
 """Newest jobs among which the estimate looks for similar ones."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from typing import Any
 
 import pytest
@@ -11,7 +11,7 @@ from sqlalchemy import Engine, create_engine, event, text
 
 from gaitswarm.services.optimizer.jobs.job import Command, JobOrder, JobState
 from gaitswarm.services.optimizer.jobs.labels import LabelsChange
-from gaitswarm.services.optimizer.store import Store, job_list, open_store
+from gaitswarm.services.optimizer.store import Store, open_store
 from gaitswarm.services.optimizer.store.engine import Database, parse_url
 from tests.store.examples import completed, spec
 from tests.store.test_job_list import with_fitness
@@ -46,7 +46,7 @@ def statements() -> Iterator[list[tuple[str, Any]]]:
     ],
     ids=["newest", "of a state", "by fitness"],
 )
-def test_sqlite_reads_a_page_of_the_list_from_an_index_and_sorts_nothing(
+def test_sqlite_finds_a_page_of_the_list_by_an_index_and_sorts_no_more_than_it(
     migrated_sqlite: Any, question: dict[str, Any]
 ) -> None:
     url = f"sqlite:///{migrated_sqlite}"
@@ -65,7 +65,10 @@ def test_sqlite_reads_a_page_of_the_list_from_an_index_and_sorts_nothing(
         for statement, parameters in selected:
             plan = connection.exec_driver_sql(f"EXPLAIN QUERY PLAN {statement}", parameters).all()
             steps = [str(row[-1]) for row in plan]
-            assert steps and all("USING INDEX ix_jobs" in step for step in steps), steps
+            ids = steps[steps.index("LIST SUBQUERY 1") + 1]
+            assert "USING INDEX ix_jobs" in ids, steps
+            # Of the page alone.
+            assert steps.count("USE TEMP B-TREE FOR ORDER BY") <= 1, steps
     database.close()
 
 
@@ -143,27 +146,3 @@ def test_a_change_is_seen_that_was_begun_before_another_and_committed_after_it(
         assert by_priority() == [second, first]
     finally:
         engine.dispose()
-
-
-def test_a_job_that_is_removed_after_it_was_sorted_is_not_on_the_page(
-    store: Store, database_url: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    if "postgresql" not in database_url:
-        pytest.skip("SQLite reads a page from one snapshot")
-    jobs = [store.create_job(spec(name=name))[0].id for name in "abc"]
-    store.command(jobs[1], Command.CANCEL)
-    assert len(store.jobs(order=JobOrder.NAME).items) == 3
-
-    def removed_first(*arguments: Any) -> Iterator[tuple[str, Any]]:
-        found = list(matches(*arguments))
-        with closing(open_store(database_url)) as other:
-            other.delete_job(jobs[1])
-        return iter(found)
-
-    matches = job_list._matches  # noqa: SLF001
-    with monkeypatch.context() as patched:
-        patched.setattr(job_list, "_matches", removed_first)
-        page = store.jobs(order=JobOrder.NAME, limit=2)
-    assert [job.id for job in page.items] == [jobs[0]]
-    rest = store.jobs(order=JobOrder.NAME, limit=2, after=page.next)
-    assert [job.id for job in rest.items] == [jobs[2]]

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import groupby
 from operator import attrgetter
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -18,7 +18,9 @@ from gaitswarm.services.optimizer.errors import Conflict, EvaluatorUnavailable
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Iteration
 from gaitswarm.services.optimizer.jobs.job import Job
-from gaitswarm.services.optimizer.store import Store
+
+if TYPE_CHECKING:
+    from gaitswarm.services.optimizer.store import Store
 
 PIECE: Final = 2000
 """Evaluations per transaction."""

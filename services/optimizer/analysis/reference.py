@@ -6,7 +6,7 @@ import logging
 import math
 from dataclasses import replace
 from functools import lru_cache
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -16,11 +16,13 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.provenance import changes_since, job_provenance
 from gaitswarm.services.optimizer.jobs.reference import START, Reference, reference_design
 from gaitswarm.services.optimizer.jobs.spec import Spec
-from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.case import Walk, run_together
 from gaitswarm.sim.errors import SimulationError
 from gaitswarm.sim.outcome import Status
 from gaitswarm.sim.worlds.walks import PerturbedWalk
+
+if TYPE_CHECKING:
+    from gaitswarm.services.optimizer.store import Store
 
 NONE: Final = Reference(None, None)
 """For a job of a shipped robot without a published design."""

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import islice
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,15 +16,21 @@ from gaitswarm.services.optimizer.jobs.chain import (
     ChainDocuments,
     Link,
     Outcomes,
+    StoredLink,
     ask_digest,
     iteration_digest,
 )
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
-from gaitswarm.services.optimizer.jobs.iteration import Reevaluation, best_particle
+from gaitswarm.services.optimizer.jobs.iteration import (
+    Reevaluation,
+    best_particle,
+    fitness_summary,
+)
 from gaitswarm.services.optimizer.jobs.job import Job
-from gaitswarm.services.optimizer.store import Store
-from gaitswarm.services.optimizer.store.history import StoredLink, fitness_summary
+
+if TYPE_CHECKING:
+    from gaitswarm.services.optimizer.store import Store
 
 _PIECE: Final = 2000
 """Evaluations per transaction."""

@@ -79,6 +79,22 @@ class Link:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class StoredLink:
+    """A stored iteration without its evaluations.
+
+    Attributes:
+        link: the content of its digest.
+        state: the optimizer's, empty once cleared.
+        summary: by name of `SUMMARY`.
+    """
+
+    link: Link
+    committed: bool
+    state: Any
+    summary: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Outcomes:
     """Results of an iteration's designs.
 

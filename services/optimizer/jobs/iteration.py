@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.outcome import Outcome
+
+SUMMARY: Final = ("best", "mean", "median", "worst", "best_so_far", "failed")
+"""Columns of an iteration computed from its fitness."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -178,3 +181,27 @@ def best_particle(fitness: NDArray[np.float64]) -> int | None:
     """Return the index of the least finite fitness."""
     finite = np.isfinite(fitness)
     return int(np.argmin(np.where(finite, fitness, np.inf))) if finite.any() else None
+
+
+def fitness_summary(
+    fitness: NDArray[np.float64], best: float | None, best_before: float | None
+) -> dict[str, Any]:
+    """Return the columns `SUMMARY`: statistics over finite fitness, None if there is none.
+
+    Args:
+        fitness: (n,) of the designs, +inf for a failed one.
+        best: least fitness in double precision; None if every design failed.
+        best_before: the same of all earlier iterations.
+    """
+    finite = fitness[np.isfinite(fitness)]
+    summary: dict[str, Any] = dict.fromkeys(SUMMARY)
+    summary["failed"] = len(fitness) - len(finite)
+    bests = [value for value in (best, best_before) if value is not None]
+    summary["best_so_far"] = min(bests, default=None)
+    if len(finite):
+        # The sum of huge values may overflow; such a mean counts as none.
+        with np.errstate(over="ignore"):
+            means = {"mean": float(np.mean(finite)), "median": float(np.median(finite))}
+        summary |= {name: value for name, value in means.items() if math.isfinite(value)}
+        summary |= {"best": float(np.min(finite)), "worst": float(np.max(finite))}
+    return summary

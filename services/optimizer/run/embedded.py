@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from gaitswarm.services.optimizer.errors import GaitswarmError, LeaseLost
 from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration, Iteration
@@ -16,7 +16,9 @@ from gaitswarm.services.optimizer.run.evaluator import EvaluationStopped, Evalua
 from gaitswarm.services.optimizer.run.execution import OnCommit, OnRetry, RunContext, run_claim
 from gaitswarm.services.optimizer.run.heartbeat import Heartbeat
 from gaitswarm.services.optimizer.run.runner import runner_name
-from gaitswarm.services.optimizer.store import Store
+
+if TYPE_CHECKING:
+    from gaitswarm.services.optimizer.store import Store
 
 EMBEDDED_LEASE_SECONDS: Final = 5.0
 """Short, because a user waits for its end when the previous process was killed."""

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import Final, TypeVar
+from typing import TYPE_CHECKING, Final, TypeVar
 
 import numpy as np
 
@@ -64,8 +64,10 @@ from gaitswarm.services.optimizer.run.evaluator import (
 from gaitswarm.services.optimizer.run.heartbeat import Heartbeat
 from gaitswarm.services.optimizer.run.journal import JOURNAL_SECONDS, Journal
 from gaitswarm.services.optimizer.run.outage import Backoff, Outage, is_infrastructure
-from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.outcome import Outcome, Status
+
+if TYPE_CHECKING:
+    from gaitswarm.services.optimizer.store import Store
 
 _CACHED: Final = -1
 

@@ -6,13 +6,15 @@ import logging
 import threading
 from collections.abc import Callable
 from types import TracebackType
-from typing import Final, Self
+from typing import TYPE_CHECKING, Final, Self
 
 from gaitswarm.services.optimizer.errors import LeaseLost
 from gaitswarm.services.optimizer.jobs.job import Claim, JobState
 from gaitswarm.services.optimizer.log_context import log_context
 from gaitswarm.services.optimizer.run.outage import Outage, is_infrastructure
-from gaitswarm.services.optimizer.store import Store
+
+if TYPE_CHECKING:
+    from gaitswarm.services.optimizer.store import Store
 
 _BEATS_PER_LEASE: Final = 3
 _LONGEST_INTERVAL: Final = 1.0

@@ -14,7 +14,7 @@ import time
 import uuid
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from gaitswarm.services.optimizer.errors import GaitswarmError, NotFound
 from gaitswarm.services.optimizer.jobs.job import QUARANTINE_AFTER, Claim, Job, JobState
@@ -23,8 +23,10 @@ from gaitswarm.services.optimizer.log_context import log_context
 from gaitswarm.services.optimizer.run.evaluator import Evaluator
 from gaitswarm.services.optimizer.run.execution import RunContext, run_claim
 from gaitswarm.services.optimizer.run.outage import Backoff, Outage, is_infrastructure
-from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.provenance import simulator_digest
+
+if TYPE_CHECKING:
+    from gaitswarm.services.optimizer.store import Store
 
 _PAUSES: Final = Backoff(first=0.5, longest=10.0)
 """Between attempts to claim a job while the store or a thread is unavailable."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import datetime
 from functools import cache
 from itertools import pairwise
@@ -37,12 +37,14 @@ from gaitswarm.services.optimizer.jobs.chain import (
     ChainDocuments,
     Link,
     Outcomes,
+    StoredLink,
     ask_digest,
     iteration_digest,
 )
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.fork import Lineage, TakenHistory
 from gaitswarm.services.optimizer.jobs.iteration import (
+    SUMMARY,
     Answered,
     Ask,
     CachedOutcome,
@@ -51,6 +53,7 @@ from gaitswarm.services.optimizer.jobs.iteration import (
     Iteration,
     Reevaluation,
     best_particle,
+    fitness_summary,
 )
 from gaitswarm.services.optimizer.jobs.listing import Page, checked_limit
 from gaitswarm.services.optimizer.store.engine import Aggregate
@@ -69,9 +72,6 @@ from gaitswarm.services.optimizer.store.tables import (
 )
 from gaitswarm.sim.outcome import Status
 
-SUMMARY: Final = ("best", "mean", "median", "worst", "best_so_far", "failed")
-"""Columns of an iteration computed from its fitness."""
-
 _LARGEST_INDEX: Final = 2**31 - 1
 
 _KEYS_AT_ONCE: Final = 1000
@@ -81,22 +81,6 @@ _ITERATIONS_AT_ONCE: Final = 64
 
 _JSON: Final = TypeAdapter(Any)
 """A faster parser than the standard library's, and as exact."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class StoredLink:
-    """A stored iteration without its evaluations.
-
-    Attributes:
-        link: the content of its digest.
-        state: the optimizer's, empty once cleared.
-        summary: by name of `SUMMARY`.
-    """
-
-    link: Link
-    committed: bool
-    state: Any
-    summary: Mapping[str, Any]
 
 
 class History(Aggregate):
@@ -354,29 +338,6 @@ def _result_columns(
 def _number(value: float | np.floating[Any]) -> float | None:
     """Return None for a value that JSON and SQL cannot hold."""
     return float(value) if math.isfinite(value) else None
-
-
-def fitness_summary(
-    fitness: NDArray[np.float64], best: float | None, best_before: float | None
-) -> dict[str, Any]:
-    """Return the columns `SUMMARY`: statistics over finite fitness, None if there is none.
-
-    Args:
-        fitness: (n,) of the designs, +inf for a failed one.
-        best: least fitness in double precision; None if every design failed.
-        best_before: the same of all earlier iterations.
-    """
-    finite = fitness[np.isfinite(fitness)]
-    summary: dict[str, Any] = dict.fromkeys(SUMMARY)
-    summary["failed"] = len(fitness) - len(finite)
-    bests = [value for value in (best, best_before) if value is not None]
-    summary["best_so_far"] = min(bests, default=None)
-    if len(finite):
-        # The sum of huge values may overflow; such a mean is stored as none.
-        with np.errstate(over="ignore"):
-            summary |= {"mean": _number(np.mean(finite)), "median": _number(np.median(finite))}
-        summary |= {"best": float(np.min(finite)), "worst": float(np.max(finite))}
-    return summary
 
 
 def open_ask(connection: Connection, job: Row) -> Ask | None:

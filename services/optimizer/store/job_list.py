@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from datetime import UTC, datetime
+from itertools import islice
 from typing import Any, Final
 
 from sqlalchemy import (
     ColumnElement,
     Connection,
     Double,
+    Select,
     and_,
     case,
     false,
@@ -91,20 +93,23 @@ class JobList(Aggregate):
         with self._database.read("jobs") as connection:
             if kind is not None:
                 conditions.append(text_at(connection, jobs.c.spec, "kind") == kind)
-            descending = reverse is not (order is JobOrder.CREATED)
             key = _key(connection, order)
-            matches = _matches(connection, conditions, where, key, last, limit + 1, descending)
-            found = [match for match, _ in zip(matches, range(limit + 1), strict=False)]
-            ids = [job_id for job_id, _ in found[:limit]]
-            shown = select(*SHOWN).where(jobs.c.id.in_(ids), EXISTING)
-            rows = connection.execute(shown) if ids else ()
-            # A job may have been removed meanwhile.
-            by_id = {row.id: shown_job(row) for row in rows}
-        items = tuple(by_id[job_id] for job_id in ids if job_id in by_id)
-        if len(found) <= limit:
+            rows = list[Any]()
+            descending = reverse is not (order is JobOrder.CREATED)
+            for ids, place in _pages(conditions, key, last, descending):
+                most = limit + 1 - len(rows)
+                # Only ids are sorted and filtered: specs may be large.
+                page: Any = ids.limit(most)
+                if where.needs_specs:
+                    page = _filtered(connection, ids, where, most)
+                shown = select(*SHOWN, key.label("sort_key")).where(jobs.c.id.in_(page))
+                rows += connection.execute(shown.order_by(*place)).all()
+                if len(rows) > limit:
+                    break
+        items = tuple(map(shown_job, rows[:limit]))
+        if len(rows) <= limit:
             return Page(items, None)
-        job_id, value = found[limit - 1]
-        return Page(items, to_cursor(cursor, value, job_id))
+        return Page(items, to_cursor(cursor, rows[limit - 1].sort_key, items[-1].id))
 
     def facets(self, *, archived: bool | None = None) -> FacetCounts:
         """Count jobs by facet.
@@ -148,38 +153,35 @@ def _existing(archived: bool | None) -> list[ColumnElement[bool]]:
     return [EXISTING, func.coalesce(jobs.c.archived, False).is_(archived)]
 
 
-def _matches(
-    connection: Connection,
+def _pages(
     conditions: list[ColumnElement[bool]],
-    where: JobFilter,
     key: ColumnElement[Any],
     last: tuple[Any, str] | None,
-    limit: int,
     descending: bool,
-) -> Iterator[tuple[str, Any]]:
-    """Yield id and sort value of jobs after the last one, those without a value last."""
-    facets = _facet_columns(connection) if where.needs_specs else []
-    listed = select(jobs.c.id, key, *facets).where(*conditions)
-    queries = []
+) -> Iterator[tuple[Select[Any], list[ColumnElement[Any]]]]:
+    """Yield ids after the last job and their order: jobs with a sort value, then the others."""
+    ids = select(jobs.c.id).where(*conditions)
     if last is None or last[0] is not None:
-        place = (key, jobs.c.id)
-        valued = listed.where(key.is_not(None))
-        valued = valued.order_by(*(c.desc() if descending else c for c in place))
+        place = [key, jobs.c.id]
+        valued = ids.where(key.is_not(None))
         if last is not None:
             value = literal(last[0], Double if isinstance(last[0], float) else None)
-            end = tuple_(value, literal(last[1]))
-            valued = valued.where(tuple_(*place) < end if descending else tuple_(*place) > end)
-        queries.append(valued)
+            end, here = tuple_(value, literal(last[1])), tuple_(*place)
+            valued = valued.where(here < end if descending else here > end)
+        order = [column.desc() if descending else column for column in place]
+        yield valued.order_by(*order), order
     if key is not jobs.c.created_at:
-        unvalued = listed.where(key.is_(None)).order_by(jobs.c.id)
+        unvalued = ids.where(key.is_(None)).order_by(jobs.c.id)
         if last is not None and last[0] is None:
             unvalued = unvalued.where(jobs.c.id > last[1])
-        queries.append(unvalued)
-    for query in queries:
-        # Custom robots and preferences have no columns, so facets are compared here.
-        for row in connection.execute(query if facets else query.limit(limit)):
-            if not facets or where.admits(_facets(*row[2:])):
-                yield row[0], row[1]
+        yield unvalued, [jobs.c.id]
+
+
+def _filtered(connection: Connection, ids: Select[Any], where: JobFilter, most: int) -> list[str]:
+    """Return ids that pass a filter; custom robots and preferences have no columns."""
+    rows = connection.execute(ids.add_columns(*_facet_columns(connection)))
+    matches = (row[0] for row in rows if where.admits(_facets(*row[1:])))
+    return list(islice(matches, most))
 
 
 def _facet_columns(connection: Connection) -> list[ColumnElement[Any]]:

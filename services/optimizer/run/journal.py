@@ -6,7 +6,7 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from gaitswarm.services.optimizer.jobs.iteration import JournalEntry
 from gaitswarm.services.optimizer.jobs.job import Claim
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, Evaluator
-from gaitswarm.services.optimizer.store import Store
 from gaitswarm.sim.outcome import Outcome
+
+if TYPE_CHECKING:
+    from gaitswarm.services.optimizer.store import Store
 
 JOURNAL_SECONDS: Final = 10.0
 """Iterations that take longer, as the previous one did or as this one does, are journaled [s]."""

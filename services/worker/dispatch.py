@@ -131,6 +131,8 @@ class _Iteration:
                 )
             into.objectives[chunk.start : chunk.stop] = outcome.objectives
             into.statuses[chunk.start : chunk.stop] = outcome.statuses
+            if self.request.on_outcome is not None:
+                self.request.on_outcome(case, chunk.start, outcome)
 
     def report(
         self, run: _Running, compute_seconds: float = 0.0, host: str = "", error: str | None = None

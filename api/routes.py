@@ -249,12 +249,14 @@ def documented(
 ) -> dict[str, Any]:
     """Return the arguments of a route: those that follow from its operation, and others."""
     has_body = operation.request is not None and operation.method != "GET"
+    is_refusable = operation.heavy or operation.access == "command"
     statuses = {
         *operation.refusals,
         *((400, 413) if has_body else ()),
         *((404,) if operation.path_names else ()),
         *((422,) if operation.request is not None or operation.path_names else ()),
         *((403,) if operation.access != "read" else ()),
+        *((409,) if "job_id" in operation.path_names and is_refusable else ()),
     }
     documents = (responses or {}) | problems(*sorted(statuses))
     if operation.content:

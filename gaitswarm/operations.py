@@ -285,14 +285,10 @@ OPERATIONS: Final[list[Operation[Any]]] = []
 
 
 def _operation(
-    method: Literal["GET", "POST", "PUT", "PATCH", "DELETE"],
-    path: str,
-    tag: Tag,
-    summary: str,
-    *refusals: int,
-    reads: bool = False,
-    **options: Any,
+    route: str, tag: Tag, summary: str, *refusals: int, reads: bool = False, **options: Any
 ) -> Callable[[Callable[..., T]], Operation[T]]:
+    method, path = route.split()
+
     def add(answer: Callable[..., T]) -> Operation[T]:
         operation = Operation(
             answer, method, path, summary, tag, reads or method == "GET", refusals=refusals,
@@ -343,7 +339,7 @@ def full_view(service: JobService, job: Job) -> JobView:
 # Core: submit a job, follow it, control it, and get the best design.
 
 
-@_operation("POST", "/jobs", "core", "Submit a job", 403, 409, access="submit", status=202)
+@_operation("POST /jobs", "core", "Submit a job", 409, access="submit", status=202)
 def submit_job(
     service: JobService,
     spec: AnySpec,
@@ -406,7 +402,7 @@ class JobsQuery(Query):
     limit: int = Field(default=50, ge=1, le=200, description="Maximum number of jobs.")
 
 
-@_operation("GET", "/jobs", "core", "List jobs")
+@_operation("GET /jobs", "core", "List jobs")
 def list_jobs(service: JobService, query: JobsQuery) -> PageView[JobSummaryView]:
     """Return a page of jobs with their progress. New jobs do not shift later pages."""
     page = service.jobs(
@@ -430,15 +426,13 @@ def list_jobs(service: JobService, query: JobsQuery) -> PageView[JobSummaryView]
     return PageView[JobSummaryView](items=items, next=page.next)
 
 
-@_operation("GET", "/jobs/{job_id}", "core", "Get a job")
+@_operation("GET /jobs/{job_id}", "core", "Get a job")
 def get_job(service: JobService, job_id: str) -> JobView:
     """Return state, progress, rates, estimated time left, best design and error."""
     return full_view(service, service.job(job_id))
 
 
-@_operation(
-    "POST", "/jobs/{job_id}/pause", "core", "Pause a job", 409, access="command", status=202
-)
+@_operation("POST /jobs/{job_id}/pause", "core", "Pause a job", access="command", status=202)
 def pause_job(service: JobService, job_id: str, *, actor: str = LOCAL) -> JobView:
     """Pause a job. A running job first commits its current iteration (`pausing`).
 
@@ -447,9 +441,7 @@ def pause_job(service: JobService, job_id: str, *, actor: str = LOCAL) -> JobVie
     return full_view(service, service.command(job_id, Command.PAUSE, actor=actor))
 
 
-@_operation(
-    "POST", "/jobs/{job_id}/resume", "core", "Resume a job", 409, access="command", status=202
-)
+@_operation("POST /jobs/{job_id}/resume", "core", "Resume a job", access="command", status=202)
 def resume_job(
     service: JobService,
     job_id: str,
@@ -469,7 +461,7 @@ def resume_job(
     return full_view(service, job)
 
 
-@_operation("POST", "/jobs/{job_id}/cancel", "core", "Cancel a job", 409, access="command")
+@_operation("POST /jobs/{job_id}/cancel", "core", "Cancel a job", access="command")
 def cancel_job(service: JobService, job_id: str, *, actor: str = LOCAL) -> JobView:
     """End a job for good. Committed iterations stay; the current one is dropped.
 
@@ -479,13 +471,7 @@ def cancel_job(service: JobService, job_id: str, *, actor: str = LOCAL) -> JobVi
 
 
 @_operation(
-    "POST",
-    "/jobs/{job_id}/extend",
-    "core",
-    "Change the budget of a job",
-    409,
-    access="command",
-    status=202,
+    "POST /jobs/{job_id}/extend", "core", "Change the budget of a job", access="command", status=202
 )
 def extend_job(
     service: JobService,
@@ -512,7 +498,7 @@ class IterationsQuery(Query):
     limit: int = Field(default=100, ge=1, le=1000, description="Maximum number of iterations.")
 
 
-@_operation("GET", "/jobs/{job_id}/iterations", "core", "List committed iterations")
+@_operation("GET /jobs/{job_id}/iterations", "core", "List committed iterations")
 def list_iterations(
     service: JobService, job_id: str, query: IterationsQuery
 ) -> PageView[IterationView]:
@@ -522,7 +508,7 @@ def list_iterations(
     return PageView[IterationView](items=items, next=page.next)
 
 
-@_operation("GET", "/jobs/{job_id}/best", "core", "Get the best design", 409)
+@_operation("GET /jobs/{job_id}/best", "core", "Get the best design", 409)
 def get_best(service: JobService, job_id: str) -> BestView:
     """Return the design of least fitness so far, with its results in every scenario.
 
@@ -552,7 +538,7 @@ class EventsQuery(Query):
     )
 
 
-@_operation("GET", "/jobs/{job_id}/events", "core", "Follow a job")
+@_operation("GET /jobs/{job_id}/events", "core", "Follow a job")
 def stream_events(
     service: JobService,
     job_id: str,
@@ -601,8 +587,7 @@ def committed(service: JobService, job_id: str, after: int | None) -> Iterator[I
 
 
 @_operation(
-    "GET",
-    "/jobs/{job_id}/iterations/{iteration}/evaluations",
+    "GET /jobs/{job_id}/iterations/{iteration}/evaluations",
     "analysis",
     "List the evaluations of an iteration",
     409,
@@ -624,7 +609,7 @@ class ExportQuery(Query):
     format: TableFormat = Field(default="csv", description="Format of the file.")
 
 
-@_operation("GET", "/jobs/{job_id}/export", "analysis", "Download all evaluations", 409)
+@_operation("GET /jobs/{job_id}/export", "analysis", "Download all evaluations", 409)
 def export_job(service: JobService, job_id: str, query: ExportQuery) -> Iterator[bytes]:
     """Return one row per design: iteration, particle, fitness, `design.<variable>`, and for every
     scenario `<scenario>.status`, `<scenario>.utility` and `<scenario>.<objective>`. Floats are
@@ -635,11 +620,9 @@ def export_job(service: JobService, job_id: str, query: ExportQuery) -> Iterator
 
 
 @_operation(
-    "GET",
-    "/jobs/{job_id}/evidence",
+    "GET /jobs/{job_id}/evidence",
     "analysis",
     "Download evidence",
-    409,
     heavy=True,
     content="The archive.",
     media_types=(ZIP,),
@@ -656,13 +639,7 @@ def get_evidence(service: JobService, job_id: str) -> bytes:
 
 
 @_operation(
-    "POST",
-    "/jobs/{job_id}/verify",
-    "analysis",
-    "Verify the stored history",
-    409,
-    reads=True,
-    heavy=True,
+    "POST /jobs/{job_id}/verify", "analysis", "Verify the stored history", reads=True, heavy=True
 )
 def verify_history(
     service: JobService, job_id: str, request: VerificationRequest, *, limits: Limits = UNLIMITED
@@ -685,11 +662,9 @@ class DistributionQuery(Query):
 
 
 @_operation(
-    "GET",
-    "/jobs/{job_id}/distribution",
+    "GET /jobs/{job_id}/distribution",
     "analysis",
     "Get the distribution of designs",
-    409,
     heavy=True,
     page=True,
 )
@@ -719,11 +694,9 @@ class ParticlesQuery(Query):
 
 
 @_operation(
-    "GET",
-    "/jobs/{job_id}/particles",
+    "GET /jobs/{job_id}/particles",
     "analysis",
     "Get all designs as binary columns",
-    409,
     heavy=True,
     page=True,
     content="Length of the header (uint32), header (JSON, padded with spaces), then every column's"
@@ -746,11 +719,9 @@ def get_particles(service: JobService, job_id: str, query: ParticlesQuery) -> by
 
 
 @_operation(
-    "POST",
-    "/jobs/{job_id}/ranking",
+    "POST /jobs/{job_id}/ranking",
     "analysis",
     "Rank designs under another preference",
-    409,
     reads=True,
     heavy=True,
 )
@@ -774,12 +745,7 @@ class ScenariosQuery(Query):
 
 
 @_operation(
-    "GET",
-    "/jobs/{job_id}/scenarios",
-    "analysis",
-    "Get the importance of scenarios",
-    409,
-    heavy=True,
+    "GET /jobs/{job_id}/scenarios", "analysis", "Get the importance of scenarios", heavy=True
 )
 def get_scenario_families(
     service: JobService, job_id: str, query: ScenariosQuery
@@ -791,12 +757,7 @@ def get_scenario_families(
 
 
 @_operation(
-    "GET",
-    "/jobs/{job_id}/importance",
-    "analysis",
-    "Get the importance of variables",
-    409,
-    heavy=True,
+    "GET /jobs/{job_id}/importance", "analysis", "Get the importance of variables", heavy=True
 )
 def get_importance(service: JobService, job_id: str) -> ImportanceView:
     """Return first-order Sobol' indices of every variable for the fitness, each objective and
@@ -819,7 +780,7 @@ class FrontQuery(Query):
     )
 
 
-@_operation("GET", "/jobs/{job_id}/front", "analysis", "Get the Pareto front", 409, heavy=True)
+@_operation("GET /jobs/{job_id}/front", "analysis", "Get the Pareto front", heavy=True)
 def get_front(service: JobService, job_id: str, query: FrontQuery) -> FrontView:
     """Return the Pareto front over f1 to f5: nondominated designs, its knees, the best in each
     objective and under A, B and C, and its hypervolume by iteration.
@@ -837,12 +798,7 @@ class DesignQuery(Query):
 
 
 @_operation(
-    "GET",
-    "/jobs/{job_id}/preference-for",
-    "analysis",
-    "Find a preference for a design",
-    409,
-    heavy=True,
+    "GET /jobs/{job_id}/preference-for", "analysis", "Find a preference for a design", heavy=True
 )
 def get_preference_for(service: JobService, job_id: str, query: DesignQuery) -> PreferenceForView:
     """Return biases and exponents under which a design is the best of its job, if there are any.
@@ -853,11 +809,9 @@ def get_preference_for(service: JobService, job_id: str, query: DesignQuery) -> 
 
 
 @_operation(
-    "POST",
-    "/jobs/{job_id}/preferences",
+    "POST /jobs/{job_id}/preferences",
     "analysis",
     "Rank designs under many preferences",
-    409,
     reads=True,
     heavy=True,
 )
@@ -876,8 +830,7 @@ def find_robust_preferences(
 
 
 @_operation(
-    "GET",
-    "/jobs/{job_id}/reference",
+    "GET /jobs/{job_id}/reference",
     "analysis",
     "Compare a job's best with the published or the start design",
     heavy=True,
@@ -900,7 +853,7 @@ class ComparisonQuery(Query):
     ] = []
 
 
-@_operation("GET", "/jobs/{job_id}/comparison", "analysis", "Compare jobs", 409, heavy=True)
+@_operation("GET /jobs/{job_id}/comparison", "analysis", "Compare jobs", heavy=True)
 def compare_jobs(service: JobService, job_id: str, query: ComparisonQuery) -> JobComparisonView:
     """Compare the convergence of jobs by iterations, evaluations and time, the distribution of
     fitness of their designs, and their specs.
@@ -918,7 +871,7 @@ class ConvergencesQuery(Query):
 
 
 @_operation(
-    "GET", "/job-convergences", "analysis", "Get short convergences of jobs", heavy=True, page=True
+    "GET /job-convergences", "analysis", "Get short convergences of jobs", heavy=True, page=True
 )
 def list_convergences(service: JobService, query: ConvergencesQuery) -> ConvergencesView:
     """Return the best fitness over the iterations of several jobs, for sparklines in lists."""
@@ -935,11 +888,9 @@ class CertificateQuery(Query):
 
 
 @_operation(
-    "GET",
-    "/jobs/{job_id}/certificate",
+    "GET /jobs/{job_id}/certificate",
     "analysis",
     "Get the results of a design in many worlds",
-    409,
     heavy=True,
 )
 def get_certificate(service: JobService, job_id: str, query: CertificateQuery) -> CertificateView:
@@ -963,11 +914,9 @@ class TargetsQuery(Query):
 
 
 @_operation(
-    "GET",
-    "/jobs/{job_id}/targets",
+    "GET /jobs/{job_id}/targets",
     "analysis",
     "Get the deviations of a calibration from its targets",
-    409,
     heavy=True,
 )
 def get_targets(service: JobService, job_id: str, query: TargetsQuery) -> TargetsView:
@@ -986,12 +935,7 @@ class RunsQuery(Query):
 
 
 @_operation(
-    "GET",
-    "/jobs/{job_id}/parameters",
-    "analysis",
-    "Get the identifiability of parameters",
-    409,
-    heavy=True,
+    "GET /jobs/{job_id}/parameters", "analysis", "Get the identifiability of parameters", heavy=True
 )
 def get_parameters(service: JobService, job_id: str, query: RunsQuery) -> IdentifiabilityView:
     """Return the interval of every variable among designs within twelve thresholds of the best.
@@ -1005,7 +949,7 @@ def get_parameters(service: JobService, job_id: str, query: RunsQuery) -> Identi
     )
 
 
-@_operation("POST", "/estimates", "analysis", "Estimate a job", reads=True, heavy=True)
+@_operation("POST /estimates", "analysis", "Estimate a job", reads=True, heavy=True)
 def estimate_job(service: JobService, spec: AnySpec) -> EstimateView:
     """Check a job as on submission, and estimate its cost. Nothing is stored.
 
@@ -1015,7 +959,7 @@ def estimate_job(service: JobService, spec: AnySpec) -> EstimateView:
     return EstimateView.from_estimate(service.estimate(spec))
 
 
-@_operation("POST", "/simulations", "analysis", "Simulate one design", reads=True, heavy=True)
+@_operation("POST /simulations", "analysis", "Simulate one design", reads=True, heavy=True)
 def simulate(
     _service: JobService, design: SimulationRequest, *, limits: Limits = UNLIMITED
 ) -> SimulationView:
@@ -1030,12 +974,7 @@ def simulate(
 
 
 @_operation(
-    "POST",
-    "/robustness",
-    "analysis",
-    "Estimate the robustness of one design",
-    reads=True,
-    heavy=True,
+    "POST /robustness", "analysis", "Estimate the robustness of one design", reads=True, heavy=True
 )
 def estimate_robustness(
     _service: JobService, design: RobustnessRequest, *, limits: Limits = UNLIMITED
@@ -1051,8 +990,7 @@ def estimate_robustness(
 
 
 @_operation(
-    "POST",
-    "/replays",
+    "POST /replays",
     "analysis",
     "Replay one simulation",
     reads=True,
@@ -1073,8 +1011,7 @@ def replay(_service: JobService, design: ReplayRequest, *, limits: Limits = UNLI
 
 
 @_operation(
-    "POST",
-    "/controllers/{controller}/surface",
+    "POST /controllers/{controller}/surface",
     "analysis",
     "Get a fuzzy controller's surface",
     reads=True,
@@ -1105,11 +1042,9 @@ class FirmwareQuery(Query):
 
 
 @_operation(
-    "GET",
-    "/jobs/{job_id}/firmware",
+    "GET /jobs/{job_id}/firmware",
     "analysis",
     "Download the best design as firmware",
-    409,
     heavy=True,
     content="The folder, as an archive.",
     media_types=(ZIP,),
@@ -1129,11 +1064,9 @@ def get_firmware(
 
 
 @_operation(
-    "GET",
-    "/jobs/{job_id}/firmware/summary",
+    "GET /jobs/{job_id}/firmware/summary",
     "analysis",
     "Summarize the best design's firmware",
-    409,
     heavy=True,
     page=True,
 )
@@ -1159,8 +1092,7 @@ def _firmware_of_best(
 
 
 @_operation(
-    "POST",
-    "/firmware",
+    "POST /firmware",
     "analysis",
     "Download one design as firmware",
     reads=True,
@@ -1181,7 +1113,7 @@ def write_firmware(
 
 
 @_operation(
-    "POST", "/firmware/summary", "analysis", "Summarize a design's firmware", reads=True, heavy=True
+    "POST /firmware/summary", "analysis", "Summarize a design's firmware", reads=True, heavy=True
 )
 def summarize_firmware(
     _service: JobService, request: FirmwareRequest, *, limits: Limits = UNLIMITED
@@ -1196,49 +1128,49 @@ def summarize_firmware(
 # Robots, measured walks, and the options of jobs and simulations.
 
 
-@_operation("GET", "/robots", "robots", "List robots")
+@_operation("GET /robots", "robots", "List robots")
 def list_robots(_service: JobService) -> CatalogueView[RobotView]:
     """Return shipped robots. A job names one, defines a variant of one, or has files of its own."""
     return CatalogueView(items=robot_views())
 
 
-@_operation("GET", "/scenarios", "robots", "List preset scenarios")
+@_operation("GET /scenarios", "robots", "List preset scenarios")
 def list_scenarios(_service: JobService) -> CatalogueView[ScenarioView]:
     """Return the six scenarios of thesis table 4.2; a job names them or defines its own."""
     return CatalogueView(items=scenario_views())
 
 
-@_operation("GET", "/preferences", "robots", "List preferences")
+@_operation("GET /preferences", "robots", "List preferences")
 def list_preferences(_service: JobService) -> CatalogueView[PreferenceView]:
     """Return biases and exponents that weight the objectives (thesis table 4.5, eq. 3.1)."""
     return CatalogueView(items=preference_views())
 
 
-@_operation("GET", "/optimizers", "robots", "List optimizers")
+@_operation("GET /optimizers", "robots", "List optimizers")
 def list_optimizers(_service: JobService) -> CatalogueView[OptimizerView]:
     """Return search methods with their settings, by the names that jobs use."""
     return CatalogueView(items=optimizer_views())
 
 
-@_operation("GET", "/controllers", "robots", "List controllers")
+@_operation("GET /controllers", "robots", "List controllers")
 def list_controllers(_service: JobService) -> CatalogueView[ControllerView]:
     """Return motor controllers with design variables, bounds, units and published designs."""
     return CatalogueView(items=controller_views())
 
 
-@_operation("GET", "/cases", "robots", "List cases of plug-ins")
+@_operation("GET /cases", "robots", "List cases of plug-ins")
 def list_cases(_service: JobService) -> CatalogueView[CaseView]:
     """Return cases of installed plug-ins, which evaluate designs in place of the simulator."""
     return CatalogueView(items=case_views())
 
 
-@_operation("GET", "/plugins", "robots", "List plug-ins")
+@_operation("GET /plugins", "robots", "List plug-ins")
 def list_plugins(_service: JobService) -> CatalogueView[PluginView]:
     """Return controllers, cases and search methods that installed packages add."""
     return CatalogueView(items=plugin_views())
 
 
-@_operation("POST", "/robots/drafts", "robots", "Draft a robot from a URDF", reads=True, heavy=True)
+@_operation("POST /robots/drafts", "robots", "Draft a robot from a URDF", reads=True, heavy=True)
 def draft_robot(_service: JobService, request: RobotDraftRequest) -> RobotDraftView:
     """Find legs, choose a stance, propose actuators and two scenarios, as `gaitswarm robot init`.
 
@@ -1249,7 +1181,7 @@ def draft_robot(_service: JobService, request: RobotDraftRequest) -> RobotDraftV
     return run_robot_draft(request)
 
 
-@_operation("POST", "/robots/checks", "robots", "Check a custom robot", reads=True, heavy=True)
+@_operation("POST /robots/checks", "robots", "Check a custom robot", reads=True, heavy=True)
 def check_robot(_service: JobService, robot: RobotFiles) -> RobotCheckView:
     """Load a robot and let it stand for a second with all joints held, as `gaitswarm robot check`.
 
@@ -1259,7 +1191,7 @@ def check_robot(_service: JobService, robot: RobotFiles) -> RobotCheckView:
     return checked_robot(robot, folder=None, field="")
 
 
-@_operation("GET", "/robots/{digest}/meshes", "robots", "List the meshes of a robot", page=True)
+@_operation("GET /robots/{digest}/meshes", "robots", "List the meshes of a robot", page=True)
 def list_meshes(
     _service: JobService, digest: str, *, folders: Sequence[Path] = ()
 ) -> CatalogueView[MeshFileView]:
@@ -1277,8 +1209,7 @@ def list_meshes(
 
 
 @_operation(
-    "GET",
-    "/robots/{digest}/meshes/{number}",
+    "GET /robots/{digest}/meshes/{number}",
     "robots",
     "Get a mesh",
     page=True,
@@ -1299,8 +1230,7 @@ def get_mesh(
 
 
 @_operation(
-    "POST",
-    "/recordings",
+    "POST /recordings",
     "robots",
     "Add a recording",
     access="submit",
@@ -1328,7 +1258,7 @@ class RecordingsQuery(Query):
     limit: int = Field(default=50, ge=1, le=200, description="Maximum number of recordings.")
 
 
-@_operation("GET", "/recordings", "robots", "List recordings")
+@_operation("GET /recordings", "robots", "List recordings")
 def list_recordings(service: JobService, query: RecordingsQuery) -> PageView[RecordingEntryView]:
     """Return a page of recordings without their numbers, newest first. New ones do not shift later
     pages.
@@ -1341,8 +1271,7 @@ def list_recordings(service: JobService, query: RecordingsQuery) -> PageView[Rec
 
 
 @_operation(
-    "POST",
-    "/measured-walks",
+    "POST /measured-walks",
     "robots",
     "Make a recording from a measured log",
     heavy=True,
@@ -1371,15 +1300,14 @@ def record_measured_walk(
     return MeasuredWalkView.from_log(recording, measured.log, measured.pair)
 
 
-@_operation("GET", "/recordings/{recording_id}", "robots", "Get a recording", 409)
+@_operation("GET /recordings/{recording_id}", "robots", "Get a recording", 409)
 def get_recording(service: JobService, recording_id: str) -> RecordedWalk:
     """Return the whole recording with its numbers."""
     return service.recording(recording_id)
 
 
 @_operation(
-    "GET",
-    "/recordings/{recording_id}/summary",
+    "GET /recordings/{recording_id}/summary",
     "robots",
     "Get a recording without its numbers",
     409,
@@ -1394,15 +1322,7 @@ def get_recording_summary(service: JobService, recording_id: str) -> RecordingVi
 
 
 @_operation(
-    "POST",
-    "/jobs/{job_id}/fork",
-    "operations",
-    "Fork a job",
-    403,
-    409,
-    heavy=True,
-    access="submit",
-    status=202,
+    "POST /jobs/{job_id}/fork", "operations", "Fork a job", heavy=True, access="submit", status=202
 )
 def fork_job(
     service: JobService,
@@ -1428,8 +1348,7 @@ def fork_job(
 
 
 @_operation(
-    "PATCH",
-    "/jobs/{job_id}",
+    "PATCH /jobs/{job_id}",
     "operations",
     "Change name, note, tags or archival of a job",
     access="command",
@@ -1442,12 +1361,7 @@ def label_job(
 
 
 @_operation(
-    "PUT",
-    "/jobs/{job_id}/priority",
-    "operations",
-    "Change the priority of a job",
-    409,
-    access="command",
+    "PUT /jobs/{job_id}/priority", "operations", "Change the priority of a job", access="command"
 )
 def prioritize_job(
     service: JobService,
@@ -1468,7 +1382,7 @@ def prioritize_job(
 
 
 @_operation(
-    "PUT", "/jobs/{job_id}/keep", "operations", "Protect a job from deletion", access="command"
+    "PUT /jobs/{job_id}/keep", "operations", "Protect a job from deletion", access="command"
 )
 def keep_job(service: JobService, job_id: str, *, actor: str = LOCAL) -> JobView:
     """Protect a job from deletion by users and by retention."""
@@ -1476,16 +1390,14 @@ def keep_job(service: JobService, job_id: str, *, actor: str = LOCAL) -> JobView
 
 
 @_operation(
-    "DELETE", "/jobs/{job_id}/keep", "operations", "End the protection of a job", access="command"
+    "DELETE /jobs/{job_id}/keep", "operations", "End the protection of a job", access="command"
 )
 def release_job(service: JobService, job_id: str, *, actor: str = LOCAL) -> JobView:
     """Allow deletion again; a server with a retention time deletes the job when that has passed."""
     return full_view(service, service.keep(job_id, kept=False, actor=actor))
 
 
-@_operation(
-    "DELETE", "/jobs/{job_id}", "operations", "Delete a job", 409, access="command", status=204
-)
+@_operation("DELETE /jobs/{job_id}", "operations", "Delete a job", access="command", status=204)
 def delete_job(service: JobService, job_id: str, *, actor: str = LOCAL) -> None:
     """Delete a job with its iterations and evaluations, irrevocably.
 
@@ -1502,7 +1414,7 @@ class FacetsQuery(Query):
     archived: Archived = None
 
 
-@_operation("GET", "/job-facets", "operations", "Count jobs by facet", page=True)
+@_operation("GET /job-facets", "operations", "Count jobs by facet", page=True)
 def count_jobs(service: JobService, query: FacetsQuery) -> JobFacetsView:
     """Count jobs by state, robot, controller, preference and tag."""
     return JobFacetsView.from_counts(service.facets(archived=query.archived))
@@ -1515,7 +1427,7 @@ class ActivityQuery(Query):
 
 
 @_operation(
-    "GET", "/jobs/{job_id}/activity", "operations", "Get the activity of a job's workers", page=True
+    "GET /jobs/{job_id}/activity", "operations", "Get the activity of a job's workers", page=True
 )
 def get_activity(
     service: JobService, job_id: str, query: ActivityQuery, *, activities: Activity | None = None
@@ -1530,9 +1442,7 @@ def get_activity(
     return ActivityView.from_activity(job_id, known, query.level, runs_jobs=activities is not None)
 
 
-@_operation(
-    "GET", "/jobs/{job_id}/notifications", "operations", "List notifications of a job's end"
-)
+@_operation("GET /jobs/{job_id}/notifications", "operations", "List notifications of a job's end")
 def list_notifications(service: JobService, job_id: str) -> list[NotificationView]:
     """Return one notification for each time that a job with a `Notify-URL` ended."""
     notifications = service.store.outbox.about(job_id)
@@ -1549,7 +1459,7 @@ class AuditQuery(Query):
     limit: int = Field(default=50, ge=1, le=200, description="Maximum number of entries.")
 
 
-@_operation("GET", "/audit", "operations", "Read the audit log", access="admin")
+@_operation("GET /audit", "operations", "Read the audit log", access="admin")
 def read_audit(service: JobService, query: AuditQuery) -> PageView[AuditEntryView]:
     """Return changes to jobs and tokens, newest first.
 

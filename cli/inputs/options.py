@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import inspect
 from collections.abc import Callable, Iterable
 from contextlib import ExitStack
@@ -364,6 +365,8 @@ def expanded(command: Callable[..., Any]) -> Callable[..., None]:
                 options = {field.name: values.pop(field.name) for field in fields(kind)}
                 group: Any = cast(type, kind)(**options)
                 values[name] = stack.enter_context(group.open()) if name == "jobs" else group
+            gc.freeze()
+            gc.enable()
             printed = command(**values)
             if prints:
                 show(*printed, as_json=as_json)

@@ -16,9 +16,12 @@ StatusName = Literal["ok", "diverged", "fell", "unreachable", "stalled"]
 
 
 class View(BaseModel):
-    """A domain object as JSON. JSON has no infinities: a number that is not finite is null."""
+    """A domain object as JSON. JSON has no infinities: a number that is not finite is null.
 
-    model_config = ConfigDict(frozen=True, extra="forbid", from_attributes=True)
+    Models are built when they are first used: a command uses a few of them.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", from_attributes=True, defer_build=True)
 
 
 class Request(BaseModel):

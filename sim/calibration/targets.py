@@ -73,7 +73,7 @@ QUANTITIES: Final[dict[QuantityName, Quantity]] = {
 class TargetWalk(BaseModel):
     """A measured or published walk: its drive and its scenarios."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
     name: WalkName
     controller: ControllerName = Field(description="Controller that drove it.")
@@ -112,7 +112,7 @@ class TargetWalk(BaseModel):
 class Target(BaseModel):
     """One result of a walk, and the tolerance of its simulation."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
     walk: WalkName
     quantity: QuantityName = Field(description="What was measured.", examples=["energy"])

@@ -24,7 +24,7 @@ FASTEST_INNER_RATE: Final = 40_000
 class Data(BaseModel):
     """Base class: immutable, without unknown fields, infinities and NaN."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
 
 class Motor(Data):

@@ -88,7 +88,7 @@ def test_a_robot_of_ones_own_is_measured_against_the_middle_of_the_bounds(
     assert (listed["reference"], listed["robot"]) == (found["reference"], "quadruped")
     table = jobs_table([JobSummaryView.model_validate(listed)])
     (gains,) = (column for column in table.columns if column.header == "gain")
-    assert [*gains.cells] == [f"{found['gain']:.1%} over start"]
+    assert [*map(str, gains.cells)] == [f"{found['gain']:.1%} over start"]
 
 
 def test_a_reference_that_is_stored_stays(store: Store, commit: Commit) -> None:

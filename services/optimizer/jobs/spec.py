@@ -51,7 +51,7 @@ DECISIVE: Final = 0.05
 class Spec(BaseModel):
     """An optimization job: variables, robot, method, budget and seed."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     outcome_independent_fields: ClassVar[frozenset[str]] = frozenset(
         {

@@ -16,7 +16,7 @@ from gaitswarm.sim.input import message_of
 class SearchSettings(BaseModel):
     """Settings that every method has."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
     name: str
     particles: int = Field(

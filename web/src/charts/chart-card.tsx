@@ -9,18 +9,9 @@ import { type Column, Table } from '../components/table/table'
 import type { DataTable } from '../export/csv'
 import type { Kind } from '../export/save'
 import { formatExact, formatNumber } from '../format/number'
-import { capitalized } from '../format/words'
 import { LineChart, type LineChartProps } from './lines/line-chart'
 
-export function ChartCard({
-  title,
-  note,
-  table,
-  data,
-  tools,
-  legend,
-  children,
-}: {
+interface ChartCardProps {
   title: string
   note?: string
   /** The chart's numbers; rendered on demand. */
@@ -30,7 +21,10 @@ export function ChartCard({
   tools?: ComponentChildren
   legend?: ComponentChildren
   children: ComponentChildren
-}) {
+}
+
+export function ChartCard(props: ChartCardProps) {
+  const { title, note, table, data, tools, legend, children } = props
   const [asTable, setAsTable] = useState(false)
   const [error, setError] = useState<unknown>(null)
   const card = useRef<HTMLElement>(null)
@@ -83,15 +77,13 @@ export function ChartCard({
   )
 }
 
-export function LegendEntry({
-  colour,
-  label,
-  area = false,
-}: {
+interface LegendEntryProps {
   colour: `--${string}`
   label: string
   area?: boolean
-}) {
+}
+
+export function LegendEntry({ colour, label, area = false }: LegendEntryProps) {
   return (
     <span>
       <i class={area ? 'swatch' : ''} style={{ background: `var(${colour})` }} aria-hidden="true" />
@@ -100,12 +92,9 @@ export function LegendEntry({
   )
 }
 
-export interface LineCardProps extends LineChartProps {
-  readonly title: string
-  readonly note?: string
-  readonly tools?: ComponentChildren
-  /** The names of the series by default. */
-  readonly legend?: ComponentChildren
+export interface LineCardProps
+  extends LineChartProps,
+    Pick<ChartCardProps, 'title' | 'note' | 'tools' | 'legend'> {
   /** Caption of the table. */
   readonly caption: string
   readonly order?: SortOrder
@@ -114,21 +103,12 @@ export interface LineCardProps extends LineChartProps {
 }
 
 /** A line chart whose table and legend list its series. */
-export function LineCard({
-  title,
-  note,
-  tools,
-  legend,
-  caption,
-  order,
-  format = (value) => formatNumber(value, 5),
-  ...chart
-}: LineCardProps) {
+export function LineCard({ title, note, tools, caption, order, ...props }: LineCardProps) {
+  const { legend, format = (value) => formatNumber(value, 5), ...chart } = props
   const { x, xLabel, xUnit, yUnit, series } = chart
   const columns: Column<number>[] = [
     {
-      key: 'x',
-      label: capitalized(xLabel),
+      key: xLabel,
       unit: xUnit,
       numeric: true,
       header: true,
@@ -163,7 +143,6 @@ export function LineCard({
           caption={caption}
           columns={columns}
           rows={Array.from(x, (_, k) => k)}
-          rowKey={String}
           order={order}
           tall
         />

@@ -2,12 +2,12 @@
 
 import { useCallback, useMemo } from 'preact/hooks'
 import type uPlot from 'uplot'
+import type { JobComparison } from '../api/types'
 import { ChartCard, LegendEntry, LineCard } from '../charts/chart-card'
 import { LineChart } from '../charts/lines/line-chart'
 import { lineLabel, paintReference } from '../charts/lines/reference-line'
-import { Check } from '../components/fields/controls'
+import { Check, Select } from '../components/fields/controls'
 import { Table } from '../components/table/table'
-import { formatNumber, percent } from '../format/number'
 import { fittedRange } from '../job/overview/model'
 import { setQuery } from '../router/navigation'
 import { flag, oneOf, useQueryValue } from '../router/query-value'
@@ -44,13 +44,7 @@ function seriesOf(jobs: readonly ComparedJob[], lines: readonly (number | null)[
 }
 
 /** Best fitness so far by iterations, evaluations or time. comparable: whether it is one quantity. */
-export function ConvergenceCard({
-  jobs,
-  comparable,
-}: {
-  jobs: readonly ComparedJob[]
-  comparable: boolean
-}) {
+export function ConvergenceCard({ jobs, comparable }: Pick<JobComparison, 'jobs' | 'comparable'>) {
   const [axis, setAxis] = useQueryValue<Axis>('by', BY, 'iterations')
   const [logarithmic, setLogarithmic] = useQueryValue('log', flag(true), true)
   const { x, series, references, range } = useMemo(() => {
@@ -77,23 +71,16 @@ export function ConvergenceCard({
       note="Best fitness so far; lower is better. Drag to zoom, double-click to reset."
       tools={
         <>
-          <label class="row small">
-            <span>By</span>
-            <select
-              value={axis}
-              onChange={(event) => {
-                // A range of the previous axis is meaningless on the new one.
-                setQuery({ zoom: null })
-                setAxis(event.currentTarget.value as Axis)
-              }}
-            >
-              {Object.entries(AXES).map(([name, each]) => (
-                <option key={name} value={name}>
-                  {each.label}
-                </option>
-              ))}
-            </select>
-          </label>
+          <Select
+            label="By"
+            value={axis}
+            options={(Object.keys(AXES) as Axis[]).map((name) => [name, AXES[name].label])}
+            onChoose={(name) => {
+              // A range of the previous axis is meaningless on the new one.
+              setQuery({ zoom: null })
+              setAxis(name)
+            }}
+          />
           <Check label="logarithmic" checked={logarithmic} onChange={setLogarithmic} />
         </>
       }
@@ -131,21 +118,13 @@ export function DistributionCard({ jobs }: { jobs: readonly ComparedJob[] }) {
         <Table
           caption="Fitness by share of the designs"
           rows={LISTED}
-          rowKey={String}
           columns={[
-            {
-              key: 'share',
-              label: 'Share',
-              header: true,
-              value: (share) => share,
-              cell: (share) => percent(share, 2),
-            },
+            { key: 'share', header: true, percent: 2, value: (share) => share },
             ...jobs.map((job) => ({
               key: job.id,
               label: job.name || job.id,
-              numeric: true,
+              digits: 5,
               value: (share: number) => at(job, share),
-              cell: (share: number) => formatNumber(at(job, share), 5),
             })),
           ]}
         />

@@ -3,10 +3,11 @@
 import { get } from '../api/client'
 import { usePolling, useResource } from '../api/resource'
 import type { JobComparison } from '../api/types'
-import { Empty, ErrorNotice, Loading } from '../components/feedback'
+import { Card, EmptyCard, Loaded } from '../components/card'
+import { Empty } from '../components/feedback'
 import { StateBadge } from '../components/state-badge'
 import { Table } from '../components/table/table'
-import { formatCount, formatNumber, NONE, percent } from '../format/number'
+import { formatCount, NONE, percent } from '../format/number'
 import { isActive } from '../job/state'
 import { ALL_JOBS, Breadcrumbs } from '../router/breadcrumbs'
 import { usePlace } from '../router/navigation'
@@ -41,23 +42,15 @@ export default function ComparePage() {
       </header>
       <div class="stack">
         {ids.length === 0 && (
-          <section class="card">
-            <Empty title="No jobs selected">
-              <p>
-                Select jobs in the <a href="/jobs">list of jobs</a>.
-              </p>
-            </Empty>
-          </section>
+          <EmptyCard title="No jobs selected">
+            <p>
+              Select jobs in the <a href="/jobs">list of jobs</a>.
+            </p>
+          </EmptyCard>
         )}
-        {comparison.error && (
-          <ErrorNotice
-            what="Could not compare the jobs."
-            error={comparison.error}
-            retry={comparison.reload}
-          />
-        )}
-        {comparison.loading && !comparison.data && <Loading what="the jobs" />}
-        {comparison.data && <Comparison comparison={comparison.data} />}
+        <Loaded resource={comparison} what="the jobs" failed="Could not compare the jobs.">
+          {(data) => <Comparison comparison={data} />}
+        </Loaded>
       </div>
     </>
   )
@@ -80,17 +73,14 @@ function Comparison({ comparison }: { comparison: JobComparison }) {
           <p>Their fitness values are not comparable: see the differences between their specs.</p>
         </div>
       )}
-      <section class="card" aria-labelledby="compared">
-        <h2 id="compared">The jobs</h2>
+      <Card title="The jobs">
         <Table
           caption="Compared jobs"
           rows={comparison.jobs}
-          rowKey={({ id }) => id}
           rowData={({ id }) => ({ 'data-compared': id })}
           columns={[
             {
-              key: 'name',
-              label: 'Job',
+              key: 'job',
               header: true,
               value: ({ name, id }) => name || id,
               cell: (job) => (
@@ -106,20 +96,12 @@ function Comparison({ comparison }: { comparison: JobComparison }) {
             },
             {
               key: 'state',
-              label: 'State',
               value: ({ state }) => state,
               cell: ({ state }) => <StateBadge state={state} />,
             },
-            {
-              key: 'best',
-              label: 'Best fitness',
-              numeric: true,
-              value: ({ best_fitness }) => best_fitness,
-              cell: ({ best_fitness }) => formatNumber(best_fitness, 5),
-            },
+            { key: 'best fitness', digits: 5, value: ({ best_fitness }) => best_fitness },
             {
               key: 'gain',
-              label: 'Gain',
               numeric: true,
               value: ({ gain }) => gain ?? null,
               cell: ({ gain, reference }) =>
@@ -130,7 +112,6 @@ function Comparison({ comparison }: { comparison: JobComparison }) {
             {
               key: 'evaluations',
               minor: true,
-              label: 'Evaluations',
               numeric: true,
               value: ({ evaluations }) => evaluations,
               cell: ({ evaluations }) => formatCount(evaluations),
@@ -138,15 +119,12 @@ function Comparison({ comparison }: { comparison: JobComparison }) {
             {
               key: 'failed',
               minor: true,
-              label: 'Failed',
-              numeric: true,
-              value: ({ failed, evaluations }) => failed / evaluations,
-              cell: ({ failed, evaluations }) =>
-                evaluations === 0 ? NONE : percent(failed / evaluations, 2),
+              percent: 2,
+              value: ({ failed, evaluations }) => (evaluations === 0 ? null : failed / evaluations),
             },
           ]}
         />
-      </section>
+      </Card>
       <ConvergenceCard jobs={comparison.jobs} comparable={comparison.comparable} />
       <DistributionCard jobs={comparison.jobs} />
       <Differences comparison={comparison} />
@@ -156,8 +134,7 @@ function Comparison({ comparison }: { comparison: JobComparison }) {
 
 function Differences({ comparison: { jobs, differences } }: { comparison: JobComparison }) {
   return (
-    <section class="card" aria-labelledby="differences" data-differences={differences.length}>
-      <h2 id="differences">Differences between specs</h2>
+    <Card title="Differences between specs">
       {differences.length === 0 ? (
         <Empty title="None">
           <p>All specs are identical.</p>
@@ -166,11 +143,9 @@ function Differences({ comparison: { jobs, differences } }: { comparison: JobCom
         <Table
           caption="Differences between specs"
           rows={differences}
-          rowKey={({ field }) => field}
           columns={[
             {
               key: 'field',
-              label: 'Field',
               header: true,
               value: ({ field }) => field,
               cell: ({ field }) => <code>{field}</code>,
@@ -185,6 +160,6 @@ function Differences({ comparison: { jobs, differences } }: { comparison: JobCom
           ]}
         />
       )}
-    </section>
+    </Card>
   )
 }

@@ -25,7 +25,7 @@ const GRID = { error_points: 65, current_points: 33 }
 
 export default function ControllerPage() {
   return (
-    <DesignPage title="Controller" what="controller" path="/controller" read={sourceOf}>
+    <DesignPage title="Controller" path="/controller" read={sourceOf}>
       {(source, query) => <Controller source={source} query={query} />}
     </DesignPage>
   )

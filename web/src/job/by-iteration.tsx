@@ -62,7 +62,7 @@ export function IterationChart<R extends Indexed>({
       {...card}
       {...drawn}
       caption={`${capitalized(name)} by iteration`}
-      order={{ column: 'x', descending: true }}
+      order={{ column: 'iteration', descending: true }}
       xLabel="iteration"
       counted
     />

@@ -4,15 +4,16 @@ import { useEffect, useMemo, useState } from 'preact/hooks'
 import { get } from '../api/client'
 import { useResource } from '../api/resource'
 import { isPublished, NOT_PUBLISHED } from '../api/robots'
-import type { Scenario } from '../api/types'
+import type { Scenario, ScenarioPreset } from '../api/types'
 import { ErrorNotice, Loading } from '../components/feedback'
+import { formatExact } from '../format/number'
+import { inWords } from '../format/words'
 import { setQuery } from '../router/navigation'
 import { useDelayedQuery, useQueryValue } from '../router/query-value'
 import { DesignHeading, DesignLinks, DesignPage } from './design/design-page'
 import { DesignPicker } from './design/design-picker'
 import { type DesignSource, queryOf, sourceOf, sourceOfWord, wordOf } from './design/design-source'
 import { type ResolvedDesign, resolveDesign } from './design/resolve-design'
-import { ScenarioPicker } from './design/scenario-picker'
 import { Playback } from './player/playback'
 import { Player } from './player/player'
 import { CAMERA, DEFAULT_VIEW, MOMENT, VIEW } from './player/view-words'
@@ -21,21 +22,21 @@ import './walk.css'
 import { WalkPlots } from './plots/walk-plots'
 import { FailureNotices } from './walk-result'
 
-interface Address {
-  readonly source: DesignSource
-  readonly against: DesignSource | null
-}
-
 export default function WalkPage() {
   return (
-    <DesignPage title="Walk" what="walk" path="/walk" read={addressOf}>
-      {(address, query) => <Walk address={address} query={query} />}
+    <DesignPage title="Walk" path="/walk" read={addressOf}>
+      {(address, query) => <Walk {...address} query={query} />}
     </DesignPage>
   )
 }
 
-function Walk({ address, query }: { address: Address; query: URLSearchParams }) {
-  const { source, against } = address
+interface WalkProps {
+  source: DesignSource
+  against: DesignSource | null
+  query: URLSearchParams
+}
+
+function Walk({ source, against, query }: WalkProps) {
   const rate = RATES.find((candidate) => String(candidate) === query.get('rate')) ?? DEFAULT_RATE
   const presets = useResource('scenarios', (signal) => get('/v1/scenarios', { signal }))
   const first = useResource(wordOf(source), (signal) => resolveDesign(source, signal))
@@ -69,12 +70,7 @@ function Walk({ address, query }: { address: Address; query: URLSearchParams }) 
           chosenLabel={first.data?.label ?? 'This design'}
           onChoose={(chosen) => setQuery(queryOf(chosen!))}
         />
-        <ScenarioPicker
-          jobScenarios={jobScenarios}
-          presets={listed}
-          chosen={requested}
-          onChoose={(name) => setQuery({ scenario: name })}
-        />
+        <ScenarioPicker jobScenarios={jobScenarios} presets={listed} chosen={requested} />
         <DesignPicker
           label="Compare with"
           chosen={against}
@@ -166,6 +162,60 @@ function RatePicker({ rate }: { rate: number }) {
 }
 
 /** Throws AddressError. */
-function addressOf(query: URLSearchParams): Address {
+function addressOf(query: URLSearchParams) {
   return { source: sourceOf(query), against: sourceOfWord(query.get('against')) }
+}
+
+interface ScenarioPickerProps {
+  /** Scenarios of the design's job. */
+  jobScenarios: readonly Scenario[]
+  presets: readonly ScenarioPreset[]
+  /** Name of the chosen scenario. */
+  chosen: string
+}
+
+function ScenarioPicker({ jobScenarios, presets, chosen }: ScenarioPickerProps) {
+  const names = new Set(jobScenarios.map(({ name }) => name))
+  const groups = [
+    ['Job', jobScenarios],
+    [names.size > 0 ? 'Other presets' : 'Presets', presets.filter(({ name }) => !names.has(name))],
+  ] as const
+  return (
+    <div class="field">
+      <label for="walk-scenario">Scenario</label>
+      <select
+        id="walk-scenario"
+        value={chosen}
+        onChange={(event) => setQuery({ scenario: event.currentTarget.value })}
+      >
+        {groups
+          .filter(([, scenarios]) => scenarios.length > 0)
+          .map(([label, scenarios]) => (
+            <optgroup key={label} label={label}>
+              {scenarios.map((scenario) => (
+                <option key={scenario.name} value={scenario.name}>
+                  {described(scenario)}
+                </option>
+              ))}
+            </optgroup>
+          ))}
+      </select>
+    </div>
+  )
+}
+
+/** Name of a scenario with its distinguishing parameters. */
+function described(scenario: Scenario | ScenarioPreset): string {
+  const { name, cycle_time, load, slope, turn, direction, drop, stuck_leg, shove } = scenario
+  const parts = [
+    `cycle ${formatExact(cycle_time)} s`,
+    load && `load ${formatExact(load)} kg`,
+    slope && `slope ${formatExact(slope)}°`,
+    direction === 'backward' && 'backward',
+    drop && `drop ${formatExact(drop * 1e3)} mm`,
+    stuck_leg && `${inWords(stuck_leg)} leg stuck`,
+    shove && `shove ${formatExact(shove)} N s`,
+    turn && `turn ${formatExact(turn)}`,
+  ]
+  return `${name} (${parts.filter(Boolean).join(', ')})`
 }

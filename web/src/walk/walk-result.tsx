@@ -1,6 +1,7 @@
 /** Outcome and objectives of walks. */
 
-import { Table } from '../components/table/table'
+import { Card } from '../components/card'
+import { type Column, Table } from '../components/table/table'
 import { Unit } from '../components/unit'
 import { change, formatNumber, NONE } from '../format/number'
 import { inWords, sentence } from '../format/words'
@@ -38,59 +39,42 @@ export function FailureNotices({ walks }: { walks: readonly Recorded[] }) {
   ))
 }
 
-interface Row {
-  readonly name: string
-  readonly unit: string
-  readonly values: readonly (number | null)[]
-}
-
 export function ObjectivesTable({ walks }: { walks: readonly Recorded[] }) {
   const { objectives, objective_units } = walks[0].replay.header
-  const rows: Row[] = Object.keys(objectives).map((name) => ({
-    name,
-    unit: objective_units[name] ?? '1',
-    values: walks.map(({ replay }) => replay.header.objectives[name] ?? null),
-  }))
-  const numbers = walks.map(({ label }, k) => ({
-    key: `walk-${k}`,
-    label: walks.length > 1 ? label : 'Value',
-    numeric: true,
-    cell: (row: Row) => formatNumber(row.values[k]),
-  }))
-  const compared = {
-    key: 'difference',
-    label: 'Second vs. first',
-    numeric: true,
-    cell: ({ unit, values: [first, second] }: Row) => difference(unit, first, second),
-  }
+  const objectiveOf = (name: string, k: number) => walks[k]?.replay.header.objectives[name] ?? null
+  const comparing = walks.length > 1
+  const columns: Column<string>[] = [
+    {
+      key: 'objective',
+      header: true,
+      cell: (name) => (
+        <>
+          {inWords(name)}
+          <Unit unit={objective_units[name]} />
+          <span class="muted small block">{MEANINGS[name]}</span>
+        </>
+      ),
+    },
+    ...walks.map(({ label }, k) => ({
+      key: `walk-${k}`,
+      label: comparing ? label : 'Value',
+      numeric: true,
+      cell: (name: string) => formatNumber(objectiveOf(name, k)),
+    })),
+    {
+      key: 'second vs. first',
+      numeric: true,
+      cell: (name) => difference(objective_units[name], objectiveOf(name, 0), objectiveOf(name, 1)),
+    },
+  ]
   return (
-    <section class={walks.length > 1 ? 'card wide' : 'card'} data-objectives>
-      <header>
-        <h2>Objectives</h2>
-        <p class="muted small">Lower is better.</p>
-      </header>
-      <Table<Row>
+    <Card title="Objectives" note="Lower is better." class={comparing ? 'wide' : ''}>
+      <Table
         caption="Objectives of the walk"
-        rows={rows}
-        rowKey={(row) => row.name}
-        columns={[
-          {
-            key: 'name',
-            label: 'Objective',
-            header: true,
-            cell: ({ name, unit }) => (
-              <>
-                {inWords(name)}
-                <Unit unit={unit} />
-                <span class="muted small block">{MEANINGS[name]}</span>
-              </>
-            ),
-          },
-          ...numbers,
-          ...(walks.length > 1 ? [compared] : []),
-        ]}
+        rows={Object.keys(objectives)}
+        columns={comparing ? columns : columns.slice(0, -1)}
       />
-    </section>
+    </Card>
   )
 }
 

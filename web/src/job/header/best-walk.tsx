@@ -16,7 +16,7 @@ export default function BestWalk({
   visible: boolean
 }) {
   const record = async (signal: AbortSignal) => {
-    const design = await resolveDesign({ kind: 'best', job: job.id }, signal)
+    const design = await resolveDesign({ job: job.id }, signal)
     return recordWalk(design, design.scenarios[0] ?? 'normal-fast', RATE, signal)
   }
   return (

@@ -9,53 +9,48 @@ import { jobPath, withQuery } from '../../router/routes'
 import { type DesignSource, queryOf } from './design-source'
 import type { ResolvedDesign } from './resolve-design'
 
-/** Parse the address and show the page, or an error for an invalid address. */
-export function DesignPage<A>({
-  title,
-  what,
-  path,
-  read,
-  children,
-}: {
+interface DesignPageProps<A> {
   title: string
-  /** Noun for the error message: "Invalid address of a walk." */
-  what: string
   /** Path of the page; without a query it shows the published optimum. */
   path: string
   /** Throws AddressError. */
   read: (query: URLSearchParams) => A
   children: (address: A, query: URLSearchParams) => ComponentChildren
-}) {
-  const { query } = usePlace()
-  const [address, error] = attempt(() => read(query))
-  if (address !== null) return <>{children(address, query)}</>
-  return (
-    <>
-      <h1>{title}</h1>
-      <ErrorNotice what={`Invalid address of a ${what}.`} error={error} />
-      <p class="row">
-        <a class="button" href={path}>
-          Show the published optimum A
-        </a>
-      </p>
-    </>
-  )
 }
 
-/** Heading and breadcrumbs, below the job of the design. */
-export function DesignHeading({
-  title,
-  path,
-  design,
-  details = [],
-}: {
+/** Parse the address and show the page, or an error for an invalid address. */
+export function DesignPage<A>({ title, path, read, children }: DesignPageProps<A>) {
+  const { query } = usePlace()
+  let address: A
+  try {
+    address = read(query)
+  } catch (error) {
+    return (
+      <>
+        <h1>{title}</h1>
+        <ErrorNotice what={`Invalid address of a ${title.toLowerCase()}.`} error={error} />
+        <p class="row">
+          <a class="button" href={path}>
+            Show the published optimum A
+          </a>
+        </p>
+      </>
+    )
+  }
+  return <>{children(address, query)}</>
+}
+
+interface DesignHeadingProps {
   title: string
   path: string
   /** Null while loading. */
   design: ResolvedDesign | null
   /** Further parts of the document title. */
   details?: readonly string[]
-}) {
+}
+
+/** Heading and breadcrumbs, below the job of the design. */
+export function DesignHeading({ title, path, design, details = [] }: DesignHeadingProps) {
   const progress = useProgress(design?.job)
   const shown = design ? [[design.label, ...details].join(', ')] : []
   return (
@@ -72,34 +67,30 @@ export function DesignHeading({
 }
 
 function placeOf(title: string, path: string, design: ResolvedDesign | null) {
-  const { job, source } = design ?? {}
-  if (!design || !job)
-    return { crumbs: design ? [[title, path] as const] : [], here: design?.label ?? title }
+  const { job, source, label = title } = design ?? {}
+  if (!job || !source) return { crumbs: design ? [[title, path] as const] : [], here: label }
   const crumbs: Crumb[] = [ALL_JOBS, [job.name || job.id, jobPath(job.id)]]
-  if (source?.kind !== 'particle') return { crumbs, here: `${title} of the best` }
+  if (!('iteration' in source)) return { crumbs, here: `${title} of the best` }
   const { iteration, particle } = source
   crumbs.push(['Iterations', jobPath(job.id, 'iterations')])
   crumbs.push([String(iteration), jobPath(job.id, `iterations/${iteration}`)])
   return { crumbs, here: `${title} of design ${particle}` }
 }
 
-/** Links to the design's other page and to its job. */
-export function DesignLinks({
-  source,
-  path,
-  label,
-}: {
+interface DesignLinksProps {
   source: DesignSource
   /** Path of the other page; null if it does not apply. */
   path: string | null
   label: string
-}) {
-  const set = Object.entries(queryOf(source)).filter(([, value]) => value !== null)
-  const query = Object.fromEntries(set) as Record<string, string>
+}
+
+/** Links to the design's other page and to its job. */
+export function DesignLinks({ source, path, label }: DesignLinksProps) {
+  const query = Object.entries(queryOf(source)).map(([name, value]) => [name, value ?? undefined])
   return (
     <div class="row">
       {path !== null && (
-        <a class="button" href={withQuery(path, query)}>
+        <a class="button" href={withQuery(path, Object.fromEntries(query))}>
           {label}
         </a>
       )}
@@ -110,12 +101,4 @@ export function DesignLinks({
       )}
     </div>
   )
-}
-
-function attempt<A>(read: () => A): [A | null, unknown] {
-  try {
-    return [read(), null]
-  } catch (error) {
-    return [null, error]
-  }
 }

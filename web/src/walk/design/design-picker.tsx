@@ -6,14 +6,7 @@ import { useResource } from '../../api/resource'
 import { type ChoiceGroup, Combobox } from '../../components/fields/combobox'
 import { type DesignSource, sourceOfWord, wordOf } from './design-source'
 
-export function DesignPicker({
-  label,
-  chosen,
-  chosenLabel,
-  none,
-  note,
-  onChoose,
-}: {
+interface DesignPickerProps {
   label: string
   chosen: DesignSource | null
   /** Label of the chosen design. */
@@ -23,11 +16,14 @@ export function DesignPicker({
   /** Why published designs are not offered; they are if missing. */
   note?: string
   onChoose: (source: DesignSource | null) => void
-}) {
+}
+
+export function DesignPicker(props: DesignPickerProps) {
+  const { label, chosen, chosenLabel, none, note, onChoose } = props
   const controllers = useResource('controllers', (signal) => get('/v1/controllers', { signal }))
   const published = (controllers.data?.items ?? []).flatMap((controller) =>
     Object.keys(controller.published).map((study) => ({
-      value: wordOf({ kind: 'published', controller: controller.name, study }),
+      value: wordOf({ controller: controller.name, published: study }),
       label: `${controller.name}: ${study}`,
     })),
   )
@@ -48,4 +44,4 @@ export function DesignPicker({
   )
 }
 
-const bestOfJobs = jobSearch('tuning', { value: (job) => wordOf({ kind: 'best', job }) })
+const bestOfJobs = jobSearch('tuning', { value: (job) => wordOf({ job }) })

@@ -18,11 +18,12 @@ export interface ResolvedDesign {
   readonly design: Design
   /** Perturbations of the model, by name. */
   readonly world?: Readonly<Record<string, number>>
-  /** Job of the design. */
   readonly job?: Job
   /** Scenarios of its job; empty without a job. */
   readonly scenarios: readonly Scenario[]
 }
+
+type JobSource = Extract<DesignSource, { job: string }>
 
 /** Load the design of a source. like: controller to prefer if the source names none. */
 export async function resolveDesign(
@@ -31,24 +32,44 @@ export async function resolveDesign(
   like?: string,
 ): Promise<ResolvedDesign> {
   const { items: controllers } = await get('/v1/controllers', { signal })
-  if (source.kind === 'best' || source.kind === 'particle') {
-    return ofJob(source, controllers, signal)
+  const named = (name: string) => {
+    const match = controllers.find((controller) => controller.name === name)
+    if (match) return match
+    const available = controllers.map((controller) => controller.name).join(', ')
+    throw new ApiProblem(404, `no controller ${name}; available: ${available}`)
   }
-  if (source.kind === 'published') return published(source, controllers, like)
-  const controller = named(controllers, source.controller)
-  return {
-    source,
-    label: 'Custom design',
-    robot: 'szabadka2-reconstructed',
-    controller,
-    design: source.design,
-    scenarios: [],
+  if ('job' in source) return ofJob(source, named, signal)
+  const common = { robot: 'szabadka2-reconstructed', scenarios: [] } as const
+  if ('design' in source) {
+    const { design } = source
+    const controller = named(source.controller)
+    return { ...common, source, label: 'Custom design', controller, design }
   }
+  const preferred = source.controller ?? like
+  const searched = source.controller
+    ? [named(source.controller)]
+    : controllers.toSorted((a, b) => Number(b.name === preferred) - Number(a.name === preferred))
+  for (const controller of searched) {
+    const published = source.published || Object.keys(controller.published)[0]
+    const design = controller.published[published]
+    if (!design) continue
+    const label = `Published ${published}, ${controller.name}`
+    const exact = { controller: controller.name, published }
+    return { ...common, source: exact, label, controller, design }
+  }
+  const available = controllers.flatMap((c) =>
+    Object.keys(c.published).map((study) => `${study} of ${c.name}`),
+  )
+  const of = source.controller ? ` of ${source.controller}` : ''
+  throw new ApiProblem(
+    404,
+    `there is no published design ${source.published}${of}; available: ${available.join(', ')}`,
+  )
 }
 
 async function ofJob(
-  source: Extract<DesignSource, { job: string }>,
-  controllers: readonly Controller[],
+  source: JobSource,
+  named: (controller: string) => Controller,
   signal: AbortSignal,
 ): Promise<ResolvedDesign> {
   const job = await readableJob(source.job, signal)
@@ -65,13 +86,16 @@ async function ofJob(
   return {
     source,
     job,
-    label: source.kind === 'best' ? `Best of ${name}` : `${name}, design ${placeWord(evaluation)}`,
+    label:
+      source.iteration === undefined
+        ? `Best of ${name}`
+        : `${name}, design ${placeWord(evaluation)}`,
     // Evaluations of a certificate are worlds, all with the same design.
     ...(spec.kind === 'certificate'
       ? { design: spec.design, world: worldOf(evaluation) }
       : { design: evaluation.design }),
     robot: spec.robot,
-    controller: named(controllers, spec.controller),
+    controller: named(spec.controller),
     scenarios: spec.scenarios.filter((entry) => typeof entry !== 'string'),
   }
 }
@@ -88,64 +112,22 @@ function worldOf(evaluation: Evaluation): Readonly<Record<string, number>> {
 }
 
 async function evaluationOf(
-  source: Extract<DesignSource, { job: string }>,
+  { iteration, particle }: JobSource,
   job: Job,
   signal: AbortSignal,
 ): Promise<Evaluation> {
-  if (source.kind === 'best') {
+  if (iteration === undefined) {
     if (job.best) return job.best
     throw new ApiProblem(404, 'no design of this job has succeeded in every scenario yet')
   }
-  const path = { job_id: source.job, iteration: source.iteration }
-  const { items: evaluations } = await get('/v1/jobs/{job_id}/iterations/{iteration}/evaluations', {
-    path,
+  const { items } = await get('/v1/jobs/{job_id}/iterations/{iteration}/evaluations', {
+    path: { job_id: job.id, iteration },
     signal,
   })
-  const match = evaluations.find((evaluation) => evaluation.particle === source.particle)
+  const match = items.find((evaluation) => evaluation.particle === particle)
   if (match) return match
   throw new ApiProblem(
     404,
-    `iteration ${source.iteration} has no design ${source.particle}; valid are 0 to ${evaluations.length - 1}`,
+    `iteration ${iteration} has no design ${particle}; valid are 0 to ${items.length - 1}`,
   )
-}
-
-function published(
-  source: Extract<DesignSource, { kind: 'published' }>,
-  controllers: readonly Controller[],
-  like?: string,
-): ResolvedDesign {
-  const preferred = source.controller ?? like
-  const ordered = [...controllers].sort(
-    (a, b) => Number(b.name === preferred) - Number(a.name === preferred),
-  )
-  const searched = source.controller ? [named(controllers, source.controller)] : ordered
-  for (const controller of searched) {
-    const study = source.study || Object.keys(controller.published)[0]
-    const design = study === undefined ? undefined : controller.published[study]
-    if (!design) continue
-    const exact: DesignSource = { kind: 'published', controller: controller.name, study }
-    return {
-      source: exact,
-      label: `Published ${study}, ${controller.name}`,
-      robot: 'szabadka2-reconstructed',
-      controller,
-      design,
-      scenarios: [],
-    }
-  }
-  const available = controllers.flatMap((c) =>
-    Object.keys(c.published).map((study) => `${study} of ${c.name}`),
-  )
-  const of = source.controller ? ` of ${source.controller}` : ''
-  throw new ApiProblem(
-    404,
-    `there is no published design ${source.study}${of}; available: ${available.join(', ')}`,
-  )
-}
-
-function named(controllers: readonly Controller[], name: string): Controller {
-  const match = controllers.find((controller) => controller.name === name)
-  if (match) return match
-  const available = controllers.map((controller) => controller.name).join(', ')
-  throw new ApiProblem(404, `no controller ${name}; available: ${available}`)
 }

@@ -5,11 +5,11 @@ import { ChartCard } from '../../charts/chart-card'
 import { linearTicks } from '../../charts/scale'
 import { Table } from '../../components/table/table'
 import { useVisible } from '../../components/use-visible'
-import { formatExact, formatNumber, percent, quantity } from '../../format/number'
+import { formatExact, formatNumber, quantity } from '../../format/number'
 import { inWords } from '../../format/words'
 import { type Playback, usePlayback } from '../player/playback'
-import { stances } from '../replay/contact'
 import type { Recorded } from '../replay/recorded'
+import { stances } from '../replay/replay'
 
 interface Row {
   readonly key: string
@@ -87,22 +87,14 @@ function GaitTable({ rows, comparing }: { rows: readonly Row[]; comparing: boole
     <Table<Row>
       caption="Stance phases"
       rows={rows}
-      rowKey={(row) => row.key}
       columns={[
-        { key: 'leg', label: 'Leg', header: true, value: (row) => row.leg },
-        ...(comparing ? [{ key: 'walk', label: 'Walk', value: (row: Row) => row.label }] : []),
+        { key: 'leg', header: true, value: ({ leg }) => leg },
+        ...(comparing ? [{ key: 'walk', value: ({ label }: Row) => label }] : []),
+        { key: 'duty factor', percent: 3, value: ({ share }) => share },
         {
-          key: 'share',
-          label: 'Duty factor',
-          numeric: true,
-          value: (row) => row.share,
-          cell: (row) => percent(row.share),
-        },
-        {
-          key: 'spans',
-          label: 'Stance phases',
-          data: (row) => row.spans.map((span) => span.join(' to ')).join('; '),
-          cell: (row) => text(row.spans),
+          key: 'stance phases',
+          data: ({ spans }) => spans.map((span) => span.join(' to ')).join('; '),
+          cell: ({ spans }) => text(spans),
         },
       ]}
     />

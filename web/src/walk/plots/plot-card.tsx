@@ -12,15 +12,13 @@ import { moments, type PlotSpec, seriesOf } from './plot-specs'
 /** Update interval of the time marker during playback [ms]. */
 const RENEWED = 120
 
-export function PlotCard({
-  spec,
-  walks,
-  playback,
-}: {
+interface PlotCardProps {
   spec: PlotSpec
   walks: readonly Recorded[]
   playback: Playback
-}) {
+}
+
+export function PlotCard({ spec, walks, playback }: PlotCardProps) {
   const x = useMemo(() => moments(walks), [walks])
   const series = useMemo(() => seriesOf(spec.curves, walks), [spec, walks])
   const box = useRef<HTMLDivElement>(null)
@@ -53,32 +51,23 @@ export function PlotCard({
   )
 }
 
-/** Legend with the current values, of both walks if there are two. */
-function PlotLegend({
-  series,
-  curves,
-  frame,
-  unit,
-}: {
+interface PlotLegendProps {
   series: readonly Series[]
   /** Number of curves per walk. */
   curves: number
   frame: number
   unit: string
-}) {
+}
+
+/** Legend with the current values, of both walks if there are two. */
+function PlotLegend({ series, curves, frame, unit }: PlotLegendProps) {
   return series.slice(0, curves).map(({ label, colour, width, values }, k) => {
     const other = series[k + curves]
     const value = quantity(rounded(values[frame]), other ? '1' : unit, 3)
     return (
       <span key={label}>
         <svg class="stroke" viewBox="0 0 22 6" aria-hidden="true">
-          <line
-            x1="0"
-            x2="22"
-            y1="3"
-            y2="3"
-            style={{ stroke: `var(${colour})`, strokeWidth: width }}
-          />
+          <path d="M0 3H22" style={{ stroke: `var(${colour})`, strokeWidth: width }} />
         </svg>
         {label}
         <b class="value">

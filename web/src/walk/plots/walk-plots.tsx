@@ -1,6 +1,7 @@
 /** Plots of a walk over time: one leg, the body, all feet. */
 
-import { useId, useMemo, useState } from 'preact/hooks'
+import { useMemo, useState } from 'preact/hooks'
+import { Select } from '../../components/fields/controls'
 import { inWords } from '../../format/words'
 import type { Playback } from '../player/playback'
 import type { Recorded } from '../replay/recorded'
@@ -9,18 +10,15 @@ import { GaitChart } from './gait-chart'
 import { PlotCard } from './plot-card'
 import { plotSpecs } from './plot-specs'
 
-export function WalkPlots({
-  walks,
-  all,
-  playback,
-}: {
+interface WalkPlotsProps {
   /** Walks with frames. */
   walks: readonly Recorded[]
   all: readonly Recorded[]
   playback: Playback
-}) {
+}
+
+export function WalkPlots({ walks, all, playback }: WalkPlotsProps) {
   const [leg, setLeg] = useState(0)
-  const id = useId()
   const [{ replay }] = walks
   const { legs } = replay.header.robot
   const shown = Math.min(leg, legs.length - 1)
@@ -32,22 +30,12 @@ export function WalkPlots({
           Click a chart to seek, drag to zoom, double-click to reset the zoom.
           {walks.length > 1 && ` Dashed: ${walks[1].label}.`}
         </p>
-        <div class="row">
-          <label for={id} class="label">
-            Leg
-          </label>
-          <select
-            id={id}
-            value={String(shown)}
-            onChange={(event) => setLeg(Number(event.currentTarget.value))}
-          >
-            {legs.map((name, k) => (
-              <option key={name} value={String(k)}>
-                {inWords(name)}
-              </option>
-            ))}
-          </select>
-        </div>
+        <Select
+          label="Leg"
+          value={String(shown)}
+          options={legs.map((name, k) => [String(k), inWords(name)])}
+          onChoose={(k) => setLeg(Number(k))}
+        />
       </div>
       <div class="grid plots">
         <ObjectivesTable walks={all} />

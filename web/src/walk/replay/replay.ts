@@ -1,77 +1,16 @@
 /** Replay format of `POST /v1/replays`: a JSON header, then float32 values by frame. */
 
-import type { Scenario } from '../../api/types'
+import type { components } from '../../api/schema'
+
+type Schemas = components['schemas']
+
+export type ReplayHeader = Schemas['ReplayHeaderView']
+export type Shape = Schemas['ShapeView']
+export type LinkMesh = Schemas['LinkMeshView']
+export type Channel = Schemas['ChannelView']
 
 /** Supported version of the format. */
 const REPLAY_VERSION = 1
-
-type Solid = 'capsule' | 'box' | 'sphere' | 'cylinder'
-export type Role = 'body' | 'coxa' | 'femur' | 'tibia' | 'foot' | 'load'
-
-/** A solid attached to a link. */
-export interface Shape {
-  readonly type: Solid
-  /** Box: edges; sphere: radius; cylinder and capsule: radius, length along z [m]. */
-  readonly size: readonly number[]
-  /** Centre in the link's frame: x y z [m], quaternion x y z w. */
-  readonly origin: readonly number[]
-  readonly role: Role
-}
-
-/** A mesh on a link, from the URDF. */
-export interface LinkMesh {
-  /** Name of its file. */
-  readonly name: string
-  /** In the link's frame: x y z [m], quaternion x y z w. */
-  readonly origin: readonly number[]
-  readonly scale: readonly number[]
-  /** Red, green, blue, opacity, 0 to 1. */
-  readonly colour: readonly number[] | null
-}
-
-interface Link {
-  readonly name: string
-  readonly parent: string | null
-  readonly shapes: readonly Shape[]
-  readonly meshes: readonly LinkMesh[]
-}
-
-/** A quantity recorded in every frame. */
-export interface Channel {
-  readonly name: string
-  readonly unit: string
-  readonly description: string
-  readonly shape: readonly number[]
-  /** Index of its first number in a frame. */
-  readonly offset: number
-  /** Names along the first axis. */
-  readonly labels: readonly string[]
-}
-
-export interface ReplayHeader {
-  readonly version: number
-  readonly rate: number
-  readonly frames: number
-  readonly duration: number
-  readonly status: string
-  readonly explanation: string
-  readonly objectives: Readonly<Record<string, number | null>>
-  readonly objective_units: Readonly<Record<string, string>>
-  readonly scenario: Scenario
-  readonly robot: {
-    readonly name: string
-    /** SHA-256 of its URDF, which identifies its meshes; null for shipped robots. */
-    readonly urdf: string | null
-    readonly links: readonly Link[]
-    readonly joints: readonly string[]
-    readonly legs: readonly string[]
-  }
-  readonly ground: { readonly slope_deg: number; readonly slope_direction_deg: number }
-  /** In the world's frame, whose z axis is normal to the ground [m/s2]. */
-  readonly gravity: readonly [number, number, number]
-  readonly load_kg: number
-  readonly channels: readonly Channel[]
-}
 
 /** Required channels; charts of other missing channels are omitted. */
 const REQUIRED = ['time', 'link_pose', 'foot_position', 'foot_force'] as const
@@ -222,4 +161,23 @@ function sizeOf({ shape }: Channel): number {
 
 function widthOf(channels: readonly Channel[]): number {
   return Math.max(0, ...channels.map((channel) => channel.offset + sizeOf(channel)))
+}
+
+/** Contact force threshold of a stance [N]. */
+export const CONTACT_FORCE = 0.5
+
+/** Stance phases of a foot [s]. */
+export function stances(replay: Replay, leg: number): (readonly [from: number, to: number])[] {
+  const spans: (readonly [number, number])[] = []
+  let from: number | null = null
+  for (let frame = 0; frame < replay.frames; frame++) {
+    const stands = replay.force(frame, leg) > CONTACT_FORCE
+    if (stands && from === null) from = replay.time(frame)
+    if (!stands && from !== null) {
+      spans.push([from, replay.time(frame)])
+      from = null
+    }
+  }
+  if (from !== null) spans.push([from, replay.end])
+  return spans
 }

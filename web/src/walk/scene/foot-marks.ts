@@ -10,8 +10,7 @@ import {
   Quaternion,
   Vector3,
 } from 'three'
-import { CONTACT_FORCE } from '../replay/contact'
-import type { Replay } from '../replay/replay'
+import { CONTACT_FORCE, type Replay } from '../replay/replay'
 import type { Palette } from './palette'
 
 /** Radii, and length of an arrow's head, in spans of the robot. */

@@ -15,13 +15,13 @@ import {
   Vector3,
 } from 'three'
 import { RoundedBoxGeometry } from 'three/examples/jsm/geometries/RoundedBoxGeometry.js'
-import type { Replay, Role, Shape } from '../replay/replay'
+import type { Replay, Shape } from '../replay/replay'
 import type { FigurePalette, Palette } from './palette'
 
 /** Parts with a common colour. */
 type Part = 'frame' | 'accent' | 'limb' | 'joint' | 'load'
 
-const PARTS: Readonly<Record<Role, Part>> = {
+const PARTS: Readonly<Record<Shape['role'], Part>> = {
   body: 'frame',
   coxa: 'joint',
   femur: 'accent',

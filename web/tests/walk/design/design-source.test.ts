@@ -10,13 +10,13 @@ import {
 } from '../../../src/walk/design/design-source'
 
 const SOURCES: DesignSource[] = [
-  { kind: 'best', job: 'k2q7' },
-  { kind: 'particle', job: 'k2q7', iteration: 24, particle: 0 },
-  { kind: 'published', controller: 'fuzzy-pi', study: 'A' },
-  { kind: 'values', controller: 'p', design: { P: 0.25, fir_window: 'hamming' } },
+  { job: 'k2q7' },
+  { job: 'k2q7', iteration: 24, particle: 0 },
+  { controller: 'fuzzy-pi', published: 'A' },
+  { controller: 'p', design: { P: 0.25, fir_window: 'hamming' } },
 ]
 
-describe.each(SOURCES)('$kind', (source) => {
+describe.each(SOURCES)('%o', (source) => {
   test('is restored from its query', () => {
     const entries = Object.entries(queryOf(source)).filter(([, value]) => value !== null)
     expect(sourceOf(new URLSearchParams(entries as [string, string][]))).toEqual(source)
@@ -32,7 +32,7 @@ test('an empty address shows the published optimum', () => {
 })
 
 test('a published design can be named without its controller', () => {
-  const source = { kind: 'published', controller: null, study: 'A' }
+  const source = { controller: null, published: 'A' }
   expect(sourceOfWord('published:A')).toEqual(source)
 })
 

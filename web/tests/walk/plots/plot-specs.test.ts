@@ -1,7 +1,6 @@
 import { expect, test } from 'vitest'
 import { moments, plotSpecs, seriesOf } from '../../../src/walk/plots/plot-specs'
-import { stances } from '../../../src/walk/replay/contact'
-import { parseReplay } from '../../../src/walk/replay/replay'
+import { parseReplay, stances } from '../../../src/walk/replay/replay'
 import { encoded, frames, header } from '../replay/replay-bytes'
 
 const walk = (count: number, label: string) => ({

@@ -10,7 +10,7 @@ import { parseReplay, type Shape } from '../../../src/walk/replay/replay'
 import { encoded, frames, header } from './replay-bytes'
 
 /** A box with these edges [m] on the body's link, 0.15 m above the ground. */
-function walker(size: readonly number[], turn: readonly number[] = [0, 0, 0, 1]) {
+function walker(size: number[], turn: [number, number, number, number] = [0, 0, 0, 1]) {
   const shape: Shape = { type: 'box', size, origin: [0, 0, 0, ...turn], role: 'body' }
   const load: Shape = { type: 'sphere', size: [9], origin: [0, 0, 0, 0, 0, 0, 1], role: 'load' }
   const robot = {
@@ -33,7 +33,7 @@ test('the largest robot of a scene determines the scale, without its load', () =
 })
 
 test('the rotation of solids is taken into account', () => {
-  const quarter = [0, 0, Math.SQRT1_2, Math.SQRT1_2]
+  const quarter: [number, number, number, number] = [0, 0, Math.SQRT1_2, Math.SQRT1_2]
   const turned = extentOf([walker([0.4, 1, 0.1], quarter)])
   expect(turned.span).toBeCloseTo(1)
   expect(turned.width).toBeCloseTo(0.4)

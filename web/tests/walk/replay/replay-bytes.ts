@@ -41,7 +41,7 @@ export function header(count: number, changes: Partial<ReplayHeader> = {}): Repl
       joints: ['leg_coxa'],
       legs: ['leg'],
     },
-    ground: { slope_deg: 0, slope_direction_deg: 0 },
+    ground: { slope_deg: 0, slope_direction_deg: 0, normal: [0, 0, 1] },
     gravity: [0, 0, -9.81],
     load_kg: 0,
     channels: CHANNELS,

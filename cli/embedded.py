@@ -272,6 +272,10 @@ def _report(
     speed = f" at {rate:.0f} simulations/s" if rate else ""
     saved = f"; {job.evaluations_saved} of them cached" if job.evaluations_saved else ""
     note(f"{job.evaluations} designs in {len(job.spec.case_names)} simulations each{speed}{saved}")
+    if job.evaluated_on is not None:
+        in_threads = job.evaluated_on.startswith("threads")
+        hint = " (--evaluator ray runs it on Ray)" if in_threads else ""
+        note(f"simulated on {job.evaluated_on}{hint}")
     note(f"history: gaitswarm history {job.id}{place}")
     note(f"page: gaitswarm serve{place}, then http://127.0.0.1:8000/jobs/{job.id}")
 

@@ -280,6 +280,7 @@ def job_parts(job: JobView) -> Iterator[Table | str]:
         "evaluations": f"{job.evaluations} of {job.evaluations_planned}",
         "evaluations saved": str(job.evaluations_saved),
         "speed": None if rate is None else f"{rate:.1f} designs/s",
+        "simulated on": job.evaluated_on,
         "time left": time_left,
         "precision": job.precision,
         "best fitness": number(job.best_fitness),

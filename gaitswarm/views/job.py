@@ -197,6 +197,12 @@ class JobSummaryView(View):
         " time [1/s].",
         examples=[121.6],
     )
+    evaluated_on: str | None = Field(
+        default=None,
+        description="Where its last iteration was simulated: threads of a process, or workers and"
+        " nodes of Ray; null before the first.",
+        examples=["ray: 4 workers on 2 nodes"],
+    )
     waiting: str | None = Field(
         default=None,
         description="What a running job waits for, such as unreachable workers; it continues"
@@ -402,6 +408,7 @@ def _summary(job: Job) -> dict[str, object]:
         "compute_seconds": progress.compute_seconds,
         "evaluations_per_second": rates.evaluations_per_second,
         "simulations_per_second": rates.simulations_per_second,
+        "evaluated_on": job.evaluated_on,
         "waiting": job.waiting,
         "eta_seconds": rates.eta_seconds,
         "eta_basis": rates.basis,

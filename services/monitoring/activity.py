@@ -16,7 +16,12 @@ from dataclasses import dataclass, field, replace
 from typing import Final, cast
 
 from gaitswarm.services.optimizer.log_context import log_fields
-from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, Evaluator, TaskReport
+from gaitswarm.services.optimizer.run.evaluator import (
+    EvaluationRequest,
+    Evaluator,
+    TaskReport,
+    place_of,
+)
 from gaitswarm.sim.outcome import Outcome
 
 _JOBS: Final = 32
@@ -222,6 +227,10 @@ class _WatchedEvaluator:
     @property
     def slots(self) -> int:
         return self._inner.slots
+
+    @property
+    def place(self) -> str | None:
+        return place_of(self._inner)
 
     def evaluate(
         self, request: EvaluationRequest, should_stop: Callable[[], bool]

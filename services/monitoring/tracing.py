@@ -18,7 +18,12 @@ from opentelemetry.trace import Span, Status, StatusCode, set_span_in_context
 from gaitswarm.services.optimizer.errors import LeaseLost
 from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
 from gaitswarm.services.optimizer.jobs.job import Claim, JobState
-from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, Evaluator, TaskReport
+from gaitswarm.services.optimizer.run.evaluator import (
+    EvaluationRequest,
+    Evaluator,
+    TaskReport,
+    place_of,
+)
 from gaitswarm.services.optimizer.store import Observer
 from gaitswarm.sim.outcome import Outcome
 
@@ -142,6 +147,10 @@ class _TracedEvaluator:
     @property
     def slots(self) -> int:
         return self._inner.slots
+
+    @property
+    def place(self) -> str | None:
+        return place_of(self._inner)
 
     def evaluate(
         self, request: EvaluationRequest, should_stop: Callable[[], bool]

@@ -28,6 +28,7 @@ class AutoEvaluator:
     def __init__(self, cpus: int | None = None) -> None:
         self._threads = InProcessEvaluator(cpus)
         self._ray = RayEvaluator(cpus=self._threads.slots)
+        self._used: InProcessEvaluator | RayEvaluator = self._threads
         self._without_ray = False
         self._closed = False
 
@@ -35,6 +36,11 @@ class AutoEvaluator:
     def slots(self) -> int:
         """Number of tasks that run concurrently."""
         return self._threads.slots
+
+    @property
+    def place(self) -> str:
+        """Place of the last evaluation."""
+        return self._used.place
 
     @property
     def loads(self) -> dict[str, Load]:
@@ -58,7 +64,7 @@ class AutoEvaluator:
         """Simulate on Ray if it is ready, else in threads."""
         if self.on_ray:
             try:
-                return self._ray.evaluate(request, should_stop)
+                outcomes = self._ray.evaluate(request, should_stop)
             except EvaluatorUnavailable as error:
                 if self._closed or not self._ray.lost:
                     raise
@@ -66,6 +72,10 @@ class AutoEvaluator:
             except ProvenanceChanged as error:
                 # Its processes have read files that changed after the start of this one.
                 self._do_without(error)
+            else:
+                self._used = self._ray
+                return outcomes
+        self._used = self._threads
         return self._threads.evaluate(request, should_stop)
 
     def close(self) -> None:

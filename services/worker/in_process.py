@@ -46,6 +46,11 @@ class InProcessEvaluator:
         return self._threads.slots
 
     @property
+    def place(self) -> str:
+        """Number of threads, as text."""
+        return f"threads: {self.slots}"
+
+    @property
     def totals(self) -> TaskTotals:
         """Totals of all tasks so far."""
         return self._dispatcher.totals

@@ -87,6 +87,13 @@ class RayEvaluator:
         return self._connection.slots
 
     @property
+    def place(self) -> str:
+        """Numbers of CPUs and nodes, as text."""
+        workers, nodes = self._connection.slots, self._connection.nodes
+        plural = "" if workers == 1 else "s"
+        return f"ray: {workers} worker{plural} on {nodes} node{'' if nodes == 1 else 's'}"
+
+    @property
     def totals(self) -> TaskTotals:
         """Totals of all tasks so far."""
         return self._dispatcher.totals

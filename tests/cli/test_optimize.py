@@ -159,6 +159,7 @@ def test_the_report_compares_the_best_with_the_published_optimum(
     assert "fitness of published A: " in result.out
     assert "2/2 iterations: best" in result.err
     assert f"gaitswarm serve --db {db}" in result.err
+    assert re.search(r"simulated on threads: \d+ \(--evaluator ray runs it on Ray\)", result.err)
 
 
 def test_the_report_compares_another_method_with_the_same_budget(
@@ -338,6 +339,7 @@ def test_a_repeated_job_simulates_only_without_the_cache(
         gaitswarm(*run, "--no-cache").json,
     )
     assert [job["evaluations_saved"] for job in (first, again, uncached)] == [0, 6, 0]
+    assert first["evaluated_on"].startswith("threads: ")
     assert first["best"] == again["best"] == uncached["best"]
 
 

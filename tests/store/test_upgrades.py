@@ -136,7 +136,7 @@ def test_a_database_of_the_first_revision_is_upgraded_with_what_jobs_are_searche
             connection.execute(text("DROP INDEX ix_jobs_entries"))
             connection.execute(text("CREATE INDEX ix_jobs_entries ON jobs (id)"))
         connection.execute(text("DROP TABLE journal"))
-        for column in ("sort_name", "search_text"):
+        for column in ("sort_name", "search_text", "evaluated_on"):
             connection.execute(text(f"ALTER TABLE jobs DROP COLUMN {column}"))
         connection.execute(text("UPDATE alembic_version SET version_num = '0020'"))
     assert upgrade(fresh_url) == FIRST

@@ -147,6 +147,7 @@ class CompletedIteration:
             is as good.
         keys: n keys of `walk_keys`, None for a design whose outcome was cached; empty for an
             iteration that is not cached.
+        evaluated_on: where it was simulated, for people; None if unknown.
     """
 
     iteration: int
@@ -157,6 +158,7 @@ class CompletedIteration:
     precision: Precision = "double"
     reevaluation: Reevaluation | None = None
     keys: tuple[bytes | None, ...] = ()
+    evaluated_on: str | None = None
 
     @property
     def saved(self) -> int:

@@ -189,6 +189,7 @@ class Job:
             wait.
         priority: see `priority.py`.
         reference: None until determined.
+        evaluated_on: where the last iteration was simulated; None if unknown.
     """
 
     id: str
@@ -211,6 +212,7 @@ class Job:
     labels: Labels = field(default_factory=Labels)
     archived: bool = False
     reference: Reference | None = None
+    evaluated_on: str | None = None
 
     @property
     def gain(self) -> float | None:

@@ -107,5 +107,19 @@ class Watched(Protocol):
         """Return why designs cannot be evaluated now; None if they can. Returns at once."""
 
 
+@runtime_checkable
+class Located(Protocol):
+    """An evaluator that reports where it simulates."""
+
+    @property
+    def place(self) -> str | None:
+        """Place of the last evaluation, such as "threads: 2"; None if unknown. Returns at once."""
+
+
+def place_of(evaluator: object) -> str | None:
+    """Return where an evaluator simulates; None if unknown."""
+    return evaluator.place if isinstance(evaluator, Located) else None
+
+
 class EvaluationStopped(Exception):
     """`should_stop` returned true."""

@@ -60,6 +60,7 @@ from gaitswarm.services.optimizer.run.evaluator import (
     EvaluationRequest,
     EvaluationStopped,
     Evaluator,
+    place_of,
 )
 from gaitswarm.services.optimizer.run.heartbeat import Heartbeat
 from gaitswarm.services.optimizer.run.journal import JOURNAL_SECONDS, Journal
@@ -312,6 +313,7 @@ class _Run:
             case Evaluate(request=request, keys=keys):
                 return self._evaluate(request, keys)
             case Commit(done=done, following=following):
+                done = replace(done, evaluated_on=place_of(self.context.evaluator))
                 state = self._commit(done, following)
                 if self.context.on_commit is not None:
                     self.context.on_commit(done, state)

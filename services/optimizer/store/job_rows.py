@@ -199,6 +199,7 @@ def to_job(row: Row, documents: _Documents | None = None) -> Job:
         labels=labels_of(row),
         archived=bool(row["archived"]),
         reference=_reference(row["reference"]),
+        evaluated_on=row["evaluated_on"],
     )
 
 

@@ -358,6 +358,7 @@ def _progress(job: Row, done: CompletedIteration) -> dict[str, Any]:
         "evaluations_saved": (job["evaluations_saved"] or 0) + done.saved,
         "compute_seconds": job["compute_seconds"] + done.evaluate_seconds,
         "recent_seconds": recent_pace(job["recent_seconds"], pace),
+        "evaluated_on": done.evaluated_on,
     }
     if done.best is not None:
         particle, fitness = done.best

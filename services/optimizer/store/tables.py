@@ -147,6 +147,8 @@ jobs: Final = sa.Table(
     # Folded name and searched text, see `search_columns`; sorted by code points in both databases.
     sa.Column("sort_name", sa.Text().with_variant(sa.Text(collation="C"), "postgresql")),
     sa.Column("search_text", sa.Text),
+    # Where the last iteration was simulated; NULL if unknown.
+    sa.Column("evaluated_on", sa.Text),
     sa.PrimaryKeyConstraint("id"),
     sa.UniqueConstraint("idempotency_key"),
     sa.Index(None, "created_at", "id"),

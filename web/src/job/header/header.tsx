@@ -130,6 +130,7 @@ function Figures({ job, gain, committed }: { job: StoredJob; gain: Gain; committ
     started > 0 && ['Start designs', formatCount(started)],
     ['Evaluation rate', quantity(job.evaluations_per_second, '1/s', 3)],
     ['Simulation rate', quantity(job.simulations_per_second, '1/s', 3)],
+    !!job.evaluated_on && ['Simulated on', job.evaluated_on],
     ['Time left', timeLeft(job)],
     ['Computing time', formatDuration(job.compute_seconds)],
   ]

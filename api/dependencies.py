@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path as FilePath
-from typing import Annotated, Final, TypedDict, TypeVar, cast
+from typing import Annotated, Any, Final, TypedDict, TypeVar, cast
 
 from anyio import CapacityLimiter
 from anyio.to_thread import run_sync
@@ -118,37 +118,25 @@ async def service(request: Request) -> JobService:
     return cast(JobService, request.app.state.service)
 
 
-async def settings(request: Request) -> Settings:
-    """Return the application's settings."""
-    return cast(Settings, request.state.settings)
+def _state(name: str) -> Any:
+    """Return a dependency on an entry of `State`."""
+
+    async def entry(request: Request) -> Any:
+        return getattr(request.state, name)
+
+    return Depends(entry)
 
 
-async def computing(request: Request) -> ComputingCapacity:
-    """Return the capacity for requests that compute."""
-    return cast(ComputingCapacity, request.state.computing)
+Service = Annotated[JobService, Depends(service)]
+ServerSettings = Annotated[Settings, _state("settings")]
+Computing = Annotated[ComputingCapacity, _state("computing")]
+JobActivities = Annotated[Activity | None, _state("activity")]
+Stopping = Annotated[asyncio.Event, _state("stopping")]
+FollowedJobs = Annotated[Topics, _state("topics")]
+ServerMetrics = Annotated[Metrics, _state("metrics")]
 
 
-async def activity(request: Request) -> Activity | None:
-    """Return the activity of jobs that run in this process; None if it runs no jobs."""
-    return cast("Activity | None", request.state.activity)
-
-
-async def stopping(request: Request) -> asyncio.Event:
-    """Return the event that is set when the server begins to stop."""
-    return cast(asyncio.Event, request.state.stopping)
-
-
-async def topics(request: Request) -> Topics:
-    """Return the jobs that event streams follow."""
-    return cast(Topics, request.state.topics)
-
-
-async def metrics(request: Request) -> Metrics:
-    """Return the metrics of this process."""
-    return cast(Metrics, request.state.metrics)
-
-
-async def limits(settings: Annotated[Settings, Depends(settings)]) -> Limits:
+async def limits(settings: ServerSettings) -> Limits:
     """Return the limits of one request."""
     return Limits(
         simulated=settings.api_max_simulated_seconds,
@@ -158,18 +146,11 @@ async def limits(settings: Annotated[Settings, Depends(settings)]) -> Limits:
     )
 
 
-async def robot_folders(settings: Annotated[Settings, Depends(settings)]) -> Sequence[FilePath]:
+async def robot_folders(settings: ServerSettings) -> Sequence[FilePath]:
     """Return the folders in which to look for meshes."""
     return settings.robots
 
 
-Service = Annotated[JobService, Depends(service)]
-ServerSettings = Annotated[Settings, Depends(settings)]
-Computing = Annotated[ComputingCapacity, Depends(computing)]
-JobActivities = Annotated[Activity | None, Depends(activity)]
-Stopping = Annotated[asyncio.Event, Depends(stopping)]
-FollowedJobs = Annotated[Topics, Depends(topics)]
-ServerMetrics = Annotated[Metrics, Depends(metrics)]
 ServerLimits = Annotated[Limits, Depends(limits)]
 RobotFolders = Annotated[Sequence[FilePath], Depends(robot_folders)]
 

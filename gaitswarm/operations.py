@@ -157,31 +157,20 @@ class Limits:
 
     def check(self, seconds: float, *, field: str, logged: bool = False) -> None:
         """Reject simulations that are too long in total."""
+        advice = f"allowed{' with logs' if logged else ''}; choose fewer scenarios or cycles"
         limit = self.logged if logged else self.simulated
-        if seconds > limit:
-            raise InvalidRequest(
-                f"the simulations last {seconds:g} s in total, more than the {limit:g} s allowed"
-                f"{' with logs' if logged else ''}; choose fewer scenarios or cycles",
-                field=field,
-            )
+        _check_length("the simulations", seconds, limit, advice, field)
 
     def check_sampled(self, seconds: float) -> None:
         """Reject samples of designs whose simulations are too long in total."""
-        if seconds > self.sampled:
-            raise InvalidRequest(
-                f"the simulations of all designs last {seconds:g} s in total, more than the"
-                f" {self.sampled:g} s allowed; choose fewer samples or scenarios",
-                field="samples",
-            )
+        advice = "allowed; choose fewer samples or scenarios"
+        designs = "the simulations of all designs"
+        _check_length(designs, seconds, self.sampled, advice, "samples")
 
     def check_repeated(self, seconds: float) -> None:
         """Reject repeated evaluations whose simulations are too long in total."""
-        if seconds > self.sampled:
-            raise InvalidRequest(
-                f"the simulations of these evaluations last {seconds:g} s in total, more than the"
-                f" {self.sampled:g} s allowed; choose fewer",
-                field="replay",
-            )
+        evaluations = "the simulations of these evaluations"
+        _check_length(evaluations, seconds, self.sampled, "allowed; choose fewer", "replay")
 
     def check_ranked(self, preferences: int, job: Job) -> None:
         """Reject too many preferences for the evaluations of a job."""
@@ -192,6 +181,12 @@ class Limits:
                 f"must be at most {math.floor(most)} for the {evaluations} evaluations of this job",
                 field="drawn",
             )
+
+
+def _check_length(what: str, seconds: float, limit: float, advice: str, field: str) -> None:
+    if seconds > limit:
+        text = f"{what} last {seconds:g} s in total, more than the {limit:g} s {advice}"
+        raise InvalidRequest(text, field=field)
 
 
 UNLIMITED: Final = Limits()

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaitswarm.errors import InvalidRequest, JobEnded, NotFound
-from gaitswarm.jobs.embedded import Workers, check_same
+from gaitswarm.jobs.embedded import check_same, check_workers
 from gaitswarm.jobs.open import open as open_database
 from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.services.optimizer.run.evaluator import Evaluator
@@ -143,7 +143,7 @@ def optimize(
     asked = None
     if resume is None or spec is not None or options:
         asked = job_spec(spec, **options)
-    workers = Workers(evaluator, cpus=cpus, ray_address=ray_address)
+    check_workers(evaluator, cpus)
     with open_database(db, create=resume is None) as jobs:
         if asked is not None and resume is not None:
             check_same(jobs.job(resume).spec, asked, resume)
@@ -151,7 +151,7 @@ def optimize(
             resume = jobs.earlier(asked)
         job = jobs.run(
             resume or jobs.submit_embedded(asked),
-            evaluator=workers.evaluator,
+            evaluator=evaluator,
             cpus=cpus,
             ray_address=ray_address,
             accept_changes=accept_changes,

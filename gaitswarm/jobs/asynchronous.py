@@ -42,8 +42,10 @@ class AsyncJobs:
     @wraps(Jobs.follow)
     async def follow(self, job_id, *, after=None):
         jobs, stop = await self._jobs(), Stop()
+        events = jobs._follow(job_id, after, stop)  # noqa: SLF001
         try:
-            async for event in _iterated(jobs._follow(job_id, after, stop)):  # noqa: SLF001
+            # A thread of its own: streams that wait must not occupy those of other calls.
+            async for event in _iterated(events, anyio.CapacityLimiter(1)):
                 yield event
         finally:
             stop.set()
@@ -156,7 +158,7 @@ class AsyncDatabaseJobs(AsyncJobs):
             group.start_soon(stop_with_the_task)
             try:
                 # Not abandoned: the thread returns the job to the queue.
-                ended = await to_thread.run_sync(work)
+                ended = await to_thread.run_sync(work, limiter=anyio.CapacityLimiter(1))
             except Exception as raised:  # noqa: BLE001 - raised again, outside the group
                 error = raised
             group.cancel_scope.cancel()
@@ -167,10 +169,11 @@ class AsyncDatabaseJobs(AsyncJobs):
         return ended
 
 
-async def _iterated(items):
+async def _iterated(items, limiter=None):
     """Yield the items of an iterator, each computed in a thread."""
+    compute = partial(to_thread.run_sync, _next, items, abandon_on_cancel=True, limiter=limiter)
     try:
-        while taken := await to_thread.run_sync(_next, items, abandon_on_cancel=True):
+        while taken := await compute():
             yield taken[0]
     finally:
         # A generator that an abandoned thread executes cannot be closed; it ends with its thread.

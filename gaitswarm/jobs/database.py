@@ -5,22 +5,25 @@ from __future__ import annotations
 import shlex
 import threading
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, closing
+from functools import cache
 from typing import Final, TypeVar
 
 from pydantic import BaseModel
 
 from gaitswarm import operations
-from gaitswarm.errors import simulation_errors
+from gaitswarm.errors import Interrupted, simulation_errors
 from gaitswarm.jobs.base import JobEvent, Jobs, Stop, Submission
-from gaitswarm.jobs.embedded import Workers, earlier_job, run_here
+from gaitswarm.jobs.embedded import check_workers, ctrl_c, earlier_job, taken_up
 from gaitswarm.operations import Operation
 from gaitswarm.requests.firmware import FirmwareRequest, firmware_view, run_firmware
+from gaitswarm.services.optimizer.analysis.reference import note_reference
 from gaitswarm.services.optimizer.jobs.job import Claim
 from gaitswarm.services.optimizer.masking import masked_url
 from gaitswarm.services.optimizer.run.evaluator import Evaluator
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.runtime import EvaluatorKind
-from gaitswarm.settings import default_database
+from gaitswarm.services.runtime import EvaluatorKind, open_evaluator, run_embedded
+from gaitswarm.settings import default_database, read_settings
 from gaitswarm.specs import SpecInput, chosen_spec
 from gaitswarm.tables import EvaluationTable
 from gaitswarm.views import HistoryIterationView, IterationView, JobView
@@ -178,24 +181,45 @@ class DatabaseJobs(Jobs):
             ProvenanceChanged: The provenance has changed, which is not accepted.
             EvaluatorUnavailable: The cluster cannot be reached.
         """
-        workers = Workers(evaluator, cpus=cpus, ray_address=ray_address)
+        check_workers(evaluator, cpus)
+        stop = stop or threading.Event()
         job_id = job if isinstance(job, str) else job.job.id
+        if isinstance(job, str):
+            taken_up(self._service, job, accept_changes=accept_changes)
 
         def committed(index: int) -> None:
             if on_iteration is not None:
                 after = index - 1 if index else None
                 on_iteration(next(self.iterations(job_id, after=after)))
 
-        ended = run_here(
-            self._service,
-            self._url,
-            job,
-            workers=workers,
-            on_iteration=committed,
-            stop=stop,
-            accept_changes=accept_changes,
-        )
-        return operations.full_view(self._service, ended)
+        try:
+            with ctrl_c(stop) as interrupted, ExitStack() as stack:
+
+                @cache
+                def opened() -> Evaluator:
+                    if not isinstance(evaluator, str):
+                        return evaluator
+                    workers = open_evaluator(
+                        evaluator, address=ray_address, cpus=cpus, should_stop=stop.is_set
+                    )
+                    return stack.enter_context(closing(workers))
+
+                ended = run_embedded(
+                    self._service.store,
+                    opened,
+                    job,
+                    on_commit=lambda done, _state: committed(done.iteration),
+                    on_follow=lambda iteration: committed(iteration.index),
+                    stop=stop,
+                    accepts_changes=accept_changes,
+                    cache=read_settings().cache,
+                )
+        except KeyboardInterrupt as error:
+            raise Interrupted(self.job(job_id), self._url) from error
+        view = operations.full_view(self._service, note_reference(self._service.store, ended))
+        if interrupted.is_set() and not ended.state.terminal:
+            raise Interrupted(view, self._url)
+        return view
 
     def close(self) -> None:
         """Close the store."""

@@ -1,79 +1,31 @@
-"""A job run in this process: resumed, run to its end, returned to the queue on Ctrl-C."""
+"""Parts of running a job in this process: earlier jobs, checks and Ctrl-C."""
 
 from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from typing import Any, Final, get_args
 
-from gaitswarm.errors import Conflict, Interrupted, InvalidRequest, ProvenanceChanged
-from gaitswarm.services.optimizer.analysis.reference import note_reference
-from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
-from gaitswarm.services.optimizer.jobs.job import Claim, Command, Job, JobState
+from gaitswarm.errors import Conflict, InvalidRequest, ProvenanceChanged
+from gaitswarm.services.optimizer.jobs.job import Command, Job, JobState
 from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.run.evaluator import Evaluator
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.services.runtime import EvaluatorKind, open_evaluator, run_embedded
-from gaitswarm.settings import read_settings
-from gaitswarm.views import JobView
+from gaitswarm.services.runtime import EvaluatorKind
 
 _RESUMED: Final = (JobState.PAUSED, JobState.PAUSING, JobState.FAILED)
 """States from which a job continues only by a command."""
 
 
-@dataclass(frozen=True, slots=True)
-class Workers:
-    """Workers of simulations; raises InvalidRequest for an unknown kind.
-
-    Attributes:
-        evaluator: A kind of workers to open, or open workers.
-        cpus: Simulations to run at once on this machine; default all processors.
-        ray_address: Of a Ray cluster, as for `open_evaluator`.
-    """
-
-    evaluator: EvaluatorKind | Evaluator
-    cpus: int | None = None
-    ray_address: str | None = None
-
-    def __post_init__(self) -> None:
-        kinds = get_args(EvaluatorKind)
-        if isinstance(self.evaluator, str) and self.evaluator not in kinds:
-            raise InvalidRequest(
-                f"{self.evaluator!r} is none of {', '.join(kinds)}", field="evaluator"
-            )
-        if self.cpus is not None and self.cpus < 1:
-            raise InvalidRequest("must be at least 1", field="cpus")
-
-    @contextmanager
-    def when_needed(
-        self, should_stop: Callable[[], bool]
-    ) -> Iterator[Evaluator | Callable[[], Evaluator]]:
-        """Yield open workers, or a function that opens them at its first call.
-
-        Those are closed again. `should_stop` is polled while they are opened.
-        """
-        if not isinstance(self.evaluator, str):
-            yield self.evaluator
-            return
-        kind, opened = self.evaluator, list[Evaluator]()
-
-        def open_once() -> Evaluator:
-            if not opened:
-                opened.append(
-                    open_evaluator(
-                        kind, address=self.ray_address, cpus=self.cpus, should_stop=should_stop
-                    )
-                )
-            return opened[0]
-
-        try:
-            yield open_once
-        finally:
-            for evaluator in opened:
-                evaluator.close()
+def check_workers(evaluator: EvaluatorKind | Evaluator, cpus: int | None) -> None:
+    """Raise InvalidRequest for an unknown kind of workers, or less than one thread."""
+    kinds = get_args(EvaluatorKind)
+    if isinstance(evaluator, str) and evaluator not in kinds:
+        raise InvalidRequest(f"{evaluator!r} is none of {', '.join(kinds)}", field="evaluator")
+    if cpus is not None and cpus < 1:
+        raise InvalidRequest("must be at least 1", field="cpus")
 
 
 def check_same(stored: Spec, asked: Spec, job_id: str) -> None:
@@ -85,60 +37,6 @@ def check_same(stored: Spec, asked: Spec, job_id: str) -> None:
             f"job {job_id} was submitted with another {', '.join(changed)}, which cannot change;"
             " resume it without a spec and options, or start a new one"
         )
-
-
-def run_here(
-    service: JobService,
-    url: str,
-    job: str | Claim,
-    *,
-    workers: Workers,
-    on_iteration: Callable[[int], None],
-    stop: threading.Event | None,
-    accept_changes: bool = False,
-) -> Job:
-    """Run a job until it ends, is paused, or `stop` is set.
-
-    Args:
-        service: Of the job's database.
-        url: Of the database, for messages.
-        job: Identifier of the job, or the claim of this process, which submitted it.
-        workers: Workers of its simulations.
-        on_iteration: Called with the index of every committed iteration, also while another process
-            runs the job.
-        stop: When set, the job is returned to the queue.
-        accept_changes: Whether it continues although its provenance has changed.
-
-    Raises:
-        Interrupted: Ctrl-C, unless the job has ended meanwhile.
-        Conflict: The job was cancelled.
-        ProvenanceChanged: The provenance has changed, which is not accepted.
-    """
-    job_id = job if isinstance(job, str) else job.job.id
-    if isinstance(job, str):
-        taken_up(service, job, accept_changes=accept_changes)
-
-    def committed(done: CompletedIteration, _state: JobState) -> None:
-        on_iteration(done.iteration)
-
-    stop = stop or threading.Event()
-    try:
-        with _ctrl_c(stop) as interrupted, workers.when_needed(stop.is_set) as evaluator:
-            ended = run_embedded(
-                service.store,
-                evaluator,
-                job,
-                on_commit=committed,
-                on_follow=lambda iteration: on_iteration(iteration.index),
-                stop=stop,
-                accepts_changes=accept_changes,
-                cache=read_settings().cache,
-            )
-    except KeyboardInterrupt as error:
-        raise _interrupted(service.job(job_id), url) from error
-    if interrupted.is_set() and not ended.state.terminal:
-        raise _interrupted(ended, url)
-    return note_reference(service.store, ended)
 
 
 def taken_up(service: JobService, job_id: str, *, accept_changes: bool) -> Job:
@@ -180,12 +78,8 @@ def earlier_job(service: JobService, spec: Spec, *, any_budget: bool = False) ->
         after = page.next
 
 
-def _interrupted(job: Job, url: str) -> Interrupted:
-    return Interrupted(JobView.from_job_and_best(job, None), url)
-
-
 @contextmanager
-def _ctrl_c(stop: threading.Event) -> Iterator[threading.Event]:
+def ctrl_c(stop: threading.Event) -> Iterator[threading.Event]:
     """Yield an event that the first Ctrl-C sets, as it sets `stop`; the second one interrupts.
 
     Nothing changes where Python's own handler is not in place, or outside the main thread.

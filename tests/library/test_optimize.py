@@ -12,6 +12,7 @@ from typing import Any
 import anyio
 import numpy as np
 import pytest
+from anyio import to_thread
 
 import gaitswarm
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
@@ -348,6 +349,8 @@ def test_an_event_loop_continues_while_it_runs_a_job(db: Path, finished: Finishe
     received: list[gaitswarm.JobEvent] = []
 
     async def work() -> gaitswarm.JobView:
+        # Neither a job that runs nor one that is followed occupies the thread of other calls.
+        to_thread.current_default_thread_limiter().total_tokens = 1
         async with gaitswarm.open_async(db) as jobs:
             job = await jobs.submit(**SMALL)
 

@@ -19,10 +19,13 @@ if TYPE_CHECKING:
     from mpl_toolkits.mplot3d.axes3d import Axes3D
 
     from gaitswarm.services.optimizer.analysis.front import FrontView, NormalisedDesignView
+    from gaitswarm.services.optimizer.analysis.identifiability import (
+        IdentifiabilityView,
+        ParameterView,
+    )
     from gaitswarm.sim.controllers.surface import Surface
     from gaitswarm.sim.drives import WalkFigures
     from gaitswarm.views import IterationView
-    from gaitswarm.views.identification import IdentifiabilityView, ParameterView
     from gaitswarm.views.robots import RobotCheckView
     from gaitswarm.views.robustness import RobustnessView
 

@@ -50,7 +50,10 @@ if TYPE_CHECKING:
     from gaitswarm.preferences import robust_preferences
     from gaitswarm.requests.firmware import FirmwareOptions
     from gaitswarm.requests.robustness import RobustnessOptions
+    from gaitswarm.services.optimizer.analysis.certificate import CertificateView
+    from gaitswarm.services.optimizer.analysis.comparison import JobComparisonView
     from gaitswarm.services.optimizer.analysis.front import FrontView
+    from gaitswarm.services.optimizer.analysis.identifiability import IdentifiabilityView
     from gaitswarm.services.optimizer.analysis.importance import ImportanceView
     from gaitswarm.services.optimizer.analysis.preferences import (
         PreferenceForView,
@@ -58,6 +61,7 @@ if TYPE_CHECKING:
     )
     from gaitswarm.services.optimizer.analysis.ranking import RankingView
     from gaitswarm.services.optimizer.analysis.scenario_families import ScenarioFamiliesView
+    from gaitswarm.services.optimizer.analysis.targets import TargetsView
     from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
     from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
     from gaitswarm.services.optimizer.jobs.kinds.identification import IdentificationSpec
@@ -96,11 +100,7 @@ if TYPE_CHECKING:
         StateView,
     )
     from gaitswarm.views.analysis import SurfaceView
-    from gaitswarm.views.calibration import TargetsView
-    from gaitswarm.views.certificate import CertificateView
-    from gaitswarm.views.comparison import JobComparisonView
     from gaitswarm.views.firmware import FirmwareView
-    from gaitswarm.views.identification import IdentifiabilityView
     from gaitswarm.views.replay import WalkReplay
     from gaitswarm.views.robustness import RobustnessView
     from gaitswarm.views.verification import VerificationView
@@ -233,12 +233,8 @@ _MODULES: Final = {
         "BestView", "EvaluationView", "HistoryIterationView", "IterationView", "JobSummaryView",
         "JobView", "StateView",
     ),
-    "gaitswarm.views.calibration": ("TargetsView",),
-    "gaitswarm.views.comparison": ("JobComparisonView",),
     "gaitswarm.views.firmware": ("FirmwareView",),
-    "gaitswarm.views.certificate": ("CertificateView",),
     "gaitswarm.views.analysis": ("SurfaceView",),
-    "gaitswarm.views.identification": ("IdentifiabilityView",),
     "gaitswarm.views.replay": ("WalkReplay",),
     "gaitswarm.views.robustness": ("RobustnessView",),
     "gaitswarm.views.verification": ("VerificationView",),
@@ -249,6 +245,10 @@ _MODULES: Final = {
     "gaitswarm.services.optimizer.analysis.ranking": ("RankingView",),
     "gaitswarm.services.optimizer.analysis.importance": ("ImportanceView",),
     "gaitswarm.services.optimizer.analysis.scenario_families": ("ScenarioFamiliesView",),
+    "gaitswarm.services.optimizer.analysis.certificate": ("CertificateView",),
+    "gaitswarm.services.optimizer.analysis.targets": ("TargetsView",),
+    "gaitswarm.services.optimizer.analysis.comparison": ("JobComparisonView",),
+    "gaitswarm.services.optimizer.analysis.identifiability": ("IdentifiabilityView",),
     "gaitswarm.services.optimizer.jobs.kinds.calibration": ("CalibrationSpec",),
     "gaitswarm.services.optimizer.jobs.kinds.certificate": ("CertificateSpec",),
     "gaitswarm.services.optimizer.jobs.labels": ("JobFilter",),

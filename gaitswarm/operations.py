@@ -30,8 +30,6 @@ from typing import (
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
-from gaitswarm.requests.analysis import run_certificate
-from gaitswarm.requests.comparison import MOST_JOBS, run_comparison, run_convergences
 from gaitswarm.requests.design import resolved
 from gaitswarm.requests.firmware import (
     FirmwareRequest,
@@ -39,7 +37,7 @@ from gaitswarm.requests.firmware import (
     firmware_view,
     run_firmware,
 )
-from gaitswarm.requests.identification import MeasuredWalkRequest, read_measured_walk, run_targets
+from gaitswarm.requests.identification import MeasuredWalkRequest, read_measured_walk
 from gaitswarm.requests.robustness import RobustnessRequest, run_robustness, sampled_indices
 from gaitswarm.requests.simulations import (
     ReplayRequest,
@@ -51,9 +49,15 @@ from gaitswarm.requests.surface import SurfaceRequest, run_surface
 from gaitswarm.robots import RobotDraftRequest, run_robot_draft
 from gaitswarm.robots import check_robot as checked_robot
 from gaitswarm.services.monitoring.activity import Activity
-from gaitswarm.services.optimizer.analysis.certificate import MOST_WORST
+from gaitswarm.services.optimizer.analysis.certificate import MOST_WORST, CertificateView
+from gaitswarm.services.optimizer.analysis.comparison import (
+    MOST_JOBS,
+    ConvergencesView,
+    JobComparisonView,
+)
 from gaitswarm.services.optimizer.analysis.distribution import DistributionView
 from gaitswarm.services.optimizer.analysis.front import FRONT_DESIGNS, MOST_FRONT_DESIGNS, FrontView
+from gaitswarm.services.optimizer.analysis.identifiability import IdentifiabilityView
 from gaitswarm.services.optimizer.analysis.importance import ImportanceView
 from gaitswarm.services.optimizer.analysis.preferences import (
     PreferenceForView,
@@ -61,8 +65,9 @@ from gaitswarm.services.optimizer.analysis.preferences import (
     RobustPreferencesView,
 )
 from gaitswarm.services.optimizer.analysis.ranking import RankingRequest, RankingView
+from gaitswarm.services.optimizer.analysis.reference import JobReferenceView
 from gaitswarm.services.optimizer.analysis.scenario_families import TOLERANCE, ScenarioFamiliesView
-from gaitswarm.services.optimizer.analysis.targets import LeaveOut
+from gaitswarm.services.optimizer.analysis.targets import LeaveOut, TargetsView
 from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
 from gaitswarm.services.optimizer.jobs.audit import LOCAL
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
@@ -110,17 +115,8 @@ from gaitswarm.views import (
     scenario_views,
 )
 from gaitswarm.views.analysis import SurfaceView
-from gaitswarm.views.calibration import TargetsView
-from gaitswarm.views.catalogue import JobReferenceView
-from gaitswarm.views.certificate import CertificateView
-from gaitswarm.views.comparison import ConvergencesView, JobComparisonView
 from gaitswarm.views.firmware import FirmwareView
-from gaitswarm.views.identification import (
-    IdentifiabilityView,
-    MeasuredWalkView,
-    RecordingEntryView,
-    RecordingView,
-)
+from gaitswarm.views.identification import MeasuredWalkView, RecordingEntryView, RecordingView
 from gaitswarm.views.job import JobFacetsView, JobKind
 from gaitswarm.views.operations import ActivityView, AuditEntryView, Level, NotificationView
 from gaitswarm.views.robots import MeshFileView, RobotCheckView, RobotDraftView
@@ -837,7 +833,7 @@ def get_reference(service: JobService, job_id: str) -> JobReferenceView:
 
     The reference is simulated once and stored with the job; job lists include it from then on.
     """
-    return JobReferenceView.from_comparison(*service.reference(job_id))
+    return service.reference(job_id)
 
 
 class ComparisonQuery(Query):
@@ -853,7 +849,7 @@ def compare_jobs(service: JobService, job_id: str, query: ComparisonQuery) -> Jo
     """Compare the convergence of jobs by iterations, evaluations and time, the distribution of
     fitness of their designs, and their specs.
     """
-    return run_comparison(service, [job_id, *query.also])
+    return service.comparison([job_id, *query.also])
 
 
 class ConvergencesQuery(Query):
@@ -870,7 +866,7 @@ class ConvergencesQuery(Query):
 )
 def list_convergences(service: JobService, query: ConvergencesQuery) -> ConvergencesView:
     """Return the best fitness over the iterations of several jobs, for sparklines in lists."""
-    return run_convergences(service, query.job, query.points)
+    return service.convergences(query.job, query.points)
 
 
 class CertificateQuery(Query):
@@ -894,7 +890,7 @@ def get_certificate(service: JobService, job_id: str, query: CertificateQuery) -
     From the worlds simulated so far. The `replay` of a world is a command; its `values` are the
     `world` of POST /v1/replays.
     """
-    return run_certificate(service, job_id, worlds=query.worlds, most=query.most)
+    return service.certificate(job_id, worlds=query.worlds, most=query.most)
 
 
 class TargetsQuery(Query):
@@ -920,7 +916,7 @@ def get_targets(service: JobService, job_id: str, query: TargetsQuery) -> Target
     Differences are in units of the tolerance. `/parameters` has the best fitness of each choice of
     a categorical variable.
     """
-    return run_targets(service, [job_id, *query.also], query.leave_out)
+    return service.targets([job_id, *query.also], query.leave_out)
 
 
 class RunsQuery(Query):
@@ -938,10 +934,7 @@ def get_parameters(service: JobService, job_id: str, query: RunsQuery) -> Identi
     Mainly for jobs of kind `identification`. A single run always narrows; only runs with different
     seeds that narrow to the same values show that a parameter is identifiable.
     """
-    jobs = [service.job(other) for other in (job_id, *query.also)]
-    return IdentifiabilityView.from_identifiability(
-        [job.id for job in jobs], service.identifiability(jobs)
-    )
+    return service.parameters([job_id, *query.also])
 
 
 @_operation("POST /estimates", "analysis", "Estimate a job", reads=True, heavy=True)

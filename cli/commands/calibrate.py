@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from gaitswarm.cli.output import Printed
     from gaitswarm.cli.rich_table import Table
     from gaitswarm.jobs.base import Jobs
-    from gaitswarm.views.calibration import ReachedView, TargetsView
-    from gaitswarm.views.identification import IdentifiabilityView
+    from gaitswarm.services.optimizer.analysis.identifiability import IdentifiabilityView
+    from gaitswarm.services.optimizer.analysis.targets import ReachedView, TargetsView
 
 LeaveOneOut = Annotated[
     str | None,

@@ -28,14 +28,14 @@ from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
 if TYPE_CHECKING:
     from gaitswarm.cli.output import Printed
     from gaitswarm.cli.rich_table import Table
-    from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
-    from gaitswarm.views.certificate import (
+    from gaitswarm.services.optimizer.analysis.certificate import (
         CertificateView,
         ComparedEngineView,
         ComparedView,
         ProportionView,
         SpreadView,
     )
+    from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 
 
 def certify(

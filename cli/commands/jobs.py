@@ -30,9 +30,9 @@ if TYPE_CHECKING:
     from gaitswarm.cli.output import Printed
     from gaitswarm.cli.rich_table import Table
     from gaitswarm.jobs.base import Jobs
+    from gaitswarm.services.optimizer.analysis.comparison import JobComparisonView
     from gaitswarm.specs import ForkOptions
     from gaitswarm.views import HistoryIterationView, JobSummaryView, JobView
-    from gaitswarm.views.comparison import JobComparisonView
 
 
 def submit(

@@ -26,10 +26,13 @@ if TYPE_CHECKING:
     from gaitswarm.cli.output import Printed
     from gaitswarm.cli.rich_table import Table
     from gaitswarm.jobs.base import Jobs
+    from gaitswarm.services.optimizer.analysis.identifiability import (
+        IdentifiabilityView,
+        ParameterView,
+    )
     from gaitswarm.sim.measurement.measured_log import MeasuredLog, MeasuredWalk
     from gaitswarm.sim.measurement.synchronise import Synchronised
     from gaitswarm.sim.robot import Robot
-    from gaitswarm.views.identification import IdentifiabilityView, ParameterView
 
 LARGEST_FILE: Final = 1 << 28
 """Largest accepted log [B]; one second takes about 1 MB."""

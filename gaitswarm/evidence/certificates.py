@@ -11,14 +11,13 @@ from typing import Any, Final
 import numpy as np
 
 from gaitswarm.evidence.archive import parsed_json
-from gaitswarm.services.optimizer.analysis.certificate import certificate
+from gaitswarm.services.optimizer.analysis.certificate import CertificateView, certificate
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.job import Job, JobState
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.views.certificate import CertificateView
 
 FOLDER: Final = "certificates"
 """Folder of an archive with a subfolder for each certificate, named by its id."""
@@ -86,8 +85,7 @@ def how_to_make_one(job_id: str) -> str:
 
 def summary(job_id: str, spec: CertificateSpec, columns: EvaluationColumns) -> CertificateView:
     """Summarize a certificate."""
-    found = certificate(spec, columns, most=WORST)
-    return CertificateView.from_certificate(job_id, spec, found)
+    return certificate(job_id, spec, columns, most=WORST)
 
 
 def by_certificate(members: Mapping[str, bytes]) -> dict[str, dict[str, bytes]]:

@@ -17,6 +17,7 @@ from gaitswarm.evidence.archive import archived
 from gaitswarm.evidence.certificates import FOLDER, SUMMARY, certificates_of, summary
 from gaitswarm.evidence.page import CertificateOnPage, bars, convergence, heat_map, page
 from gaitswarm.requests.surface import SurfaceRequest, run_surface
+from gaitswarm.services.optimizer.analysis.certificate import CertificateView
 from gaitswarm.services.optimizer.analysis.fork import budgets_of
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.chain import VERSION as CHAIN_VERSION
@@ -33,7 +34,6 @@ from gaitswarm.sim.kernel.emitted.source import kernel_identity
 from gaitswarm.sim.robot import RobotFiles, RobotSource, RobotVariant, load_robot
 from gaitswarm.tables import encoded_table
 from gaitswarm.views import BestView, IterationView
-from gaitswarm.views.certificate import CertificateView
 
 JOB: Final = "job.json"
 SPEC: Final = "spec.json"

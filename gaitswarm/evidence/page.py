@@ -13,12 +13,17 @@ from numpy.typing import NDArray
 
 from gaitswarm.evidence.archive import FORMAT, MANIFEST, VERSION
 from gaitswarm.evidence.certificates import Certified, how_to_make_one
+from gaitswarm.services.optimizer.analysis.certificate import (
+    CertificateView,
+    ProportionView,
+    SpreadView,
+    WorldView,
+)
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.settings import place_of
 from gaitswarm.sim.robot import load_robot
 from gaitswarm.views import BestView, IterationView
-from gaitswarm.views.certificate import CertificateView, ProportionView, SpreadView, WorldView
 
 Floats = NDArray[np.float64]
 

@@ -6,7 +6,10 @@ from typing import Self, Unpack
 from gaitswarm.jobs.base import JobEvent, Jobs
 from gaitswarm.requests.firmware import FirmwareOptions
 from gaitswarm.requests.robustness import RobustnessOptions
+from gaitswarm.services.optimizer.analysis.certificate import CertificateView
+from gaitswarm.services.optimizer.analysis.comparison import JobComparisonView
 from gaitswarm.services.optimizer.analysis.front import FrontView
+from gaitswarm.services.optimizer.analysis.identifiability import IdentifiabilityView
 from gaitswarm.services.optimizer.analysis.importance import ImportanceView
 from gaitswarm.services.optimizer.analysis.preferences import (
     PreferenceForView,
@@ -14,7 +17,7 @@ from gaitswarm.services.optimizer.analysis.preferences import (
 )
 from gaitswarm.services.optimizer.analysis.ranking import RankingView
 from gaitswarm.services.optimizer.analysis.scenario_families import ScenarioFamiliesView
-from gaitswarm.services.optimizer.analysis.targets import LeaveOut
+from gaitswarm.services.optimizer.analysis.targets import LeaveOut, TargetsView
 from gaitswarm.services.optimizer.jobs.job import Command, JobOrder, JobState
 from gaitswarm.services.optimizer.jobs.labels import JobFilter
 from gaitswarm.services.optimizer.run.evaluator import Evaluator
@@ -41,11 +44,8 @@ from gaitswarm.views import (
     JobView,
 )
 from gaitswarm.views.analysis import SurfaceView
-from gaitswarm.views.calibration import TargetsView
-from gaitswarm.views.certificate import CertificateView
-from gaitswarm.views.comparison import JobComparisonView
 from gaitswarm.views.firmware import FirmwareView
-from gaitswarm.views.identification import IdentifiabilityView, RecordingEntryView, RecordingView
+from gaitswarm.views.identification import RecordingEntryView, RecordingView
 from gaitswarm.views.replay import WalkReplay
 from gaitswarm.views.robustness import RobustnessView
 from gaitswarm.views.verification import HistoryVerificationView

@@ -23,7 +23,10 @@ from gaitswarm.requests.firmware import (
     firmware_request_of_best,
 )
 from gaitswarm.requests.robustness import RobustnessOptions
+from gaitswarm.services.optimizer.analysis.certificate import CertificateView
+from gaitswarm.services.optimizer.analysis.comparison import JobComparisonView
 from gaitswarm.services.optimizer.analysis.front import FrontView
+from gaitswarm.services.optimizer.analysis.identifiability import IdentifiabilityView
 from gaitswarm.services.optimizer.analysis.importance import ImportanceView
 from gaitswarm.services.optimizer.analysis.preferences import (
     PreferenceForView,
@@ -31,7 +34,7 @@ from gaitswarm.services.optimizer.analysis.preferences import (
 )
 from gaitswarm.services.optimizer.analysis.ranking import RankingView
 from gaitswarm.services.optimizer.analysis.scenario_families import ScenarioFamiliesView
-from gaitswarm.services.optimizer.analysis.targets import LeaveOut
+from gaitswarm.services.optimizer.analysis.targets import LeaveOut, TargetsView
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
 from gaitswarm.services.optimizer.jobs.job import Command, JobOrder, JobState
 from gaitswarm.services.optimizer.jobs.labels import ANY_JOB, JobFilter
@@ -65,11 +68,8 @@ from gaitswarm.views import (
     StateView,
 )
 from gaitswarm.views.analysis import SurfaceView
-from gaitswarm.views.calibration import TargetsView
-from gaitswarm.views.certificate import CertificateView
-from gaitswarm.views.comparison import JobComparisonView
 from gaitswarm.views.firmware import FirmwareView
-from gaitswarm.views.identification import IdentifiabilityView, RecordingEntryView, RecordingView
+from gaitswarm.views.identification import RecordingEntryView, RecordingView
 from gaitswarm.views.replay import WalkReplay, decoded_replay
 from gaitswarm.views.robustness import RobustnessView
 from gaitswarm.views.verification import HistoryVerificationView

@@ -1,22 +1,14 @@
-"""Measured logs and calibration targets"""
+"""Measured logs"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 from pydantic import Field
 
 from gaitswarm.errors import simulation_errors
 from gaitswarm.requests.design import DesignRequest, resolved
-from gaitswarm.services.optimizer.analysis.identifiability import check_comparable
-from gaitswarm.services.optimizer.analysis.targets import LeaveOut, target_results
 from gaitswarm.services.optimizer.errors import InvalidRequest
-from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
-from gaitswarm.services.optimizer.jobs.iteration import Evaluation
-from gaitswarm.services.optimizer.jobs.job import Job
-from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from gaitswarm.sim.errors import MeasuredLogError
 from gaitswarm.sim.identification.recorded_walk import RecordedWalk, record
 from gaitswarm.sim.measurement.measured_csv import parse_measured_log
@@ -24,7 +16,6 @@ from gaitswarm.sim.measurement.measured_log import MeasuredLog, MeasuredWalk
 from gaitswarm.sim.measurement.synchronise import Synchronised, synchronise
 from gaitswarm.sim.robot import load_robot
 from gaitswarm.sim.scenario import Scenario, ScenarioChoice
-from gaitswarm.views.calibration import TargetsView
 
 
 class MeasuredWalkRequest(DesignRequest):
@@ -78,36 +69,3 @@ def read_measured_walk(request: MeasuredWalkRequest) -> ReadWalk:
         return ReadWalk(log, pair, record(pair, scenario, request.controller, design))
     except MeasuredLogError as error:
         raise InvalidRequest(str(error), field="log") from error
-
-
-class Histories(Protocol):
-    """Source of jobs and their evaluations."""
-
-    def job(self, job_id: str) -> Job:
-        """A job."""
-
-    def columns(self, job: Job) -> EvaluationColumns:
-        """All evaluations of a job."""
-
-    def best(self, job_id: str) -> Evaluation | None:
-        """The best design of a job."""
-
-
-def run_targets(
-    histories: Histories, job_ids: Sequence[str], leave_out: LeaveOut | None
-) -> TargetsView:
-    """Compare the best design of several runs with their targets."""
-    jobs = [histories.job(job_id) for job_id in job_ids]
-    first, spec = jobs[0], jobs[0].spec
-    if not isinstance(spec, CalibrationSpec):
-        raise InvalidRequest(
-            f"job {first.id} is of kind {spec.kind}; only a calibration has targets", field="job_id"
-        )
-    check_comparable(jobs)
-    runs = [histories.columns(job) for job in jobs]
-    bests = None
-    if spec.precision != "double":
-        found = [histories.best(job.id) for job in jobs]
-        bests = [best for best in found if best is not None]
-    results = target_results(spec, runs, leave_out, bests=bests)
-    return TargetsView.from_results([job.id for job in jobs], spec, results)

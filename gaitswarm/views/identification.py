@@ -1,4 +1,4 @@
-"""Recorded walks at a glance, and which fitted parameters can be trusted."""
+"""Recorded walks, without their numbers."""
 
 from __future__ import annotations
 
@@ -6,138 +6,13 @@ from datetime import datetime
 
 from pydantic import Field
 
-from gaitswarm.services.optimizer.analysis.identifiability import (
-    THRESHOLDS,
-    ChoiceEvidence,
-    Identifiability,
-    ParameterIdentifiability,
-    Trust,
-)
 from gaitswarm.services.optimizer.jobs.listing import RecordingEntry
-from gaitswarm.services.optimizer.views import View, finite
+from gaitswarm.services.optimizer.views import View
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
 from gaitswarm.sim.identification.recorded_walk import RecordedWalk
 from gaitswarm.sim.measurement.measured_log import MeasuredLog, Quantity
 from gaitswarm.sim.measurement.synchronise import Synchronised
 from gaitswarm.sim.scenario import Scenario
-
-
-class IntervalView(View):
-    """Values of a parameter among designs within a threshold, in the parameter's unit."""
-
-    low: float = Field(description="Least of them.", examples=[10.9])
-    high: float = Field(description="Greatest of them.", examples=[11.3])
-
-
-class ChoiceView(View):
-    """One choice of a categorical parameter."""
-
-    name: str = Field(description="Name of the choice.", examples=["stick"])
-    fitness: float | None = Field(
-        description="Least fitness of all runs among designs with it; null if all failed, or none"
-        " was tried.",
-        examples=[0.84],
-    )
-    by_run: list[float | None] = Field(
-        description="The same of each run.", examples=[[0.84, 0.91, None]]
-    )
-    remains: bool = Field(
-        description="Whether a run has it among the designs that count as good as its best: within"
-        " 5 %, of a calibration those whose sum of squared differences, in tolerances, is at most 4"
-        " (times the best fitness squared, if that is above 1) greater."
-    )
-
-    @classmethod
-    def from_evidence(cls, choice: ChoiceEvidence) -> ChoiceView:
-        """Make a view of one choice."""
-        return cls(
-            name=choice.name,
-            fitness=finite(min(choice.fitness)),
-            by_run=[finite(fitness) for fitness in choice.fitness],
-            remains=choice.remains,
-        )
-
-
-class ParameterView(View):
-    """One parameter over all runs."""
-
-    name: str = Field(description="Name of the variable.", examples=["battery_voltage"])
-    unit: str = Field(description="Its unit.", examples=["V"])
-    low: float = Field(description="Lower bound of the search.", examples=[8.0])
-    high: float = Field(description="Upper bound of the search.", examples=[13.0])
-    best: float | str = Field(
-        description="Value in the best design of all runs; of a categorical parameter the name of"
-        " the choice.",
-        examples=[11.1],
-    )
-    bests: list[float | str] = Field(
-        description="Value in each run's best design.", examples=[[11.1, 11.2, 11.0]]
-    )
-    intervals: list[IntervalView] = Field(
-        description="One for each of `thresholds`, over all runs; indices of choices of a"
-        " categorical parameter."
-    )
-    choices: list[ChoiceView] = Field(description="Those of a categorical parameter; else none.")
-    trust: Trust | None = Field(
-        description="How far the runs agree among designs as good as their best (see `remains` of"
-        " choices): within 15 %, within 35 %, or"
-        " not within 35 % of the range that was searched; of a categorical parameter on one"
-        " choice, on some, or on none; null for a single run, which cannot tell.",
-        examples=["trusted"],
-    )
-    explanation: str | None = Field(
-        description="The same in a sentence.",
-        examples=["all runs agree on a small part of the range"],
-    )
-
-    @classmethod
-    def from_parameter(cls, found: ParameterIdentifiability) -> ParameterView:
-        """Make a view of one parameter."""
-        shown = found.variable.shown
-        return cls(
-            name=found.variable.name,
-            unit=found.variable.unit,
-            low=found.variable.low,
-            high=found.variable.high,
-            best=shown(found.best),
-            bests=[shown(value) for value in found.bests],
-            intervals=[IntervalView(low=low, high=high) for low, high in found.intervals],
-            choices=[ChoiceView.from_evidence(choice) for choice in found.choices],
-            trust=found.trust,
-            explanation=found.explanation,
-        )
-
-
-class IdentifiabilityView(View):
-    """How runs of one problem, that differ in their seed, converge (thesis fig. 2.14)."""
-
-    jobs: list[str] = Field(description="The runs.", examples=[["k2q7zr5dm9xw"]])
-    fitness: list[float] = Field(description="Each run's least fitness.", examples=[[0.0312]])
-    thresholds: list[float] = Field(
-        description="Distances from a run's best fitness, as shares of it [1].",
-        examples=[list(THRESHOLDS)],
-    )
-    designs: list[int] = Field(
-        description="Number of designs of all runs within each of them [1].",
-        examples=[[3214, 2851, 2617]],
-    )
-    parameters: list[ParameterView] = Field(description="Every variable that was searched.")
-
-    @classmethod
-    def from_identifiability(cls, jobs: list[str], found: Identifiability) -> IdentifiabilityView:
-        """Make a view of all parameters.
-
-        Args:
-            jobs: ids of the runs.
-            found: what they say, each run in the same order.
-        """
-        return cls(
-            jobs=jobs,
-            fitness=list(found.fitness),
-            thresholds=list(THRESHOLDS),
-            designs=list(found.designs),
-            parameters=[ParameterView.from_parameter(p) for p in found.parameters],
-        )
 
 
 class RecordingView(View):

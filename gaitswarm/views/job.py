@@ -9,6 +9,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from gaitswarm.services.optimizer.analysis.evaluations import ObjectiveView
+from gaitswarm.services.optimizer.analysis.reference import ReferenceView
 from gaitswarm.services.optimizer.errors import Unreadable
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.estimate import Estimate, time_left
@@ -27,7 +28,6 @@ from gaitswarm.services.optimizer.jobs.provenance import ProvenanceRecord
 from gaitswarm.services.optimizer.views import View, finite
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.views.base import job_links
-from gaitswarm.views.catalogue import ReferenceView
 from gaitswarm.views.history import BestView
 
 

@@ -4,11 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gaitswarm.services.optimizer.analysis.certificate import CertificateView, certificate
+from gaitswarm.services.optimizer.analysis.comparison import (
+    MOST_JOBS,
+    POINTS,
+    ConvergencesView,
+    ConvergenceView,
+    JobComparisonView,
+    comparison,
+    convergence,
+)
 from gaitswarm.services.optimizer.analysis.distribution import (
     DistributionView,
     distribution,
@@ -32,7 +43,7 @@ from gaitswarm.services.optimizer.analysis.history import (
     read_history,
 )
 from gaitswarm.services.optimizer.analysis.identifiability import (
-    Identifiability,
+    IdentifiabilityView,
     check_comparable,
     identifiability,
 )
@@ -46,12 +57,17 @@ from gaitswarm.services.optimizer.analysis.preferences import (
     robust_preferences,
 )
 from gaitswarm.services.optimizer.analysis.ranking import RankingRequest, RankingView, rank
-from gaitswarm.services.optimizer.analysis.reference import with_reference
+from gaitswarm.services.optimizer.analysis.reference import (
+    JobReferenceView,
+    ReferenceView,
+    with_reference,
+)
 from gaitswarm.services.optimizer.analysis.scenario_families import (
     TOLERANCE,
     ScenarioFamiliesView,
     scenario_families,
 )
+from gaitswarm.services.optimizer.analysis.targets import LeaveOut, TargetsView, target_results
 from gaitswarm.services.optimizer.analysis.utilities import (
     log_utilities,
     objective_vectors,
@@ -75,6 +91,8 @@ from gaitswarm.services.optimizer.jobs.estimate import (
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Iteration, Reevaluation
 from gaitswarm.services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState, refusal
+from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
+from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.labels import ANY_JOB, FacetCounts, JobFilter, LabelsChange
 from gaitswarm.services.optimizer.jobs.listing import Page, RecordingEntry
@@ -88,6 +106,9 @@ from gaitswarm.sim.identification.recorded_walk import RecordedWalk
 
 if TYPE_CHECKING:
     from gaitswarm.services.optimizer.store import Store
+
+_PAGE: Final = 5000
+"""Iterations read at a time."""
 
 _RECENT_JOBS: Final = 50
 """Newest jobs among which the estimate looks for similar ones."""
@@ -345,9 +366,16 @@ class JobService:
         """
         return read_history(self.store, job_id, after=after)
 
-    def reference(self, job_id: str) -> tuple[Job, str | None]:
-        """Return a job with its reference, simulated if needed, and why there is no gain."""
-        return with_reference(self.store, self.store.job(job_id))
+    def reference(self, job_id: str) -> JobReferenceView:
+        """Compare a job's best design with its reference, which is simulated if needed."""
+        job, reason = with_reference(self.store, self.job(job_id))
+        return JobReferenceView(
+            id=job.id,
+            reference=ReferenceView.from_reference(job.reference),
+            best_fitness=job.progress.best_fitness,
+            gain=job.gain,
+            reason=reason,
+        )
 
     def asked_positions(
         self, job: Job, iterations: int | None = None
@@ -441,9 +469,65 @@ class JobService:
             )
         return rank(self.columns(job), job.spec, request)
 
-    def identifiability(self, jobs: Sequence[Job]) -> Identifiability:
+    def parameters(self, job_ids: Sequence[str]) -> IdentifiabilityView:
         """Determine the parameters on which several runs of one problem agree."""
+        jobs = [self.job(job_id) for job_id in job_ids]
         check_comparable(jobs)
-        runs = [self.columns(job) for job in jobs]
+        runs, spec = [self.columns(job) for job in jobs], jobs[0].spec
+        return identifiability(job_ids, spec.design_space().variables, runs, spec.as_good_as)
+
+    def targets(self, job_ids: Sequence[str], leave_out: LeaveOut | None = None) -> TargetsView:
+        """Compare the best design of several runs of a calibration with their targets."""
+        jobs = [self.job(job_id) for job_id in job_ids]
         spec = jobs[0].spec
-        return identifiability(spec.design_space().variables, runs, spec.as_good_as)
+        if not isinstance(spec, CalibrationSpec):
+            raise InvalidRequest(
+                f"job {jobs[0].id} is of kind {spec.kind}; only a calibration has targets",
+                field="job_id",
+            )
+        check_comparable(jobs)
+        bests = None
+        if spec.precision != "double":
+            bests = [best for job in jobs if (best := self.best(job.id)) is not None]
+        runs = [self.columns(job) for job in jobs]
+        return target_results(job_ids, spec, runs, leave_out, bests=bests)
+
+    def certificate(
+        self, job_id: str, *, worlds: int | None = None, most: int = 5
+    ) -> CertificateView:
+        """Summarize a certificate, from its first `worlds` worlds; list the `most` worst."""
+        job = self.job(job_id)
+        if not isinstance(job.spec, CertificateSpec):
+            raise InvalidRequest(
+                f"job {job_id} is of kind {job.spec.kind}; only a certificate has worlds",
+                field="job_id",
+            )
+        return certificate(job_id, job.spec, self.columns(job), worlds=worlds, most=most)
+
+    def comparison(self, job_ids: Sequence[str]) -> JobComparisonView:
+        """Compare jobs by convergence, distribution of fitness, and spec."""
+        if len(set(job_ids)) < len(job_ids) or len(job_ids) > MOST_JOBS:
+            raise InvalidRequest(f"must be at most {MOST_JOBS} jobs, each once", field="job_ids")
+        jobs = [self.job(job_id) for job_id in job_ids]
+        fitness = [
+            self.columns(job).fitness if job.progress.iterations else np.empty(0) for job in jobs
+        ]
+        return comparison(jobs, fitness, [self._convergence(job.id, POINTS) for job in jobs])
+
+    def convergences(self, job_ids: Sequence[str], points: int) -> ConvergencesView:
+        """List the convergence of jobs that were not deleted, thinned to some points."""
+        views = []
+        for job_id in job_ids:
+            with suppress(NotFound):
+                views.append(self._convergence(job_id, points))
+        return ConvergencesView(items=views)
+
+    def _convergence(self, job_id: str, points: int) -> ConvergenceView:
+        iterations: list[Iteration] = []
+        after: int | None = None
+        while True:
+            page = self.iterations(job_id, after=after, limit=_PAGE)
+            iterations += page.items
+            if page.next is None or not page.items:
+                return convergence(job_id, iterations, points)
+            after = page.items[-1].index

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from gaitswarm.services.optimizer.analysis.identifiability import Trust, identifiability
-from gaitswarm.services.optimizer.analysis.targets import target_results
+from gaitswarm.services.optimizer.analysis.identifiability import (
+    IdentifiabilityView,
+    Trust,
+    identifiability,
+)
+from gaitswarm.services.optimizer.analysis.targets import LeaveOut, TargetsView, target_results
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Reevaluation
 from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
@@ -43,12 +46,22 @@ FAIR, ALL_BUT_TORQUE = (11.0, 55.0, 22.0), (13.0, 50.0, 20.0)
 ALL_BUT_ENERGY, ALL_BUT_FUZZY = (10.0, 70.0, 20.0), (10.0, 50.0, 29.0)
 
 
+def results(
+    wanted: CalibrationSpec,
+    runs: list[EvaluationColumns],
+    leave_out: LeaveOut | None = None,
+    bests: list[Evaluation] | None = None,
+) -> TargetsView:
+    """Runs are named by number."""
+    return target_results([str(k) for k in range(len(runs))], wanted, runs, leave_out, bests=bests)
+
+
 def test_the_best_design_of_all_runs_is_compared_with_every_target() -> None:
     runs = [made_up(WANTED, ALL_BUT_TORQUE), made_up(WANTED, ALL_BUT_ENERGY, FAIR)]
-    found = target_results(WANTED, runs)
-    assert (found.run, found.iteration) == (1, 1)
-    assert [t.best.simulated for t in found.targets] == [11.0, 55.0, 22.0, 1.0]
-    np.testing.assert_allclose([t.best.difference for t in found.targets[:3]], 1.0)
+    found = results(WANTED, runs)
+    assert (found.job, found.iteration) == ("1", 1)
+    assert [t.simulated for t in found.targets] == [11.0, 55.0, 22.0, 1.0]
+    assert [t.difference for t in found.targets[:3]] == pytest.approx([1.0] * 3)
     assert found.fitness == pytest.approx(1.0)
     assert all(t.left_out is None for t in found.targets)
 
@@ -67,13 +80,13 @@ def test_runs_in_single_precision_are_compared_by_their_bests_in_double() -> Non
         )
         for run, share, fitness in zip(runs, (1.01, 1.0), (2.5, 2.4), strict=True)
     ]
-    assert target_results(WANTED, runs).run == 0
-    found = target_results(WANTED, runs, bests=bests)
-    assert (found.run, found.fitness) == (1, 2.4)
-    assert [t.best.simulated for t in found.targets] == [13.0, 50.0, 20.0, 1.0]
-    alone = target_results(WANTED, runs[:1], bests=bests[:1])
+    assert results(WANTED, runs).job == "0"
+    found = results(WANTED, runs, bests=bests)
+    assert (found.job, found.fitness) == ("1", 2.4)
+    assert [t.simulated for t in found.targets] == [13.0, 50.0, 20.0, 1.0]
+    alone = results(WANTED, runs[:1], bests=bests[:1])
     assert alone.fitness == 2.5
-    assert alone.targets[0].best.simulated == pytest.approx(1.01 * 11.0)
+    assert alone.targets[0].simulated == pytest.approx(1.01 * 11.0)
 
 
 def test_a_target_that_is_left_out_is_predicted_by_what_is_best_without_it() -> None:
@@ -81,22 +94,27 @@ def test_a_target_that_is_left_out_is_predicted_by_what_is_best_without_it() -> 
         made_up(WANTED, FAIR, ALL_BUT_TORQUE),
         made_up(WANTED, ALL_BUT_ENERGY, ALL_BUT_FUZZY),
     ]
-    found = target_results(WANTED, runs, "target")
+    found = results(WANTED, runs, "target")
     predicted = [None if t.left_out is None else t.left_out.simulated for t in found.targets]
     assert predicted == [13.0, 70.0, 29.0, None]
 
 
 def test_a_walk_is_left_out_with_all_of_its_targets() -> None:
     runs = [made_up(WANTED, FAIR, ALL_BUT_FUZZY, (30.0, 90.0, 20.0))]
-    found = target_results(WANTED, runs, "walk")
+    found = results(WANTED, runs, "walk")
     predicted = [None if t.left_out is None else t.left_out.simulated for t in found.targets]
     assert predicted == [30.0, 90.0, 29.0, None]
 
 
 def test_nothing_is_predicted_where_nothing_is_left_to_fit() -> None:
     only = spec()
-    found = target_results(only, [made_up(only, FAIR)], "target")
+    found = results(only, [made_up(only, FAIR)], "target")
     assert found.targets[0].left_out is None
+
+
+def choices(runs: list[EvaluationColumns]) -> IdentifiabilityView:
+    """Runs whose designs count as good as the best within 5 %."""
+    return identifiability([str(k) for k in range(len(runs))], [LAW], runs, lambda f: 1.05 * f)
 
 
 def run_of(**least: float) -> EvaluationColumns:
@@ -125,17 +143,14 @@ def run_of(**least: float) -> EvaluationColumns:
 def test_evidence_decides_for_choices_that_any_run_has_near_its_best(
     runs: list[EvaluationColumns], trust: Trust, remaining: list[str]
 ) -> None:
-    (law,) = identifiability([LAW], runs).parameters
+    (law,) = choices(runs).parameters
     assert law.trust is trust
     assert [choice.name for choice in law.choices if choice.remains] == remaining
     assert law.explanation is not None
 
 
 def test_the_smallest_misfit_of_each_choice_is_reported_by_run() -> None:
-    (law,) = identifiability([LAW], [run_of(linear=2.0, stick=1.0), run_of(stick=1.5)]).parameters
-    assert [choice.fitness for choice in law.choices] == [
-        (2.0, math.inf),
-        (1.0, 1.5),
-        (math.inf, math.inf),
-    ]
-    assert law.variable.shown(law.best) == "stick"
+    (law,) = choices([run_of(linear=2.0, stick=1.0), run_of(stick=1.5)]).parameters
+    assert [choice.by_run for choice in law.choices] == [[2.0, None], [1.0, 1.5], [None, None]]
+    assert [choice.fitness for choice in law.choices] == [2.0, 1.0, None]
+    assert law.best == "stick"

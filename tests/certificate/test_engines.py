@@ -93,21 +93,21 @@ def test_differences_are_shares_of_ours_by_scenario_and_objective() -> None:
     made = columns(spec, np.arange(1.0, 11.0).reshape(5, 2))
     made.objectives[:3, 0] = np.array([10.0, 11.0, 8.0])[:, np.newaxis]
     made.objectives[:2, 0, 5] = -0.5, 0.25
-    found = certificate(spec, made)
-    assert [engine.name for engine in found.engines] == ENGINES
-    first, second = (engine.cases[0] for engine in found.engines)
+    found = certificate("job", spec, made)
+    assert list(found.engines) == ENGINES
+    first, second = (engine.scenarios["short"] for engine in found.engines.values())
     assert (first.utility.ours, first.utility.theirs) == pytest.approx((10.0, 11.0))
     assert first.utility.difference == pytest.approx(0.1)
-    assert second.objectives[3].difference == pytest.approx(-0.2)
+    assert second.objectives["energy"].difference == pytest.approx(-0.2)
     # The loss of height counts by its size.
-    assert first.objectives[5].difference == pytest.approx(-0.5)
+    assert first.objectives["height_loss"].difference == pytest.approx(-0.5)
     # Of the other scenario 2, 4, 6: over both the geometric mean.
-    assert found.engines[0].fitness.difference == pytest.approx(math.sqrt(1.1 * 2.0) - 1.0)
+    assert found.engines[ENGINES[0]].fitness.difference == pytest.approx(math.sqrt(1.1 * 2.0) - 1.0)
     # Worlds and spreads are those of our engine alone.
     assert found.worlds == 2
-    assert found.cases[1].utility.nominal == pytest.approx(2.0)
-    assert found.cases[1].utility.worst == pytest.approx(10.0)
-    assert [world.index for world in found.worst] == [1, 0]
+    assert found.scenarios["uphill"].utility.nominal == pytest.approx(2.0)
+    assert found.scenarios["uphill"].utility.worst == pytest.approx(10.0)
+    assert [world.world for world in found.worst] == [1, 0]
     assert all("engine" not in world.values for world in found.worst)
 
 
@@ -116,13 +116,12 @@ def test_a_walk_that_fails_in_one_engine_has_no_difference() -> None:
     statuses = np.zeros((4, 2))
     statuses[1, 0] = Status.FELL
     made = columns(spec, np.ones((4, 2)), statuses)
-    found = certificate(spec, made)
-    (engine,) = found.engines
-    assert (engine.cases[0].ours, engine.cases[0].theirs) == (Status.OK, Status.FELL)
-    assert engine.cases[0].utility.ours == pytest.approx(1.0)
-    assert math.isnan(engine.cases[0].utility.theirs)
-    assert math.isnan(engine.cases[0].utility.difference)
-    assert engine.cases[1].utility.difference == pytest.approx(0.0)
+    found = certificate("job", spec, made)
+    short, uphill = found.engines["mujoco"].scenarios.values()
+    assert (short.ours, short.theirs) == ("ok", "fell")
+    assert short.utility.ours == pytest.approx(1.0)
+    assert (short.utility.theirs, short.utility.difference) == (None, None)
+    assert uphill.utility.difference == pytest.approx(0.0)
     # It is no failure of the design in a world.
     assert found.failed.count == 0
 
@@ -150,9 +149,10 @@ def test_under_the_runner_our_rows_have_the_bits_of_a_certificate_without_engine
     assert first == second
     assert [*first[:1], *first[2:]] == without
     assert first[1] != first[0]
-    found = certificate(spec, walked[-1])
-    (case,) = found.engines[0].cases[:1]
-    assert max(abs(compared.difference) for compared in case.objectives[:5]) < 0.02
+    found = certificate("job", spec, walked[-1])
+    objectives = found.engines["mujoco"].scenarios["short"].objectives
+    objectives.pop("height_loss")
+    assert max(abs(compared.difference or 0.0) for compared in objectives.values()) < 0.02
 
 
 @pytest.mark.slow
@@ -194,7 +194,7 @@ PROGRAM = """
 import sys
 from gaitswarm.services.optimizer.jobs.documents import SPECS
 from tests.certificate.examples import DOCUMENT
-import gaitswarm.cli.main, gaitswarm.views.certificate, gaitswarm.sim.worlds
+import gaitswarm.cli.main, gaitswarm.services.optimizer.analysis.certificate, gaitswarm.sim.worlds
 spec = SPECS.validate_python(DOCUMENT | {"engines": ["mujoco"]})
 case = spec.cases({})[0]
 designs = spec.design_space().designs(spec.create_search().ask())[:1]

@@ -98,17 +98,16 @@ def test_runs_of_other_seeds_tell_which_parameters_to_trust(store: Store, twin: 
         "optimizer": PsoSettings(particles=8),
     }
     jobs = [
-        store.job(finished(store, spec(recording, seed=seed, name=f"run {seed}", **brief)))
-        for seed in (1, 2)
+        finished(store, spec(recording, seed=seed, name=f"run {seed}", **brief)) for seed in (1, 2)
     ]
-    found = service.identifiability(jobs)
-    assert [p.variable.name for p in found.parameters] == ["battery_voltage", "damping_left_rear"]
-    assert found.fitness == tuple(job.progress.best_fitness for job in jobs)
+    found = service.parameters(jobs)
+    assert [p.name for p in found.parameters] == ["battery_voltage", "damping_left_rear"]
+    assert found.fitness == [store.job(job).progress.best_fitness for job in jobs]
     # Two short runs find much the same battery; a sole's damping hardly shows in the currents.
     battery, damping = found.parameters
     assert battery.trust in (Trust.TRUSTED, Trust.ROUGH)
     assert damping.trust is Trust.UNKNOWN
-    assert [p.trust for p in service.identifiability(jobs[:1]).parameters] == [None, None]
+    assert [p.trust for p in service.parameters(jobs[:1]).parameters] == [None, None]
 
 
 def test_runs_of_different_problems_are_not_compared(store: Store, twin: Twin) -> None:
@@ -116,10 +115,10 @@ def test_runs_of_different_problems_are_not_compared(store: Store, twin: Twin) -
     first, _ = service.submit(spec(recording))
     other, _ = service.submit(spec(recording, links=(1,), seed=2))
     with pytest.raises(InvalidRequest, match="another problem") as refused:
-        service.identifiability([first, other])
+        service.parameters([first.id, other.id])
     assert refused.value.field == "also"
     with pytest.raises(Conflict, match="no successful design yet"):
-        service.identifiability([first])
+        service.parameters([first.id])
 
 
 def test_a_run_is_no_evidence_for_itself(store: Store, twin: Twin) -> None:
@@ -128,7 +127,7 @@ def test_a_run_is_no_evidence_for_itself(store: Store, twin: Twin) -> None:
     again, _ = service.submit(spec(recording, iterations=20))
     for other in (first, again):
         with pytest.raises(InvalidRequest, match="has the seed of job") as refused:
-            service.identifiability([first, other])
+            service.parameters([first.id, other.id])
         assert refused.value.field == "also"
 
 

@@ -88,4 +88,4 @@ def test_a_certificate_is_summed_up_in_parts() -> None:
     worlds = DESIGNS // 3
     spec = small(worlds=worlds)
     walked = columns(spec, np.random.default_rng(1).uniform(5.0, 9.0, (worlds + 1, 2)))
-    assert computes_in_parts(lambda: certificate(spec, walked))
+    assert computes_in_parts(lambda: certificate("job", spec, walked))

@@ -3,92 +3,33 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Final
+from typing import Annotated, Final
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from gaitswarm.services.optimizer.analysis.statistics import spearman
 from gaitswarm.services.optimizer.errors import Conflict
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
+from gaitswarm.services.optimizer.jobs.judgement import Judgement
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
-from gaitswarm.services.optimizer.jobs.preference import HEIGHT_LOSS
+from gaitswarm.services.optimizer.jobs.preference import HEIGHT_LOSS, Preference
+from gaitswarm.services.optimizer.views import (
+    DesignValues,
+    Finite,
+    IterationIndex,
+    JobName,
+    Particle,
+    StatusName,
+    View,
+)
 from gaitswarm.sim.memory import require_room_for_scipy
-from gaitswarm.sim.mujoco.engines import EngineName
+from gaitswarm.sim.mujoco.engines import ENGINES
 from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.robot import RobotSource
 
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True)
-class Compared:
-    """One quantity by two engines; NaN after a failed simulation."""
-
-    ours: float
-    theirs: float
-
-    @property
-    def difference(self) -> float:
-        """Relative difference of the other engine [1]; NaN if ours is 0."""
-        return (self.theirs - self.ours) / self.ours if self.ours else float("nan")
-
-
-@dataclass(frozen=True, slots=True)
-class ComparedCase:
-    """One scenario by two engines.
-
-    Attributes:
-        objectives: f1 to f6 of table 4.1; f6 by its absolute value.
-    """
-
-    name: str
-    ours: Status
-    theirs: Status
-    utility: Compared
-    objectives: tuple[Compared, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class ComparedEngine:
-    """Another engine, in the nominal world of all scenarios."""
-
-    name: EngineName
-    fitness: Compared
-    cases: tuple[ComparedCase, ...]
-
-
-def compared_engines(
-    spec: CertificateSpec, nominal: EvaluationColumns
-) -> tuple[ComparedEngine, ...]:
-    judged = spec.judge(nominal.objectives, nominal.failed)
-    utilities = judged.utilities
-    values = nominal.objectives.copy()
-    values[:, :, HEIGHT_LOSS] = np.abs(values[:, :, HEIGHT_LOSS])
-    return tuple(
-        ComparedEngine(
-            name,
-            _compared(judged.fitness[[0, row]]),
-            tuple(
-                ComparedCase(
-                    case,
-                    Status(int(nominal.statuses[0, k])),
-                    Status(int(nominal.statuses[row, k])),
-                    _compared(utilities[[0, row], k]),
-                    tuple(map(_compared, values[[0, row], k].T)),
-                )
-                for k, case in enumerate(spec.case_names)
-            ),
-        )
-        for row, name in enumerate(spec.engines, start=1)
-    )
-
-
-def _compared(pair: Floats) -> Compared:
-    """pair (2,): NaN or +inf for a failed simulation."""
-    ours, theirs = np.where(np.isfinite(pair), pair, np.nan).tolist()
-    return Compared(ours, theirs)
-
 
 QUANTILES: Final = (0.05, 0.25, 0.5, 0.75, 0.95)
 
@@ -105,152 +46,261 @@ _NORMAL: Final = 1.959963984540054
 """0.975 quantile of the standard normal distribution."""
 
 
-@dataclass(frozen=True, slots=True)
-class Proportion:
-    """A binomial proportion over worlds.
+class ProportionView(View):
+    """A count over worlds with its confidence interval."""
 
-    Attributes:
-        count: worlds in which the event occurred.
-        low: lower end of the exact 95 % interval (Clopper and Pearson 1934).
-    """
-
-    count: int
-    worlds: int
-    low: float
-    high: float
-
-    @property
-    def share(self) -> float:
-        return self.count / self.worlds
+    count: int = Field(description="Worlds in which it happened.", examples=[3])
+    share: float = Field(description="Of all worlds [1].", examples=[0.003])
+    low: float = Field(
+        description="Lower end of the exact interval of 95 % (Clopper and Pearson 1934) [1]."
+    )
+    high: float = Field(description="Upper end [1].", examples=[0.0087])
 
 
-@dataclass(frozen=True, slots=True)
-class Spread:
-    """Distribution of a minimized quantity over worlds; failures are worse than any value.
+class SpreadView(View):
+    """Distribution of a quantity over worlds; lower is better, and a failure is worse than any."""
 
-    Attributes:
-        quantiles: at `QUANTILES`, over all worlds; +inf where a quantile is a failure.
-        worst: greatest value of successful simulations, NaN if all failed.
-        cvar: mean of the worst 5 % of worlds, the conditional value at risk at 0.95. A failure
-            counts as `worst`: with failures in the tail this is a lower bound.
-        tail_failed: failed share of that tail.
-        nominal: in the nominal world, NaN after a failure.
-    """
-
-    quantiles: tuple[float, ...]
-    worst: float
-    cvar: float
-    tail_failed: float
-    nominal: float
+    quantiles: list[Finite] = Field(
+        description="At the certificate's `quantiles`; null where a quantile is a failure.",
+        examples=[[19.8, 20.4, 21.0, 21.9, 24.2]],
+    )
+    worst: Finite = Field(description="The greatest without failures; null if all failed.")
+    cvar: Finite = Field(
+        description="Conditional value at risk: mean of the worst 5 % of worlds. A failure counts"
+        " as `worst`, so that with failures this is a lower bound; null if all failed.",
+        examples=[26.3],
+    )
+    tail_failed: float = Field(description="Share of these 5 % that failed [1].", examples=[0.06])
+    nominal: Finite = Field(description="In the nominal world; null after a failure.")
 
 
-@dataclass(frozen=True, slots=True)
-class CaseResult:
-    """One scenario over all worlds.
-
-    Attributes:
-        objectives: f1 to f6 of table 4.1; f6 by its absolute value.
-    """
-
-    name: str
-    statuses: dict[Status, int]
-    fell: Proportion
-    failed: Proportion
-    utility: Spread
-    objectives: tuple[Spread, ...]
+Objectives = Field(
+    description="By name, in the units of the job's `objectives`; height_loss by its size."
+)
+Utility = Field(description="By the job's preference (eq. 3.8, 4.1) [1].")
 
 
-@dataclass(frozen=True, slots=True)
-class WorldOutcome:
-    """A design's results in one world.
+class CertifiedScenarioView(View):
+    """One scenario over all worlds."""
 
-    Attributes:
-        index: of the world, from 0.
-        fitness: geometric mean over the scenarios, +inf if one failed.
-        failures: failed scenarios with their statuses.
-        scenario: worst scenario: a failed one, else the one whose utility is the greatest multiple
-            of that in the nominal world.
-        values: drawn and fixed perturbations, by name.
-    """
-
-    index: int
-    iteration: int
-    particle: int
-    fitness: float
-    failures: tuple[tuple[str, Status], ...]
-    scenario: str
-    values: dict[str, float | str]
+    held_out: bool = Field(
+        description="Whether it is one of the spec's `held_out`, which the design was not tuned in;"
+        " without them a preset for which no design of the thesis was optimized."
+    )
+    statuses: dict[StatusName, int] = Field(
+        description="Simulations by status; missing ones are 0.", examples=[{"ok": 997, "fell": 3}]
+    )
+    fell: ProportionView = Field(description="How often the robot fell.")
+    failed: ProportionView = Field(
+        description="Failures of any kind: fell, diverged, stalled or out of reach."
+    )
+    utility: Annotated[SpreadView, Utility]
+    objectives: Annotated[dict[str, SpreadView], Objectives]
 
 
-@dataclass(frozen=True, slots=True)
-class Influence:
-    """Rank correlation of a perturbation with the fitness.
+class WorldView(View):
+    """Results of the design in one world."""
 
-    Attributes:
-        correlation: Spearman's; worlds with a failed scenario share the last rank. Positive:
-            greater values go with worse results.
-        low: lower end of the 95 % interval (Bonett and Wright 2000).
-    """
+    world: int = Field(description="Number of the world, from 0.", examples=[417])
+    iteration: IterationIndex
+    particle: Particle
+    fitness: Finite = Field(
+        description="Geometric mean over the scenarios (eq. 4.2) [1]; null if one failed.",
+        examples=[31.7],
+    )
+    failures: dict[str, StatusName] = Field(
+        description="Failed scenarios with their statuses.", examples=[{"slope-fast": "fell"}]
+    )
+    scenario: str = Field(
+        description="The worst scenario: one that failed, or else the one whose utility is the"
+        " greatest multiple of that in the nominal world.",
+        examples=["slope-fast"],
+    )
+    values: dict[str, float | str] = Field(
+        description="Value of every perturbation that is drawn or fixed, by name."
+    )
+    replay: str = Field(
+        description="The command that simulates the design in this world again.",
+        examples=["gaitswarm certify k2q7zr5dm9xw --replay 417 --scenarios slope-fast"],
+    )
 
-    name: str
-    correlation: float
-    low: float
-    high: float
+
+class InfluenceView(View):
+    """Correlation of a perturbation with the outcome."""
+
+    name: str = Field(description="Name of the perturbation.", examples=["friction"])
+    correlation: float = Field(
+        description="Spearman's, of its value with the fitness, failed worlds sharing the last rank"
+        " [1]. Positive: greater values go with worse outcomes.",
+        examples=[-0.62],
+    )
+    low: float = Field(description="Lower end of its interval of 95 % [1].", examples=[-0.66])
+    high: float = Field(description="Upper end [1].", examples=[-0.58])
 
 
-@dataclass(frozen=True, slots=True)
-class Certificate:
-    """Results of a design in many worlds.
+class ComparedView(View):
+    """One quantity in the nominal world, by our engine and by another one."""
 
-    Attributes:
-        fitness: over all scenarios.
-        fell: worlds in which the robot fell in at least one scenario.
-        failed: worlds in which at least one scenario failed.
-        worst: those with the most failed scenarios first.
-    """
+    ours: Finite = Field(description="By our engine; null after a failure.", examples=[7.805])
+    theirs: Finite = Field(description="By the other engine; null after a failure.")
+    difference: Finite = Field(
+        description="Excess of the other engine's, as a share of ours [1]; null if either is, or if"
+        " ours is 0.",
+        examples=[-0.0003],
+    )
 
-    worlds: int
-    cases: tuple[CaseResult, ...]
-    fitness: Spread
-    fell: Proportion
-    failed: Proportion
-    worst: tuple[WorldOutcome, ...]
-    influences: tuple[Influence, ...]
-    engines: tuple[ComparedEngine, ...] = ()
+
+class ComparedScenarioView(View):
+    """One scenario in the nominal world, by our engine and by another one."""
+
+    ours: StatusName = Field(description="Status by our engine.", examples=["ok"])
+    theirs: StatusName = Field(description="Status by the other engine.", examples=["ok"])
+    utility: Annotated[ComparedView, Utility]
+    objectives: Annotated[dict[str, ComparedView], Objectives]
+
+
+class ComparedEngineView(View):
+    """Results of another engine in the nominal world."""
+
+    description: str = Field(description="Properties of the engine.", examples=[ENGINES["mujoco"]])
+    fitness: ComparedView = Field(description="Over all scenarios (eq. 4.2) [1].")
+    scenarios: dict[str, ComparedScenarioView] = Field(
+        description="By name of the scenario, in the job's order."
+    )
+
+
+class CertificateView(View):
+    """Results of a design over all worlds; no guarantee for other worlds."""
+
+    job: JobName
+    robot: RobotSource = Field(description="Simulated robot.")
+    controller: str = Field(description="Controller that drives it.", examples=["fuzzy-pi"])
+    design: DesignValues
+    preference: Preference = Field(description="By which utilities and fitness were computed.")
+    seed: int = Field(description="Of the worlds.", examples=[1])
+    worlds: int = Field(description="Worlds simulated so far.", examples=[1000])
+    worlds_planned: int = Field(description="Worlds of the whole job.", examples=[1000])
+    level: float = Field(
+        default=LEVEL, description="Of intervals and of the conditional value at risk [1]."
+    )
+    quantiles: list[float] = Field(
+        description="Quantiles of the distributions [1].", examples=[list(QUANTILES)]
+    )
+    fitness: SpreadView = Field(
+        description="Over all scenarios, the geometric mean of utilities (eq. 4.2) [1]."
+    )
+    fell: ProportionView = Field(description="Worlds with a fall in at least one scenario.")
+    failed: ProportionView = Field(description="Worlds with a failure in at least one scenario.")
+    scenarios: dict[str, CertifiedScenarioView] = Field(
+        description="By name of the scenario, in the job's order."
+    )
+    worst: list[WorldView] = Field(
+        description="The worst worlds, those with most failed scenarios first."
+    )
+    influences: list[InfluenceView] = Field(
+        description="Correlations of perturbations with the outcome, the strongest first."
+    )
+    engines: dict[str, ComparedEngineView] = Field(
+        default_factory=dict,
+        description="Results of the job's `engines` in the nominal world, by name.",
+    )
 
 
 def certificate(
-    spec: CertificateSpec, columns: EvaluationColumns, *, worlds: int | None = None, most: int = 5
-) -> Certificate:
-    """Evaluate a certificate's simulations."""
+    job_id: str,
+    spec: CertificateSpec,
+    columns: EvaluationColumns,
+    *,
+    worlds: int | None = None,
+    most: int = 5,
+) -> CertificateView:
+    """Evaluate a certificate's simulations in the first `worlds` worlds; list the `most` worst."""
     first = spec.nominal_rows
-    nominal = columns.rows(slice(first))
     walked = columns.rows(slice(None if worlds is None else first + worlds))
     taken = walked.rows(np.delete(np.arange(len(walked)), slice(1, first)))
     if len(taken) < 2:
         raise Conflict("no drawn world has been simulated yet; try again after the first iteration")
-    values = taken.objectives.copy()
-    values[:, :, HEIGHT_LOSS] = np.abs(values[:, :, HEIGHT_LOSS])
     judged = spec.judge(taken.objectives, taken.failed)
-    utilities = judged.utilities
+    utilities, values = judged.utilities, _sizes(taken.objectives)
     drawn = taken.rows(slice(1, None))
     fell = np.asarray(drawn.statuses == Status.FELL)
-    return Certificate(
+    return CertificateView(
+        job=job_id,
+        robot=spec.robot,
+        controller=spec.controller,
+        design=dict(spec.design),
+        preference=spec.resolved_preference(),
+        seed=spec.seed,
         worlds=len(drawn),
-        cases=tuple(
-            _case(name, drawn.statuses[:, k], utilities[:, k], values[:, k])
-            for k, name in enumerate(spec.case_names)
-        ),
+        worlds_planned=spec.worlds,
+        quantiles=list(QUANTILES),
         fitness=_spread(judged.fitness),
         fell=proportion(np.asarray(fell.any(axis=1))),
         failed=proportion(np.asarray(drawn.failed.any(axis=1))),
-        worst=_worst(spec, taken, judged.log_utilities, judged.fitness, most),
+        scenarios={
+            name: CertifiedScenarioView(
+                held_out=name in spec.held_out_names,
+                statuses={
+                    Status(code).label: int(np.count_nonzero(drawn.statuses[:, k] == code))
+                    for code in np.unique(drawn.statuses[:, k]).tolist()
+                },
+                fell=proportion(fell[:, k]),
+                failed=proportion(drawn.failed[:, k]),
+                utility=_spread(utilities[:, k]),
+                objectives={
+                    objective.name: _spread(values[:, k, m])
+                    for m, objective in enumerate(spec.objectives)
+                },
+            )
+            for k, name in enumerate(spec.case_names)
+        },
+        worst=_worst(job_id, spec, taken, judged, most),
         influences=_influences(spec, drawn.designs, judged.fitness[1:]),
-        engines=compared_engines(spec, nominal),
+        engines=_engines(spec, columns.rows(slice(first))),
     )
 
 
-def proportion(happened: NDArray[np.bool_]) -> Proportion:
+def _sizes(objectives: Floats) -> Floats:
+    """(r, K, m) objectives, with the absolute value of the height loss."""
+    values = objectives.copy()
+    values[:, :, HEIGHT_LOSS] = np.abs(values[:, :, HEIGHT_LOSS])
+    return values
+
+
+def _engines(spec: CertificateSpec, nominal: EvaluationColumns) -> dict[str, ComparedEngineView]:
+    """Compare other engines with ours; nominal: a row for each, ours first."""
+    judged = spec.judge(nominal.objectives, nominal.failed)
+    utilities, values = judged.utilities, _sizes(nominal.objectives)
+    statuses = [[Status(code).label for code in row] for row in nominal.statuses.tolist()]
+    return {
+        name: ComparedEngineView(
+            description=ENGINES[name],
+            fitness=_compared(judged.fitness[[0, row]]),
+            scenarios={
+                case: ComparedScenarioView(
+                    ours=statuses[0][k],
+                    theirs=statuses[row][k],
+                    utility=_compared(utilities[[0, row], k]),
+                    objectives={
+                        objective.name: _compared(values[[0, row], k, m])
+                        for m, objective in enumerate(spec.objectives)
+                    },
+                )
+                for k, case in enumerate(spec.case_names)
+            },
+        )
+        for row, name in enumerate(spec.engines, start=1)
+    }
+
+
+def _compared(pair: Floats) -> ComparedView:
+    """pair (2,): NaN or +inf for a failed simulation."""
+    ours, theirs = np.where(np.isfinite(pair), pair, np.nan).tolist()
+    difference = (theirs - ours) / ours if ours else math.nan
+    return ComparedView(ours=ours, theirs=theirs, difference=difference)
+
+
+def proportion(happened: NDArray[np.bool_]) -> ProportionView:
     """Return the proportion of worlds in which an event (n,) occurred, n >= 1."""
     # Its import takes a quarter of a second.
     require_room_for_scipy()
@@ -260,7 +310,7 @@ def proportion(happened: NDArray[np.bool_]) -> Proportion:
     tail = 0.5 * (1.0 - LEVEL)
     low = float(betaincinv(k, n - k + 1, tail)) if k > 0 else 0.0
     high = float(betaincinv(k + 1, n - k, 1.0 - tail)) if k < n else 1.0
-    return Proportion(k, n, low, high)
+    return ProportionView(count=k, share=k / n, low=low, high=high)
 
 
 def conditional_value_at_risk(values: Floats, level: float = LEVEL) -> float:
@@ -275,80 +325,59 @@ def conditional_value_at_risk(values: Floats, level: float = LEVEL) -> float:
     return total / size
 
 
-def _case(name: str, statuses: NDArray[np.uint8], utility: Floats, values: Floats) -> CaseResult:
-    """utility (1 + n,) and values (1 + n, 6) start with the nominal world; statuses (n,) do not."""
-    occurring, counts = np.unique(statuses, return_counts=True)
-    return CaseResult(
-        name=name,
-        statuses={
-            Status(s): int(c) for s, c in zip(occurring.tolist(), counts.tolist(), strict=True)
-        },
-        fell=proportion(statuses == Status.FELL),
-        failed=proportion(statuses != Status.OK),
-        utility=_spread(utility),
-        objectives=tuple(_spread(column) for column in values.T),
-    )
-
-
-def _spread(values: Floats) -> Spread:
+def _spread(values: Floats) -> SpreadView:
     """values (1 + n,), the nominal world first; NaN or +inf for a failed simulation."""
     nominal, drawn = float(values[0]), values[1:]
     failed = ~np.isfinite(drawn)
-    filled = np.where(failed, np.inf, drawn)
-    quantiles = np.quantile(filled, QUANTILES, method="inverted_cdf").tolist()
-    worst = math.nan if failed.all() else float(drawn[~failed].max())
+    quantiles = np.quantile(np.where(failed, np.inf, drawn), QUANTILES, method="inverted_cdf")
+    worst = cvar = math.nan
+    if not failed.all():
+        worst = float(drawn[~failed].max())
+        cvar = conditional_value_at_risk(np.where(failed, worst, drawn))
     tail = (1.0 - LEVEL) * len(drawn)
-    return Spread(
-        quantiles=tuple(quantiles),
+    return SpreadView(
+        quantiles=quantiles.tolist(),
         worst=worst,
-        cvar=math.nan
-        if failed.all()
-        else conditional_value_at_risk(np.where(failed, worst, drawn)),
+        cvar=cvar,
         tail_failed=min(1.0, int(failed.sum()) / max(tail, 1.0)),
-        nominal=nominal if math.isfinite(nominal) else math.nan,
+        nominal=nominal,
     )
 
 
 def _worst(
-    spec: CertificateSpec,
-    taken: EvaluationColumns,
-    log_utilities: Floats,
-    fitness: Floats,
-    most: int,
-) -> tuple[WorldOutcome, ...]:
-    failed = taken.failed[1:]
+    job_id: str, spec: CertificateSpec, taken: EvaluationColumns, judged: Judgement, most: int
+) -> list[WorldView]:
+    failed, logarithms = taken.failed[1:], judged.log_utilities
     # The last key sorts first; ties keep their order.
-    order = np.lexsort((-fitness[1:], -failed.sum(axis=1)))[:most]
+    order = np.lexsort((-judged.fitness[1:], -failed.sum(axis=1)))[:most]
     space, names = spec.design_space(), spec.case_names
     drawn = set(spec.world_space().names)
-    nominal = np.where(np.isfinite(log_utilities[0]), log_utilities[0], 0.0)
+    nominal = np.where(np.isfinite(logarithms[0]), logarithms[0], 0.0)
     results = []
-    for index in order.tolist():
-        row = index + 1
-        failures = tuple(
-            (names[k], Status(int(taken.statuses[row, k]))) for k in np.flatnonzero(failed[index])
-        )
+    for world in order.tolist():
+        row = world + 1
+        failures = {
+            names[k]: Status(int(taken.statuses[row, k])).label
+            for k in np.flatnonzero(failed[world])
+        }
+        scenario = next(iter(failures), names[int(np.argmax(logarithms[row] - nominal))])
+        shown = space.shown(taken.designs[row].tolist())
         results.append(
-            WorldOutcome(
-                index=index,
+            WorldView(
+                world=world,
                 iteration=int(taken.iteration[row]),
                 particle=int(taken.particle[row]),
-                fitness=float(fitness[row]),
+                fitness=float(judged.fitness[row]),
                 failures=failures,
-                scenario=failures[0][0]
-                if failures
-                else names[int(np.argmax(log_utilities[row] - nominal))],
-                values={
-                    name: value
-                    for name, value in space.shown(taken.designs[row].tolist()).items()
-                    if name in drawn
-                },
+                scenario=scenario,
+                values={name: value for name, value in shown.items() if name in drawn},
+                replay=f"gaitswarm certify {job_id} --replay {world} --scenarios {scenario}",
             )
         )
-    return tuple(results)
+    return results
 
 
-def _influences(spec: CertificateSpec, worlds: Floats, fitness: Floats) -> tuple[Influence, ...]:
+def _influences(spec: CertificateSpec, worlds: Floats, fitness: Floats) -> list[InfluenceView]:
     """worlds: (n, v) drawn values."""
     results = []
     for j, variable in enumerate(spec.world_space().variables):
@@ -356,10 +385,11 @@ def _influences(spec: CertificateSpec, worlds: Floats, fitness: Floats) -> tuple
             continue
         correlation = spearman(worlds[:, j], fitness)
         if not math.isnan(correlation):
+            low, high = _interval(correlation, len(worlds))
             results.append(
-                Influence(variable.name, correlation, *_interval(correlation, len(worlds)))
+                InfluenceView(name=variable.name, correlation=correlation, low=low, high=high)
             )
-    return tuple(sorted(results, key=lambda influence: -abs(influence.correlation)))
+    return sorted(results, key=lambda influence: -abs(influence.correlation))
 
 
 def _interval(correlation: float, n: int) -> tuple[float, float]:

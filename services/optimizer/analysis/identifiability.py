@@ -8,18 +8,19 @@ intervals here are over all runs, with each run's good designs relative to its o
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from gaitswarm.services.optimizer.errors import Conflict, InvalidRequest
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.job import Job
-from gaitswarm.services.optimizer.jobs.spec import DECISIVE, Spec
+from gaitswarm.services.optimizer.jobs.spec import Spec
 from gaitswarm.services.optimizer.search.pso import PsoSettings
+from gaitswarm.services.optimizer.views import Finite, View
 from gaitswarm.sim.variables import Variable
 
 Floats = NDArray[np.float64]
@@ -39,11 +40,6 @@ class Trust(StrEnum):
     ROUGH = "rough"
     UNKNOWN = "unknown"
 
-    @property
-    def phrase(self) -> str:
-        """Explanation in one sentence."""
-        return _PHRASES[self]
-
 
 _PHRASES: Final = {
     Trust.TRUSTED: "all runs agree on a small part of the range",
@@ -52,107 +48,126 @@ _PHRASES: Final = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class ChoiceEvidence:
-    """Evidence for one choice of a categorical variable.
+class IntervalView(View):
+    """Values of a parameter among designs within a threshold, in the parameter's unit."""
 
-    Attributes:
-        fitness: each run's least fitness with this choice, +inf if there is none.
-        remains: whether any run's equally good designs include it.
-    """
-
-    name: str
-    fitness: tuple[float, ...]
-    remains: bool
+    low: float = Field(description="Least of them.", examples=[10.9])
+    high: float = Field(description="Greatest of them.", examples=[11.3])
 
 
-@dataclass(frozen=True, slots=True)
-class ParameterIdentifiability:
-    """One parameter over all runs.
+class ChoiceView(View):
+    """One choice of a categorical parameter."""
 
-    Attributes:
-        variable: with the bounds of the search.
-        best: value in the best design of all runs; for a categorical variable the index of a
-            choice.
-        bests: value in each run's best design.
-        intervals: least and greatest value at each of `THRESHOLDS`.
-        trust: None for a single run.
-        choices: of a categorical variable.
-    """
-
-    variable: Variable
-    best: float
-    bests: tuple[float, ...]
-    intervals: tuple[tuple[float, float], ...]
-    trust: Trust | None
-    choices: tuple[ChoiceEvidence, ...] = ()
-
-    @property
-    def explanation(self) -> str | None:
-        """Explanation of the trust in one sentence; None without any."""
-        if self.trust is None or not self.choices:
-            return None if self.trust is None else self.trust.phrase
-        remaining = [choice.name for choice in self.choices if choice.remains]
-        if self.trust is Trust.TRUSTED:
-            return f"only the choice {remaining[0]} comes close to the best"
-        if self.trust is Trust.ROUGH:
-            return f"undecided between {', '.join(remaining)}; the others are worse"
-        return "every choice comes close to the best: these walks do not determine it"
-
-    def width(self, threshold: float = DECISIVE) -> float:
-        """Return the width of an interval as a share of the searched range [1]."""
-        low, high = self.intervals[THRESHOLDS.index(threshold)]
-        return (high - low) / (self.variable.high - self.variable.low)
+    name: str = Field(description="Name of the choice.", examples=["stick"])
+    fitness: Finite = Field(
+        description="Least fitness of all runs among designs with it; null if all failed, or none"
+        " was tried.",
+        examples=[0.84],
+    )
+    by_run: list[Finite] = Field(description="The same of each run.", examples=[[0.84, None]])
+    remains: bool = Field(
+        description="Whether a run has it among the designs that count as good as its best: within"
+        " 5 %, of a calibration those whose sum of squared differences, in tolerances, is at most 4"
+        " (times the best fitness squared, if that is above 1) greater."
+    )
 
 
-@dataclass(frozen=True, slots=True)
-class Identifiability:
-    """Identifiability of all searched parameters.
+class ParameterView(View):
+    """One parameter over all runs."""
 
-    Attributes:
-        fitness: each run's least fitness.
-        designs: number of designs of all runs within each of `THRESHOLDS`.
-    """
+    name: str = Field(description="Name of the variable.", examples=["battery_voltage"])
+    unit: str = Field(description="Its unit.", examples=["V"])
+    low: float = Field(description="Lower bound of the search.", examples=[8.0])
+    high: float = Field(description="Upper bound of the search.", examples=[13.0])
+    best: float | str = Field(
+        description="Value in the best design of all runs, of a categorical parameter a choice.",
+        examples=[11.1],
+    )
+    bests: list[float | str] = Field(
+        description="Value in each run's best design.", examples=[[11.1, 11.2, 11.0]]
+    )
+    intervals: list[IntervalView] = Field(
+        description="One for each of `thresholds`, over all runs; of a categorical parameter"
+        " indices of choices."
+    )
+    choices: list[ChoiceView] = Field(description="Those of a categorical parameter; else none.")
+    trust: Trust | None = Field(
+        description="Agreement of the runs among designs as good as their best (see `remains` of"
+        " choices): within 15 %, within 35 %, or not within 35 % of the searched range; of a"
+        " categorical parameter on one choice, on some, or on none; null for a single run."
+    )
+    explanation: str | None = Field(
+        description="The same in a sentence.",
+        examples=["all runs agree on a small part of the range"],
+    )
 
-    fitness: tuple[float, ...]
-    designs: tuple[int, ...]
-    parameters: tuple[ParameterIdentifiability, ...]
+
+class IdentifiabilityView(View):
+    """How runs of one problem, that differ in their seed, converge (thesis fig. 2.14)."""
+
+    jobs: list[str] = Field(description="The runs.", examples=[["k2q7zr5dm9xw"]])
+    fitness: list[float] = Field(description="Each run's least fitness.", examples=[[0.0312]])
+    thresholds: list[float] = Field(
+        description="Distances from a run's best fitness, as shares of it [1]."
+    )
+    designs: list[int] = Field(description="Number of designs of all runs within each of them.")
+    parameters: list[ParameterView] = Field(description="Every variable that was searched.")
 
 
 def identifiability(
+    job_ids: Sequence[str],
     variables: Sequence[Variable],
     runs: Sequence[EvaluationColumns],
-    as_good_as: Callable[[float], float] = lambda fitness: fitness * (1.0 + DECISIVE),
-) -> Identifiability:
-    if not runs or not all(np.isfinite(run.fitness).any() for run in runs):
-        raise ValueError("every run must have a design that did not fail")
+    as_good_as: Callable[[float], float],
+) -> IdentifiabilityView:
+    """Compare runs of one problem, each with a design that did not fail."""
     best = [int(np.argmin(run.fitness)) for run in runs]
-    fitness = tuple(float(run.fitness[row]) for run, row in zip(runs, best, strict=True))
+    fitness = [float(run.fitness[row]) for run, row in zip(runs, best, strict=True)]
     overall = int(np.argmin(fitness))
     within = [
         [run.fitness <= least * (1.0 + threshold) for run, least in zip(runs, fitness, strict=True)]
         for threshold in THRESHOLDS
     ]
     near = [run.fitness <= as_good_as(least) for run, least in zip(runs, fitness, strict=True)]
+
+    def interval(column: int, good: Sequence[NDArray[np.bool_]]) -> IntervalView:
+        values = [run.designs[rows, column] for run, rows in zip(runs, good, strict=True)]
+        together = np.concatenate(values)
+        return IntervalView(low=float(together.min()), high=float(together.max()))
+
     parameters = []
     for column, variable in enumerate(variables):
-        bests = tuple(float(run.designs[row, column]) for run, row in zip(runs, best, strict=True))
-        intervals = tuple(
-            _interval([run.designs[rows, column] for run, rows in zip(runs, good, strict=True)])
-            for good in within
-        )
-        parameter = ParameterIdentifiability(
-            variable, bests[overall], bests, intervals, None, _choices(variable, column, runs, near)
-        )
+        bests = [
+            variable.shown(float(run.designs[row, column]))
+            for run, row in zip(runs, best, strict=True)
+        ]
+        choices = _choices(variable, column, runs, near)
+        trust = None
         if len(runs) > 1:
-            low, high = _interval(
-                [run.designs[rows, column] for run, rows in zip(runs, near, strict=True)]
+            equally_good = interval(column, near)
+            width = (equally_good.high - equally_good.low) / (variable.high - variable.low)
+            trust = _trust(choices, width)
+        parameters.append(
+            ParameterView(
+                name=variable.name,
+                unit=variable.unit,
+                low=variable.low,
+                high=variable.high,
+                best=bests[overall],
+                bests=bests,
+                intervals=[interval(column, good) for good in within],
+                choices=choices,
+                trust=trust,
+                explanation=None if trust is None else _explanation(trust, choices),
             )
-            width = (high - low) / (variable.high - variable.low)
-            parameter = replace(parameter, trust=_trust(parameter, width))
-        parameters.append(parameter)
-    designs = tuple(int(sum(rows.sum() for rows in good)) for good in within)
-    return Identifiability(fitness, designs, tuple(parameters))
+        )
+    return IdentifiabilityView(
+        jobs=list(job_ids),
+        fitness=fitness,
+        thresholds=list(THRESHOLDS),
+        designs=[int(sum(rows.sum() for rows in good)) for good in within],
+        parameters=parameters,
+    )
 
 
 def check_comparable(jobs: Sequence[Job]) -> None:
@@ -187,37 +202,43 @@ def _problem(spec: Spec) -> Spec:
     )
 
 
-def _interval(values: Sequence[Floats]) -> tuple[float, float]:
-    together = np.concatenate(values)
-    return float(together.min()), float(together.max())
-
-
 def _choices(
     variable: Variable,
     column: int,
     runs: Sequence[EvaluationColumns],
     near: Sequence[NDArray[np.bool_]],
-) -> tuple[ChoiceEvidence, ...]:
+) -> list[ChoiceView]:
     """Empty for a variable that is not categorical. near: of each run, its equally good designs."""
     choices = []
     for index, name in enumerate(variable.choices):
         chosen = [run.designs[:, column] == index for run in runs]
-        least = tuple(
+        least = [
             float(run.fitness[rows].min(initial=np.inf))
             for run, rows in zip(runs, chosen, strict=True)
-        )
+        ]
         remains = any(bool((a & b).any()) for a, b in zip(chosen, near, strict=True))
-        choices.append(ChoiceEvidence(name, least, remains))
-    return tuple(choices)
+        choices.append(ChoiceView(name=name, fitness=min(least), by_run=least, remains=remains))
+    return choices
 
 
-def _trust(parameter: ParameterIdentifiability, width: float) -> Trust:
+def _trust(choices: Sequence[ChoiceView], width: float) -> Trust:
     """width: of the interval of equally good designs, as a share of the range."""
-    if parameter.choices:
-        remaining = sum(choice.remains for choice in parameter.choices)
-        if remaining == len(parameter.choices):
+    if choices:
+        remaining = sum(choice.remains for choice in choices)
+        if remaining == len(choices):
             return Trust.UNKNOWN
         return Trust.TRUSTED if remaining == 1 else Trust.ROUGH
     if width > _ROUGH:
         return Trust.UNKNOWN
     return Trust.TRUSTED if width <= _TRUSTED else Trust.ROUGH
+
+
+def _explanation(trust: Trust, choices: Sequence[ChoiceView]) -> str:
+    if not choices:
+        return _PHRASES[trust]
+    remaining = [choice.name for choice in choices if choice.remains]
+    if trust is Trust.TRUSTED:
+        return f"only the choice {remaining[0]} comes close to the best"
+    if trust is Trust.ROUGH:
+        return f"undecided between {', '.join(remaining)}; the others are worse"
+    return "every choice comes close to the best: these walks do not determine it"

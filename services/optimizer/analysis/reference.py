@@ -9,13 +9,20 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from pydantic import Field
 
 from gaitswarm.services.optimizer.errors import StoreUnavailable
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.provenance import changes_since, job_provenance
-from gaitswarm.services.optimizer.jobs.reference import START, Reference, reference_design
+from gaitswarm.services.optimizer.jobs.reference import (
+    START,
+    Reference,
+    ReferenceKind,
+    reference_design,
+)
 from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.services.optimizer.views import Finite, JobName, View
 from gaitswarm.sim.case import Walk, run_together
 from gaitswarm.sim.errors import SimulationError
 from gaitswarm.sim.outcome import Status
@@ -33,6 +40,43 @@ _JUDGED_BY: Final = frozenset(
 """Fields of a spec on which a reference depends."""
 
 _log = logging.getLogger(__name__)
+
+
+class ReferenceView(View):
+    """The design that a job's best is compared with."""
+
+    name: str = Field(
+        description="Study or preference for which it was published, or `start design`.",
+        examples=["A"],
+    )
+    kind: ReferenceKind = Field(
+        default="published",
+        description="`published`, or for a custom robot `start`: the middle of the job's bounds.",
+    )
+    fitness: Finite = Field(
+        description="By the job's measure, in double precision [1]; null if it fails.",
+        examples=[20.93],
+    )
+
+    @classmethod
+    def from_reference(cls, reference: Reference | None) -> ReferenceView | None:
+        """Return None without a reference."""
+        if reference is None or reference.name is None:
+            return None
+        return cls.model_validate(reference)
+
+
+class JobReferenceView(View):
+    """A job's best design compared with its reference."""
+
+    id: JobName
+    reference: ReferenceView | None = Field(description="The published or the start design.")
+    best_fitness: Finite = Field(description="Least fitness of the job so far [1].")
+    gain: Finite = Field(
+        description="Relative improvement over the reference [1]; null if undefined.",
+        examples=[0.39],
+    )
+    reason: str | None = Field(description="Why there is no gain, in words; null if there is one.")
 
 
 def walked_reference(spec: Spec) -> Reference:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation
 from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
-from gaitswarm.sim.calibration.targets import Target
+from gaitswarm.services.optimizer.views import DesignValues, Finite, IterationIndex, Particle, View
 from gaitswarm.sim.outcome import Status
 
 Floats = NDArray[np.float64]
@@ -22,68 +22,63 @@ LeaveOut = Literal["target", "walk"]
 """What is left out together: one target, or all targets of a walk."""
 
 
-@dataclass(frozen=True, slots=True)
-class Reached:
-    """A design's result for one target.
+class ReachedView(View):
+    """Simulated value of one target."""
 
-    Attributes:
-        simulated: in the target's unit.
-        difference: in tolerances; see `CalibrationSpec.differences`.
-    """
-
-    simulated: float
-    difference: float
+    simulated: Finite = Field(description="In the target's unit; null if its simulation failed.")
+    difference: Finite = Field(
+        description="From the target's value, in tolerances: ln(simulated / value) /"
+        " ln(1 + tolerance), of height_loss (simulated - value) / tolerance.",
+        examples=[0.69],
+    )
 
 
-@dataclass(frozen=True, slots=True)
-class TargetResult:
-    """One target over all runs.
+class TargetResultView(ReachedView):
+    """One target and the best design's value."""
 
-    Attributes:
-        best: of the best design of all runs; NaN if its walk failed (only for targets that are not
-            fitted).
-        left_out: of the best design without this target; None if not requested, if the target is
-            not fitted, or if no target would remain.
-    """
+    walk: str = Field(description="Label of the simulation.", examples=["fuzzy-pso-ps"])
+    relative_to: str | None = Field(
+        description="Simulation that the value is the ratio to; null for a value of its own."
+    )
+    quantity: str = Field(description="Measured quantity.", examples=["energy"])
+    unit: str = Field(description="Unit of the value; 1 for a ratio.", examples=["J/m"])
+    value: float = Field(description="The target.", examples=[41.96])
+    tolerance: float = Field(description="Relative tolerance; of height_loss in metres.")
+    use: str = Field(description="fit, or predict for one that is only compared.", examples=["fit"])
+    left_out: ReachedView | None = Field(
+        description="Value of the design that is best without this target; null if that was"
+        " not requested, the target is not fitted, or no other target is."
+    )
 
-    target: Target
-    best: Reached
-    left_out: Reached | None
 
+class TargetsView(View):
+    """Targets reached by the best design of several runs of a calibration."""
 
-@dataclass(frozen=True, slots=True)
-class TargetResults:
-    """All targets, for the best design of all runs.
-
-    Attributes:
-        run: index of the run that found it.
-        design: (v,) as stored.
-        fitness: root mean square over fitted targets, in tolerances.
-    """
-
-    run: int
-    iteration: int
-    particle: int
-    design: Floats
-    fitness: float
-    targets: tuple[TargetResult, ...]
+    jobs: list[str] = Field(description="The runs.", examples=[["k2q7zr5dm9xw"]])
+    job: str = Field(description="The run of the best design.", examples=["k2q7zr5dm9xw"])
+    iteration: IterationIndex
+    particle: Particle
+    fitness: float = Field(
+        description="Root mean square of the differences of fitted targets, in tolerances [1].",
+        examples=[0.84],
+    )
+    design: DesignValues
+    targets: list[TargetResultView] = Field(description="Every target, in the job's order.")
 
 
 def target_results(
+    job_ids: Sequence[str],
     spec: CalibrationSpec,
     runs: Sequence[EvaluationColumns],
     leave_out: LeaveOut | None = None,
     *,
     bests: Sequence[Evaluation] | None = None,
-) -> TargetResults:
-    """Compare the best design of all runs with the targets.
+) -> TargetsView:
+    """Compare the best design of all runs with the targets; bests: those in double precision.
 
     Left-out targets are predicted from stored objectives: the design that is best without them
     gives the prediction. Nothing is simulated.
     """
-    fitness = np.concatenate([run.fitness for run in runs])
-    if not np.isfinite(fitness).any():
-        raise ValueError("every design has failed")
     simulated = np.concatenate([spec.simulated(r.objectives, r.failed) for r in runs])
     differences = spec.differences(simulated)
     best = _best_of_all(runs) if bests is None else _best_in_double(bests)
@@ -92,24 +87,40 @@ def target_results(
     results = []
     for index, target in enumerate(spec.targets):
         left_out = None
-        if leave_out is not None and target.use == "fit":
-            remaining = spec.fitted & ~_left_out(spec, index, leave_out)
-            chosen = _best_by(differences[:, remaining]) if remaining.any() else None
-            if chosen is not None:
-                left_out = _reached(simulated, differences, chosen, index)
-        results.append(TargetResult(target, _reached(of_best, off, 0, index), left_out))
-    return TargetResults(
-        run=best.run,
+        remaining = spec.fitted & ~_left_out(spec, index, leave_out)
+        if leave_out is not None and target.use == "fit" and remaining.any():
+            squares = np.square(differences[:, remaining]).sum(axis=1)
+            row = int(np.argmin(squares))
+            if math.isfinite(squares[row]):
+                left_out = ReachedView(
+                    simulated=simulated[row, index], difference=differences[row, index]
+                )
+        results.append(
+            TargetResultView(
+                simulated=of_best[0, index],
+                difference=off[0, index],
+                walk=target.walk,
+                relative_to=target.relative_to,
+                quantity=target.quantity,
+                unit=target.unit,
+                value=target.value,
+                tolerance=target.tolerance,
+                use=target.use,
+                left_out=left_out,
+            )
+        )
+    return TargetsView(
+        jobs=list(job_ids),
+        job=job_ids[best.run],
         iteration=best.iteration,
         particle=best.particle,
-        design=best.design,
         fitness=best.fitness,
-        targets=tuple(results),
+        design=spec.design_space().shown(best.design.tolist()),
+        targets=results,
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _Best:
+class _Best(NamedTuple):
     """The best design of all runs; see `Evaluation`."""
 
     run: int
@@ -123,50 +134,32 @@ class _Best:
 
 def _best_of_all(runs: Sequence[EvaluationColumns]) -> _Best:
     run = int(np.argmin([columns.fitness.min(initial=math.inf) for columns in runs]))
-    found = runs[run]
-    row = int(np.argmin(found.fitness))
+    columns = runs[run]
+    row = int(np.argmin(columns.fitness))
     return _Best(
         run,
-        int(found.iteration[row]),
-        int(found.particle[row]),
-        found.designs[row],
-        found.objectives[row],
-        found.statuses[row],
-        float(found.fitness[row]),
+        int(columns.iteration[row]),
+        int(columns.particle[row]),
+        columns.designs[row],
+        columns.objectives[row],
+        columns.statuses[row],
+        float(columns.fitness[row]),
     )
 
 
 def _best_in_double(bests: Sequence[Evaluation]) -> _Best:
     reevaluations = [best.reevaluation for best in bests]
     judged = [(a.fitness, run, a) for run, a in enumerate(reevaluations) if a is not None]
-    fitness, run, found = min(judged, key=lambda entry: entry[:2])
+    fitness, run, result = min(judged, key=lambda entry: entry[:2])
     best = bests[run]
-    return _Best(
-        run,
-        best.iteration,
-        best.particle,
-        best.design,
-        found.objectives,
-        found.statuses,
-        fitness,
-    )
+    place = (run, best.iteration, best.particle)
+    return _Best(*place, best.design, result.objectives, result.statuses, fitness)
 
 
-def _left_out(spec: CalibrationSpec, index: int, leave_out: LeaveOut) -> NDArray[np.bool_]:
+def _left_out(spec: CalibrationSpec, index: int, leave_out: LeaveOut | None) -> NDArray[np.bool_]:
     """(T,) mask of the targets left out together with one."""
-    if leave_out == "target":
-        return np.array([k == index for k in range(len(spec.targets))], dtype=np.bool_)
+    if leave_out != "walk":
+        return np.asarray(np.arange(len(spec.targets)) == index)
     walk = spec.targets[index].walk
     together = [walk in (target.walk, target.relative_to) for target in spec.targets]
     return np.array(together, dtype=np.bool_)
-
-
-def _best_by(differences: Floats) -> int | None:
-    """Row of the least sum of squares; None if all failed."""
-    squares = np.square(differences).sum(axis=1)
-    row = int(np.argmin(squares))
-    return row if math.isfinite(squares[row]) else None
-
-
-def _reached(simulated: Floats, differences: Floats, row: int, column: int) -> Reached:
-    return Reached(float(simulated[row, column]), float(differences[row, column]))

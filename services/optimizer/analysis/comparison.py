@@ -1,0 +1,218 @@
+"""Comparison of jobs: convergence, distributions and differences of specs"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from gaitswarm.services.optimizer.analysis.reference import ReferenceView
+from gaitswarm.services.optimizer.jobs.iteration import Iteration
+from gaitswarm.services.optimizer.jobs.job import Job, JobState
+from gaitswarm.services.optimizer.views import Finite, JobName, View
+from gaitswarm.sim.scenario import Scenario
+from gaitswarm.sim.variables import Variable
+
+MOST_JOBS: Final = 12
+"""Jobs that can be compared at once."""
+
+POINTS: Final = 400
+"""Iterations of a job that are listed at most."""
+
+_SHARES: Final = np.linspace(0.0, 1.0, 101)
+
+_MEASURE: Final = {"kind", "robot", "scenarios", "preference", "worlds", "recordings", "targets"}
+"""Fields of a spec that define fitness."""
+
+
+class ConvergenceView(View):
+    """Convergence of a job: some of its iterations, the last among them."""
+
+    id: JobName
+    iterations: list[int] = Field(description="Index of each of them, from 0.", examples=[[0, 24]])
+    evaluations: list[int] = Field(description="Designs evaluated by then.", examples=[[25, 625]])
+    seconds: list[float] = Field(description="Time of evaluation by then [s].")
+    best_so_far: list[Finite] = Field(
+        description="Least fitness by then; null while every design has failed.",
+        examples=[[31.0, 17.2]],
+    )
+
+
+class ConvergencesView(View):
+    """Convergence of several jobs."""
+
+    items: list[ConvergenceView] = Field(
+        description="Jobs in the requested order, without deleted ones."
+    )
+
+
+class ComparedJobView(View):
+    """One of several jobs."""
+
+    id: JobName
+    name: str = Field(description="Name of the job.", examples=["chapter 4, preference A"])
+    state: JobState = Field(description="Its state.", examples=["succeeded"])
+    best_fitness: Finite = Field(description="Least fitness so far.", examples=[17.2])
+    reference: ReferenceView | None = Field(
+        default=None, description="Published design that it is compared with, once known."
+    )
+    gain: Finite = Field(
+        default=None,
+        description="Relative improvement of `best_fitness` over that of `reference` [1]; null if"
+        " undefined.",
+        examples=[0.39],
+    )
+    evaluations: int = Field(description="Designs evaluated so far.", examples=[625])
+    failed: int = Field(description="Of these, those that failed.", examples=[12])
+    convergence: ConvergenceView = Field(description="Its convergence.")
+    shares: list[float] = Field(
+        description="Shares of its designs that succeed in every case, rising from 0 to 1 [1].",
+        examples=[[0.0, 0.5, 1.0]],
+    )
+    fitness: list[float] = Field(
+        description="Quantile of the fitness at each of these shares.",
+        examples=[[17.2, 25.1, 310.0]],
+    )
+
+
+class SpecDifferenceView(View):
+    """A difference between the specs of jobs, names aside."""
+
+    field: str = Field(
+        description="Path of the field. A variable is one, as is a scenario that some specs lack.",
+        examples=["optimizer.particles"],
+    )
+    values: list[str | None] = Field(
+        description="As JSON, by job; null where a spec has none. Of a variable its range in words;"
+        " of a scenario that some specs lack its values that are not defaults.",
+        examples=[["25", "50"]],
+    )
+
+
+class JobComparisonView(View):
+    """Comparison of jobs, without simulation."""
+
+    jobs: list[ComparedJobView] = Field(description="In the requested order.")
+    differences: list[SpecDifferenceView] = Field(description="Fields whose values differ.")
+    comparable: bool = Field(
+        description="Whether all have the same measure: kind, robot, scenarios, preference and"
+        " worlds. If not, their fitness is not the same quantity."
+    )
+
+
+def comparison(
+    jobs: Sequence[Job],
+    fitness: Sequence[NDArray[np.float64]],
+    convergences: Sequence[ConvergenceView],
+) -> JobComparisonView:
+    """Compare jobs by the fitness (r,) of their designs, +inf for failed ones."""
+    differences = list(_differences([job.spec.model_dump(mode="json") for job in jobs]))
+    return JobComparisonView(
+        jobs=[_compared(*parts) for parts in zip(jobs, fitness, convergences, strict=True)],
+        differences=differences,
+        comparable=_MEASURE.isdisjoint(d.field.split(".")[0] for d in differences),
+    )
+
+
+def _compared(
+    job: Job, fitness: NDArray[np.float64], convergence: ConvergenceView
+) -> ComparedJobView:
+    finite = fitness[np.isfinite(fitness)]
+    return ComparedJobView(
+        id=job.id,
+        name=job.name,
+        state=job.state,
+        best_fitness=job.progress.best_fitness,
+        reference=ReferenceView.from_reference(job.reference),
+        gain=job.gain,
+        evaluations=len(fitness),
+        failed=len(fitness) - len(finite),
+        convergence=convergence,
+        shares=_SHARES.tolist() if len(finite) else [],
+        fitness=np.quantile(finite, _SHARES).tolist() if len(finite) else [],
+    )
+
+
+def convergence(job_id: str, iterations: Sequence[Iteration], points: int) -> ConvergenceView:
+    """Thin a job's iterations to some points."""
+    count = len(iterations)
+    evaluations = np.cumsum([i.designs for i in iterations], dtype=np.int64)
+    seconds = np.cumsum([i.evaluate_seconds for i in iterations], dtype=np.float64)
+    rows = np.unique(np.linspace(0, count - 1, min(points, count)).round().astype(int))
+    return ConvergenceView(
+        id=job_id,
+        iterations=[iterations[k].index for k in rows],
+        evaluations=evaluations[rows].tolist(),
+        seconds=seconds[rows].tolist(),
+        best_so_far=[iterations[k].best_so_far for k in rows],
+    )
+
+
+def _differences(documents: Sequence[dict[str, Any]]) -> Iterator[SpecDifferenceView]:
+    items = [set(_items(document, "")) for document in documents]
+    lacked = items[0].union(*items) - items[0].intersection(*items)
+    flat = [dict(_leaves(document, "", lacked)) for document in documents]
+    fields = dict.fromkeys(field for document in flat for field in document)
+    # Names are shown with the jobs.
+    fields.pop("name", None)
+    rooms = list(dict.fromkeys(field.split(".")[0] for field in fields))
+    for field in sorted(fields, key=lambda field: rooms.index(field.split(".")[0])):
+        values = [document.get(field) for document in flat]
+        if len(set(values)) > 1:
+            yield SpecDifferenceView(field=field, values=values)
+
+
+def _items(value: Any, path: str) -> Iterator[str]:
+    """Paths of the items of lists that have names."""
+    for inner, item, named in _parts(value, path):
+        if named:
+            yield inner
+        yield from _items(item, inner)
+
+
+def _leaves(value: Any, path: str, lacked: set[str]) -> Iterator[tuple[str, str]]:
+    """Fields by path; variables, and items that some specs lack, as one value."""
+    parts = list(_parts(value, path))
+    for inner, item, named in parts:
+        if named and path == "variables":
+            yield inner, Variable.model_validate(item).range_in_words
+        elif named and inner in lacked:
+            yield inner, _json(_content(item, path))
+        else:
+            yield from _leaves(_rest(item) if named else item, inner, lacked)
+    if not parts:
+        yield path, _json(value)
+
+
+def _parts(value: Any, path: str) -> Iterator[tuple[str, Any, bool]]:
+    """(path, part, whether it is of a list) of an object, or of a list of objects with names."""
+    if isinstance(value, dict):
+        for name, part in value.items():
+            yield f"{path}.{name}" if path else name, part, False
+    elif isinstance(value, list) and all(_named(item) for item in value):
+        for item in value:
+            yield f"{path}.{item['name']}", item, True
+
+
+def _content(item: dict[str, Any], path: str) -> dict[str, Any]:
+    """Content of a list's item; of a scenario its values that are not defaults."""
+    if path == "scenarios":
+        item = Scenario.model_validate(item).model_dump(mode="json", exclude_defaults=True)
+    return _rest(item)
+
+
+def _rest(item: dict[str, Any]) -> dict[str, Any]:
+    """Fields of a list's item other than its name."""
+    return {name: part for name, part in item.items() if name != "name"} or item
+
+
+def _json(value: Any) -> str:
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _named(item: Any) -> bool:
+    return isinstance(item, dict) and isinstance(item.get("name"), str)

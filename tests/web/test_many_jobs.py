@@ -98,7 +98,7 @@ def test_paging_reaches_every_job(
     expect(page.locator("[data-job]")).to_have_count(3)
     page.reload()
     expect(page.locator("[data-job]")).to_have_count(3)
-    expect(page.locator("[data-chosen='1']")).to_be_visible()
+    expect(page.locator("[data-selected-jobs='1']")).to_be_visible()
     page.get_by_role("button", name="Previous").click()
     expect(page.locator("[data-job]")).to_have_count(50)
     page.go_back()

@@ -94,7 +94,7 @@ def test_a_search_starts_from_the_best_of_a_job(
     # Forks created by other tests are loaded later and move the content below.
     page.wait_for_load_state("networkidle")
     page.get_by_role("link", name="Start from best design").click()
-    expect(page.locator(f"[data-chosen='{finished_job}']")).to_contain_text("fitness")
+    expect(page.locator(f"[data-item='{finished_job}']")).to_contain_text("fitness")
     page.goto(f"{page.url},nosuchjob")
     jobs = page.get_by_label("Best designs of jobs")
     page.get_by_role("button", name="Submit the job").click()

@@ -10,16 +10,16 @@ export interface Tab<K extends string> {
 
 export function Tabs<K extends string>({
   tabs,
-  chosen,
+  selected,
   onChoose,
   label,
   children,
 }: {
   tabs: readonly Tab<K>[]
-  chosen: K
+  selected: K
   onChoose: (key: K) => void
   label: string
-  /** Panel of the chosen tab. */
+  /** Panel of the selected tab. */
   children: ComponentChildren
 }) {
   const id = useId()
@@ -27,7 +27,7 @@ export function Tabs<K extends string>({
     const step = event.key === 'ArrowRight' ? 1 : event.key === 'ArrowLeft' ? -1 : 0
     if (step === 0) return
     event.preventDefault()
-    const at = tabs.findIndex((tab) => tab.key === chosen)
+    const at = tabs.findIndex((tab) => tab.key === selected)
     const next = tabs[(at + step + tabs.length) % tabs.length]
     onChoose(next.key)
     document.getElementById(`${id}-${next.key}`)?.focus()
@@ -41,16 +41,16 @@ export function Tabs<K extends string>({
             type="button"
             role="tab"
             id={`${id}-${tab.key}`}
-            aria-selected={tab.key === chosen}
+            aria-selected={tab.key === selected}
             aria-controls={`${id}-panel`}
-            tabIndex={tab.key === chosen ? 0 : -1}
+            tabIndex={tab.key === selected ? 0 : -1}
             onClick={() => onChoose(tab.key)}
           >
             {tab.label}
           </button>
         ))}
       </div>
-      <div role="tabpanel" id={`${id}-panel`} aria-labelledby={`${id}-${chosen}`}>
+      <div role="tabpanel" id={`${id}-panel`} aria-labelledby={`${id}-${selected}`}>
         {children}
       </div>
     </>

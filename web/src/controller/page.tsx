@@ -99,7 +99,7 @@ function Outputs({ surface }: { surface: SurfaceView }) {
         <Tabs
           label="Outputs"
           tabs={outputs.map((each) => ({ key: each.name, label: `${each.name} [${each.unit}]` }))}
-          chosen={output.name}
+          selected={output.name}
           onChoose={setName}
         >
           {panel}

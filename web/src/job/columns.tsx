@@ -1,8 +1,8 @@
 /** Table columns and links that several tabs have. */
 
 import type { Job, Objective } from '../api/types'
-import { BrokenName } from '../components/broken-name'
 import type { Column } from '../components/table/table'
+import { BrokenName } from '../components/text'
 import { type Place, placeWord } from '../format/place'
 import { inWords } from '../format/words'
 import { jobPath, withQuery } from '../router/routes'

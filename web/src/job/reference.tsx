@@ -96,7 +96,7 @@ export function ReferencePicker({
   return (
     <Combobox
       label="Compare with"
-      chosenLabel={selected?.label ?? label ?? choice.slice(choice.indexOf(':') + 1)}
+      selected={selected?.label ?? label ?? choice.slice(choice.indexOf(':') + 1)}
       hint={tuning && !hasPublished ? NOT_PUBLISHED : undefined}
       groups={groups}
       remote={{

@@ -1,10 +1,9 @@
 /** Columns of the job list. */
 
 import type { JobSummary } from '../api/types'
-import { Progress } from '../components/progress'
-import { STATE_TONES, StateBadge } from '../components/state-badge'
+import { Progress, StateBadge } from '../components/state'
 import type { Column } from '../components/table/table'
-import { formatNumber, percent, quantity } from '../format/number'
+import { NONE, percent, quantity } from '../format/number'
 import { formatAge, formatDuration, formatMoment } from '../format/time'
 import { budgetSpent, spentInWords } from '../job/budget'
 import { fitnessUnit } from '../job/fitness'
@@ -16,55 +15,37 @@ import { Sparkline, type Sparklines } from './sparkline'
 interface Shared {
   readonly lines: Sparklines
   /** Ids of the selected jobs. */
-  readonly chosen: readonly string[]
-  readonly onChoose: (id: string, on: boolean) => void
+  readonly selected: readonly string[]
+  readonly onSelect: (id: string, on: boolean) => void
 }
 
 /** Columns sorted by the server. now: [ms], for ages. */
 export function jobColumns(
   now: number,
-  { lines, chosen, onChoose }: Shared,
+  { lines, selected, onSelect }: Shared,
 ): readonly Column<JobSummary>[] {
   return [
     {
-      key: 'choose',
-      label: 'Select',
-      cell: (job) => (
+      key: 'select',
+      cell: ({ id, name }) => (
         <input
           type="checkbox"
-          aria-label={`Select ${job.name || job.id}`}
-          checked={chosen.includes(job.id)}
-          onChange={(event) => onChoose(job.id, event.currentTarget.checked)}
+          aria-label={`Select ${name || id}`}
+          checked={selected.includes(id)}
+          onChange={(event) => onSelect(id, event.currentTarget.checked)}
         />
       ),
     },
-    {
-      key: 'name',
-      label: 'Name',
-      sortable: true,
-      header: true,
-      cell: (job) => <NameCell job={job} />,
-    },
-    {
-      key: 'state',
-      label: 'State',
-      sortable: true,
-      cell: (job) => <StateBadge state={job.state} />,
-    },
+    { key: 'name', sortable: true, header: true, cell: (job) => <NameCell job={job} /> },
+    { key: 'state', sortable: true, cell: ({ state }) => <StateBadge state={state} /> },
     {
       key: 'priority',
-      label: 'Priority',
       sortable: true,
       numeric: true,
       minor: true,
-      cell: (job) => String(job.priority),
+      cell: ({ priority }) => String(priority),
     },
-    {
-      key: 'iterations',
-      label: 'Iterations',
-      sortable: true,
-      cell: (job) => <ProgressCell job={job} />,
-    },
+    { key: 'iterations', sortable: true, cell: (job) => <ProgressCell job={job} /> },
     {
       key: 'fitness',
       label: 'Best fitness',
@@ -74,25 +55,24 @@ export function jobColumns(
     },
     {
       key: 'gain',
-      label: 'Gain',
       sortable: true,
       numeric: true,
-      cell: (job) => <GainCell job={job} />,
+      cell: ({ gain, reference }) =>
+        typeof gain === 'number' && reference ? (
+          <span title={`over ${referenceLabel(reference)}`}>{percent(gain, 3)}</span>
+        ) : (
+          NONE
+        ),
     },
-    {
-      key: 'line',
-      label: 'Convergence',
-      minor: true,
-      cell: (job) => <Sparkline line={lines.get(job.id)} />,
-    },
+    { key: 'convergence', minor: true, cell: ({ id }) => <Sparkline line={lines.get(id)} /> },
     {
       key: 'rate',
       label: 'Evaluations',
       sortable: true,
       unit: '1/s',
-      numeric: true,
+      digits: 3,
       minor: true,
-      cell: (job) => formatNumber(job.evaluations_per_second, 3),
+      value: (job) => job.evaluations_per_second,
     },
     {
       key: 'time_left',
@@ -100,7 +80,7 @@ export function jobColumns(
       sortable: true,
       numeric: true,
       minor: true,
-      cell: (job) => (job.state === 'succeeded' ? '–' : formatDuration(job.eta_seconds)),
+      cell: (job) => (job.state === 'succeeded' ? NONE : formatDuration(job.eta_seconds)),
     },
     {
       key: 'created',
@@ -108,60 +88,50 @@ export function jobColumns(
       sortable: true,
       numeric: true,
       minor: true,
-      cell: (job) => (
-        <time dateTime={job.created_at} title={`submitted ${formatMoment(job.created_at)}`}>
-          {formatAge(job.created_at, now)}
+      cell: ({ created_at }) => (
+        <time dateTime={created_at} title={`submitted ${formatMoment(created_at)}`}>
+          {formatAge(created_at, now)}
         </time>
       ),
     },
   ]
 }
 
-function GainCell({ job }: { job: JobSummary }) {
-  if (typeof job.gain !== 'number' || !job.reference) return '–'
-  return <span title={`over ${referenceLabel(job.reference)}`}>{percent(job.gain, 3)}</span>
-}
-
 function NameCell({ job }: { job: JobSummary }) {
-  const what = [job.kind === 'tuning' ? null : job.kind, job.controller]
-  const details = [job.name ? job.id : null, ...what].filter((part) => part)
+  const { id, name, kind, controller, lineage, tags = [], note, error } = job
+  const details = [name && id, kind !== 'tuning' && kind, controller].filter(Boolean)
   return (
     <div class="job-name">
-      <a href={jobPath(job.id)}>{job.name || job.id}</a>
+      <a href={jobPath(id)}>{name || id}</a>
       <span class="muted small">{details.join(' · ')}</span>
-      {job.lineage && (
+      {lineage && (
         <span class="muted small">
-          fork of <a href={jobPath(job.lineage.parent)}>{job.lineage.parent}</a>
+          fork of <a href={jobPath(lineage.parent)}>{lineage.parent}</a>
         </span>
       )}
-      {(job.tags ?? []).length > 0 && (
+      {tags.length > 0 && (
         <span class="small">
-          {(job.tags ?? []).map((tag) => (
+          {tags.map((tag) => (
             <span key={tag} class="tag">
               {tag}
             </span>
           ))}
         </span>
       )}
-      {job.note && <span class="muted small note">{job.note}</span>}
-      {job.error && <span class="wrong">{job.error}</span>}
+      {note && <span class="muted small note">{note}</span>}
+      {error && <span class="wrong">{error}</span>}
     </div>
   )
 }
 
 function ProgressCell({ job }: { job: JobSummary }) {
-  const tone = STATE_TONES[job.state]
   const spent = budgetSpent(job)
   const text = spentInWords(spent)
+  const label = `${text} ${spent.unit}`
   return (
     <div class="job-progress">
-      <span>{spent.unit === 'iterations' ? text : `${text} ${spent.unit}`}</span>
-      <Progress
-        done={spent.done}
-        planned={spent.planned}
-        label={`${text} ${spent.unit}`}
-        tone={tone === 'good' || tone === 'bad' ? tone : 'accent'}
-      />
+      <span>{spent.unit === 'iterations' ? text : label}</span>
+      <Progress done={spent.done} planned={spent.planned} label={label} state={job.state} />
     </div>
   )
 }

@@ -2,10 +2,19 @@
 
 import type { ComponentChildren } from 'preact'
 import type { JobFacets } from '../api/types'
+import { Check, Select } from '../components/fields/controls'
 import { formatCount } from '../format/number'
 import { capitalized } from '../format/words'
 import { setQuery } from '../router/navigation'
-import { FACETS, type Facet, FIRST_PAGE, type ListQuery, ORDERS, STATES } from './list-query'
+import {
+  FACETS,
+  type Facet,
+  FIRST_PAGE,
+  type ListQuery,
+  ORDERS,
+  type Order,
+  STATES,
+} from './list-query'
 
 /** Query changes that reset all filters. */
 export const NO_FILTER: Readonly<Record<string, null>> = {
@@ -50,27 +59,18 @@ export function Filters({
       {FACETS.map((facet) => (
         <FacetFilter key={facet} facet={facet} query={query} facets={facets} />
       ))}
-      <select
-        aria-label="Order"
+      <Select
+        hidden
+        label="Order"
         value={query.order}
-        onChange={(event) =>
-          setQuery({ ...FIRST_PAGE, order: event.currentTarget.value, reverse: null })
-        }
-      >
-        {Object.entries(ORDERS).map(([order, words]) => (
-          <option key={order} value={order}>
-            {words}
-          </option>
-        ))}
-      </select>
-      <label class="check small">
-        <input
-          type="checkbox"
-          checked={query.archived}
-          onChange={() => setQuery({ ...FIRST_PAGE, archived: query.archived ? null : '' })}
-        />
-        archived
-      </label>
+        options={Object.entries(ORDERS) as [Order, string][]}
+        onChoose={(order) => setQuery({ ...FIRST_PAGE, order, reverse: null })}
+      />
+      <Check
+        label="archived"
+        checked={query.archived}
+        onChange={(on) => setQuery({ ...FIRST_PAGE, archived: on ? '' : null })}
+      />
       <span class="muted small" aria-live="polite">
         {children}
       </span>
@@ -87,28 +87,24 @@ function FacetFilter({
   query: ListQuery
   facets: JobFacets | null
 }) {
-  const chosen = query[facet]
+  const selected = query[facet]
   const counts: Readonly<Record<string, number>> = facets?.[COUNTS[facet]] ?? {}
-  const names = facet === 'state' ? STATES.filter((s) => s in counts) : Object.keys(counts).sort()
-  const offered =
-    chosen === undefined || names.includes(chosen as never) ? names : [...names, chosen]
+  const names: string[] =
+    facet === 'state' ? STATES.filter((s) => s in counts) : Object.keys(counts).sort()
+  if (selected !== undefined && !names.includes(selected)) names.push(selected)
   // A single option cannot filter.
-  if (chosen === undefined && offered.length < 2 && facet !== 'state') return null
+  if (selected === undefined && names.length < 2 && facet !== 'state') return null
+  const total = facet === 'state' && facets ? ` (${formatCount(facets.total)})` : ''
   return (
-    <select
-      aria-label={capitalized(facet)}
-      value={chosen ?? ''}
-      onChange={(event) => setQuery({ ...FIRST_PAGE, [facet]: event.currentTarget.value || null })}
-    >
-      <option value="">
-        all {COUNTS[facet]}
-        {facet === 'state' && facets ? ` (${formatCount(facets.total)})` : ''}
-      </option>
-      {offered.map((name) => (
-        <option key={name} value={name}>
-          {name} ({formatCount(counts[name] ?? 0)})
-        </option>
-      ))}
-    </select>
+    <Select
+      hidden
+      label={capitalized(facet)}
+      value={selected ?? ''}
+      options={[
+        ['', `all ${COUNTS[facet]}${total}`],
+        ...names.map((name) => [name, `${name} (${formatCount(counts[name] ?? 0)})`] as const),
+      ]}
+      onChoose={(name) => setQuery({ ...FIRST_PAGE, [facet]: name || null })}
+    />
   )
 }

@@ -2,15 +2,16 @@
 
 import { useNow } from '../api/resource'
 import type { JobFacets } from '../api/types'
+import { EmptyCard } from '../components/card'
 import { CopyBlock } from '../components/copy-button'
 import { Empty, ErrorNotice, Loading } from '../components/feedback'
 import { Table } from '../components/table/table'
 import { formatCount } from '../format/number'
 import { setQuery, usePlace } from '../router/navigation'
 import { idsOf } from '../router/query-value'
-import { Chosen } from './chosen'
 import { jobColumns } from './columns'
 import { Filters, NO_FILTER } from './filters'
+import { jobsInWords, Selection } from './selection'
 import './jobs.css'
 import { descends, isFiltered, listQuery, type Order, PAGE, reordered } from './list-query'
 import { useSparklines } from './sparkline'
@@ -22,16 +23,18 @@ export function JobsPage() {
   // Cursors of the previous pages, so that Previous, Back and reload work.
   const cursors = place.query.getAll('after')
   const setCursors = (after: readonly string[]) => setQuery({ after }, { replace: false })
-  const chosen = idsOf(place.query.get('chosen'))
-  const setChosen = (ids: readonly string[]) => setQuery({ chosen: ids.join() || null })
+  const selected = idsOf(place.query.get('selected'))
+  const setSelected = (ids: readonly string[]) => setQuery({ selected: ids.join() || null })
   const { page, error, announcement, reload } = useList(query, cursors.at(-1) ?? null)
   const facets = useFacets(query.archived)
   const now = useNow(1000)
   const lines = useSparklines(page?.items ?? [])
   const jobs = page?.items ?? null
   const toggle = (id: string, on: boolean) =>
-    setChosen(on ? [...chosen, id] : chosen.filter((each) => each !== id))
-  const none = jobs !== null && jobs.length === 0 && cursors.length === 0
+    setSelected(on ? [...selected, id] : selected.filter((each) => each !== id))
+  const filtered = isFiltered(query)
+  const none = jobs?.length === 0 && cursors.length === 0
+  const empty = none && !filtered && !query.archived
   return (
     <>
       <header class="page-header">
@@ -48,17 +51,17 @@ export function JobsPage() {
           />
         )}
         {jobs === null && error === null && <Loading what="jobs" />}
-        {none && !isFiltered(query) && !query.archived && <NoJobs />}
-        {jobs !== null && !(none && !isFiltered(query) && !query.archived) && (
+        {empty && <NoJobs />}
+        {page !== null && jobs !== null && !empty && (
           <section class="card" aria-label="List of jobs">
             <Filters query={query} facets={facets}>
-              {countWords(facets, isFiltered(query), jobs.length, page!.next, cursors.length)}
+              {countWords(facets, filtered, jobs.length, page.next, cursors.length)}
             </Filters>
-            <Chosen
-              chosen={chosen}
+            <Selection
+              selected={selected}
               archived={query.archived}
               onDone={reload}
-              onChoose={setChosen}
+              onSelect={setSelected}
             />
             {none ? (
               <Empty title="No matching jobs">
@@ -69,7 +72,7 @@ export function JobsPage() {
             ) : (
               <Table
                 caption="Jobs"
-                columns={jobColumns(now, { lines, chosen, onChoose: toggle })}
+                columns={jobColumns(now, { lines, selected, onSelect: toggle })}
                 rows={jobs}
                 rowKey={(job) => job.id}
                 external={{
@@ -79,7 +82,7 @@ export function JobsPage() {
                 rowData={(job) => ({ 'data-job': job.id, 'data-state': job.state })}
               />
             )}
-            <Pages cursors={cursors} next={page!.next} onPage={setCursors} />
+            <Pages cursors={cursors} next={page.next} onPage={setCursors} />
           </section>
         )}
       </div>
@@ -90,7 +93,7 @@ export function JobsPage() {
   )
 }
 
-/** Number of matches, as far as known without loading all pages. */
+/** Number of matches, or a bound if it would require all pages. */
 function countWords(
   facets: JobFacets | null,
   filtered: boolean,
@@ -98,11 +101,8 @@ function countWords(
   next: string | null,
   earlier: number,
 ): string {
-  if (!filtered && facets) return facets.total === 1 ? '1 job' : `${formatCount(facets.total)} jobs`
-  if (next === null) {
-    const count = earlier * PAGE + shown
-    return count === 1 ? '1 job' : `${formatCount(count)} jobs`
-  }
+  if (!filtered && facets) return jobsInWords(facets.total)
+  if (next === null) return jobsInWords(earlier * PAGE + shown)
   return `more than ${formatCount((earlier + 1) * PAGE)} jobs`
 }
 
@@ -144,20 +144,18 @@ function Pages({
 
 function NoJobs() {
   return (
-    <section class="card">
-      <Empty title="No jobs yet">
-        <p>A job searches for the controller that performs best in all of its scenarios.</p>
-        <p>
-          <a class="button primary" href="/jobs/new">
-            Create the first job
-          </a>
-        </p>
-        <p>or run the job of the thesis’s chapter 4 in a terminal:</p>
-        <CopyBlock
-          label="the command"
-          text={`echo '{"name": "chapter 4"}' > job.json\ngaitswarm submit --spec job.json --server ${location.origin}`}
-        />
-      </Empty>
-    </section>
+    <EmptyCard title="No jobs yet">
+      <p>A job searches for the controller that performs best in all of its scenarios.</p>
+      <p>
+        <a class="button primary" href="/jobs/new">
+          Create the first job
+        </a>
+      </p>
+      <p>or run the job of the thesis’s chapter 4 in a terminal:</p>
+      <CopyBlock
+        label="the command"
+        text={`echo '{"name": "chapter 4"}' > job.json\ngaitswarm submit --spec job.json --server ${location.origin}`}
+      />
+    </EmptyCard>
   )
 }

@@ -2,21 +2,20 @@
 
 import { useEffect, useId, useRef, useState } from 'preact/hooks'
 import { get } from '../api/client'
-import { messageOf } from '../api/problem'
 import { useResource } from '../api/resource'
+import { Check } from '../components/fields/controls'
 import { navigate } from '../router/navigation'
 import { jobPath } from '../router/routes'
 import { useManual } from '../session/session'
 import { toggleTheme } from '../theme'
-import { type Entry, entriesOfPage, matchingEntries } from './entries'
 import type { Shown } from './keys'
 import './palette.css'
-import { SHORTCUTS, shortcutsOn, switchShortcuts } from './shortcuts'
+import { type Entry, matchingEntries, SHORTCUTS, shortcutsOn, switchShortcuts } from './shortcuts'
 
 /** Most jobs listed. */
 const MOST_JOBS = 8
 /** Debounce of typing [ms]. */
-const DELAY = 150
+const PAUSE_MS = 150
 
 const MANUAL: Entry = {
   key: 'manual',
@@ -54,13 +53,16 @@ export default function Dialogs({ shown, onShow }: DialogsProps) {
 
 function Palette({ onClose, onHelp }: { onClose: () => void; onHelp: () => void }) {
   const [text, setText] = useState('')
-  const [chosen, setChosen] = useState(0)
+  const [active, setActive] = useState(0)
   const [pageEntries] = useState(entriesOfPage)
   const id = useId()
-  const search = useDelayed(text.trim())
+  const search = text.trim()
   const manual = useManual()
-  const jobs = useResource(`palette ${search}`, (signal) =>
-    get('/v1/jobs', { query: { search: search || undefined, limit: MOST_JOBS }, signal }),
+  const jobs = useResource(
+    `palette ${search}`,
+    (signal) =>
+      get('/v1/jobs', { query: { search: search || undefined, limit: MOST_JOBS }, signal }),
+    { keep: true, pause: search === '' ? 0 : PAUSE_MS },
   )
   const pages = [
     ...SHORTCUTS.flatMap(({ words, action }): Entry[] =>
@@ -88,7 +90,7 @@ function Palette({ onClose, onHelp }: { onClose: () => void; onHelp: () => void 
     }),
   )
   const entries = [...matchingEntries([...pageEntries, ...pages], text), ...listed]
-  const at = Math.min(chosen, entries.length - 1)
+  const at = Math.min(active, entries.length - 1)
   const choose = (entry: Entry | undefined) => {
     if (!entry) return
     if (entry.key !== 'help') onClose()
@@ -96,7 +98,7 @@ function Palette({ onClose, onHelp }: { onClose: () => void; onHelp: () => void 
   }
   const press = (event: KeyboardEvent) => {
     const step = { ArrowDown: 1, ArrowUp: -1 }[event.key]
-    if (step) setChosen((at + step + entries.length) % Math.max(1, entries.length))
+    if (step) setActive((at + step + entries.length) % Math.max(1, entries.length))
     else if (event.key === 'Enter') choose(entries[at])
     else return
     event.preventDefault()
@@ -117,7 +119,7 @@ function Palette({ onClose, onHelp }: { onClose: () => void; onHelp: () => void 
         value={text}
         onInput={(event) => {
           setText(event.currentTarget.value)
-          setChosen(0)
+          setActive(0)
         }}
         onKeyDown={press}
       />
@@ -139,7 +141,7 @@ function Palette({ onClose, onHelp }: { onClose: () => void; onHelp: () => void 
       </div>
       <p class="muted small" role="status">
         {jobs.error !== null
-          ? `Could not search jobs: ${messageOf(jobs.error)}`
+          ? `Could not search jobs: ${jobs.error.message}`
           : entries.length === 0 && 'No matches.'}
       </p>
     </>
@@ -167,17 +169,15 @@ function Help({ onClose }: { onClose: () => void }) {
           </div>
         ))}
       </dl>
-      <label class="check">
-        <input
-          type="checkbox"
-          checked={on}
-          onChange={(event) => {
-            switchShortcuts(event.currentTarget.checked)
-            setOn(event.currentTarget.checked)
-          }}
-        />
-        enable single-key shortcuts
-      </label>
+      <Check
+        small={false}
+        label="enable single-key shortcuts"
+        checked={on}
+        onChange={(next) => {
+          switchShortcuts(next)
+          setOn(next)
+        }}
+      />
       <div class="actions">
         <button type="button" onClick={onClose}>
           Close
@@ -187,11 +187,15 @@ function Help({ onClose }: { onClose: () => void }) {
   )
 }
 
-function useDelayed(value: string): string {
-  const [delayed, setDelayed] = useState(value)
-  useEffect(() => {
-    const timer = setTimeout(() => setDelayed(value), DELAY)
-    return () => clearTimeout(timer)
-  }, [value])
-  return delayed
+/** Commands and tabs of the open job, taken from its buttons and links. */
+function entriesOfPage(): readonly Entry[] {
+  const offered = (selector: string, kind: string) =>
+    [...document.querySelectorAll<HTMLElement>(selector)].map((element, k): Entry => {
+      const label = element.textContent?.trim() ?? ''
+      return { key: `${kind} ${k}`, label, kind, run: () => element.click() }
+    })
+  return [
+    ...offered('main .actions > .row > :is(button:not(:disabled), a)', 'this job'),
+    ...offered('main nav.tabs > a', 'part of this job'),
+  ]
 }

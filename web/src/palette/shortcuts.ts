@@ -1,4 +1,6 @@
-/** Global keyboard shortcuts. */
+/** Global keyboard shortcuts, and entries of the command palette. */
+
+import { matching } from '../components/table/rows'
 
 export type Action =
   | { readonly kind: 'go'; readonly href: string }
@@ -46,4 +48,20 @@ export function actionOf(
   }
   if (!on || target?.closest(LETTER_TARGETS)) return null
   return SHORTCUTS.find(({ key }) => key === event.key)?.action ?? null
+}
+
+/** Entry of the command palette. */
+export interface Entry {
+  readonly key: string
+  readonly label: string
+  /** Category, shown after the label. */
+  readonly kind: string
+  readonly run: () => void
+}
+
+/** Entries that contain every word; those whose label starts with the text come first. */
+export function matchingEntries(entries: readonly Entry[], text: string): readonly Entry[] {
+  const begins = (entry: Entry) => entry.label.toLowerCase().startsWith(text.toLowerCase().trim())
+  const hits = matching(entries, text, ({ label, kind }) => `${label} ${kind}`)
+  return [...hits.filter(begins), ...hits.filter((entry) => !begins(entry))]
 }

@@ -2,7 +2,7 @@
 
 import { Card } from '../components/card'
 import { type Column, Table } from '../components/table/table'
-import { Unit } from '../components/unit'
+import { Unit } from '../components/text'
 import { change, formatNumber, NONE } from '../format/number'
 import { inWords, sentence } from '../format/words'
 import type { Recorded } from './replay/recorded'

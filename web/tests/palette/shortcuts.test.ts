@@ -1,6 +1,5 @@
 import { expect, test } from 'vitest'
-import { type Entry, matchingEntries } from '../../src/palette/entries'
-import { actionOf, SHORTCUTS } from '../../src/palette/shortcuts'
+import { actionOf, type Entry, matchingEntries, SHORTCUTS } from '../../src/palette/shortcuts'
 
 const press = (key: string, more = {}) => ({
   ...{ key, ctrlKey: false, metaKey: false, altKey: false, isComposing: false },

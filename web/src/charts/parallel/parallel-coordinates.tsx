@@ -1,7 +1,7 @@
 /** Parallel coordinates; dragging along an axis selects a range. */
 
 import { useEffect, useMemo, useRef } from 'preact/hooks'
-import { BrokenName } from '../../components/broken-name'
+import { BrokenName } from '../../components/text'
 import { formatExact, writtenUnit } from '../../format/number'
 import { themeColour, useTheme } from '../../theme'
 import { useWidth } from '../canvas'

@@ -14,8 +14,8 @@ const MORE = { value: '', label: 'Show more' }
 
 interface Props {
   readonly label: string
-  /** Label of the current choice; '' for none. */
-  readonly chosenLabel: string
+  /** Label of the current choice. */
+  readonly selected?: string
   readonly placeholder?: string
   /** Help text below the field. */
   readonly hint?: string
@@ -32,7 +32,7 @@ interface Props {
 
 export function Combobox({
   label,
-  chosenLabel,
+  selected = '',
   placeholder,
   hint,
   invalid,
@@ -94,7 +94,7 @@ export function Combobox({
   // Typing replaces the current choice.
   useEffect(() => {
     if (!open && document.activeElement === input.current) input.current?.select()
-  }, [open, chosenLabel])
+  }, [open, selected])
 
   let next = 0
   const option = (choice: Choice) => {
@@ -135,8 +135,8 @@ export function Combobox({
           aria-describedby={hint === undefined ? undefined : `${id}-hint`}
           autocomplete="off"
           spellcheck={false}
-          placeholder={open && chosenLabel !== '' ? chosenLabel : placeholder}
-          value={typed ?? (open ? '' : chosenLabel)}
+          placeholder={open && selected !== '' ? selected : placeholder}
+          value={typed ?? (open ? '' : selected)}
           onFocus={(event) => event.currentTarget.select()}
           onClick={show}
           onInput={(event) => {

@@ -1,6 +1,7 @@
-/** Fields that consist of a label and one control. */
+/** Single controls with their labels. */
 
 import type { ComponentChildren } from 'preact'
+import { useState } from 'preact/hooks'
 
 /** A checkbox; among the tools of a chart by default. */
 export function Check({
@@ -65,5 +66,75 @@ export function Select<K extends string>({
       <span>{label}</span>
       {select}
     </label>
+  )
+}
+
+/** A choice among a few options, as adjacent buttons. */
+export function Segmented<K extends string>({
+  label,
+  value,
+  options,
+  onChoose,
+  roomy = false,
+}: {
+  label: string
+  /** Several for equivalent options; empty if none applies. */
+  value: K | readonly K[]
+  options: readonly (readonly [key: K, text: string])[]
+  onChoose: (key: K) => void
+  /** As high as the fields of a form. */
+  roomy?: boolean
+}) {
+  const pressed: readonly string[] = typeof value === 'string' ? [value] : value
+  return (
+    <fieldset class="segmented" aria-label={label}>
+      {options.map(([key, text]) => (
+        <button
+          key={key}
+          type="button"
+          class={roomy ? undefined : 'compact'}
+          aria-pressed={pressed.includes(key)}
+          onClick={() => onChoose(key)}
+        >
+          {text}
+        </button>
+      ))}
+    </fieldset>
+  )
+}
+
+/** A number committed on Enter or blur. onChange: receives the text typed; empty if it is no number. */
+export function NumberField({
+  label,
+  value,
+  min,
+  step = 'any',
+  narrow = false,
+  onChange,
+}: {
+  label: string
+  value: number
+  min?: number
+  step?: number | 'any'
+  narrow?: boolean
+  onChange: (text: string) => void
+}) {
+  // Local, so that updates of a running job do not overwrite the text being typed.
+  const [written, setWritten] = useState<string | null>(null)
+  return (
+    <input
+      class={narrow ? 'short' : undefined}
+      type="number"
+      min={min}
+      step={step}
+      value={written ?? value}
+      aria-label={label}
+      onInput={(event) => setWritten(event.currentTarget.value)}
+      onChange={(event) => {
+        setWritten(null)
+        onChange(event.currentTarget.value)
+      }}
+      onBlur={() => setWritten(null)}
+    />
   )
 }

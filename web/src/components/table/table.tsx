@@ -4,7 +4,7 @@ import type { ComponentChildren } from 'preact'
 import { useContext, useState } from 'preact/hooks'
 import { formatCount, formatNumber, percent } from '../../format/number'
 import { capitalized } from '../../format/words'
-import { Unit } from '../unit'
+import { Unit } from '../text'
 import { type Cell, paged, type SortOrder, sorted } from './rows'
 import { type CollectedTable, TableSink } from './table-sink'
 

@@ -4,11 +4,11 @@ import { get } from '../../api/client'
 import { useResource, useSlowly } from '../../api/resource'
 import type { Importance, ImportanceIndex, Job, VariableImportance } from '../../api/types'
 import { ChartCard } from '../../charts/chart-card'
-import { BrokenName } from '../../components/broken-name'
 import { Card, EmptyCard, Loaded } from '../../components/card'
 import { Empty } from '../../components/feedback'
 import { Select } from '../../components/fields/controls'
 import { type Column, Table } from '../../components/table/table'
+import { BrokenName } from '../../components/text'
 import {
   exactQuantity,
   formatCount,

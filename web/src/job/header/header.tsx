@@ -4,8 +4,7 @@ import { get } from '../../api/client'
 import { isReadable } from '../../api/readable'
 import { useNow, useResource } from '../../api/resource'
 import type { Job, JobSummary, StoredJob, TuningWorlds } from '../../api/types'
-import { Progress } from '../../components/progress'
-import { STATE_TONES, StateBadge } from '../../components/state-badge'
+import { Progress, StateBadge } from '../../components/state'
 import {
   change,
   formatCount,
@@ -29,7 +28,6 @@ import './header.css'
 export function JobHeader({ live, job, gain }: { live: LiveJob; job: StoredJob; gain: Gain }) {
   const { followed } = live
   const spent = budgetSpent(job, followed.iterations)
-  const tone = STATE_TONES[job.state]
   const labels = [
     ...(job.kept ? ['kept'] : []),
     ...(job.archived ? ['archived'] : []),
@@ -82,7 +80,7 @@ export function JobHeader({ live, job, gain }: { live: LiveJob; job: StoredJob; 
           done={spent.done}
           planned={spent.planned}
           label={`${spent.done} of ${spent.planned} ${spent.unit}`}
-          tone={tone === 'good' || tone === 'bad' ? tone : 'accent'}
+          state={job.state}
         />
         <Figures
           job={job}

@@ -2,8 +2,8 @@
 
 import type { Job } from '../../api/types'
 import { ChartCard } from '../../charts/chart-card'
-import { BrokenName } from '../../components/broken-name'
 import { Table } from '../../components/table/table'
+import { BrokenName } from '../../components/text'
 import { formatExact, NONE, percent } from '../../format/number'
 import { placeWord } from '../../format/place'
 import { exactValueQuantity } from '../../format/value'

@@ -2,9 +2,8 @@
 
 import type { FittedParameter, Identifiability } from '../../api/types'
 import { ChartCard } from '../../charts/chart-card'
-import { BrokenName } from '../../components/broken-name'
 import { type Column, Table } from '../../components/table/table'
-import { Unit } from '../../components/unit'
+import { BrokenName, Unit } from '../../components/text'
 import { formatExact, formatNumber, percent } from '../../format/number'
 import { exactValueQuantity, type Value, valueQuantity } from '../../format/value'
 import { VARIABLE } from '../columns'

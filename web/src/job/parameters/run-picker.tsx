@@ -96,7 +96,6 @@ export function RunPicker({
       {others.length < MOST_RUNS && (
         <Combobox
           label="Add a run"
-          chosenLabel=""
           placeholder="name, id, note or tag"
           hint={
             listed.data?.next

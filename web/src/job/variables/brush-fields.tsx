@@ -3,10 +3,8 @@
 import { type Brushes, withBrush } from '../../charts/parallel/parallel-coordinates'
 import type { Axis, ParallelModel } from '../../charts/parallel/parallel-model'
 import { shareOf, valueAt } from '../../charts/scale'
-import { BrokenName } from '../../components/broken-name'
-import { Select } from '../../components/fields/controls'
-import { NumberField } from '../../components/fields/number-field'
-import { Unit } from '../../components/unit'
+import { NumberField, Select } from '../../components/fields/controls'
+import { BrokenName, Unit } from '../../components/text'
 import { inWords } from '../../format/words'
 import './brush-fields.css'
 

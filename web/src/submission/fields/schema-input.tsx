@@ -1,7 +1,7 @@
 /** Inputs for the fields of a schema. */
 
 import { ChoiceField, TextField } from '../../components/fields/field'
-import { Unit } from '../../components/unit'
+import { Unit } from '../../components/text'
 import { capitalized, inWords } from '../../format/words'
 import { errorsUnder, type FieldErrors } from '../draft/build-spec'
 import { boundsInWords, describe, type SchemaField } from './schema-fields'

@@ -1,8 +1,8 @@
 /** Robot of the job: shipped, a variant, or custom. */
 
 import { Card } from '../../components/card'
+import { Segmented } from '../../components/fields/controls'
 import { ChoiceField, Problems } from '../../components/fields/field'
-import { Segmented } from '../../components/fields/segmented'
 import { errorsUnder } from '../draft/build-spec'
 import { emptyDraft, type RobotDraft } from '../draft/draft'
 import { SchemaInput } from '../fields/schema-input'

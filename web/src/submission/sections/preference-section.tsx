@@ -1,8 +1,8 @@
 /** Weights of the objectives: a published preference or custom values. */
 
 import { Card } from '../../components/card'
+import { Segmented } from '../../components/fields/controls'
 import { Problems } from '../../components/fields/field'
-import { Segmented } from '../../components/fields/segmented'
 import { Table } from '../../components/table/table'
 import { formatExact } from '../../format/number'
 import { inWords } from '../../format/words'

@@ -1,8 +1,8 @@
 /** Sections of the form whose fields come from schemas: job, case, worlds and optimizer. */
 
 import { Card } from '../../components/card'
+import { Segmented } from '../../components/fields/controls'
 import { ChoiceField, Problems, TextField } from '../../components/fields/field'
-import { Segmented } from '../../components/fields/segmented'
 import { formatCount } from '../../format/number'
 import { sentence } from '../../format/words'
 import type { FieldErrors } from '../draft/build-spec'

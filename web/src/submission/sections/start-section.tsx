@@ -4,9 +4,9 @@ import { get } from '../../api/client'
 import { jobSearch } from '../../api/job-search'
 import { useResource } from '../../api/resource'
 import { Card } from '../../components/card'
-import { ChosenList } from '../../components/fields/chosen-list'
 import { Combobox } from '../../components/fields/combobox'
 import { Problems, TextField } from '../../components/fields/field'
+import { RemovableList } from '../../components/fields/removable-list'
 import { formatCount, formatNumber } from '../../format/number'
 import { errorsUnder } from '../draft/build-spec'
 import { NO_START, type StartDraft } from '../draft/start'
@@ -18,13 +18,12 @@ export function StartSection({ draft, errors, onChange }: SectionProps) {
   const change = (changes: Partial<StartDraft>) => onChange({ start: { ...start, ...changes } })
   return (
     <Card class="stack-tight" title="Start">
-      <ChosenList ids={start.jobs} onChange={(jobs) => change({ jobs })}>
+      <RemovableList ids={start.jobs} onChange={(jobs) => change({ jobs })}>
         {(job) => <JobWords id={job} />}
-      </ChosenList>
+      </RemovableList>
       <div class="fields">
         <Combobox
           label="Best designs of jobs"
-          chosenLabel=""
           placeholder={start.jobs.length === 0 ? 'none' : 'add another job'}
           hint="Their best designs are evaluated first, as part of the budget."
           invalid={problems.length > 0}

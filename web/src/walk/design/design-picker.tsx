@@ -35,7 +35,7 @@ export function DesignPicker(props: DesignPickerProps) {
   return (
     <Combobox
       label={label}
-      chosenLabel={chosen ? (publishedLabel ?? chosenLabel) : (none ?? '')}
+      selected={chosen ? (publishedLabel ?? chosenLabel) : (none ?? '')}
       hint={note}
       groups={groups}
       remote={{ label: 'Best of a job', search: bestOfJobs }}

@@ -2,7 +2,7 @@
 
 import { useEffect, useId, useRef, useState } from 'preact/hooks'
 import { messageOf } from '../../api/problem'
-import { Progress } from '../../components/progress'
+import { Progress } from '../../components/state'
 import { fileStem } from '../../export/csv'
 import { saveFile } from '../../export/save'
 import { type Playback, usePlayback } from './playback'

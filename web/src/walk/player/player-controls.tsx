@@ -1,8 +1,7 @@
 /** Playback and view controls of a replay. */
 
 import { useId } from 'preact/hooks'
-import { Check } from '../../components/fields/controls'
-import { Segmented } from '../../components/fields/segmented'
+import { Check, Segmented } from '../../components/fields/controls'
 import { formatExact } from '../../format/number'
 import type { ViewName } from '../scene/camera-rig'
 import type { SceneOptions } from '../scene/walk-scene'

@@ -3,8 +3,8 @@
 import type { Resource } from '../../../api/resource'
 import type { RecordingView } from '../../../api/types'
 import { Card, Loaded } from '../../../components/card'
-import { ChosenList } from '../../../components/fields/chosen-list'
 import { Combobox } from '../../../components/fields/combobox'
+import { RemovableList } from '../../../components/fields/removable-list'
 import { formatNumber } from '../../../format/number'
 import { idsIn, recordingSearch, shortId } from './recording-search'
 
@@ -23,13 +23,12 @@ export function RecordingsCard({
         <p class="muted">None yet: upload a log above, or select a stored recording.</p>
       )}
       <Loaded resource={recordings} what="the recordings" failed="Could not load a recording." />
-      <ChosenList ids={ids} short={shortId} onChange={onChange}>
+      <RemovableList ids={ids} short={shortId} onChange={onChange}>
         {(id) => inWords(recordings.data?.find((recording) => recording.id === id))}
-      </ChosenList>
+      </RemovableList>
       <div class="fields">
         <Combobox
           label="Stored recordings"
-          chosenLabel=""
           placeholder="scenario, controller or id"
           remote={{ label: 'Recordings, newest first', search: recordingSearch(ids) }}
           hint="You can paste several ids at once."

@@ -1,8 +1,8 @@
-/** Removable list of the items chosen with a picker. */
+/** Removable list of the items selected with a picker. */
 
 import type { ComponentChildren } from 'preact'
 
-export function ChosenList({
+export function RemovableList({
   ids,
   short = (id) => id,
   children,
@@ -19,7 +19,7 @@ export function ChosenList({
   return (
     <ul class="stack-tight">
       {ids.map((id) => (
-        <li key={id} class="row" data-chosen={id}>
+        <li key={id} class="row" data-item={id}>
           <span>
             <code>{short(id)}</code> {children(id)}
           </span>

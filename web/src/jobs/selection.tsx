@@ -18,17 +18,17 @@ import {
 /** Most jobs that can be compared. */
 const MOST_COMPARED = 12
 
-export function Chosen({
-  chosen,
+export function Selection({
+  selected,
   archived,
   onDone,
-  onChoose,
+  onSelect,
 }: {
-  chosen: readonly string[]
+  selected: readonly string[]
   /** Whether the list shows archived jobs. */
   archived: boolean
   onDone: () => void
-  onChoose: (chosen: readonly string[]) => void
+  onSelect: (selected: readonly string[]) => void
 }) {
   const [error, setError] = useState<unknown>(null)
   const [preview, setPreview] = useState<DeletionPreview | null>(null)
@@ -42,9 +42,9 @@ export function Chosen({
   const archive = async () => {
     const body = { archived: !archived }
     await Promise.all(
-      chosen.map((id) => patch('/v1/jobs/{job_id}', { path: { job_id: id }, body })),
+      selected.map((id) => patch('/v1/jobs/{job_id}', { path: { job_id: id }, body })),
     )
-    onChoose([])
+    onSelect([])
     onDone()
   }
   const deleteJobs = async (jobs: readonly JobSummary[]) => {
@@ -54,16 +54,16 @@ export function Chosen({
     )
     setDeletion(result)
     const deleted = new Set(result.deleted)
-    onChoose(chosen.filter((id) => !deleted.has(id)))
+    onSelect(selected.filter((id) => !deleted.has(id)))
     onDone()
   }
   return (
     <>
-      {chosen.length > 0 && (
-        <div class="row chosen" data-chosen={chosen.length}>
-          <strong aria-live="polite">{formatCount(chosen.length)} selected</strong>
-          {chosen.length <= MOST_COMPARED ? (
-            <a class="button compact" href={comparePath(chosen)}>
+      {selected.length > 0 && (
+        <div class="row selection" data-selected-jobs={selected.length}>
+          <strong aria-live="polite">{formatCount(selected.length)} selected</strong>
+          {selected.length <= MOST_COMPARED ? (
+            <a class="button compact" href={comparePath(selected)}>
               Compare
             </a>
           ) : (
@@ -76,11 +76,11 @@ export function Chosen({
             type="button"
             class="compact danger"
             disabled={busy}
-            onClick={() => during(deletionPreview(chosen).then(setPreview))}
+            onClick={() => during(deletionPreview(selected).then(setPreview))}
           >
             Delete…
           </button>
-          <button type="button" class="compact" onClick={() => onChoose([])}>
+          <button type="button" class="compact" onClick={() => onSelect([])}>
             Clear selection
           </button>
         </div>
@@ -151,6 +151,6 @@ function Reasons({ items }: { items: DeletionPreview['refused'] }) {
   )
 }
 
-function jobsInWords(count: number): string {
+export function jobsInWords(count: number): string {
   return count === 1 ? '1 job' : `${formatCount(count)} jobs`
 }

@@ -14,11 +14,9 @@ type Operation<P extends keyof paths, M extends Method> =
 
 type Json<R> = R extends { content: { 'application/json': infer B } } ? B : never
 
-/** Body of a successful response. */
 export type Answer<P extends keyof paths, M extends Method> =
   Operation<P, M> extends { responses: infer R } ? Json<R[keyof R & (200 | 201 | 202)]> : never
 
-/** Request body of an operation. */
 export type Body<P extends keyof paths, M extends Method> =
   Operation<P, M> extends { requestBody: { content: { 'application/json': infer B } } } ? B : never
 

@@ -33,7 +33,6 @@ export async function problemOf(response: Response): Promise<ApiProblem> {
   return new ApiProblem(response.status, `the server responded with ${response.status}: ${reason}`)
 }
 
-/** Message of any thrown value. */
 export function messageOf(error: unknown): string {
   return error instanceof Error ? error.message : String(error)
 }

@@ -12,7 +12,6 @@ export type JobState = Schemas['JobState']
 export type JobSummary = Schemas['JobSummaryView']
 /** A job whose spec and kind are null if the server cannot read them. */
 export type StoredJob = Schemas['JobView']
-/** A readable job. */
 export type Job = StoredJob & {
   readonly spec: AnySpec
   readonly kind: NonNullable<StoredJob['kind']>

@@ -58,7 +58,6 @@ export function Loaded<T>({
   children,
 }: {
   resource: Resource<T>
-  /** As in "Loading the targets". */
   what: string
   failed?: string
   children?: (data: T) => ComponentChildren

@@ -13,7 +13,6 @@ export function ConfirmDialog({
   children,
 }: {
   title: string
-  /** Label of the confirming button. */
   confirm?: string
   dangerous?: boolean
   disabled?: boolean

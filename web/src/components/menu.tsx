@@ -12,7 +12,6 @@ export function Menu({
   of,
   items,
 }: {
-  /** Label of the button. */
   label: string
   /** Subject of the commands, for screen readers only. */
   of: string

@@ -29,7 +29,6 @@ export function Progress({
   done: number
   planned: number
   label: string
-  /** Colours the bar of an ended job. */
   state?: JobState
 }) {
   const share = planned > 0 ? Math.min(1, done / planned) : 0

@@ -19,7 +19,6 @@ export function Tabs<K extends string>({
   selected: K
   onChoose: (key: K) => void
   label: string
-  /** Panel of the selected tab. */
   children: ComponentChildren
 }) {
   const id = useId()

@@ -5,7 +5,6 @@ import './bars.css'
 
 export interface Bar {
   readonly value: number | null
-  /** The value as text. */
   readonly text: string
   readonly colour?: `--${string}`
   readonly interval?: { readonly low: number; readonly high: number } | null
@@ -13,7 +12,6 @@ export interface Bar {
 
 export interface BarRow {
   readonly name: string
-  /** The name by default. */
   readonly label?: ComponentChildren
   readonly bars: readonly Bar[]
 }

@@ -34,7 +34,6 @@ export function ByIteration<R extends Indexed>({
   )
 }
 
-/** A card with a line over the iterations. */
 export function IterationChart<R extends Indexed>({
   rows,
   name,

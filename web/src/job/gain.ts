@@ -10,7 +10,6 @@ export interface Gain {
   readonly reference: ReferenceLine | null
   /** [1]; null if unknown. */
   readonly share: number | null
-  /** Why the gain is unknown. */
   readonly reason: string | null
 }
 
@@ -38,7 +37,6 @@ export function gainOf(
   return { reference: { label: referenceLabel(reference), fitness }, share, reason }
 }
 
-/** Display name of a reference. */
 export function referenceLabel({ name, kind }: Pick<ReferenceView, 'name' | 'kind'>): string {
   return kind === 'start' ? name : `published ${name}`
 }

@@ -9,13 +9,12 @@ import { ALL_JOBS, Breadcrumbs, type Crumb } from '../router/breadcrumbs'
 import { lazyPage } from '../router/lazy-page'
 import { usePlace } from '../router/navigation'
 import { jobPath, withQuery } from '../router/routes'
-import { SHARED } from './designs/selection'
-import { caseWords } from './fitness'
+import { SHARED } from './designs/particles'
+import { caseWords, progressInWords } from './facts'
 import { type Gain, useGain } from './gain'
 import { JobHeader } from './header/header'
 import { type LiveJob, useJob } from './live/use-job'
 import { OverviewPanel } from './overview/panel'
-import { progressInWords } from './state'
 import './job.css'
 
 export interface PanelProps {
@@ -45,7 +44,6 @@ function part(
 // A certificate has no best world to show by scenario, and searches nothing.
 const SEARCHES = ['tuning', 'identification', 'calibration'] as const
 
-/** Tabs by their part of the path. */
 const PARTS: Readonly<Record<string, Part>> = {
   '': { label: 'Overview', kinds: [], Panel: OverviewPanel },
   certificate: part('Certificate', () => import('./certificate/panel'), 'certificate'),

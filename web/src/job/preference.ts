@@ -17,7 +17,6 @@ export function weighed({ bias }: { readonly bias: readonly unknown[] }): readon
   return PREFERRED.slice(0, bias.length)
 }
 
-/** Preference in the query; undefined if there is none or it is invalid. */
 export function preferenceIn(query: URLSearchParams): Preference | undefined {
   return preferenceOf(query.get('preference') ?? '')
 }
@@ -35,7 +34,6 @@ export function preferenceOf(text: string): Preference | undefined {
   }
 }
 
-/** Inverse of `preferenceIn`. */
 export function preferenceQuery({ bias, exponent }: Preference): string {
   return JSON.stringify({ bias, exponent })
 }
@@ -54,14 +52,11 @@ export interface Factor {
   readonly sensitivity: number
 }
 
-/** Explanation of a design's fitness. */
 export interface Analysis {
   readonly factors: readonly Factor[]
   /** Logarithm of each scenario's utility over the geometric mean of all. */
   readonly utilities: Readonly<Record<string, number>>
-  /** The scenario of greatest utility, i.e. the worst. */
   readonly worstScenario: string
-  /** The factor of greatest contribution in that scenario. */
   readonly worstFactor: Factor
   /** Utility of the worst scenario over the geometric mean of all. */
   readonly excess: number

@@ -83,7 +83,6 @@ export function ReferencePicker({
 }: {
   job: Job
   choice: string
-  /** Label of the reference once loaded. */
   label: string | null
   onChoose: (choice: string) => void
 }) {

@@ -5,16 +5,13 @@ import { Progress, StateBadge } from '../components/state'
 import type { Column } from '../components/table/table'
 import { NONE, percent, quantity } from '../format/number'
 import { formatAge, formatDuration, formatMoment } from '../format/time'
-import { budgetSpent, spentInWords } from '../job/budget'
-import { fitnessUnit } from '../job/fitness'
+import { budgetSpent, fitnessUnit, spentInWords } from '../job/facts'
 import { referenceLabel } from '../job/gain'
 import { jobPath } from '../router/routes'
 import { Sparkline, type Sparklines } from './sparkline'
 
-/** Data shared by all rows. */
 interface Shared {
   readonly lines: Sparklines
-  /** Ids of the selected jobs. */
   readonly selected: readonly string[]
   readonly onSelect: (id: string, on: boolean) => void
 }

@@ -4,17 +4,14 @@ import { get } from '../api/client'
 import { ApiProblem } from '../api/problem'
 import type { JobSummary } from '../api/types'
 
-/** Concurrent requests. */
 const AT_ONCE = 4
 
 interface Refused {
   readonly id: string
   readonly name: string
-  /** Why the job cannot be deleted. */
   readonly reason: string
 }
 
-/** Preview of a deletion. */
 export interface DeletionPreview {
   readonly deletable: readonly JobSummary[]
   readonly refused: readonly Refused[]
@@ -52,7 +49,6 @@ export function previewOf(jobs: readonly JobSummary[]): DeletionPreview {
   }
 }
 
-/** Totals lost with the jobs. */
 export function lostWith(jobs: readonly JobSummary[]) {
   return {
     iterations: jobs.reduce((sum, job) => sum + job.iterations, 0),

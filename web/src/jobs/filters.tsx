@@ -38,9 +38,7 @@ export function Filters({
   children,
 }: {
   query: ListQuery
-  /** Null while loading. */
   facets: JobFacets | null
-  /** Number of matches. */
   children: ComponentChildren
 }) {
   return (

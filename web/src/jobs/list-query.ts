@@ -27,7 +27,6 @@ export const ORDERS = {
 
 export type Order = keyof typeof ORDERS
 
-/** Jobs per page. */
 export const PAGE = 50
 
 /** Filters in the order in which they are offered. */
@@ -44,14 +43,12 @@ export interface ListQuery {
   readonly tag?: string
   readonly archived: boolean
   readonly order: Order
-  /** Whether the order is reversed. */
   readonly reverse: boolean
 }
 
 /** Orders that start with the greatest value; all others start with the smallest. */
 const DESCENDING: readonly Order[] = ['gain', 'priority', 'iterations', 'evaluations', 'rate']
 
-/** Whether a list is in descending order. */
 export function descends(order: Order, reverse: boolean): boolean {
   return DESCENDING.includes(order) !== reverse
 }

@@ -6,7 +6,6 @@ import { useResource, useSlowly } from '../api/resource'
 import type { Convergence, JobSummary } from '../api/types'
 
 const POINTS = 24
-/** Polling interval for running jobs [ms]. */
 const RENEW_MS = 8000
 const WIDTH = 80
 const HEIGHT = 20

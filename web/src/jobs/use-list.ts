@@ -8,7 +8,6 @@ import { type ListQuery, PAGE } from './list-query'
 
 const POLL_MS = 2000
 const FACETS_MS = 15_000
-/** Debounce of typing [ms]. */
 const PAUSE_MS = 150
 
 export function useList(query: ListQuery, after: string | null) {

@@ -14,7 +14,6 @@ import { type Entry, matchingEntries, SHORTCUTS, shortcutsOn, switchShortcuts } 
 
 /** Most jobs listed. */
 const MOST_JOBS = 8
-/** Debounce of typing [ms]. */
 const PAUSE_MS = 150
 
 const MANUAL: Entry = {

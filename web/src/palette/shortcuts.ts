@@ -50,11 +50,9 @@ export function actionOf(
   return SHORTCUTS.find(({ key }) => key === event.key)?.action ?? null
 }
 
-/** Entry of the command palette. */
 export interface Entry {
   readonly key: string
   readonly label: string
-  /** Category, shown after the label. */
   readonly kind: string
   readonly run: () => void
 }

@@ -23,7 +23,6 @@ import './submission.css'
 interface Start {
   readonly catalogue: Catalogue
   readonly draft: Draft
-  /** The cloned job. */
   readonly from: Job | null
 }
 

@@ -7,7 +7,7 @@ import { ErrorNotice } from '../components/feedback'
 import { TextField } from '../components/fields/field'
 import { formatCount } from '../format/number'
 import { formatDuration } from '../format/time'
-import { HIGHEST, isPriority, LOWEST, PRIORITY_ERROR, PRIORITY_HELP } from '../job/priority'
+import { HIGHEST, isPriority, LOWEST, PRIORITY_ERROR, PRIORITY_HELP } from '../job/facts'
 import { NOTIFY, type Submission } from './use-submission'
 
 export function SubmitPanel({
@@ -17,7 +17,6 @@ export function SubmitPanel({
 }: {
   spec: AnySpec
   submission: Submission
-  /** Edit the spec as JSON instead. */
   onJson?: () => void
 }) {
   const { estimate, problem, sending } = submission
@@ -90,7 +89,6 @@ export function SubmitPanel({
   )
 }
 
-/** Message of the server for a field. */
 function problemOf(problem: unknown, field: string): string | undefined {
   const errors = problem instanceof ApiProblem ? problem.errors : []
   return errors.find((error) => error.field === field)?.message

@@ -8,10 +8,8 @@ import type { AnySpec, Estimate } from '../api/types'
 import { navigate } from '../router/navigation'
 import { jobPath } from '../router/routes'
 
-/** Debounce of typing [ms]. */
 const PAUSE_MS = 400
 
-/** Request header with the webhook's URL. */
 export const NOTIFY = 'Notify-URL'
 
 export interface Submission {
@@ -19,10 +17,8 @@ export interface Submission {
   /** Why the server rejects the spec; null if it does not, or is unknown. */
   readonly problem: unknown
   readonly sending: boolean
-  /** Priority as typed. */
   readonly priority: string
   readonly setPriority: (text: string) => void
-  /** Webhook URL as typed; empty for none. */
   readonly notify: string
   readonly setNotify: (text: string) => void
   readonly submit: () => void

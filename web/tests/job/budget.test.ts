@@ -1,6 +1,6 @@
 import { describe, expect, test } from 'vitest'
 import type { Iteration } from '../../src/api/types'
-import { budgetSpent, iterationsSpent } from '../../src/job/budget'
+import { budgetSpent, iterationsSpent } from '../../src/job/facts'
 
 const job = (iterations: number, evaluations: number) => ({
   iterations,

@@ -1,5 +1,5 @@
 import { expect, test } from 'vitest'
-import { caseWords, fitnessUnit } from '../../src/job/fitness'
+import { caseWords, fitnessUnit } from '../../src/job/facts'
 
 const currents = [{ name: 'current_link_1', unit: 'mA', description: 'error' }]
 

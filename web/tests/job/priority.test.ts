@@ -1,5 +1,5 @@
 import { expect, test } from 'vitest'
-import { isPriority } from '../../src/job/priority'
+import { isPriority } from '../../src/job/facts'
 
 test.each(['-10', '0', ' 7 ', '10'])('%s is a priority', (text) => {
   expect(isPriority(text)).toBe(true)

@@ -1,6 +1,6 @@
 import { expect, test } from 'vitest'
 import type { Iteration } from '../../src/api/types'
-import { hasEnded, isActive, isRunning, progressInWords } from '../../src/job/state'
+import { hasEnded, isActive, isRunning, progressInWords } from '../../src/job/facts'
 
 const STATES = [
   'queued',

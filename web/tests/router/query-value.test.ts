@@ -1,6 +1,6 @@
 import { describe, expect, test } from 'vitest'
 import { buildModel } from '../../src/charts/parallel/parallel-model'
-import { brushesOf, brushWords } from '../../src/job/designs/brush-words'
+import { brushesOf, brushWords } from '../../src/job/designs/particles'
 import { flag, ORDER, oneOf, RANGE } from '../../src/router/query-value'
 
 describe('a query value', () => {

@@ -26,7 +26,6 @@ export type Search = (
 
 const NOTHING = { items: [], next: null, text: null }
 
-/** Debounce of typing [ms]. */
 const PAUSE_MS = 150
 
 /** Search while `text` is not null; previous matches stay until the response arrives. */

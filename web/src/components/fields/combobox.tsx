@@ -14,12 +14,9 @@ const MORE = { value: '', label: 'Show more' }
 
 interface Props {
   readonly label: string
-  /** Label of the current choice. */
   readonly selected?: string
   readonly placeholder?: string
-  /** Help text below the field. */
   readonly hint?: string
-  /** Whether the choice was rejected. */
   readonly invalid?: boolean
   /** Local choices, filtered by the text typed. */
   readonly groups?: readonly ChoiceGroup[]

@@ -15,7 +15,6 @@ export interface FieldProps {
   readonly wide?: boolean
 }
 
-/** Attributes that connect a control to its label, hint and error. */
 interface Connection {
   readonly id: string
   readonly 'aria-invalid': boolean

@@ -14,10 +14,8 @@ export interface Column<R> {
   readonly label?: string
   /** Shown in brackets in the header; `1` is omitted. */
   readonly unit?: string
-  /** Title of the header. */
   readonly help?: string
   readonly numeric?: boolean
-  /** Digits of a numeric column. */
   readonly digits?: number
   /** Digits of a numeric column of shares, shown in percent. */
   readonly percent?: number
@@ -48,7 +46,6 @@ export function Table<R>({
   rowData,
   external,
 }: {
-  /** Caption for screen readers. */
   caption: string
   columns: readonly Column<R>[]
   rows: readonly R[]
@@ -210,9 +207,7 @@ function Pager({
   size,
   onPage,
 }: {
-  /** Caption of the table. */
   caption: string
-  /** Counted from 0. */
   page: number
   pages: number
   total: number

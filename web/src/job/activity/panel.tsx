@@ -11,7 +11,7 @@ import { formatCount } from '../../format/number'
 import { formatMoment } from '../../format/time'
 import { sentence } from '../../format/words'
 import { oneOf, useQueryValue } from '../../router/query-value'
-import { isActive } from '../state'
+import { isActive } from '../facts'
 import './activity.css'
 import { TimelineCard } from './timeline-card'
 

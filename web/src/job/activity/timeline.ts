@@ -13,7 +13,6 @@ export interface Bar {
   readonly computed: number
 }
 
-/** Tasks that do not overlap. */
 export type Lane = readonly Bar[]
 
 interface WorkerLanes {
@@ -25,7 +24,6 @@ export interface Timeline {
   readonly workers: readonly WorkerLanes[]
   /** Starts of the iterations, since the first task shown [s]. */
   readonly iterations: readonly { readonly iteration: number; readonly start: number }[]
-  /** Time span shown [s]. */
   readonly seconds: number
 }
 
@@ -54,7 +52,6 @@ export function timelineOf({ tasks, iterations }: Activity, most: number): Timel
   }
 }
 
-/** Tolerance for rounded times of consecutive tasks [s]. */
 const TOUCH = 0.002
 
 /** Put each bar into the first lane that is free when it starts. */

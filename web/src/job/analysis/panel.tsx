@@ -23,7 +23,6 @@ import { withQuery } from '../../router/routes'
 import { Bars } from '../bars'
 import { VARIABLE } from '../columns'
 
-/** Polling interval of a running job [ms]. */
 const RENEW_MS = 8000
 
 /** Correlation above which the importance of one of two variables may be spurious. */

@@ -17,9 +17,8 @@ import { type Column, Table } from '../../components/table/table'
 import { change, formatCount, formatNumber, percent, withUnit } from '../../format/number'
 import { inWords } from '../../format/words'
 import { withQuery } from '../../router/routes'
-import { isRunning } from '../state'
+import { isRunning } from '../facts'
 
-/** Polling interval while the job runs [ms]. */
 const RENEW_MS = 15_000
 
 export default function CertificatePanel({ job }: { job: Job }) {

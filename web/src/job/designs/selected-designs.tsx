@@ -6,7 +6,7 @@ import { formatValue, named } from '../../format/value'
 import { inWords } from '../../format/words'
 import { PAGE_NUMBER, useQueryValue } from '../../router/query-value'
 import { DesignLink } from '../columns'
-import { caseWords } from '../fitness'
+import { caseWords } from '../facts'
 import { columnNamed, type ParticleColumn, type Particles } from './particles'
 
 const DIGITS: Readonly<Record<string, number>> = { integer: 1, continuous: 4 }
@@ -19,9 +19,7 @@ export function SelectedDesigns({
 }: {
   job: Job
   particles: Particles
-  /** Rows of `particles`, in order. */
   rows: readonly number[]
-  /** Highlighted row. */
   marked?: number | null
 }) {
   const iteration = columnNamed(particles, 'iteration')!.values

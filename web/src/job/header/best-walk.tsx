@@ -11,7 +11,6 @@ export default function BestWalk({
   visible,
 }: {
   job: Job
-  /** Iteration of the best design to show. */
   best: number
   visible: boolean
 }) {

@@ -11,8 +11,16 @@ import { ChoiceField, TextField } from '../../components/fields/field'
 import { formatCount } from '../../format/number'
 import { navigate } from '../../router/navigation'
 import { jobPath } from '../../router/routes'
-import { budgetSpent, iterationsSpent, spentInWords } from '../budget'
-import { HIGHEST, isPriority, LOWEST, PRIORITY_ERROR, PRIORITY_HELP } from '../priority'
+import {
+  budgetSpent,
+  HIGHEST,
+  isPriority,
+  iterationsSpent,
+  LOWEST,
+  PRIORITY_ERROR,
+  PRIORITY_HELP,
+  spentInWords,
+} from '../facts'
 
 export interface DialogProps {
   readonly job: StoredJob
@@ -126,7 +134,6 @@ interface ForkProps {
   readonly from: number
 }
 
-/** A button that opens the dialog. */
 export function ForkButton({ compact = false, ...props }: ForkProps & { compact?: boolean }) {
   const [open, setOpen] = useState(false)
   return (

@@ -3,7 +3,7 @@
 import { useEffect, useRef, useState } from 'preact/hooks'
 import type { StoredJob } from '../../api/types'
 import { formatCount, formatNumber } from '../../format/number'
-import { hasEnded } from '../state'
+import { hasEnded } from '../facts'
 
 export function EndNotice({ job }: { job: StoredJob }) {
   const [enabled, setEnabled] = useState(false)
@@ -73,7 +73,6 @@ export function noticeState(
   return { label: 'Notify me when it ends', on: true, hint: 'while this page is open' }
 }
 
-/** Content of the notification. */
 export function endInWords(
   job: Pick<StoredJob, 'id' | 'name' | 'state' | 'iterations' | 'best_fitness' | 'error'>,
 ): { readonly title: string; readonly body: string } {

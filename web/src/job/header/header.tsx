@@ -15,11 +15,9 @@ import {
 } from '../../format/number'
 import { formatAge, formatClock, formatDuration, formatMoment } from '../../format/time'
 import { jobPath } from '../../router/routes'
-import { budgetSpent } from '../budget'
-import { caseWords, fitnessUnit } from '../fitness'
+import { budgetSpent, caseWords, fitnessUnit, startDesigns } from '../facts'
 import type { Gain } from '../gain'
 import type { LiveJob } from '../live/use-job'
-import { startDesigns } from '../start'
 import { JobActions } from './actions'
 import { EndNotice } from './end-notice'
 import { WalkPreview } from './walk-preview'
@@ -152,7 +150,6 @@ function timeLeft(job: StoredJob): string {
   return formatDuration(job.eta_seconds)
 }
 
-/** Connection status of the live data. */
 function StreamNote({ live }: { live: LiveJob }) {
   const { connection, staleSince } = live.followed
   if (connection === 'stale' && staleSince !== null) {
@@ -166,7 +163,6 @@ function StreamNote({ live }: { live: LiveJob }) {
   return null
 }
 
-/** Key settings, and the time of submission. */
 function Subtitle({ job }: { job: StoredJob }) {
   const now = useNow(1000)
   const words = caseWords(job.kind ?? 'tuning')
@@ -187,7 +183,6 @@ function Subtitle({ job }: { job: StoredJob }) {
   return <p class="muted small">{[job.id, ...settings, ...priority, submitted].join(' · ')}</p>
 }
 
-/** Summary of a robust job's worlds. */
 function WorldsNote({ job }: { job: Job }) {
   const worlds = job.spec.kind === 'tuning' ? job.spec.worlds : null
   if (!worlds) return null
@@ -202,7 +197,6 @@ function WorldsNote({ job }: { job: Job }) {
   )
 }
 
-/** Description of the aggregation over worlds. */
 function judgedBy({ aggregate, level = 0.75 }: TuningWorlds): string {
   if (aggregate === 'mean' || aggregate === 'worst') return `the ${aggregate} over all worlds`
   if (aggregate === 'quantile') return `the ${percent(level, 2)} quantile over all worlds`

@@ -10,9 +10,7 @@ import '../../walk/player/walk-stage.css'
 
 const BestWalk = lazyPage('the walk', () => import('./best-walk'))
 
-/** Delay before loading [ms]. */
 const REST_MS = 1200
-/** Interval at which a running job's newer best is simulated [ms]. */
 const RENEW_MS = 30_000
 
 export function WalkPreview({ job }: { job: Job }) {

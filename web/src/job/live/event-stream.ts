@@ -1,11 +1,10 @@
 /** Stream of a job's events: every committed iteration once and in order, despite network failures. */
 
 import type { Iteration, JobState } from '../../api/types'
-import { hasEnded } from '../state'
+import { hasEnded } from '../facts'
 
 export type Connection = 'connecting' | 'open' | 'stale' | 'ended'
 
-/** State of a job as received from its events. */
 export interface Followed {
   /** Consecutive, from index 0. */
   readonly iterations: readonly Iteration[]
@@ -27,7 +26,6 @@ export const NOT_CONNECTED: Followed = {
   staleSince: null,
 }
 
-/** The part of an EventSource in use. */
 export type Source = Pick<EventSource, 'addEventListener' | 'close'>
 
 type Timer = ReturnType<typeof setTimeout>

@@ -22,7 +22,6 @@ export interface LiveJob {
 const FIRST = 100
 const FURTHER = 1000
 
-/** Shortest interval between requests [ms]. */
 const REQUEST_MS = 1000
 
 export function useJob(id: string): LiveJob {

@@ -4,9 +4,8 @@ import { useState } from 'preact/hooks'
 import { get } from '../../api/client'
 import { usePolling } from '../../api/resource'
 import type { StoredJob } from '../../api/types'
-import { isActive, progressInWords } from '../state'
+import { isActive, progressInWords } from '../facts'
 
-/** Polling interval [ms]. */
 const RENEW_MS = 4000
 
 /** Current progress of an active job; null for any other. */

@@ -14,12 +14,11 @@ import { capitalized, inWords } from '../../format/words'
 import { flag, useQueryValue } from '../../router/query-value'
 import { ByIteration } from '../by-iteration'
 import { decodeParticles } from '../designs/particles'
-import { fitnessUnit } from '../fitness'
+import { fitnessUnit } from '../facts'
 import { paintDots, paintOver } from './convergence-painter'
 import { type Dots, dotsOf, fittedRange, iterationsAbove, MOST_DOTS } from './model'
 import type { Distribution } from './use-distribution'
 
-/** Polling interval for single designs of a running job [ms]. */
 const RENEW_MS = 8000
 
 const COLUMNS = ['best_so_far', 'best', 'median', 'mean', 'worst'] as const
@@ -33,7 +32,6 @@ export function ConvergenceChart({
   job: Job
   iterations: readonly Iteration[]
   distribution: Distribution
-  /** Reference fitness. */
   reference: ReferenceLine | null
 }) {
   const [logarithmic, setLogarithmic] = useQueryValue('log', flag(true), true)

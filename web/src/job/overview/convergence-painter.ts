@@ -11,11 +11,9 @@ export interface Painted {
   readonly reference: ReferenceLine | null
   /** End of the best line, with its label. */
   readonly end: { readonly x: number; readonly y: number; readonly label: string } | null
-  /** Iterations with values above the range. */
   readonly above: ReadonlySet<number>
 }
 
-/** Draw single designs behind the lines. */
 export function paintDots(plot: uPlot, { dots }: Painted): void {
   if (dots === null) return
   const { ctx, bbox } = plot

@@ -9,7 +9,7 @@ import { LineChart } from '../../charts/lines/line-chart'
 import { percent } from '../../format/number'
 import { themeColour } from '../../theme'
 import { ByIteration } from '../by-iteration'
-import { fitnessUnit } from '../fitness'
+import { fitnessUnit } from '../facts'
 import { grouped, type Strip } from './model'
 import type { Distribution } from './use-distribution'
 

@@ -35,11 +35,9 @@ export function fittedRange(
   return [low - room, high + room]
 }
 
-/** Single designs by column. */
 export interface Dots {
   readonly iterations: Float32Array
   readonly fitness: Float32Array
-  /** Number of designs of the job. */
   readonly total: number
 }
 

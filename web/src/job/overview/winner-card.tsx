@@ -9,7 +9,7 @@ import { placeWord } from '../../format/place'
 import { exactValueQuantity } from '../../format/value'
 import { withQuery } from '../../router/routes'
 import { VARIABLE } from '../columns'
-import { searchedVariables } from '../designs/variables'
+import { searchedVariables } from '../facts'
 import { type WinnerVariable, winnerVariables } from './model'
 
 export function WinnerCard({ job }: { job: Job }) {

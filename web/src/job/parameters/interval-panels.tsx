@@ -20,7 +20,6 @@ export function IntervalPanels({
   judged,
 }: {
   identifiability: Identifiability
-  /** The parameters with intervals. */
   shown: readonly FittedParameter[]
   runs: number
   /** Whether agreement is judged at the decisive threshold. */

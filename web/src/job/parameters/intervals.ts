@@ -5,16 +5,13 @@ import type { Value } from '../../format/value'
 
 export type Trust = NonNullable<FittedParameter['trust']>
 
-/** From best to worst. */
 const TRUSTS: readonly Trust[] = ['trusted', 'rough', 'unknown']
 
-/** Thresholds whose widths are listed. */
 export const WIDTHS = [0.2, 0.1, 0.05, 0.02] as const
 
 /** Threshold at which a parameter is judged. */
 export const DECISIVE = 0.05
 
-/** Whether a parameter is categorical, and thus has no intervals. */
 export function isCategorical({ choices }: FittedParameter): boolean {
   return choices.length > 0
 }
@@ -37,7 +34,6 @@ export function rankOf({ trust }: FittedParameter): number | null {
   return trust === null ? null : TRUSTS.indexOf(trust)
 }
 
-/** All verdicts with their explanations and counts. */
 export function verdicts({ parameters }: Identifiability) {
   return TRUSTS.map((trust) => {
     const matches = parameters.filter((parameter) => parameter.trust === trust)

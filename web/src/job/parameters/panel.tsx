@@ -17,15 +17,13 @@ import { formatValue } from '../../format/value'
 import { inWords } from '../../format/words'
 import { setQuery, usePlace } from '../../router/navigation'
 import { VARIABLE } from '../columns'
-import { caseWords, fitnessUnit } from '../fitness'
-import { isRunning } from '../state'
+import { caseWords, fitnessUnit, isRunning } from '../facts'
 import { IntervalPanels, TrustBadge } from './interval-panels'
 import { isCategorical, rankOf, type Trust, verdicts, WIDTHS, widthAt } from './intervals'
 import { RunPicker } from './run-picker'
 import { labelsOf, runsOf } from './runs'
 import './parameters.css'
 
-/** Polling interval while the job runs [ms]. */
 const RENEW_MS = 15_000
 
 export default function ParametersPanel({ job }: { job: Job }) {
@@ -187,10 +185,8 @@ function Verdicts({
   onText,
 }: {
   identifiability: Identifiability
-  /** Verdict to filter by; null for all. */
   trust: Trust | null
   onTrust: (trust: Trust | null) => void
-  /** Text to filter names by. */
   text: string
   onText: (text: string) => void
 }) {
@@ -247,7 +243,6 @@ function Verdicts({
   )
 }
 
-/** labels: of the runs. */
 function parameterColumns(
   identifiability: Identifiability,
   labels: readonly string[],

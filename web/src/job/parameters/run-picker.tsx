@@ -10,10 +10,9 @@ import { Combobox } from '../../components/fields/combobox'
 import { Check } from '../../components/fields/controls'
 import { formatCount, quantity } from '../../format/number'
 import { jobPath, withQuery } from '../../router/routes'
-import { caseWords, fitnessUnit } from '../fitness'
+import { caseWords, fitnessUnit } from '../facts'
 import { furtherRuns, isSameFit, MOST_RUNS, repeatedSeeds } from './runs'
 
-/** Number of newest jobs searched for runs of the same fit. */
 const OFFERED = 100
 
 /** others: ids of the runs compared with the job; runs: the compared ones loaded so far. */

@@ -40,7 +40,6 @@ export function labelsOf(ids: readonly string[], jobs: readonly Job[]): readonly
   return ids.map((id, k) => (distinct ? `seed ${seeds[k]}` : id))
 }
 
-/** Seeds used by more than one run. */
 export function repeatedSeeds(jobs: readonly Job[]): readonly number[] {
   const seeds = jobs.map((job) => job.spec.seed)
   return [...new Set(seeds.filter((seed, k) => seeds.indexOf(seed) !== k))]

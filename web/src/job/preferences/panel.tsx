@@ -23,7 +23,7 @@ import { useQueryValue } from '../../router/query-value'
 import { withQuery } from '../../router/routes'
 import { IterationChart } from '../by-iteration'
 import { DesignLink, designColumn } from '../columns'
-import { searchedVariables } from '../designs/variables'
+import { searchedVariables } from '../facts'
 import { preferenceOf, preferenceQuery, weighed } from '../preference'
 import './what-if.css'
 

@@ -13,7 +13,7 @@ import { type Design, formatExactValue } from '../../format/value'
 import { inWords, sentence } from '../../format/words'
 import { withQuery } from '../../router/routes'
 import { methodNamed, settingText, settingTexts } from '../../submission/draft/optimizer'
-import { startDesigns } from '../start'
+import { startDesigns } from '../facts'
 
 export default function ReproducePanel({ job }: { job: Job }) {
   return (

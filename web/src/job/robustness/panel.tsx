@@ -21,7 +21,7 @@ import { inWords } from '../../format/words'
 import { jobPath, withQuery } from '../../router/routes'
 import { Bars } from '../bars'
 import { DesignLink } from '../columns'
-import { searchedVariables } from '../designs/variables'
+import { searchedVariables } from '../facts'
 import { preferenceQuery } from '../preference'
 
 /** Fewest designs simulated around the job's winner, and around the winner of a preference. */
@@ -41,7 +41,6 @@ function cached<T>(key: string, request: () => Promise<T>): Promise<T> {
   return response
 }
 
-/** Samples for the searched variables of a job. */
 function samplesOf(job: Job, least: number): number {
   return Math.max(least, 4 * (searchedVariables(job.spec).length + 1))
 }

@@ -12,7 +12,6 @@ import { exactQuantity, formatCount, formatNumber, NONE, percent } from '../../f
 import { withQuery } from '../../router/routes'
 import { DesignLink } from '../columns'
 
-/** Choices for the largest tolerated regret. */
 const TOLERANCES = [0.005, 0.01, 0.02, 0.05]
 
 export function ScenarioFamiliesCard({ job }: { job: Job }) {

@@ -12,7 +12,7 @@ import { capitalized, inWords } from '../../format/words'
 import { setQuery, usePlace } from '../../router/navigation'
 import { withQuery } from '../../router/routes'
 import { Bars } from '../bars'
-import { caseWords, fitnessUnit } from '../fitness'
+import { caseWords, fitnessUnit } from '../facts'
 import { utilityOf } from '../preference'
 import { type Reference, ReferencePicker, useReference } from '../reference'
 import { ScenarioFamiliesCard } from './families-card'
@@ -20,7 +20,6 @@ import './notes.css'
 
 interface Row {
   readonly scenario: string
-  /** Display name. */
   readonly label: string
   readonly winner: ScenarioResult
   readonly other: ScenarioResult | null
@@ -236,7 +235,6 @@ function Compared({
   winner,
   other,
 }: {
-  /** Whether lower is better. */
   ranked: boolean
   winner: number | null
   other: number | null | undefined

@@ -10,9 +10,8 @@ import { change, formatExact, formatNumber, NONE, percent, quantity } from '../.
 import { placeWord } from '../../format/place'
 import { inWords } from '../../format/words'
 import { setQuery, usePlace } from '../../router/navigation'
-import { isRunning } from '../state'
+import { isRunning } from '../facts'
 
-/** Polling interval while the job runs [ms]. */
 const RENEW_MS = 15_000
 
 const LEAVE_OUT = [

@@ -9,7 +9,6 @@ import type { Reference } from '../reference'
 /** Default axes: less vibration costs speed. */
 const USUAL = ['reciprocal_speed', 'acceleration']
 
-/** Owner of a preference as text. */
 export function ownerWords(owner: string): string {
   return owner === 'job' ? 'the job’s preference' : owner
 }
@@ -75,7 +74,6 @@ function geometricMean(walks: readonly ScenarioResult[], objective: string): num
   return Math.exp(logarithms.reduce((a, b) => a + b, 0) / walks.length)
 }
 
-/** Marks of the published designs. */
 export function publishedMarks(
   designs: readonly PublishedDesign[],
   x: string,

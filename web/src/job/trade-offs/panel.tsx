@@ -16,9 +16,7 @@ import { ownerWords } from './designs'
 import { PreferenceCard } from './preference-card'
 import { fitColumn, ScatterCard } from './scatter-card'
 
-/** Polling interval while the job runs [ms]. */
 const RENEW_MS = 8000
-/** Most designs drawn behind the front. */
 const MOST_DRAWN = 5000
 
 export default function TradeOffsPanel({ job }: { job: Job }) {

@@ -16,8 +16,7 @@ import { setQuery, usePlace } from '../../router/navigation'
 import { flag, PAGE_NUMBER, useQueryValue } from '../../router/query-value'
 import { AxisSelect } from '../axis-select'
 import { designColumn, objectiveColumns } from '../columns'
-import type { Particles } from '../designs/particles'
-import { selectedRows } from '../designs/selection'
+import { type Particles, selectedRows } from '../designs/particles'
 import { publishedReferences } from '../reference'
 import {
   allCloud,
@@ -39,7 +38,6 @@ export function ScatterCard({
 }: {
   job: Job
   front: Front
-  /** Designs drawn behind the front; null while loading. */
   all: Particles | null
   selected: Place | null
   onSelect: (place: Place) => void

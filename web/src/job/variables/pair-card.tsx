@@ -26,7 +26,6 @@ export function PairCard({
   selected: Uint32Array
   brushes: Brushes
   onBrush: (brushes: Brushes) => void
-  /** Highlighted row; null for none. */
   marked: number | null
   onMark: (row: number) => void
 }) {

@@ -19,16 +19,21 @@ import { formatCount } from '../../format/number'
 import { type Place, placeOf, placeWord } from '../../format/place'
 import { ignore } from '../../router/ignored'
 import { type Codec, flag, useDelayedQuery, useQueryValue } from '../../router/query-value'
-import { brushesOf, brushWords } from '../designs/brush-words'
-import { columnNamed, decodeParticles, type Particles, particlesTable } from '../designs/particles'
+import {
+  axesOf,
+  brushesOf,
+  brushWords,
+  columnNamed,
+  decodeParticles,
+  type Particles,
+  particlesTable,
+} from '../designs/particles'
 import { SelectedDesigns } from '../designs/selected-designs'
-import { axesOf } from '../designs/selection'
-import { caseWords } from '../fitness'
+import { caseWords } from '../facts'
 import { BrushFields } from './brush-fields'
 import { PairCard } from './pair-card'
 
 const NONE: Brushes = new Map()
-/** Polling interval while the job runs [ms]. */
 const RENEW_MS = 8000
 
 export default function VariablesPanel({ job }: { job: Job }) {

@@ -7,7 +7,6 @@ import { type OptimizerDraft, settingText, settingTexts } from './optimizer'
 /** null for gaitswarm's simulator. */
 export type CaseDraft = OptimizerDraft | null
 
-/** Settings of a case, without its name. */
 export function caseFields(entry: PluginCase | undefined): readonly SchemaField[] {
   if (!entry) return []
   return [...fieldsIn(entry.settings_schema as ObjectSchema).values()].filter(

@@ -18,14 +18,12 @@ export interface Catalogue {
   readonly scenarios: readonly ScenarioPreset[]
   readonly preferences: readonly PreferencePreset[]
   readonly optimizers: readonly OptimizerPreset[]
-  /** Cases of plug-ins. */
   readonly cases: readonly PluginCase[]
   readonly fields: {
     readonly job: ReadonlyMap<string, SchemaField>
     readonly scenario: ReadonlyMap<string, SchemaField>
     readonly variant: ReadonlyMap<string, SchemaField>
     readonly worlds: ReadonlyMap<string, SchemaField>
-    /** Fields of a calibration's target. */
     readonly target: ReadonlyMap<string, SchemaField>
   }
 }

@@ -28,7 +28,6 @@ export interface RobotDraft {
   /** Empty for the robot's default, as planned_soles. */
   readonly contact_law: string
   readonly planned_soles: string
-  /** Coxa, femur, tibia [deg]. */
   readonly backlash: readonly string[]
   readonly toml: string
   readonly urdf: string
@@ -45,9 +44,7 @@ export interface Draft {
   readonly name: string
   readonly robot: RobotDraft
   readonly controller: string
-  /** Names of the selected presets. */
   readonly presets: readonly string[]
-  /** Custom scenarios, by field. */
   readonly custom: readonly Readonly<Record<string, string>>[]
   readonly variables: Readonly<Record<string, VariableDraft>>
   readonly preference: PreferenceDraft
@@ -150,7 +147,6 @@ export function draftOf(spec: JobSpec, catalogue: Catalogue): Draft {
   }
 }
 
-/** Keep only the named scenarios. */
 export function withScenarios(draft: Draft, selected: readonly string[]): Draft {
   return {
     ...draft,
@@ -159,7 +155,6 @@ export function withScenarios(draft: Draft, selected: readonly string[]): Draft 
   }
 }
 
-/** A custom scenario, based on a preset or on defaults. */
 export function scenarioDraft(
   fields: ReadonlyMap<string, SchemaField>,
   start: Scenario | null,
@@ -196,7 +191,6 @@ export function preferenceOf(
   }
 }
 
-/** Method of a job that does not specify one. */
 function defaultMethod({ fields, optimizers }: Catalogue): string {
   const optimizerDefault = fields.job.get('optimizer')?.default as { name?: string } | undefined
   return optimizerDefault?.name ?? optimizers[0].settings.name

@@ -4,7 +4,6 @@ import type { JobSpec } from '../../api/types'
 import type { Design } from '../../format/value'
 
 export interface StartDraft {
-  /** Ids of jobs. */
   readonly jobs: readonly string[]
   /** Total number of designs of these jobs, at most. */
   readonly count: string
@@ -22,7 +21,6 @@ export function startDraft(start: JobSpec['start']): StartDraft {
   return { ...NO_START, jobs, count: String(count ?? NO_START.count) }
 }
 
-/** Start for a spec; undefined for none. */
 export function startOf({ jobs, count, designs }: StartDraft): JobSpec['start'] | undefined {
   if (jobs.length > 0) {
     const most = Number(count)

@@ -6,7 +6,6 @@ import type { SchemaField } from '../fields/schema-fields'
 export interface WorldsDraft {
   /** Whether designs are evaluated in many worlds, not just the nominal model. */
   readonly robust: boolean
-  /** Field values as text, by name. */
   readonly values: Readonly<Record<string, string>>
   /** Perturbations of a cloned job with their bounds; null for all with default bounds. */
   readonly ranges: TuningWorlds['ranges'] | null
@@ -25,7 +24,6 @@ export function hasEffect({ name }: SchemaField, { values }: WorldsDraft): boole
   return name !== 'level' || OF_A_LEVEL.includes(values.aggregate)
 }
 
-/** Draft of a spec's worlds, completed with defaults. */
 export function worldsDraft(
   fields: ReadonlyMap<string, SchemaField>,
   worlds: JobSpec['worlds'] = null,

@@ -10,7 +10,6 @@ export interface SchemaField {
   readonly type: 'number' | 'integer' | 'string' | 'boolean' | 'other'
   readonly low: number | null
   readonly high: number | null
-  /** Whether the bound is exclusive. */
   readonly above: boolean
   readonly below: boolean
   readonly choices: readonly string[] | null

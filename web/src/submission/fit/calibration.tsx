@@ -8,7 +8,6 @@ import type { FitProps } from './page'
 import { calibrationSpec, selectedTargets, type TargetDraft, withRecordings } from './targets'
 import { TargetsTable } from './targets-table'
 
-/** Parameters fitted by default. */
 const FITTED_BY_DEFAULT = ['battery_voltage', 'efficiency']
 
 interface Targets {

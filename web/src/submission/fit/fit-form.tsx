@@ -42,7 +42,6 @@ export function FitForm({
   spec: AnySpec
   /** Parts of the spec without fields here; their errors are shown together. */
   parts: readonly string[]
-  /** Content before the fields. */
   before?: ComponentChildren
   /** Additional fields, given the errors by part. */
   children?: (errors: Readonly<Record<string, string>>) => ComponentChildren

@@ -34,16 +34,12 @@ const WORDS = {
   calibration: 'a calibration to measured walks',
 }
 
-/** Parameters of a robot that can be fitted. */
 type FittableParameters = Pick<RobotPreset, 'parameters' | 'conventions'>
 
-/** Props of the forms. */
 export interface FitProps {
   readonly catalogue: Catalogue
   readonly robot: RobotSource
-  /** Parameters that can be fitted. */
   readonly fittable: FittableParameters
-  /** Ids of the selected recordings. */
   readonly ids: readonly string[]
 }
 

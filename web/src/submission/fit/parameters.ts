@@ -6,15 +6,12 @@ import { type FieldErrors, number } from '../draft/build-spec'
 import { type VariableDraft, variableDraft } from '../draft/draft'
 
 export interface Parameters {
-  /** All parameters that can be fitted. */
   readonly fittable: readonly Variable[]
   /** Names of those fitted by default; null for all. */
   readonly fittedByDefault: readonly string[] | null
-  /** Edited parameters. */
   readonly edited: Readonly<Record<string, VariableDraft>>
 }
 
-/** Draft of every parameter. */
 export function parameterDrafts({
   fittable,
   fittedByDefault,
@@ -54,7 +51,6 @@ export function fittedVariables(parameters: Parameters) {
   })
 }
 
-/** Mark all parameters as fitted or not fitted. */
 export function allEdited(
   { fittable }: Parameters,
   mode: 'searched' | 'default',
@@ -62,7 +58,6 @@ export function allEdited(
   return Object.fromEntries(fittable.map((v) => [v.name, variableDraft(v, mode)]))
 }
 
-/** API errors by parameter. */
 export function parameterErrors(
   errors: readonly FieldError[],
   parameters: Parameters,

@@ -17,7 +17,6 @@ export function TargetsTable({
 }: {
   catalogue: Catalogue
   recordings: readonly RecordingView[]
-  /** Targets of the selected recordings. */
   targets: readonly TargetDraft[]
   onChange: (change: Change) => void
 }) {

@@ -8,7 +8,6 @@ import type { Parameters } from './parameters'
 /** Form state of a target; numbers as text. */
 export interface TargetDraft {
   readonly key: number
-  /** Id of its recording. */
   readonly recording: string
   readonly quantity: string
   readonly value: string
@@ -39,7 +38,6 @@ function targetsOf(recording: RecordingView, key: number): readonly TargetDraft[
   ]
 }
 
-/** Add the default targets of new recordings. */
 export function withRecordings(
   targets: readonly TargetDraft[],
   added: readonly string[],
@@ -56,7 +54,6 @@ export function nextKey(targets: readonly TargetDraft[]): number {
   return Math.max(-1, ...targets.map(({ key }) => key)) + 1
 }
 
-/** Name of a walk in the job. */
 export function walkName(index: number): string {
   return `walk-${index + 1}`
 }
@@ -93,7 +90,6 @@ export function calibrationSpec(
   } as unknown as CalibrationSpec
 }
 
-/** Targets of the selected recordings. */
 export function selectedTargets(
   targets: readonly TargetDraft[],
   recordings: readonly RecordingView[],

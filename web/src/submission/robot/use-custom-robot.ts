@@ -9,7 +9,6 @@ import { robotName, textOf, withJob, withRobotJob } from './job'
 
 export type ActuatorChoice = NonNullable<RobotDraftRequest['actuator']>
 
-/** A file's name and content. */
 interface TextFile {
   readonly name: string
   readonly text: string
@@ -22,7 +21,6 @@ export interface CustomRobot {
   /** Uploaded job.json; null if its fields are generated. */
   readonly job: TextFile | null
   readonly actuator: ActuatorChoice
-  /** Request in progress. */
   readonly busy: 'proposing' | 'checking' | null
   readonly problem: { readonly what: string; readonly error: unknown } | null
   /** Guessed values in the generated robot.toml. */
@@ -127,7 +125,6 @@ export function useCustomRobot(
     if (succeeded) await check()
   }
 
-  /** Read a file and process its content. */
   const read = async (file: File, use: (chosen: TextFile) => unknown) => {
     try {
       await use({ name: file.name, text: await textOf(file) })

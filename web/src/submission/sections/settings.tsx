@@ -21,7 +21,6 @@ import { hasEffect, type WorldsDraft, walksEach, worldsFields } from '../draft/w
 import { describe } from '../fields/schema-fields'
 import { otherErrors, SchemaInput } from '../fields/schema-input'
 
-/** Props of all sections of the form. */
 export interface SectionProps {
   readonly draft: Draft
   readonly catalogue: Catalogue
@@ -29,7 +28,6 @@ export interface SectionProps {
   readonly onChange: (changes: Partial<Draft>) => void
 }
 
-/** Name, budget, seed and precision. */
 export function JobSection({ draft, catalogue, errors, onChange }: SectionProps) {
   const { job } = catalogue.fields
   return (

@@ -132,7 +132,6 @@ function modeInWords(mode: VariableMode, { default: value, choices }: Variable):
   return `default: ${inWords(choices?.[value] ?? String(value))}`
 }
 
-/** words: labels of the treatments. */
 export function VariableTable({
   title,
   variables,

@@ -1,6 +1,5 @@
 import { expect, test } from 'vitest'
-import type { Particles } from '../../../src/job/designs/particles'
-import { selectedRows } from '../../../src/job/designs/selection'
+import { type Particles, selectedRows } from '../../../src/job/designs/particles'
 
 const column = (name: string, kind: string, values: readonly number[]) => ({
   name,

@@ -10,11 +10,9 @@ export interface WalkDraft {
   /** Empty for the preset's value. */
   readonly cycles: string
   readonly controller: string
-  /** JSON. */
   readonly design: string
 }
 
-/** Form fields that can have errors. */
 export type WalkField = 'log' | 'robot' | keyof WalkDraft
 
 export function emptyWalk({ scenarios, controllers }: Catalogue): WalkDraft {
@@ -49,7 +47,6 @@ export function measuredRequest(
   } as MeasuredWalkRequest
 }
 
-/** API errors by form field; others have an empty key. */
 export function walkErrors(errors: readonly FieldError[]): Partial<Record<WalkField | '', string>> {
   const byField: Partial<Record<WalkField | '', string>> = {}
   for (const { field, message } of errors) {

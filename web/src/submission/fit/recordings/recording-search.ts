@@ -6,13 +6,10 @@ import type { Choice, Search } from '../../../components/fields/choice-search'
 import { formatNumber } from '../../../format/number'
 import { formatMoment } from '../../../format/time'
 
-/** Recordings per page. */
 const PAGE = 20
 
-/** A full recording id. */
 const ID = /^[0-9a-f]{32}$/
 
-/** Shortened id for display. */
 export function shortId(id: string): string {
   return id.slice(0, 12)
 }

@@ -140,7 +140,6 @@ function studyOf(controller: Catalogue['controllers'][number], design: string): 
 /** Correlation of desired angles below which the log probably shows another walk. */
 const SAME_WALK = 0.95
 
-/** Summary of an uploaded log. */
 function ReadLog({ read }: { read: MeasuredWalk }) {
   const { recording } = read
   return (

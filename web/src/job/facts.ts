@@ -1,0 +1,156 @@
+/** Facts about a job: state, budget, fitness, priority, start and searched variables. */
+
+import type {
+  AnySpec,
+  Iteration,
+  Job,
+  JobState,
+  JobSummary,
+  StoredJob,
+  Variable,
+} from '../api/types'
+import { formatCount } from '../format/number'
+import type { Design } from '../format/value'
+
+interface WithState {
+  readonly state: JobState
+}
+
+export function hasEnded({ state }: WithState): boolean {
+  return state === 'succeeded' || state === 'failed' || state === 'cancelled'
+}
+
+/** Whether the job will progress without a command. */
+export function isActive(job: WithState): boolean {
+  return job.state === 'queued' || isRunning(job)
+}
+
+export function isRunning({ state }: WithState): boolean {
+  return state === 'running' || state === 'pausing'
+}
+
+/** `running 3/6`, or the final state. followed: iterations received from the stream. */
+export function progressInWords(
+  job: Counts & WithState,
+  followed: readonly Iteration[] = [],
+): string {
+  const { done, planned } = budgetSpent(job, followed)
+  return hasEnded(job) ? job.state : `${job.state} ${done}/${planned}`
+}
+
+export interface Spent {
+  readonly done: number
+  readonly planned: number
+  /** `designs` if some iterations were smaller than planned, so that there may be more of them. */
+  readonly unit: 'iterations' | 'designs'
+}
+
+export type Counts = Pick<
+  JobSummary,
+  'iterations' | 'evaluations' | 'particles' | 'iterations_planned' | 'evaluations_planned'
+>
+
+/** followed: iterations received from the stream, which may be ahead of the job. */
+export function budgetSpent(job: Counts, followed: readonly Iteration[] = []): Spent {
+  const ahead = followed.length > job.iterations
+  const iterations = ahead ? followed.length : job.iterations
+  const evaluations = ahead ? designsIn(followed) : job.evaluations
+  const whole = iterations <= job.iterations_planned && evaluations === iterations * job.particles
+  return job.particles === 0 || whole
+    ? { done: iterations, planned: job.iterations_planned, unit: 'iterations' }
+    : { done: evaluations, planned: job.evaluations_planned, unit: 'designs' }
+}
+
+/** Budget spent in full iterations, the lower limit of an extension. */
+export function iterationsSpent(job: Counts): number {
+  return job.particles === 0 ? job.iterations : Math.ceil(job.evaluations / job.particles)
+}
+
+/** `12 of 25`, without the unit. */
+export function spentInWords({ done, planned }: Spent): string {
+  return `${formatCount(done)} of ${formatCount(planned)}`
+}
+
+function designsIn(iterations: readonly Iteration[]): number {
+  return iterations.reduce((sum, { designs }) => sum + designs, 0)
+}
+
+/** Unit of a job's fitness: dimensionless, except for identification, which averages errors in current. */
+export function fitnessUnit({
+  kind,
+  objectives,
+}: {
+  readonly kind: StoredJob['kind']
+  /** Missing in summaries. */
+  readonly objectives?: Job['objectives']
+}): string {
+  return kind !== 'identification' ? '1' : (objectives?.[0]?.unit ?? 'A')
+}
+
+/** Terms for the components of the fitness. */
+export interface CaseWords {
+  /** What is evaluated: singular and plural. */
+  readonly item: string
+  readonly items: string
+  /** Its measure: singular and plural. */
+  readonly measure: string
+  readonly measures: string
+  /** How the fitness combines the measures. */
+  readonly note: string
+}
+
+const MEAN = 'The fitness is their mean'
+
+const SCENARIOS: CaseWords = {
+  item: 'scenario',
+  items: 'scenarios',
+  measure: 'utility',
+  measures: 'utilities',
+  note: MEAN,
+}
+
+const WORDS: Readonly<Partial<Record<Job['kind'], CaseWords>>> = {
+  identification: {
+    item: 'recording',
+    items: 'recordings',
+    measure: 'error',
+    measures: 'errors',
+    note: MEAN,
+  },
+  calibration: {
+    item: 'walk',
+    items: 'walks',
+    measure: 'misfit',
+    measures: 'misfits',
+    note: 'Root mean square of the deviations from the fitted targets of a walk, in tolerances',
+  },
+}
+
+export function caseWords(kind: Job['kind']): CaseWords {
+  return WORDS[kind] ?? SCENARIOS
+}
+
+export const LOWEST = -10
+export const HIGHEST = 10
+
+export const PRIORITY_HELP =
+  'Queued jobs start in order of priority. Among running jobs, each step doubles the share of the' +
+  ' workers. Results do not depend on it.'
+
+export const PRIORITY_ERROR = `must be an integer from ${LOWEST} to ${HIGHEST}`
+
+export function isPriority(text: string): boolean {
+  const priority = Number(text)
+  const whole = text.trim() !== '' && Number.isInteger(priority)
+  return whole && LOWEST <= priority && priority <= HIGHEST
+}
+
+/** Start designs; references to jobs were resolved to designs when the job was stored. */
+export function startDesigns({ spec }: { readonly spec: AnySpec }): readonly Design[] {
+  return Array.isArray(spec.start) ? (spec.start as readonly Design[]) : []
+}
+
+export function searchedVariables(spec: Job['spec']): readonly Variable[] {
+  // Presets are resolved in a stored spec.
+  return (spec.variables ?? []).filter((v): v is Variable => typeof v !== 'string')
+}

@@ -44,7 +44,7 @@ class Store(Jobs, JobList, Leases, History, Recordings, Audit):
         tokens: access tokens.
         outbox: notifications about ended jobs.
         changes: changes of jobs, by any process.
-        observers: told what this process does with the store.
+        observers: receive what this process does with the store.
 
     Args:
         database: of the newest schema; closed with the store.

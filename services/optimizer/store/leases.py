@@ -259,7 +259,7 @@ def _claimed_row(connection: Connection, claim: Claim, committed: int | None) ->
     repeated = committed is not None and committed < row["iterations"]
     if not taken_over and (repeated or owner == claim.runner):
         return row
-    holder = f"held by {owner}" if owner else f"{row['state']} and held by nobody"
+    holder = f"held by {owner}" if owner else f"{row['state']} and not held"
     lost = f"{claim.runner} has lost job {claim.job.id}: it is {holder}"
     raise LeaseLost(lost, taken_over=taken_over)
 

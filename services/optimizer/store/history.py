@@ -25,6 +25,7 @@ from sqlalchemy import (
     Text,
     bindparam,
     cast,
+    delete,
     func,
     insert,
     literal,
@@ -51,6 +52,7 @@ from gaitswarm.services.optimizer.jobs.iteration import (
     CompletedIteration,
     Evaluation,
     Iteration,
+    JournalEntry,
     Reevaluation,
     best_particle,
     fitness_summary,
@@ -68,9 +70,10 @@ from gaitswarm.services.optimizer.store.tables import (
     evaluations,
     iterations,
     jobs,
+    journal,
     reevaluations,
 )
-from gaitswarm.sim.outcome import Status
+from gaitswarm.sim.outcome import Outcome, Status
 
 _LARGEST_INDEX: Final = 2**31 - 1
 
@@ -443,6 +446,42 @@ def _evaluation_rows(job_id: str, done: CompletedIteration) -> list[dict[str, An
         }
         for particle, (design, by_case, labels, fitness, key) in enumerate(rows)
     ]
+
+
+def insert_entries(connection: Connection, job: Row, entries: Sequence[JournalEntry]) -> None:
+    """Add outcomes of the open ask of a locked job."""
+    rows = [
+        {
+            "job_id": job["id"],
+            "iteration": job["iterations"],
+            "case_index": entry.case,
+            "keys": b"".join(entry.keys),
+            "objectives": entry.outcome.objectives.astype("<f8").tobytes(),
+            "statuses": entry.outcome.statuses.astype(np.uint8).tobytes(),
+        }
+        for entry in entries
+    ]
+    connection.execute(insert(journal), rows)
+
+
+def journal_of(connection: Connection, job: Row) -> tuple[JournalEntry, ...]:
+    """Return the entries of a job's open ask, in the order of their writing."""
+    of_ask = (journal.c.job_id == job["id"]) & (journal.c.iteration == job["iterations"])
+    query = select(journal).where(of_ask).order_by(journal.c.id)
+    return tuple(_journal_entry(row) for row in connection.execute(query).mappings())
+
+
+def clear_journal(connection: Connection, job: Row) -> None:
+    """Remove all entries of a job."""
+    connection.execute(delete(journal).where(journal.c.job_id == job["id"]))
+
+
+def _journal_entry(row: Row) -> JournalEntry:
+    statuses = np.frombuffer(row["statuses"], dtype=np.uint8)
+    objectives = np.frombuffer(row["objectives"], dtype="<f8").reshape(len(statuses), -1)
+    size = len(row["keys"]) // len(statuses)
+    keys = tuple(row["keys"][k * size : (k + 1) * size] for k in range(len(statuses)))
+    return JournalEntry(row["case_index"], keys, Outcome(objectives, statuses))
 
 
 def take_history(

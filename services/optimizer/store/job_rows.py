@@ -45,6 +45,18 @@ _REMEDY: Final = (
 
 _DOCUMENTS: Final = ("spec", "provenance", "lineage")
 
+_SAME_NAME: Final = (
+    *("id", "created_at", "updated_at", "started_at", "finished_at", "error", "owner", "waiting"),
+    "priority",
+)
+"""Columns that are fields of `Job`."""
+
+_PROGRESS: Final = (
+    *("iterations", "evaluations", "best_fitness", "best_iteration", "best_particle"),
+    *("compute_seconds", "recent_seconds", "head"),
+)
+"""Columns that are fields of `Progress`."""
+
 _UNSHOWN: Final = frozenset(
     {
         *("idempotency_key", "request_digest", "lease_owner", "lease_token", "lease_expires_at"),
@@ -122,10 +134,7 @@ def _add_notification(connection: Connection, job: Row) -> None:
             "id": job["id"],
             "name": spec.get("name", "") if isinstance(spec, dict) else "",
             "state": str(job["state"]),
-            "iterations": job["iterations"],
-            "evaluations": job["evaluations"],
-            "best_fitness": job["best_fitness"],
-            "error": job["error"],
+            **{name: job[name] for name in ("iterations", "evaluations", "best_fitness", "error")},
         },
     }
     connection.execute(
@@ -169,33 +178,18 @@ def to_job(row: Row, documents: _Documents | None = None) -> Job:
         else:
             spec = spec.with_budget(row["budget"])
     return Job(
-        id=row["id"],
+        **{name: row[name] for name in _SAME_NAME},
         stored_spec=spec,
         state=JobState(row["state"]),
-        created_at=row["created_at"],
-        updated_at=row["updated_at"],
-        started_at=row["started_at"],
-        finished_at=row["finished_at"],
-        error=row["error"],
         progress=Progress(
-            iterations=row["iterations"],
-            evaluations=row["evaluations"],
             evaluations_saved=row["evaluations_saved"] or 0,
-            best_fitness=row["best_fitness"],
-            best_iteration=row["best_iteration"],
-            best_particle=row["best_particle"],
-            compute_seconds=row["compute_seconds"],
-            recent_seconds=row["recent_seconds"],
-            head=row["head"],
+            **{name: row[name] for name in _PROGRESS},
         ),
         provenance=provenance,
         accepts_changes=bool(row["accepts_changes"]),
         lineage=lineage,
-        owner=row["owner"],
         kept=bool(row["kept"]),
         submitted_iterations=submitted_iterations,
-        waiting=row["waiting"],
-        priority=row["priority"],
         labels=labels_of(row),
         archived=bool(row["archived"]),
         reference=_reference(row["reference"]),

@@ -25,8 +25,11 @@ from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, with_rec
 from gaitswarm.services.optimizer.store.engine import Aggregate
 from gaitswarm.services.optimizer.store.history import (
     answered_ask,
+    clear_journal,
     complete_iteration,
     insert_ask,
+    insert_entries,
+    journal_of,
     open_ask,
 )
 from gaitswarm.services.optimizer.store.job_rows import (
@@ -40,7 +43,6 @@ from gaitswarm.services.optimizer.store.job_rows import (
     unreadable,
     update_job,
 )
-from gaitswarm.services.optimizer.store.journal import clear_journal, insert_entries, journal_of
 from gaitswarm.services.optimizer.store.recordings import load_recordings
 from gaitswarm.services.optimizer.store.tables import Row, jobs
 

@@ -184,11 +184,7 @@ iterations: Final = sa.Table(
     # The following are NULL until the iteration is committed, the statistics also if all designs
     # failed.
     sa.Column("committed_at", UtcDateTime),
-    sa.Column("best", sa.Double),
-    sa.Column("mean", sa.Double),
-    sa.Column("median", sa.Double),
-    sa.Column("worst", sa.Double),
-    sa.Column("best_so_far", sa.Double),
+    *(sa.Column(n, sa.Double) for n in ("best", "mean", "median", "worst", "best_so_far")),
     sa.Column("failed", sa.Integer),
     sa.Column("evaluate_seconds", sa.Double),
     # Of positions and state, and of the committed iteration, chained to the previous one.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -34,6 +35,27 @@ def postgresql_server() -> Iterator[PostgresServer]:
 
 
 @pytest.fixture(scope="session")
+def lasting_stoppable_server() -> Iterator[PostgresServer]:
+    with postgres_server(server_binaries()) as server:
+        open_store(f"{server.url}/postgres").close()
+        yield server
+
+
+@pytest.fixture
+def stoppable_server(lasting_stoppable_server: PostgresServer) -> PostgresServer:
+    """An empty server that the test stops and starts again."""
+    with closing(Database(f"{lasting_stoppable_server.url}/postgres")) as database:
+        empty(database)
+    return lasting_stoppable_server
+
+
+def empty(database: Database) -> None:
+    with database.write() as connection:
+        for table in reversed(metadata.sorted_tables):
+            connection.execute(table.delete())
+
+
+@pytest.fixture(scope="session")
 def emptied_postgresql(postgresql_server: PostgresServer) -> Iterator[Callable[[], str]]:
     """Empties a database of the newest schema, which it gives the URL of.
 
@@ -44,9 +66,7 @@ def emptied_postgresql(postgresql_server: PostgresServer) -> Iterator[Callable[[
     database = Database(url)
 
     def emptied() -> str:
-        with database.write() as connection:
-            for table in reversed(metadata.sorted_tables):
-                connection.execute(table.delete())
+        empty(database)
         return url
 
     yield emptied

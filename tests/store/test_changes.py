@@ -15,7 +15,7 @@ from gaitswarm.services.optimizer.store import Store, open_store
 from gaitswarm.services.optimizer.store.engine import Database
 from tests.examples.processes import eventually
 from tests.store.examples import LEASE, ask, begun, completed, spec
-from tests.store.postgres_server import postgres_server, server_binaries
+from tests.store.postgres_server import PostgresServer
 
 NEVER = 3600.0
 """Seconds between polls that no test waits for."""
@@ -171,19 +171,20 @@ def test_without_a_listener_changes_are_polled_for(
 
 
 @pytest.mark.slow
-def test_the_listener_is_back_after_a_crash_of_the_server() -> None:
-    with postgres_server(server_binaries()) as server:
-        url = f"{server.url}/postgres"
-        with closing(open_store(url)) as store, closing(open_store(url)) as waiting:
-            claim = begun(store)
-            woken = threading.Event()
-            with waiting.changes.watch(claim.job.id, woken.set, poll_seconds=0.2):
-                settle(url, waiting, woken)
-                server.stop()
-                server.start()
-                store.commit(claim, completed(0), ask(1))
-                assert woken.wait(10.0)
-                eventually(lambda: len(listening(url)) == 1)
+def test_the_listener_is_back_after_a_crash_of_the_server(
+    stoppable_server: PostgresServer,
+) -> None:
+    url = f"{stoppable_server.url}/postgres"
+    with closing(open_store(url)) as store, closing(open_store(url)) as waiting:
+        claim = begun(store)
+        woken = threading.Event()
+        with waiting.changes.watch(claim.job.id, woken.set, poll_seconds=0.2):
+            settle(url, waiting, woken)
+            stoppable_server.stop()
+            stoppable_server.start()
+            store.commit(claim, completed(0), ask(1))
+            assert woken.wait(10.0)
+            eventually(lambda: len(listening(url)) == 1)
 
 
 def test_a_listener_that_has_left_receives_nothing(

@@ -14,9 +14,17 @@ from gaitswarm.services.optimizer.jobs.fork import Fork, Lineage, TakenHistory
 from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
 from gaitswarm.services.optimizer.jobs.job import Command, Job, JobState
 from gaitswarm.services.optimizer.store import Store
+from gaitswarm.services.optimizer.store import jobs as jobs_module
 from gaitswarm.services.optimizer.store.engine import Database
 from gaitswarm.services.optimizer.store.tables import metadata
 from tests.store.examples import LEASE, Clock, ask, begun, completed, spec
+
+
+@pytest.fixture(autouse=True)
+def short_transactions(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Remove fifty evaluations in one transaction."""
+    monkeypatch.setattr(jobs_module, "_EVALUATIONS_AT_ONCE", 50)
+
 
 KEYS = (b"\0" * 16, b"\xff" * 16)
 TABLES = ("jobs", "iterations", "evaluations", "reevaluations", "notifications")
@@ -43,13 +51,13 @@ def ended(store: Store, done: CompletedIteration | None = None) -> Job:
     return store.job(claim.job.id)
 
 
-def large(particles: int = 6000) -> CompletedIteration:
+def large(particles: int = 60) -> CompletedIteration:
     """More evaluations than are removed in one transaction."""
     return completed(0, [float(k) for k in range(particles)])
 
 
 @pytest.mark.variants("*-2")
-@pytest.mark.parametrize("particles", [2, 6000])
+@pytest.mark.parametrize("particles", [2, 60])
 def test_all_of_a_job_goes_and_nothing_of_another(
     store: Store, database_url: str, particles: int
 ) -> None:
@@ -66,19 +74,19 @@ def test_all_of_a_job_goes_and_nothing_of_another(
 def test_rows_of_a_long_job_go_by_pieces_that_can_be_gone_on_with(
     store: Store, database_url: str
 ) -> None:
-    claim = begun(store, iterations=3, particles=4000)
+    claim = begun(store, iterations=3, particles=40)
     for index in range(3):
-        following = None if index == 2 else ask(index + 1, particles=4000)
-        done = completed(index, [float(k) for k in range(4000)])
+        following = None if index == 2 else ask(index + 1, particles=40)
+        done = completed(index, [float(k) for k in range(40)])
         store.commit(claim, done, following)
     store.delete_job(claim.job.id)
-    assert rows(database_url)["evaluations"] == 12_000
+    assert rows(database_url)["evaluations"] == 120
     asked = iter([False, True])
     store.purge_deleted(lambda: next(asked))
     assert rows(database_url) == {
         "jobs": 1,
         "iterations": 2,
-        "evaluations": 8000,
+        "evaluations": 80,
         "reevaluations": 0,
         "notifications": 0,
     }
@@ -213,10 +221,10 @@ def test_only_jobs_that_ended_in_the_states_asked_for_are_deleted(
 
 
 def test_two_processes_that_remove_the_same_job_do_no_harm(store: Store, database_url: str) -> None:
-    claim = begun(store, iterations=3, particles=4000)
+    claim = begun(store, iterations=3, particles=40)
     for index in range(3):
-        following = None if index == 2 else ask(index + 1, particles=4000)
-        store.commit(claim, completed(index, [float(k) for k in range(4000)]), following)
+        following = None if index == 2 else ask(index + 1, particles=40)
+        store.commit(claim, completed(index, [float(k) for k in range(40)]), following)
     store.delete_job(claim.job.id)
     threads = [threading.Thread(target=store.purge_deleted) for _ in range(2)]
     for thread in threads:

@@ -27,7 +27,7 @@ from tests.examples.processes import eventually
 from tests.optimizer.formula import SPEC, FormulaEvaluator
 from tests.store.examples import LEASE, spec
 from tests.store.partition_process import SILENCE_SECONDS
-from tests.store.postgres_server import PostgresServer, postgres_server, server_binaries
+from tests.store.postgres_server import PostgresServer, server_binaries
 
 pytestmark = pytest.mark.slow
 
@@ -35,13 +35,6 @@ UNSHARE = shutil.which("unshare")
 
 LONG = SPEC.model_copy(update={"iterations": 60})
 """A second of commits, at least."""
-
-
-@pytest.fixture
-def server() -> Iterator[PostgresServer]:
-    """A server that a test may stop."""
-    with postgres_server(server_binaries()) as server:
-        yield server
 
 
 @pytest.fixture(scope="module")
@@ -84,20 +77,20 @@ def run_to_its_end(store: Store, lease_seconds: float, disturb: threading.Event)
 @pytest.mark.variants
 @pytest.mark.parametrize("lease_seconds", [30.0, 0.5], ids=["within-a-lease", "past-a-lease"])
 def test_a_crash_of_the_server_in_mid_run_changes_no_bit_of_a_history(
-    server: PostgresServer, undisturbed: list[Bits], lease_seconds: float
+    stoppable_server: PostgresServer, undisturbed: list[Bits], lease_seconds: float
 ) -> None:
     crash = threading.Event()
 
     def restart() -> None:
         crash.wait()
-        server.stop()
+        stoppable_server.stop()
         if lease_seconds < 1.0:
             threading.Event().wait(2.0 * lease_seconds)
-        server.start()
+        stoppable_server.start()
 
     thread = threading.Thread(target=restart)
     thread.start()
-    with closing(open_store(f"{server.url}/postgres")) as store:
+    with closing(open_store(f"{stoppable_server.url}/postgres")) as store:
         job = run_to_its_end(store, lease_seconds, crash)
         thread.join()
         assert job.state is JobState.SUCCEEDED, job.error

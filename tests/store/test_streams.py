@@ -18,7 +18,7 @@ from gaitswarm.services.optimizer.store import Store, open_store
 from tests.examples.processes import within
 from tests.examples.servers import Server
 from tests.store.examples import ask, begun, completed
-from tests.store.postgres_server import postgres_server, server_binaries
+from tests.store.postgres_server import PostgresServer
 
 pytestmark = pytest.mark.slow
 
@@ -79,22 +79,21 @@ def test_many_streams_of_a_job_have_every_iteration_once_and_in_order(
             assert stream.result(timeout=30.0) == list(range(ITERATIONS))
 
 
-def test_an_open_stream_survives_a_crash_of_the_database() -> None:
-    with postgres_server(server_binaries()) as database:
-        url = f"{database.url}/postgres"
-        with (
-            closing(open_store(url)) as store,
-            closing(open_store(url)) as served,
-            closing(Server(JobService(served), api_event_poll_seconds=0.2)) as server,
-            ThreadPoolExecutor(1) as pool,
-        ):
-            claim = begun(store, iterations=ITERATIONS)
-            opened = threading.Semaphore(0)
-            stream = pool.submit(followed, server.url, claim.job.id, opened)
-            assert opened.acquire(timeout=30.0)
-            for index in range(ITERATIONS):
-                if index == ITERATIONS // 2:
-                    database.stop()
-                    database.start()
-                commit(store, claim, index)
-            assert stream.result(timeout=30.0) == list(range(ITERATIONS))
+def test_an_open_stream_survives_a_crash_of_the_database(stoppable_server: PostgresServer) -> None:
+    url = f"{stoppable_server.url}/postgres"
+    with (
+        closing(open_store(url)) as store,
+        closing(open_store(url)) as served,
+        closing(Server(JobService(served), api_event_poll_seconds=0.2)) as server,
+        ThreadPoolExecutor(1) as pool,
+    ):
+        claim = begun(store, iterations=ITERATIONS)
+        opened = threading.Semaphore(0)
+        stream = pool.submit(followed, server.url, claim.job.id, opened)
+        assert opened.acquire(timeout=30.0)
+        for index in range(ITERATIONS):
+            if index == ITERATIONS // 2:
+                stoppable_server.stop()
+                stoppable_server.start()
+            commit(store, claim, index)
+        assert stream.result(timeout=30.0) == list(range(ITERATIONS))

@@ -83,7 +83,7 @@ class News:
     @cached_property
     def events(self) -> tuple[bytes, ...]:
         """Encoded events `iteration`, one for each iteration."""
-        views = map(IterationView.from_iteration, self.iterations)
+        views = map(IterationView.model_validate, self.iterations)
         return tuple(
             format_sse_event(event="iteration", id=str(view.index), data_str=view.model_dump_json())
             for view in views

@@ -495,7 +495,7 @@ def list_iterations(
 ) -> PageView[IterationView]:
     """Return a page of iterations with statistics of their fitness, for convergence plots."""
     page = service.iterations(job_id, after=query.after, limit=query.limit)
-    items = [IterationView.from_iteration(iteration) for iteration in page.items]
+    items = [IterationView.model_validate(iteration) for iteration in page.items]
     return PageView[IterationView](items=items, next=page.next)
 
 
@@ -568,7 +568,7 @@ def committed(service: JobService, job_id: str, after: int | None) -> Iterator[I
     """List committed iterations, read by pages."""
     while True:
         page = service.iterations(job_id, after=after)
-        yield from map(IterationView.from_iteration, page.items)
+        yield from map(IterationView.model_validate, page.items)
         if page.next is None or not page.items:
             return
         after = page.items[-1].index
@@ -944,7 +944,7 @@ def estimate_job(service: JobService, spec: AnySpec) -> EstimateView:
     The time follows from the rate of earlier jobs with the same robot and controller; if there are
     none, a short simulation is timed on the server, which may have to compile the robot's kernel.
     """
-    return EstimateView.from_estimate(service.estimate(spec))
+    return EstimateView.model_validate(service.estimate(spec))
 
 
 @_operation("POST /simulations", "analysis", "Simulate one design", reads=True, heavy=True)
@@ -1405,7 +1405,7 @@ class FacetsQuery(Query):
 @_operation("GET /job-facets", "operations", "Count jobs by facet", page=True)
 def count_jobs(service: JobService, query: FacetsQuery) -> JobFacetsView:
     """Count jobs by state, robot, controller, preference and tag."""
-    return JobFacetsView.from_counts(service.facets(archived=query.archived))
+    return JobFacetsView.model_validate(service.facets(archived=query.archived))
 
 
 class ActivityQuery(Query):
@@ -1454,5 +1454,5 @@ def read_audit(service: JobService, query: AuditQuery) -> PageView[AuditEntryVie
     Requires a token of scope `admin`, where tokens are required.
     """
     page = service.store.audit(job_id=query.job_id, after=query.after, limit=query.limit)
-    items = [AuditEntryView.from_entry(entry) for entry in page.items]
+    items = [AuditEntryView.model_validate(entry) for entry in page.items]
     return PageView[AuditEntryView](items=items, next=page.next)

@@ -252,4 +252,4 @@ def audit(
                 f" {entry.job_id or '-':12}  {details}".rstrip()
             )
 
-    return map(AuditEntryView.from_entry, entries), parts()
+    return map(AuditEntryView.model_validate, entries), parts()

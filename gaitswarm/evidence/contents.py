@@ -227,7 +227,7 @@ def _iterations(service: JobService, job: Job) -> Iterator[IterationView]:
         page_of = service.iterations(job.id, after=after, limit=_PIECE)
         for iteration in page_of.items:
             if iteration.index < job.progress.iterations:
-                yield IterationView.from_iteration(iteration)
+                yield IterationView.model_validate(iteration)
             after = iteration.index
         if page_of.next is None:
             return

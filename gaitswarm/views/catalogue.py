@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Generic, Literal, TypeVar
+from typing import Annotated, Any, Generic, Literal, TypeVar
 
 from pydantic import ConfigDict, Field
 
@@ -73,31 +73,38 @@ class PreferenceView(Preference):
     name: PreferenceName = Field(description="Name, as in job specs.", examples=["A"])
 
 
+Description = Annotated[
+    str, Field(description="What it is, with its source.", examples=["Mamdani fuzzy-PI, chapter 4"])
+]
+Needs = Annotated[
+    str | None,
+    Field(
+        description="Command that installs what is missing for it here; null if nothing is.",
+        examples=["pip install 'gaitswarm[search]'"],
+    ),
+]
+SettingsSchema = Annotated[
+    dict[str, Any],
+    Field(description="JSON schema of its settings, with defaults, bounds and descriptions."),
+]
+CatalogueName = Annotated[str, Field(description="Name, as in job specs.", examples=["fuzzy-pi"])]
+
+
 class OptimizerView(View):
     """A search method by its default settings, or a preset of one."""
 
     name: ChoiceName = Field(description="Name, as in job specs.", examples=["pso-falling-inertia"])
-    description: str = Field(
-        description="What the method is, with its source.",
-        examples=["Particle swarm optimization (Kennedy and Eberhart 1995; thesis 3.4.1)"],
-    )
-    needs: str | None = Field(
-        description="Command that installs what is missing for it here; null if nothing is.",
-        examples=["pip install 'gaitswarm[search]'"],
-    )
+    description: Description
+    needs: Needs
     settings: ChosenSettings = Field(description="What the name stands for.")
-    settings_schema: dict[str, Any] = Field(
-        description="JSON schema of the method's settings, with defaults, bounds and descriptions."
-    )
+    settings_schema: SettingsSchema
 
 
 class ControllerView(View):
     """A family of motor controllers and what can be tuned in it."""
 
-    name: str = Field(description="Name, as in job specs.", examples=["fuzzy-pi"])
-    description: str = Field(
-        description="What it is, with its source.", examples=["Mamdani fuzzy-PI, chapter 4"]
-    )
+    name: CatalogueName
+    description: Description
     variables: list[Variable] = Field(
         description="Design variables; a job searches all that it does not hold fixed."
     )
@@ -117,15 +124,10 @@ class ControllerView(View):
 class CaseView(View):
     """A plug-in's case: what evaluates designs in place of a walk in gaitswarm's simulator."""
 
-    name: str = Field(description="Name, as in job specs.", examples=["mujoco-walk"])
-    description: str = Field(description="What it is, with its source.", examples=["MuJoCo"])
-    needs: str | None = Field(
-        description="Command that installs what is missing for it here; null if nothing is.",
-        examples=["pip install mujoco-core"],
-    )
-    settings_schema: dict[str, Any] = Field(
-        description="JSON schema of its settings, with defaults, bounds and descriptions."
-    )
+    name: CatalogueName
+    description: Description
+    needs: Needs
+    settings_schema: SettingsSchema
 
 
 class PluginView(View):
@@ -196,23 +198,21 @@ def case_views() -> list[CaseView]:
 
 
 def plugin_views() -> list[PluginView]:
-    """Every entry point that is installed for gaitswarm, those that are refused among them."""
+    """Every entry point that is installed for gaitswarm, refused ones included."""
     registries: tuple[Registry[Any], ...] = (CONTROLLERS, CASES, METHODS)
-    found = []
-    for registry in registries:
-        for plugin in registry.plugins():
-            reason = registry.problem(plugin)
-            found.append(
-                PluginView(
-                    kind=plugin.kind,
-                    name=plugin.name,
-                    distribution=plugin.distribution,
-                    version=plugin.version,
-                    state="ok" if reason is None else "refused",
-                    reason=reason,
-                )
-            )
-    return found
+    return [
+        PluginView(
+            kind=plugin.kind,
+            name=plugin.name,
+            distribution=plugin.distribution,
+            version=plugin.version,
+            state="ok" if reason is None else "refused",
+            reason=reason,
+        )
+        for registry in registries
+        for plugin in registry.plugins()
+        for reason in (registry.problem(plugin),)
+    ]
 
 
 def _of_method(settings: ChosenSettings) -> dict[str, Any]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, replace
 from datetime import datetime
 from typing import Literal
 
@@ -24,7 +24,7 @@ from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Iteration
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.spec import Spec
-from gaitswarm.services.optimizer.views import View, finite, framed
+from gaitswarm.services.optimizer.views import Finite, IterationIndex, JobName, View, framed
 from gaitswarm.sim.kernel.walk import Precision
 
 
@@ -44,24 +44,14 @@ class SearchView(View):
 class BestView(EvaluationView):
     """The best design that a job has found so far, always judged in double precision."""
 
-    fitness: float = Field(
-        description="As of any evaluation; never null.",
-        examples=[20.87],
-    )
+    fitness: float = Field(description="As of any evaluation; never null.", examples=[20.87])
     search: SearchView | None = Field(
-        default=None,
-        description="Fitness that the search was given; null if it is in double precision, too.",
+        default=None, description="Fitness that a search in single precision was given."
     )
 
     @classmethod
     def from_evaluation(cls, evaluation: Evaluation, spec: Spec) -> BestView:
-        """Make a view of the best design.
-
-        Args:
-            evaluation: of a design that did not fail, with its reevaluation if the job searches in
-                single precision.
-            spec: of its job.
-        """
+        """Make a view of a design that did not fail, by its reevaluation if there is one."""
         search, reevaluation = None, evaluation.reevaluation
         if reevaluation is not None:
             found = evaluation.fitness
@@ -81,44 +71,25 @@ class BestView(EvaluationView):
 
 
 class IterationView(View):
-    """Summary of one committed iteration."""
+    """Summary of one committed iteration. Fitness is minimized; null if every design failed."""
 
-    index: int = Field(description="Index of the iteration, from 0.", examples=[24])
-    designs: int = Field(
-        description="Designs of the iteration [1].",
-        examples=[25],
-    )
-    best: float | None = Field(
-        description="Least fitness of this iteration [1]; null if every design failed.",
-        examples=[21.3],
-    )
-    mean: float | None = Field(description="Mean of its finite fitnesses [1].", examples=[25.2])
-    median: float | None = Field(description="Median of them [1].", examples=[23.9])
-    worst: float | None = Field(description="Greatest of them [1].", examples=[41.7])
-    best_so_far: float | None = Field(
+    index: IterationIndex
+    designs: int = Field(description="Designs of the iteration [1].", examples=[25])
+    best: Finite = Field(description="Least fitness of this iteration [1].", examples=[21.3])
+    mean: Finite = Field(description="Mean of its finite fitnesses [1].", examples=[25.2])
+    median: Finite = Field(description="Median of them [1].", examples=[23.9])
+    worst: Finite = Field(description="Greatest of them [1].", examples=[41.7])
+    best_so_far: Finite = Field(
         description="Least fitness of this and all earlier iterations [1].", examples=[20.9]
     )
-    failed: int = Field(
-        description="Designs that failed in at least one scenario [1].", examples=[2]
-    )
-    evaluate_seconds: float = Field(
-        description="Time that its evaluation took [s].", examples=[1.23]
-    )
+    failed: int = Field(description="Designs that failed in some scenario [1].", examples=[2])
+    evaluate_seconds: float = Field(description="Time of its evaluation [s].", examples=[1.23])
     committed_at: datetime = Field(description="When it was committed, UTC.")
     digest: str | None = Field(
         default=None,
         description="SHA-256 of it, the spec and all iterations before it.",
         examples=["9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08"],
     )
-
-    @classmethod
-    def from_iteration(cls, iteration: Iteration) -> IterationView:
-        """Make a view of an iteration.
-
-        Args:
-            iteration: as the store lists it.
-        """
-        return cls.model_validate(_at_a_glance(iteration))
 
 
 class HistoryIterationView(IterationView):
@@ -130,37 +101,14 @@ class HistoryIterationView(IterationView):
     def from_iteration_and_evaluations(
         cls, iteration: Iteration, evaluations: tuple[Evaluation, ...], spec: Spec
     ) -> HistoryIterationView:
-        """Make a view of an iteration with its designs.
-
-        Args:
-            iteration: as the store lists it.
-            evaluations: of its designs.
-            spec: of the job.
-        """
+        """Make a view of an iteration with its designs."""
         particles = evaluation_views(evaluations, spec)
-        return cls.model_validate({**_at_a_glance(iteration), "evaluations": particles})
+        return cls.model_validate({**asdict(iteration), "evaluations": particles})
 
 
 def encoded_iterations(iterations: Sequence[Iteration]) -> Iterator[bytes]:
-    """Encode views of iterations, of which none is made."""
-    return (to_json(_at_a_glance(iteration)) for iteration in iterations)
-
-
-def _at_a_glance(iteration: Iteration) -> dict[str, object]:
-    """Fields of `IterationView`, in its order."""
-    return {
-        "index": iteration.index,
-        "designs": iteration.designs,
-        "best": finite(iteration.best),
-        "mean": finite(iteration.mean),
-        "median": finite(iteration.median),
-        "worst": finite(iteration.worst),
-        "best_so_far": finite(iteration.best_so_far),
-        "failed": iteration.failed,
-        "evaluate_seconds": iteration.evaluate_seconds,
-        "committed_at": iteration.committed_at,
-        "digest": iteration.digest,
-    }
+    """Encode iterations as their views, of which none is made."""
+    return (to_json(asdict(iteration), inf_nan_mode="null") for iteration in iterations)
 
 
 class ParticleColumnView(View):
@@ -190,7 +138,7 @@ class ParticleColumnView(View):
 class ParticlesHeaderView(View):
     """What the numbers after it are."""
 
-    job_id: str = Field(description="Identifier of the job.", examples=["k2q7zr5dm9xw"])
+    job_id: JobName
     rows: int = Field(description="Evaluations that follow: numbers of each column [1].")
     total: int = Field(description="Evaluations there are, of which the rows are chosen [1].")
     iterations: tuple[int, int] | None = Field(
@@ -227,20 +175,19 @@ def encoded_particles(
 
 
 def _described(job: Job) -> list[ParticleColumnView]:
+    def plain(kind: str, names: Iterable[str], unit: str) -> Iterator[ParticleColumnView]:
+        nothing: dict[str, object] = {"low": None, "high": None, "choices": []}
+        for name in names:
+            column = {"name": name, "unit": unit, "kind": kind, **nothing}
+            yield ParticleColumnView.model_validate(column)
+
     unit = "A" if job.spec.kind == "identification" else "1"
-    plain = [("iteration", "1", "index"), ("particle", "1", "index"), ("fitness", unit, "fitness")]
-    worth = [(f"utility:{name}", unit, "utility") for name in job.spec.case_names]
-    variables = [
-        {name: getattr(v, name) for name in ParticleColumnView.model_fields}
-        for v in job.spec.design_space().variables
+    return [
+        *plain("index", ("iteration", "particle"), "1"),
+        *plain("fitness", ("fitness",), unit),
+        *map(ParticleColumnView.model_validate, job.spec.design_space().variables),
+        *plain("utility", (f"utility:{name}" for name in job.spec.case_names), unit),
     ]
-    nothing: dict[str, object] = {"low": None, "high": None, "choices": []}
-    unbounded = [
-        [{"name": n, "unit": u, "kind": kind, **nothing} for n, u, kind in group]
-        for group in (plain, worth)
-    ]
-    described = [*unbounded[0], *variables, *unbounded[1]]
-    return [ParticleColumnView.model_validate(column) for column in described]
 
 
 def _objectives_described(job: Job) -> list[ParticleColumnView]:

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from gaitswarm.services.optimizer.analysis.evaluations import ObjectiveView
 from gaitswarm.services.optimizer.analysis.reference import ReferenceView
 from gaitswarm.services.optimizer.errors import Unreadable
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
-from gaitswarm.services.optimizer.jobs.estimate import Estimate, time_left
+from gaitswarm.services.optimizer.jobs.estimate import time_left
 from gaitswarm.services.optimizer.jobs.fork import Lineage
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation
 from gaitswarm.services.optimizer.jobs.job import (
@@ -22,10 +22,10 @@ from gaitswarm.services.optimizer.jobs.job import (
     UnreadableSpec,
 )
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.labels import FacetCounts, preference_name, robot_name
+from gaitswarm.services.optimizer.jobs.labels import preference_name, robot_name
 from gaitswarm.services.optimizer.jobs.priority import HIGHEST, LOWEST
 from gaitswarm.services.optimizer.jobs.provenance import ProvenanceRecord
-from gaitswarm.services.optimizer.views import View, finite
+from gaitswarm.services.optimizer.views import Finite, JobName, Request, View
 from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.views.base import job_links
 from gaitswarm.views.history import BestView
@@ -36,10 +36,7 @@ class Spent:
     """How much of a budget is spent. Its text is `12 of 25 iterations`.
 
     Attributes:
-        done: Units that are committed.
-        planned: Units of the whole budget.
-        unit: `iterations` where each of them has as many designs as it may have; else `designs`,
-            as there may be many more and smaller iterations than the budget names.
+        unit: `designs` if there are iterations with fewer than they may have.
     """
 
     done: int
@@ -71,12 +68,10 @@ class EstimateView(View):
     evaluations: int = Field(description="Designs that are judged [1].", examples=[625])
     walks: int = Field(description="Each design in each scenario [1].", examples=[3750])
     simulated_seconds: float = Field(
-        description="Length of all walks together [s]; less for designs that fall.",
-        examples=[20250.0],
+        description="Simulated time in total [s]; less for designs that fall.", examples=[20250.0]
     )
     seconds: float | None = Field(
-        description="Wall time once it runs and has the machine to itself [s]; null"
-        " if that is unknown.",
+        description="Wall time if it has the machine to itself [s]; null if unknown.",
         examples=[21.5],
     )
     basis: str = Field(
@@ -84,88 +79,44 @@ class EstimateView(View):
         examples=["the rate of 2 earlier jobs with similar simulations: 942 simulated s/s"],
     )
 
-    @classmethod
-    def from_estimate(cls, estimate: Estimate) -> EstimateView:
-        """Make a view of an estimate."""
-        return cls(
-            evaluations=estimate.evaluations,
-            walks=estimate.walks,
-            simulated_seconds=estimate.simulated_seconds,
-            seconds=estimate.seconds,
-            basis=estimate.basis,
-        )
-
 
 JobKind = Literal["tuning", "identification", "calibration", "certificate"]
 
 
 class JobSummaryView(View):
-    """A job and its progress."""
+    """A job and its progress. What depends on the spec is null, 0 or empty if it is unreadable."""
 
-    id: str = Field(description="Identifier of the job.", examples=["k2q7zr5dm9xw"])
-    name: str = Field(
-        description="Name, given with the spec or later.",
-        examples=["chapter 4, preference A"],
-    )
-    kind: JobKind | None = Field(
-        description="Kind of job: tunes a drive, fits parameters of the robot to recordings, fits"
-        " robot and conventions to a table of results, or tests a design in many worlds; null if"
-        " its spec cannot be read.",
-        examples=["tuning"],
-    )
+    id: JobName
+    name: str = Field(description="Name, given with the spec or later.", examples=["chapter 4"])
+    kind: JobKind | None = Field(description="What it tunes, fits or tests.", examples=["tuning"])
     state: JobState = Field(
-        description="queued, running, pausing (ends its iteration first), paused, cancelled,"
-        " failed or succeeded.",
-        examples=["running"],
+        description="State; a pausing job finishes its iteration first.", examples=["running"]
     )
-    error: str | None = Field(
-        description="Why it failed, or why its spec cannot be read; null if neither is so.",
-        examples=[None],
-    )
+    error: str | None = Field(description="Why it failed, or why its spec cannot be read.")
     controller: str | None = Field(
-        description="Motor controller that it tunes; null for a job that tunes none.",
-        examples=["fuzzy-pi"],
+        description="Motor controller that it tunes; null for none.", examples=["fuzzy-pi"]
     )
     scenarios: list[str] = Field(
-        description="Scenarios in which every design walks, or recordings or walks that it is"
-        " fitted to;"
-        " empty if the spec cannot be read.",
+        description="Scenarios of every design, or recordings or walks that it is fitted to.",
         examples=[["normal-fast", "turn-right-fast"]],
     )
     precision: Precision | None = Field(
-        description="Of the search's numbers; what is reported as best is judged in double. Null if"
-        " the spec cannot be read.",
-        examples=["double"],
+        description="Precision of the search; the best is judged in double.", examples=["double"]
     )
-    optimizer: str | None = Field(
-        description="Search method; null if the spec cannot be read.", examples=["pso"]
-    )
-    particles: int = Field(
-        description="Designs of one iteration, at most [1]; 0 if the spec cannot be read.",
-        examples=[25],
-    )
-    iterations: int = Field(
-        description="Iterations committed so far [1]; a method that asks for fewer designs at once"
-        " takes more of them than are planned.",
-        examples=[12],
-    )
+    optimizer: str | None = Field(description="Search method.", examples=["pso"])
+    particles: int = Field(description="Most designs of one iteration [1].", examples=[25])
+    iterations: int = Field(description="Iterations committed so far [1].", examples=[12])
     iterations_planned: int = Field(
-        description="Budget in iterations of `particles` designs each [1]; 0 if the spec cannot be"
-        " read.",
-        examples=[25],
+        description="Budget in iterations of `particles` designs each [1].", examples=[25]
     )
-    evaluations: int = Field(
-        description="Designs judged so far, each in every scenario [1].", examples=[300]
-    )
+    evaluations: int = Field(description="Designs judged so far [1].", examples=[300])
     evaluations_saved: int = Field(
-        description="Of the designs judged, those whose results were already known: proposed"
-        " twice, or simulated before by this or another job of the database [1].",
-        examples=[25],
+        description="Of these, designs whose results were already known [1].", examples=[25]
     )
     evaluations_planned: int = Field(
         description="Designs that the whole budget will judge [1].", examples=[625]
     )
-    best_fitness: float | None = Field(
+    best_fitness: Finite = Field(
         description="Least fitness so far, in double precision [1]; null while every design has"
         " failed.",
         examples=[21.3],
@@ -173,13 +124,11 @@ class JobSummaryView(View):
     reference: ReferenceView | None = Field(
         default=None,
         description="Published design of its controller and preference in the same walks; null"
-        " where there is none, and until the job has ended or `/v1/jobs/{job_id}/reference` was"
-        " requested.",
+        " without one, and until the job has ended or `/v1/jobs/{job_id}/reference` was requested.",
     )
-    gain: float | None = Field(
+    gain: Finite = Field(
         default=None,
-        description="Share by which `best_fitness` is less than that of `reference` [1]; null"
-        " where one of them is not known.",
+        description="Share by which `best_fitness` is less than that of `reference` [1].",
         examples=[0.39],
     )
     best_iteration: int | None = Field(
@@ -189,30 +138,22 @@ class JobSummaryView(View):
         description="Time spent in evaluating committed iterations [s].", examples=[14.8]
     )
     evaluations_per_second: float | None = Field(
-        description="Designs judged per second of that time [1/s]; null before the first.",
-        examples=[20.3],
+        description="Designs judged per second of that time [1/s].", examples=[20.3]
     )
     simulations_per_second: float | None = Field(
-        description="Walks (designs x scenarios, but for saved ones) simulated per second of that"
-        " time [1/s].",
+        description="Simulations that were not saved, per second of that time [1/s].",
         examples=[121.6],
     )
     evaluated_on: str | None = Field(
         default=None,
-        description="Where its last iteration was simulated: threads of a process, or workers and"
-        " nodes of Ray; null before the first.",
+        description="Where its last iteration was simulated: threads, or workers of Ray.",
         examples=["ray: 4 workers on 2 nodes"],
     )
     waiting: str | None = Field(
-        default=None,
-        description="What a running job waits for, such as unreachable workers; it continues"
-        " when they are back. Null for nothing.",
-        examples=[None],
+        default=None, description="What a running job waits for, such as unreachable workers."
     )
     eta_seconds: float | None = Field(
-        description="Estimated time to the end of the budget at the pace of the last iterations"
-        " [s]: 0 for a job that succeeded, null unless it runs, waits for nothing and has committed"
-        " an iteration.",
+        description="Estimated time to the end of the budget [s]; null if unknown.",
         examples=[16.1],
     )
     eta_basis: str = Field(
@@ -221,35 +162,29 @@ class JobSummaryView(View):
         examples=["at the pace of the last iterations, 1.23 s each"],
     )
     lineage: Lineage | None = Field(
-        default=None,
-        description="Of a job that was forked from another one: from which, and what it took over;"
-        " null for any other. Forks of a job are listed by `/v1/jobs?parent=`.",
+        default=None, description="Parent of a fork, and what it took over."
     )
     robot: str | None = Field(
         default=None,
-        description="Name of its robot, of one of its user's that in robot.toml, or `own`; null if"
-        " the spec cannot be read, or names none.",
+        description="Name of its robot; of a custom one that in robot.toml, or `own`.",
         examples=["szabadka2-reconstructed"],
     )
     preference: str | None = Field(
         default=None,
-        description="Name of the preference that it tunes by, `own` for any other; null for a job"
-        " that tunes nothing.",
+        description="Name of the preference that it tunes by, `own` for a custom one.",
         examples=["A"],
     )
     note: str = Field(default="", description="Note, free text.")
     tags: list[str] = Field(default_factory=list, description="Tags.", examples=[["thesis"]])
     archived: bool = Field(default=False, description="Whether lists leave it out.")
     owner: str | None = Field(
-        default=None,
-        description="Name of the token that it was submitted with; null for none.",
-        examples=["ci"],
+        default=None, description="Name of the token that submitted it.", examples=["ci"]
     )
     kept: bool = Field(default=False, description="Whether it is protected from deletion.")
     priority: int = Field(
         default=0,
-        description="Priority: of waiting jobs the one of highest priority runs first,"
-        " and of running jobs one that is a step higher has twice the share of the workers [1].",
+        description="Priority: the highest one runs first; each step doubles the share of workers"
+        " [1].",
         examples=[0],
     )
     created_at: datetime = Field(description="When it was submitted, UTC.")
@@ -257,12 +192,7 @@ class JobSummaryView(View):
     started_at: datetime | None = Field(description="When it was first claimed, UTC.")
     finished_at: datetime | None = Field(description="When it ended, UTC.")
     links: dict[str, str] = Field(
-        description="Links: `self`, `iterations`, `events`; where the spec can be read,"
-        " `best`, `distribution`, `particles`, `export`; for a job that tunes a drive `ranking`"
-        " (POST) and, once it has a best design, `scenarios`, `preferences` (POST), `firmware`;"
-        " `evidence` and `verify` (POST) once an iteration is committed; `parent` of a fork; those"
-        " of `pause`, `resume`, `cancel`, `extend`, `fork` (POST), `keep` (PUT, DELETE),"
-        " `priority` (PUT) and `delete` (DELETE) that its state allows.",
+        description="Links to its resources, and those of the commands that its state allows.",
         examples=[{"self": "/v1/jobs/k2q7zr5dm9xw", "pause": "/v1/jobs/k2q7zr5dm9xw/pause"}],
     )
 
@@ -284,11 +214,7 @@ class JobSummaryView(View):
 
     @classmethod
     def from_job(cls, job: Job) -> JobSummaryView:
-        """Make a summary without a further query.
-
-        Args:
-            job: as it was read.
-        """
+        """Make a summary without a further query."""
         return cls.model_validate(_summary(job))
 
 
@@ -298,28 +224,23 @@ class JobView(JobSummaryView):
     model_config = ConfigDict(serialize_by_alias=True)
 
     best: BestView | None = Field(
-        description="Best design so far, judged in double precision; null while there is none that"
-        " walks in every scenario."
+        description="Best design so far, judged in double precision; null while none walks in"
+        " every scenario."
     )
-    objectives: list[ObjectiveView] = Field(
-        description="What every case of this job yields; columns of its results."
-    )
+    objectives: list[ObjectiveView] = Field(description="Columns of its results.")
     stored_spec: AnySpec | None = Field(
         alias="spec",
-        description="Spec, with scenarios, preference and variables resolved as they"
-        " were on submission; robot and controller as they were named. Null if this version cannot"
-        " read it, and `error` says why.",
+        description="Spec, with scenarios, preference and variables as they were on submission;"
+        " null if this version cannot read it.",
     )
     provenance: list[ProvenanceRecord] = Field(
-        description="What its numbers depend on besides the spec: code, libraries, content of the"
-        " robot, backend, precision. One entry since submission, and one for every change that was"
-        " accepted, the last of an iteration counting."
+        description="What its numbers depend on besides the spec; one entry since submission, and"
+        " one for every change that was accepted."
     )
     head: str | None = Field(
         default=None,
         description="Digest of the last committed iteration, chained to all before it and"
-        " the spec: with a copy of it, `verify` detects later changes"
-        " (POST /v1/jobs/{job_id}/verify). Null before the first.",
+        " the spec, for POST /v1/jobs/{job_id}/verify.",
         examples=["9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08"],
     )
 
@@ -336,12 +257,7 @@ class JobView(JobSummaryView):
 
     @classmethod
     def from_job_and_best(cls, job: Job, best: Evaluation | None) -> JobView:
-        """Make a view of a job in full.
-
-        Args:
-            job: as it was read.
-            best: its best design so far, if there is one; not shown if the spec cannot be read.
-        """
+        """Make a view of a job; its best design is not shown if the spec cannot be read."""
         view, objectives, spec = None, [], None
         if job.readable:
             spec = job.spec
@@ -362,24 +278,18 @@ class JobView(JobSummaryView):
 class StateView(View):
     """A change of a job's state, as sent in the event stream."""
 
-    id: str = Field(description="Identifier of the job.", examples=["k2q7zr5dm9xw"])
-    state: JobState = Field(description="The state that it is in now.", examples=["succeeded"])
-    error: str | None = Field(description="Why it failed; null if it did not.", examples=[None])
+    id: JobName
+    state: JobState = Field(description="The present state.", examples=["succeeded"])
+    error: str | None = Field(description="Why it failed; null if it did not.")
     iterations: int = Field(description="Iterations committed so far [1].", examples=[25])
     evaluations: int = Field(description="Designs judged in them [1].", examples=[625])
     waiting: str | None = Field(
-        default=None,
-        description="What a running job waits for, such as unreachable workers; null for nothing.",
-        examples=[None],
+        default=None, description="What a running job waits for, such as unreachable workers."
     )
 
     @classmethod
     def from_job(cls, job: Job) -> StateView:
-        """Make a view of a job's present state.
-
-        Args:
-            job: as it was read.
-        """
+        """Make a view of a job's present state."""
         return cls(
             id=job.id,
             state=job.state,
@@ -391,80 +301,55 @@ class StateView(View):
 
 
 def _summary(job: Job) -> dict[str, object]:
-    progress = job.progress
-    rates = time_left(job, datetime.now(UTC))
+    progress, rates, spec = job.progress, time_left(job, datetime.now(UTC)), job.stored_spec
+    of_spec: dict[str, object] = {
+        "kind": None,
+        "scenarios": [],
+        "precision": None,
+        "optimizer": None,
+        "particles": spec.particles if isinstance(spec, UnreadableSpec) else 0,
+        "iterations_planned": spec.iterations,
+    }
+    if isinstance(spec, UnreadableSpec):
+        of_spec["evaluations_planned"] = spec.iterations * spec.particles
+    else:
+        cases = list(spec.case_names)
+        if isinstance(spec, JobSpec):
+            # Its cases are each scenario in every world.
+            cases = [scenario.name for scenario in spec.resolved_scenarios()]
+        of_spec |= {
+            "kind": spec.kind,
+            "scenarios": cases,
+            "precision": spec.precision,
+            "optimizer": spec.optimizer.name,
+            "particles": spec.optimizer.particles,
+            "evaluations_planned": spec.budget,
+        }
+    named = ("id", "name", "state", "waiting", "lineage", "owner", "kept", "priority", "archived")
+    times = ("created_at", "updated_at", "started_at", "finished_at")
+    of_progress = ("iterations", "evaluations", "evaluations_saved", "best_fitness")
     return {
-        "id": job.id,
-        "state": job.state,
-        "error": job.error or _why_unreadable(job.stored_spec),
-        **_asked(job.stored_spec),
-        "iterations": progress.iterations,
-        "evaluations": progress.evaluations,
-        "evaluations_saved": progress.evaluations_saved,
-        "best_fitness": finite(progress.best_fitness),
+        **{field: getattr(job, field) for field in (*named, *times, "gain", "evaluated_on")},
+        **{field: getattr(progress, field) for field in (*of_progress, "best_iteration")},
+        **of_spec,
+        "error": job.error or getattr(spec, "reason", None),
+        "robot": robot_name(getattr(spec, "robot", None)),
+        "preference": preference_name(getattr(spec, "preference", None)),
+        "controller": spec.controller if isinstance(spec, JobSpec) else None,
         "reference": ReferenceView.from_reference(job.reference),
-        "gain": finite(job.gain),
-        "best_iteration": progress.best_iteration,
         "compute_seconds": progress.compute_seconds,
         "evaluations_per_second": rates.evaluations_per_second,
         "simulations_per_second": rates.simulations_per_second,
-        "evaluated_on": job.evaluated_on,
-        "waiting": job.waiting,
         "eta_seconds": rates.eta_seconds,
         "eta_basis": rates.basis,
-        "lineage": job.lineage,
-        "owner": job.owner,
-        "kept": job.kept,
-        "priority": job.priority,
-        "name": job.name,
         "note": job.labels.note,
         "tags": job.labels.tags,
-        "archived": job.archived,
-        "created_at": job.created_at,
-        "updated_at": job.updated_at,
-        "started_at": job.started_at,
-        "finished_at": job.finished_at,
         "links": job_links(job),
     }
 
 
-def _why_unreadable(spec: AnySpec | UnreadableSpec) -> str | None:
-    return spec.reason if isinstance(spec, UnreadableSpec) else None
-
-
-def _walked(spec: AnySpec) -> list[str]:
-    """Names of the cases; of a tuning in many worlds each scenario once."""
-    if isinstance(spec, JobSpec):
-        return [scenario.name for scenario in spec.resolved_scenarios()]
-    return list(spec.case_names)
-
-
-def _asked(spec: AnySpec | UnreadableSpec) -> dict[str, object]:
-    """Fields of a summary that come from the spec."""
-    if isinstance(spec, UnreadableSpec):
-        kind, scenarios, particles = None, [], spec.particles
-    else:
-        kind, scenarios, particles = spec.kind, _walked(spec), spec.optimizer.particles
-    return {
-        "kind": kind,
-        "robot": robot_name(getattr(spec, "robot", None)),
-        "preference": preference_name(getattr(spec, "preference", None)),
-        "controller": spec.controller if isinstance(spec, JobSpec) else None,
-        "scenarios": scenarios,
-        "precision": None if isinstance(spec, UnreadableSpec) else spec.precision,
-        "optimizer": None if isinstance(spec, UnreadableSpec) else spec.optimizer.name,
-        "particles": particles,
-        "iterations_planned": spec.iterations,
-        "evaluations_planned": spec.iterations * particles
-        if isinstance(spec, UnreadableSpec)
-        else spec.budget,
-    }
-
-
-class ExtensionRequest(BaseModel):
+class ExtensionRequest(Request):
     """New budget of a job."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     iterations: int = Field(
         ge=1,
@@ -475,23 +360,19 @@ class ExtensionRequest(BaseModel):
     )
 
 
-class ResumeRequest(BaseModel):
+class ResumeRequest(Request):
     """Options for resuming a job."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     accept_changes: bool = Field(
         default=False,
-        description="Whether to continue although its provenance changed, which is"
-        " then recorded in its `provenance`. Otherwise such a job fails and says what has changed.",
+        description="Whether to continue although its provenance changed, which is then recorded."
+        " Otherwise such a job fails and says what has changed.",
         examples=[True],
     )
 
 
-class PriorityRequest(BaseModel):
+class PriorityRequest(Request):
     """New priority of a job."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     priority: int = Field(
         ge=LOWEST, le=HIGHEST, description="Higher runs sooner; the default is 0 [1].", examples=[5]
@@ -507,15 +388,3 @@ class JobFacetsView(View):
     controllers: dict[str, int] = Field(description="By motor controller [1].")
     preferences: dict[str, int] = Field(description="By preference, `own` for any other [1].")
     tags: dict[str, int] = Field(description="By tag [1].", examples=[{"thesis": 3}])
-
-    @classmethod
-    def from_counts(cls, counts: FacetCounts) -> JobFacetsView:
-        """Make a view of counts."""
-        return cls(
-            total=counts.total,
-            states=counts.states,
-            robots=counts.robots,
-            controllers=counts.controllers,
-            preferences=counts.preferences,
-            tags=counts.tags,
-        )

@@ -13,7 +13,10 @@ from collections import OrderedDict, deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime, timedelta
 from typing import Final, cast
+
+from pydantic import Field
 
 from gaitswarm.services.optimizer.log_context import log_fields
 from gaitswarm.services.optimizer.run.evaluator import (
@@ -22,6 +25,7 @@ from gaitswarm.services.optimizer.run.evaluator import (
     TaskReport,
     place_of,
 )
+from gaitswarm.services.optimizer.views import IterationIndex, View
 from gaitswarm.sim.outcome import Outcome
 
 _JOBS: Final = 32
@@ -34,111 +38,88 @@ _LONGEST_MESSAGE: Final = 2000
 """Characters of a message."""
 
 
-@dataclass(frozen=True, slots=True)
-class IterationSpan:
-    """Evaluation of an iteration.
+class IterationSpanView(View):
+    """An iteration as it was evaluated."""
 
-    Attributes:
-        begun: Unix time [s].
-        seconds: duration [s]; None while in progress.
-        error: cause of failure; None for a result or while in progress.
-    """
-
-    iteration: int
-    begun: float
-    designs: int
-    seconds: float | None = None
-    error: str | None = None
+    iteration: IterationIndex
+    begun_at: datetime = Field(description="When it was sent to the workers, UTC.")
+    designs: int = Field(description="Designs simulated for it [1].", examples=[25])
+    seconds: float | None = Field(
+        description="Duration [s]; null while in progress.", examples=[0.61]
+    )
+    error: str | None = Field(
+        description="Why it has no result; null for a result or while in progress."
+    )
 
 
-@dataclass(frozen=True, slots=True)
-class TaskSpan:
-    """A task of an iteration, as run by a worker.
+class TaskSpanView(View):
+    """A task: simulations of an iteration that a worker ran together."""
 
-    Attributes:
-        worker: name of the worker's machine; "" without an answer.
-        begun: Unix time of the dispatch [s].
-        seconds: from the dispatch to the answer [s].
-        compute_seconds: computing time [s].
-        walks: number of simulations.
-        error: cause of failure; None for a result.
-    """
-
-    iteration: int
-    worker: str
-    begun: float
-    seconds: float
-    compute_seconds: float
-    walks: int
-    error: str | None = None
+    iteration: IterationIndex
+    worker: str = Field(
+        description="Name of the worker's machine; empty without an answer.", examples=["node-1"]
+    )
+    begun_at: datetime = Field(description="When the worker received it, UTC.")
+    seconds: float = Field(description="From then to its answer [s].", examples=[0.52])
+    compute_seconds: float = Field(description="Computing time of these [s].", examples=[0.5])
+    walks: int = Field(description="Number of simulations [1].", examples=[48])
+    error: str | None = Field(description="Why there is no result; null if there is one.")
 
 
-@dataclass(frozen=True, slots=True)
-class Message:
-    """A log message.
+class WorkerHealthView(View):
+    """A machine that has run tasks of the job."""
 
-    Attributes:
-        at: Unix time [s].
-        level: such as "WARNING".
-        iteration: None if it belongs to none.
-    """
+    name: str = Field(
+        description="Name of the machine; empty for tasks without an answer.", examples=["node-1"]
+    )
+    tasks: int = Field(description="Ended tasks [1].", examples=[120])
+    walks: int = Field(description="Simulations with a result [1].", examples=[5760])
+    failures: int = Field(description="Tasks without a result [1].", examples=[0])
+    compute_seconds: float = Field(description="Computing time [s].", examples=[61.2])
+    last_seen_at: datetime = Field(description="When it answered last, UTC.")
+    error: str | None = Field(
+        description="Of the last task without a result; null if all have one."
+    )
 
-    at: float
-    level: str
-    text: str
-    iteration: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class WorkerHealth:
-    """Statistics of a machine that has run tasks of a job.
-
-    Attributes:
-        name: of the machine; "" for tasks without an answer.
-        walks: simulations in these tasks.
-        compute_seconds: total computing time [s].
-        last_seen: Unix time of the last answer [s].
-        error: of the last failed task; None if there is none.
-    """
-
-    name: str
-    tasks: int = 0
-    walks: int = 0
-    failures: int = 0
-    compute_seconds: float = 0.0
-    last_seen: float = 0.0
-    error: str | None = None
-
-    def after(self, task: TaskSpan) -> WorkerHealth:
+    def after(self, task: TaskSpanView) -> WorkerHealthView:
         """Return the statistics with another task."""
         failed = task.error is not None
-        return replace(
-            self,
+        return WorkerHealthView(
+            name=self.name,
             tasks=self.tasks + 1,
             walks=self.walks + (0 if failed else task.walks),
             failures=self.failures + failed,
             compute_seconds=self.compute_seconds + task.compute_seconds,
-            last_seen=task.begun + task.seconds,
+            last_seen_at=task.begun_at + timedelta(seconds=task.seconds),
             error=task.error if failed else self.error,
         )
+
+
+class MessageView(View):
+    """A line of the log."""
+
+    at: datetime = Field(description="When it was written, UTC.")
+    level: str = Field(description="Severity.", examples=["WARNING"])
+    text: str = Field(description="Text of the message.", examples=["job k2q7zr5dm9xw waits"])
+    iteration: int | None = Field(description="Iteration of the job, from 0; null for none.")
 
 
 @dataclass(frozen=True, slots=True)
 class JobActivity:
     """Recent activity of a job in this process."""
 
-    iterations: tuple[IterationSpan, ...] = ()
-    tasks: tuple[TaskSpan, ...] = ()
-    messages: tuple[Message, ...] = ()
-    workers: tuple[WorkerHealth, ...] = ()
+    iterations: tuple[IterationSpanView, ...] = ()
+    tasks: tuple[TaskSpanView, ...] = ()
+    messages: tuple[MessageView, ...] = ()
+    workers: tuple[WorkerHealthView, ...] = ()
 
 
 @dataclass(slots=True)
 class _Records:
-    iterations: deque[IterationSpan] = field(default_factory=lambda: deque(maxlen=_ITERATIONS))
-    tasks: deque[TaskSpan] = field(default_factory=lambda: deque(maxlen=_TASKS))
-    messages: deque[Message] = field(default_factory=lambda: deque(maxlen=_MESSAGES))
-    workers: dict[str, WorkerHealth] = field(default_factory=dict)
+    iterations: deque[IterationSpanView] = field(default_factory=lambda: deque(maxlen=_ITERATIONS))
+    tasks: deque[TaskSpanView] = field(default_factory=lambda: deque(maxlen=_TASKS))
+    messages: deque[MessageView] = field(default_factory=lambda: deque(maxlen=_MESSAGES))
+    workers: dict[str, WorkerHealthView] = field(default_factory=dict)
 
 
 class Activity:
@@ -177,38 +158,51 @@ class Activity:
 
     def begun(self, request: EvaluationRequest) -> None:
         """Record the start of an evaluation."""
-        span = IterationSpan(request.iteration, self._clock(), len(request.designs))
+        span = IterationSpanView(
+            iteration=request.iteration,
+            begun_at=self._now(),
+            designs=len(request.designs),
+            seconds=None,
+            error=None,
+        )
         with self._lock:
             self._of(request.job_id).iterations.append(span)
 
     def ended(self, request: EvaluationRequest, error: str | None) -> None:
         """Record the end of an evaluation."""
-        now = self._clock()
+        now = self._now()
         with self._lock:
             spans = self._of(request.job_id).iterations
             if spans and spans[-1].iteration == request.iteration:
                 span = spans.pop()
-                spans.append(replace(span, seconds=now - span.begun, error=error))
+                seconds = (now - span.begun_at).total_seconds()
+                spans.append(span.model_copy(update={"seconds": seconds, "error": error}))
 
     def task(self, request: EvaluationRequest, report: TaskReport) -> None:
-        span = TaskSpan(
-            request.iteration,
-            report.host,
-            self._clock() - report.seconds,
-            report.seconds,
-            report.compute_seconds,
-            report.walks,
-            report.error,
+        span = TaskSpanView(
+            iteration=request.iteration,
+            worker=report.host,
+            begun_at=self._now() - timedelta(seconds=report.seconds),
+            seconds=report.seconds,
+            compute_seconds=report.compute_seconds,
+            walks=report.walks,
+            error=report.error,
         )
         with self._lock:
-            records = self._of(request.job_id)
-            records.tasks.append(span)
-            health = records.workers.get(span.worker, WorkerHealth(span.worker))
-            records.workers[span.worker] = health.after(span)
+            workers = self._of(request.job_id).workers
+            self._of(request.job_id).tasks.append(span)
+            nothing = dict.fromkeys(("tasks", "walks", "failures", "compute_seconds"), 0)
+            unknown = WorkerHealthView.model_validate(
+                {"name": span.worker, "last_seen_at": span.begun_at, "error": None, **nothing}
+            )
+            workers[span.worker] = workers.get(span.worker, unknown).after(span)
 
-    def message(self, job_id: str, message: Message) -> None:
+    def message(self, job_id: str, message: MessageView) -> None:
         with self._lock:
             self._of(job_id).messages.append(message)
+
+    def _now(self) -> datetime:
+        return datetime.fromtimestamp(self._clock(), UTC)
 
     def _of(self, job_id: str) -> _Records:
         """The caller holds the lock."""
@@ -274,10 +268,10 @@ class _LogRecorder(logging.Handler):
             text = f"{text}: {type(error).__name__}: {error}"
         self._activity.message(
             job_id,
-            Message(
-                record.created,
-                record.levelname,
-                text[:_LONGEST_MESSAGE],
-                iteration if isinstance(iteration, int) else None,
+            MessageView(
+                at=datetime.fromtimestamp(record.created, UTC),
+                level=record.levelname,
+                text=text[:_LONGEST_MESSAGE],
+                iteration=iteration if isinstance(iteration, int) else None,
             ),
         )

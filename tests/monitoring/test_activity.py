@@ -61,7 +61,7 @@ def test_iterations_tasks_and_workers_are_recorded(request_: EvaluationRequest) 
     assert found is not None
     (iteration,) = found.iterations
     assert (iteration.iteration, iteration.designs, iteration.seconds) == (4, 3, 0.0)
-    assert [(t.worker, t.begun, t.error) for t in found.tasks] == [
+    assert [(t.worker, t.begun_at.timestamp(), t.error) for t in found.tasks] == [
         ("node-1", 998.0, None),
         ("", 997.0, "it died"),
         ("node-1", 998.0, None),

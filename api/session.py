@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Final
 
 from fastapi import APIRouter, Request, Response, status
 from pydantic import BaseModel, ConfigDict, Field
@@ -16,6 +16,8 @@ from gaitswarm.services.optimizer.errors import Unauthorized
 from gaitswarm.views import PREFIX, View
 
 router = APIRouter(prefix=PREFIX, tags=["operations"])
+
+_FOR_PAGE: Final = {"x-used-by": "page"}
 
 _MAX_AGE_SECONDS = 30 * 24 * 3600
 
@@ -46,13 +48,17 @@ class SessionView(View):
 @router.get(
     "/session",
     operation_id="get_session",
+    openapi_extra=_FOR_PAGE,
     summary="Get the session",
     responses=problems(429, guarded=False),
 )
 def get_session(
     request: Request, service: Service, settings: ServerSettings, manual: HasManual
 ) -> SessionView:
-    """Return the session, with or without a token, so that a page knows whether to ask for one."""
+    """Return the session, with or without a token, so that a page knows whether to ask for one.
+
+    For the web page; it may change with the page.
+    """
     secret = secret_of(request.headers)
     token = None if secret is None else find_token(request, service.store.tokens, secret)
     return _view(token, required=settings.tokens_required, manual=manual)
@@ -61,6 +67,7 @@ def get_session(
 @router.post(
     "/session",
     operation_id="begin_session",
+    openapi_extra=_FOR_PAGE,
     summary="Begin a session",
     response_description="The response sets a cookie that scripts cannot read.",
     responses=problems(400, 401, 413, 422, 429, guarded=False),
@@ -73,7 +80,10 @@ def begin_session(
     manual: HasManual,
     response: Response,
 ) -> SessionView:
-    """Store a token in a cookie, for browsers; programs send `Authorization`."""
+    """Store a token in a cookie, for browsers; programs send `Authorization`.
+
+    For the web page; it may change with the page.
+    """
     token = find_token(request, service.store.tokens, body.token)
     if token is None:
         raise Unauthorized(UNKNOWN)
@@ -93,12 +103,16 @@ def begin_session(
 @router.delete(
     "/session",
     operation_id="end_session",
+    openapi_extra=_FOR_PAGE,
     summary="End the session",
     status_code=status.HTTP_204_NO_CONTENT,
     responses=problems(429, guarded=False),
 )
 def end_session(response: Response) -> None:
-    """Delete the cookie; the token stays valid."""
+    """Delete the cookie; the token stays valid.
+
+    For the web page; it may change with the page.
+    """
     response.delete_cookie(COOKIE, path="/", httponly=True, samesite="strict")
 
 

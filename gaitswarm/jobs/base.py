@@ -150,8 +150,10 @@ class Jobs(ABC):
 
     Both return the same results and raise the same errors: every method raises Unavailable if the
     database or the server cannot be reached, and methods that take an id raise NotFound for an
-    unknown one. Iterators read as they are consumed, so that a long history is never held in
-    memory. Thread-safe. A context manager: leaving the block closes it.
+    unknown one. `job_id` is the identifier of a job. Commands return the job as it is then.
+    Analyses raise InvalidRequest for a job of another kind, and Conflict for one that is too large
+    to be held in memory. Iterators read as they are consumed, so that a long history is never held
+    in memory. Thread-safe. A context manager: leaving the block closes it.
     """
 
     @abstractmethod
@@ -330,9 +332,6 @@ class Jobs(ABC):
     def job(self, job_id: str) -> JobView:
         """Return one job.
 
-        Args:
-            job_id: Identifier of the job.
-
         Returns:
             Its spec, state, progress and best design so far.
         """
@@ -344,14 +343,10 @@ class Jobs(ABC):
         """Pause, resume or cancel a job.
 
         Args:
-            job_id: Identifier of the job.
             command: "pause": end when the current iteration is committed; "resume": queue a paused
                 or failed job again; "cancel": end for good, committed iterations stay.
             accept_changes: For "resume": whether the job continues although its provenance (code,
                 robot, compiler) has changed; the change is recorded with it.
-
-        Returns:
-            The job as it is then.
 
         Raises:
             Conflict: The job's state does not allow it.
@@ -367,9 +362,6 @@ class Jobs(ABC):
     def pause(self, job_id: str) -> JobView:
         """Pause a job when its current iteration is committed.
 
-        Args:
-            job_id: Identifier of the job.
-
         Raises:
             Conflict: It is paused already, or has ended.
         """
@@ -379,7 +371,6 @@ class Jobs(ABC):
         """Queue a paused or failed job again; it continues as if it had never stopped.
 
         Args:
-            job_id: Identifier of the job.
             accept_changes: As for `command`.
 
         Raises:
@@ -390,9 +381,6 @@ class Jobs(ABC):
     def cancel(self, job_id: str) -> JobView:
         """End a job for good; committed iterations stay.
 
-        Args:
-            job_id: Identifier of the job.
-
         Raises:
             Conflict: It has ended.
         """
@@ -402,11 +390,7 @@ class Jobs(ABC):
         """Change the budget of a job; one that has succeeded is queued again.
 
         Args:
-            job_id: Identifier of the job.
             iterations: Budget in all, more than the job has committed.
-
-        Returns:
-            The job as it is then.
 
         Raises:
             Conflict: It was cancelled.
@@ -420,11 +404,7 @@ class Jobs(ABC):
         A running job's share of the workers changes from its next iteration on.
 
         Args:
-            job_id: Identifier of the job.
             priority: As for `submit`.
-
-        Returns:
-            The job as it is then.
 
         Raises:
             Conflict: It has ended.
@@ -445,15 +425,11 @@ class Jobs(ABC):
         """Change the labels of a job; its spec and its results stay.
 
         Args:
-            job_id: Identifier of the job.
             name: Shown in place of the spec's name; "" to show that again. None leaves it
                 unchanged, as with the others.
             note: Free text.
             tags: Words to find the job by, in place of the previous ones.
             archived: Whether lists hide the job by default.
-
-        Returns:
-            The job as it is then.
 
         Raises:
             InvalidRequest: A label is too long; names it.
@@ -467,11 +443,7 @@ class Jobs(ABC):
         """Protect a job from deletion, or release it.
 
         Args:
-            job_id: Identifier of the job.
             kept: Whether it is protected.
-
-        Returns:
-            The job as it is then.
         """
         return self._call(operations.keep_job if kept else operations.release_job, job_id)
 
@@ -479,9 +451,6 @@ class Jobs(ABC):
         """Delete a job with its iterations and evaluations, irrevocably.
 
         Forks of it and certificates of its designs stay.
-
-        Args:
-            job_id: Identifier of the job.
 
         Raises:
             Conflict: It is protected, or has neither ended nor is paused.
@@ -492,7 +461,6 @@ class Jobs(ABC):
         """Follow a job until it has ended, also while it is paused.
 
         Args:
-            job_id: Identifier of the job.
             after: Leave out iterations up to this index.
 
         Returns:
@@ -505,9 +473,6 @@ class Jobs(ABC):
     def wait(self, job_id: str) -> JobView:
         """Wait until a job has ended, also while it is paused.
 
-        Args:
-            job_id: Identifier of the job.
-
         Returns:
             The job; its `state` says how it ended.
         """
@@ -517,9 +482,6 @@ class Jobs(ABC):
 
     def best(self, job_id: str) -> BestView:
         """Return the best design of a job so far.
-
-        Args:
-            job_id: Identifier of the job.
 
         Returns:
             The design of least fitness, with its results in every case.
@@ -533,7 +495,6 @@ class Jobs(ABC):
         """List the committed iterations of a job.
 
         Args:
-            job_id: Identifier of the job.
             after: Only iterations with a greater index.
 
         Returns:
@@ -544,9 +505,6 @@ class Jobs(ABC):
     def history(self, job_id: str) -> Iterator[HistoryIterationView]:
         """List the committed iterations of a job with every design.
 
-        Args:
-            job_id: Identifier of the job.
-
         Returns:
             Iterations in order, each with its evaluations.
         """
@@ -556,9 +514,6 @@ class Jobs(ABC):
 
     def evaluations(self, job_id: str) -> EvaluationTable:
         """Return every evaluation of a job at once, as arrays.
-
-        Args:
-            job_id: Identifier of the job.
 
         Returns:
             One row per evaluation: design, fitness, and status, utility and objectives by case.
@@ -579,8 +534,7 @@ class Jobs(ABC):
             The best designs with their previous ranks, and how far the rankings agree.
 
         Raises:
-            InvalidRequest: The job has no preference, or an argument is invalid.
-            Conflict: The job is too large to be held in memory.
+            InvalidRequest: An argument is invalid.
         """
         return self._call(operations.rank_designs, job_id, preference=preference, top=top)
 
@@ -595,9 +549,8 @@ class Jobs(ABC):
             The best designs that the job would have had without each scenario, and with few.
 
         Raises:
-            InvalidRequest: The job tunes no drive, or the tolerance is invalid.
-            Conflict: No design of it succeeds in all scenarios, or it is too large to be held in
-                memory.
+            InvalidRequest: The tolerance is invalid.
+            Conflict: No design of it succeeds in all scenarios.
         """
         return self._call(operations.get_scenario_families, job_id, tolerance=tolerance)
 
@@ -612,8 +565,7 @@ class Jobs(ABC):
             failure, with intervals; and whether the best design lies at a bound.
 
         Raises:
-            InvalidRequest: The job is of another kind.
-            Conflict: It has no design yet, or is too large to be held in memory.
+            Conflict: It has no design yet.
         """
         return self._call(operations.get_importance, job_id)
 
@@ -629,7 +581,6 @@ class Jobs(ABC):
 
         Raises:
             InvalidRequest: There are none, too many, or one is named twice.
-            Conflict: One of them is too large to be held in memory.
         """
         return self._call_about(operations.compare_jobs, job_ids)
 
@@ -663,10 +614,8 @@ class Jobs(ABC):
             The candidates, the most robust first; without simulations those of most preferences.
 
         Raises:
-            InvalidRequest: The job tunes no drive, an argument is invalid, or it takes more than
-                the server allows.
-            Conflict: No design of it succeeds in all scenarios, or it is too large to be held in
-                memory.
+            InvalidRequest: An argument is invalid, or it takes more than the server allows.
+            Conflict: No design of it succeeds in all scenarios.
         """
         return self._call(
             operations.find_robust_preferences,
@@ -691,9 +640,8 @@ class Jobs(ABC):
             The front with its knees, extremes and winners, and its hypervolume by iteration.
 
         Raises:
-            InvalidRequest: The job tunes no drive, or the number is invalid.
-            Conflict: No design of it succeeds in all scenarios, or it is too large to be held in
-                memory.
+            InvalidRequest: The number is invalid.
+            Conflict: No design of it succeeds in all scenarios.
         """
         return self._call(operations.get_front, job_id, most=most)
 
@@ -709,9 +657,9 @@ class Jobs(ABC):
             The best preference for each set of biases, with the design's rank under it.
 
         Raises:
-            InvalidRequest: The job tunes no drive, or a number is invalid.
+            InvalidRequest: A number is invalid.
             NotFound: The job has no such design.
-            Conflict: The design fails in a scenario, or the job is too large to be held in memory.
+            Conflict: The design fails in a scenario.
         """
         return self._call(
             operations.get_preference_for, job_id, iteration=iteration, particle=particle
@@ -764,8 +712,8 @@ class Jobs(ABC):
             Failure rates, spreads by scenario, the worst worlds, and what correlates with them.
 
         Raises:
-            InvalidRequest: The job is of another kind, or an argument is invalid.
-            Conflict: No world was simulated yet, or the job is too large to be held in memory.
+            InvalidRequest: An argument is invalid.
+            Conflict: No world was simulated yet.
         """
         return self._call(operations.get_certificate, job_id, worlds=worlds, most=most)
 
@@ -773,7 +721,6 @@ class Jobs(ABC):
         """Write every evaluation of a job as a file.
 
         Args:
-            job_id: Identifier of the job.
             file_format: "parquet" or "csv".
 
         Returns:
@@ -792,15 +739,12 @@ class Jobs(ABC):
     def evidence(self, job_id: str) -> bytes:
         """Write an archive that documents a job's run, for `gaitswarm.verify`.
 
-        Args:
-            job_id: Identifier of the job.
-
         Returns:
             A zip archive as in docs/evidence.md: spec, robot, provenance, all evaluations, finished
             certificates of its designs, figures and a page; identical for the same stored jobs.
 
         Raises:
-            Conflict: The job has no committed iteration yet, or is too large to be held in memory.
+            Conflict: The job has no committed iteration yet.
         """
         return self._call(operations.get_evidence, job_id)
 
@@ -810,7 +754,6 @@ class Jobs(ABC):
         """Verify the stored history of a job.
 
         Args:
-            job_id: Identifier of the job.
             replay: Evaluations to draw and simulate again, besides the best one; 0 for none.
             seed: Of the draw; None for a random one.
             head: Digest of an iteration noted earlier, as `JobView.head`, that must be in the
@@ -1043,7 +986,13 @@ class Jobs(ABC):
         if isinstance(job_ids, str) or not job_ids:
             raise InvalidRequest("must be a list of at least one id", field="job_ids")
         first, *also = job_ids
-        return self._call(operation, first, also=also, **arguments)
+        try:
+            return self._call(operation, first, also=also, **arguments)
+        except InvalidRequest as error:
+            if not error.field.startswith("also"):
+                raise
+            message = str(error).removeprefix(f"{error.field}: ")
+            raise InvalidRequest(f"{message}, after the first", field="job_ids") from error
 
     @abstractmethod
     def close(self) -> None:

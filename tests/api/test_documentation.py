@@ -113,6 +113,19 @@ def test_every_route_has_a_summary_a_description_a_tag_and_a_short_id(document: 
         assert operation["operationId"].isidentifier(), name
 
 
+def test_the_core_comes_first_and_what_the_page_alone_uses_is_marked(document: Document) -> None:
+    named = [(operation["tags"], operation["operationId"]) for _, operation in operations(document)]
+    assert TAGS[0]["name"] == "core"
+    assert {name for tags, name in named if tags == ["core"]} == {
+        *("submit_job", "list_jobs", "get_job", "pause_job", "resume_job", "cancel_job"),
+        *("extend_job", "list_iterations", "get_best", "stream_events"),
+    }
+    assert next(iter(document["paths"])) == "/v1/jobs"
+    for name, operation in operations(document):
+        for_page = "For the web page" in operation["description"]
+        assert (operation.get("x-used-by") == "page") is for_page, name
+
+
 def test_every_parameter_is_described(document: Document) -> None:
     for name, operation in operations(document):
         for parameter in operation.get("parameters", []):

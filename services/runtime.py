@@ -66,10 +66,7 @@ def open_evaluator(
     if kind == "auto" and address is None:
         return AutoEvaluator(cpus)
     ray = RayEvaluator(address, cpus=cpus)
-    if lasting:
-        ray.stay_connected(should_stop)
-    else:
-        ray.wait_until_open(should_stop)
+    ray.wait_until_open(should_stop, lasting=lasting)
     return ray
 
 

@@ -12,7 +12,11 @@ _TASKS_PER_SLOT: Final = 3
 """Chunks of single cases per slot, so that all slots finish at about the same time."""
 
 _LONGEST_SECONDS: Final = 1.0
-"""Of a task; other jobs and a stop wait for so long."""
+"""Of a task on few slots; other jobs and a stop wait for so long."""
+
+_SECONDS_PER_SLOT: Final = 0.003
+"""Length of tasks on many slots, per slot: the evaluator spends about 1 ms on each of its tasks
+(docs/scale.md), and is to be idle for most of the time."""
 
 _OVERHEAD_SHARE: Final = 0.05
 """Largest share of a task's time that sending it may take."""
@@ -83,11 +87,11 @@ class Pace:
             (1.0 - _WEIGHT) * self.overhead + _WEIGHT * overhead,
         )
 
-    def bounds(self) -> tuple[float, float]:
+    def bounds(self, slots: int) -> tuple[float, float]:
         """Return the smallest and largest cost of a task [simulated s]."""
         if not self.seconds:
             return _UNMEASURED
-        longest = _LONGEST_SECONDS / self.seconds
+        longest = max(_LONGEST_SECONDS, _SECONDS_PER_SLOT * slots) / self.seconds
         return min(self.overhead / _OVERHEAD_SHARE / self.seconds, longest), longest
 
 
@@ -113,7 +117,7 @@ def cut(
         pace: That of the job's earlier iterations.
         together: Whether one task can simulate several cases.
     """
-    bounds = (pace or Pace()).bounds()
+    bounds = (pace or Pace()).bounds(slots)
     if together and slots < len(durations):
         # With one simulation per lane, the kernel cannot refill its lanes; with two, few are idle.
         filled = lanes * max(durations)

@@ -23,9 +23,7 @@ from gaitswarm.services.worker.chunks import Chunk, Pace, cut
 from gaitswarm.services.worker.tasks import Answer, TaskTotals
 from gaitswarm.sim import simulate
 from gaitswarm.sim.case import Case, LongCase, WalkingCase
-from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.outcome import Outcome
-from gaitswarm.sim.robot import RobotSource
 
 T = TypeVar("T")
 
@@ -275,47 +273,22 @@ def awaited(work: Future[T], should_stop: Callable[[], bool]) -> T:
     return work.result()
 
 
-class KernelBuilder:
-    """Builds robots' kernels, each once and in a thread of its own, for all requests.
+def build_kernels(cases: Sequence[Case], should_stop: Callable[[], bool]) -> None:
+    """Return when the kernels of all robots are in the cache.
 
-    Workers without a kernel in the cache would each build it, and other jobs would wait for them.
+    Workers without a kernel there would each wait for it, and so would other jobs. Raises
+    EvaluationStopped, and KernelBuildError if the compiler refuses a kernel.
     """
+    work: Future[None] = Future()
 
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._building: dict[tuple[RobotSource, Precision], Future[None]] = {}
-
-    def build(self, cases: Sequence[Case], should_stop: Callable[[], bool]) -> None:
-        """Return when the cases' kernels are in the cache.
-
-        Raises EvaluationStopped, and KernelBuildError if the compiler refuses a kernel.
-        """
-        kernels = {(robot, case.precision) for case in cases for robot in case.robots}
-        for work in [self._begun(kernel) for kernel in kernels]:
-            awaited(work, should_stop)
-
-    def _begun(self, kernel: tuple[RobotSource, Precision]) -> Future[None]:
-        with self._lock:
-            work = self._building.get(kernel)
-            if work is None:
-                work = Future()
-                threading.Thread(
-                    target=self._build, args=(kernel, work), name="kernel", daemon=True
-                ).start()
-                # Not before a start that may be refused; the thread needs the lock to end.
-                self._building[kernel] = work
-            return work
-
-    def _build(self, kernel: tuple[RobotSource, Precision], work: Future[None]) -> None:
-        robot, precision = kernel
-        failure: BaseException | None = None
+    def build() -> None:
         try:
-            simulate.prepare(robot, precision=precision)
+            for robot, precision in {(r, case.precision) for case in cases for r in case.robots}:
+                simulate.prepare(robot, precision=precision)
         except BaseException as error:  # noqa: BLE001 - raised again in `awaited`
-            failure = error
-        with self._lock:
-            del self._building[kernel]
-        if failure is None:
-            work.set_result(None)
+            work.set_exception(error)
         else:
-            work.set_exception(failure)
+            work.set_result(None)
+
+    threading.Thread(target=build, name="kernel", daemon=True).start()
+    awaited(work, should_stop)

@@ -12,7 +12,7 @@ from queue import SimpleQueue
 from gaitswarm.services.optimizer.errors import EvaluatorUnavailable
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
 from gaitswarm.services.worker.chunks import Chunk
-from gaitswarm.services.worker.dispatch import Dispatcher, KernelBuilder, Load
+from gaitswarm.services.worker.dispatch import Dispatcher, Load, build_kernels
 from gaitswarm.services.worker.tasks import Answer, TaskTotals, run_task
 from gaitswarm.sim.outcome import Outcome
 
@@ -36,7 +36,6 @@ class InProcessEvaluator:
         slots = cpus if cpus is not None else available_cpus()
         if slots < 1:
             raise ValueError(f"cpus must be at least 1, it is {slots}")
-        self._kernels = KernelBuilder()
         self._dispatcher = Dispatcher()
         self._threads = _Threads(slots)
 
@@ -64,7 +63,7 @@ class InProcessEvaluator:
         self, request: EvaluationRequest, should_stop: Callable[[], bool]
     ) -> tuple[Outcome, ...]:
         """Simulate in the threads, once the robots' kernels are built."""
-        self._kernels.build(request.cases, should_stop)
+        build_kernels(request.cases, should_stop)
         return self._dispatcher.evaluate(self._threads, request, should_stop)
 
     def close(self) -> None:

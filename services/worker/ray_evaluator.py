@@ -17,11 +17,11 @@ from gaitswarm.services.worker.chunks import Chunk
 from gaitswarm.services.worker.dispatch import (
     MOST_KILLED,
     Dispatcher,
-    KernelBuilder,
     Load,
     TaskLost,
     WorkerDied,
     awaited,
+    build_kernels,
     unlike,
 )
 from gaitswarm.services.worker.ray_session import RaySession, open_ray
@@ -54,6 +54,9 @@ _CLOSE_SECONDS: Final = 30.0
 _RECONNECT_SECONDS: Final = 5.0
 """Interval of attempts to reach a cluster that is away."""
 
+_TASKS_PER_LOOK: Final = 64
+"""Submitted tasks for each that must be finished before the next look, so that looks are few."""
+
 _SHARED: Final = 64
 """Number of jobs whose cases stay in the object store."""
 
@@ -76,7 +79,6 @@ class RayEvaluator:
         self._cpus = cpus
         self._changing = threading.Lock()
         self._closing = threading.Event()
-        self._kernels = KernelBuilder()
         self._dispatcher = Dispatcher()
         self._connection = _Connection(address, cpus)
 
@@ -132,8 +134,10 @@ class RayEvaluator:
         connection.opened.result()
         return self._living().warm.is_set()
 
-    def wait_until_open(self, should_stop: Callable[[], bool]) -> None:
-        """Return when Ray is open. Closes this evaluator otherwise.
+    def wait_until_open(self, should_stop: Callable[[], bool], *, lasting: bool = False) -> None:
+        """Return when Ray is open, and close this evaluator if it cannot be.
+
+        lasting: also return if Ray is away, and open it as soon as it is there.
 
         Raises:
             EvaluatorUnavailable: Ray cannot be opened.
@@ -145,20 +149,13 @@ class RayEvaluator:
             # Ray cannot be interrupted while it connects.
             threading.Thread(target=self.close, name="ray-closing", daemon=True).start()
             raise
-        except BaseException:
-            self.close()
-            raise
-
-    def stay_connected(self, should_stop: Callable[[], bool]) -> None:
-        """Return when Ray is open or has turned out to be away; keep reconnecting from then on."""
-        try:
-            awaited(self._connection.opened, should_stop)
-        except EvaluationStopped:
-            threading.Thread(target=self.close, name="ray-closing", daemon=True).start()
-            raise
         except EvaluatorUnavailable as error:
+            if not lasting:
+                self.close()
+                raise
             _log.warning("jobs wait for workers: %s", error)
-        threading.Thread(target=self._reconnect, name="ray-reconnect", daemon=True).start()
+        if lasting:
+            threading.Thread(target=self._reconnect, name="ray-reconnect", daemon=True).start()
 
     def _reconnect(self) -> None:
         was_away = self.lost
@@ -176,7 +173,7 @@ class RayEvaluator:
     ) -> tuple[Outcome, ...]:
         """Simulate on Ray, on a new connection if the last one was lost."""
         # Workers of this machine find the kernel in the cache.
-        self._kernels.build(request.cases, should_stop)
+        build_kernels(request.cases, should_stop)
         connection = self._living()
         awaited(connection.opened, should_stop)
         with connection.used():
@@ -272,11 +269,13 @@ class _Connection:
         return self._remote.options(**options).remote((self._put(request),), cases, designs)
 
     def wait(self, handles: Sequence[Any], seconds: float) -> Sequence[Any]:
-        """Return all finished tasks, at least one unless the time is over."""
+        """Return all finished tasks, some unless the time is over."""
         waiting = list(handles)
+        # A look at all tasks takes time in proportion to their number.
+        least = 1 + len(waiting) // _TASKS_PER_LOOK
         done: list[Any]
-        done, _ = self._ray.wait(waiting, num_returns=1, timeout=seconds, fetch_local=False)
-        if done and len(waiting) > 1:
+        done, _ = self._ray.wait(waiting, num_returns=least, timeout=seconds, fetch_local=False)
+        if least == len(done) < len(waiting):
             done, _ = self._ray.wait(
                 waiting, num_returns=len(waiting), timeout=0.0, fetch_local=False
             )

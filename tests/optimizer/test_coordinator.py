@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
 
 from gaitswarm.services.optimizer.jobs.iteration import Ask, CompletedIteration
-from gaitswarm.services.optimizer.jobs.job import Claim, JobState, Progress
+from gaitswarm.services.optimizer.jobs.job import Claim, JobState
 from gaitswarm.services.optimizer.jobs.spec import judge_outcomes
 from gaitswarm.services.optimizer.run.coordinator import (
     Action,
@@ -111,16 +111,7 @@ def test_the_ask_is_stored_before_it_is_sent_out() -> None:
         sent.request.designs, SPEC.design_space().designs(first.ask.positions)
     )
     assert sent.request.cases == SPEC.cases({})
-    assert sent.request.iterations_left == SPEC.iterations - 1
-
-
-def test_iterations_left_are_those_of_the_designs_left() -> None:
-    position = np.array([[variable.low for variable in SPEC.design_space().variables]])
-    judged = replace(job(), progress=Progress(iterations=3, evaluations=3))
-    claim = Claim(judged, "runner", 1, Ask(3, position, {}))
-    _, (*_, sent) = handle(Coordination(), Claimed(claim, HERE))
-    assert isinstance(sent, Evaluate)
-    assert sent.request.iterations_left == SPEC.budget - 4
+    assert sent.request.iteration == first.ask.iteration == 0
 
 
 @pytest.mark.parametrize("crash_before", range(2 * SPEC.iterations + 1))

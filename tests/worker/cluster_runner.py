@@ -25,7 +25,7 @@ _evaluator: RayEvaluator
 def connect(address: str) -> None:
     """Requests fail after a second without a CPU."""
     global _evaluator  # noqa: PLW0603 - the state of this process
-    vars(ray_evaluator)["EMPTY_SECONDS"] = 1.0
+    vars(ray_evaluator).update(EMPTY_SECONDS=1.0, PULSE_SECONDS=0.3)
     # Ray lets workers import from where a driver was started, here a checkout.
     os.chdir("/")
     _evaluator = RayEvaluator(address)

@@ -80,6 +80,11 @@ def test_a_task_of_a_big_job_takes_a_second_at_the_measured_pace(slots: int) -> 
         assert 0.3 <= max(chunk.cost for chunk in chunks) * seconds <= 1.1
 
 
+def test_tasks_of_a_big_job_are_longer_on_many_slots() -> None:
+    chunks = cut(DURATIONS, 1_000_000, slots=1000, lanes=8, pace=Pace(1e-3, 5e-3))
+    assert max(chunk.cost for chunk in chunks) * 1e-3 == pytest.approx(3.0, rel=0.2)
+
+
 @pytest.mark.parametrize("slots", [8, 64])
 def test_sending_takes_at_most_a_twentieth_of_a_task_of_a_big_job(slots: int) -> None:
     seconds, overhead = 1e-3, 0.02

@@ -139,6 +139,16 @@ def test_a_job_on_three_nodes_of_which_one_is_lost_every_few_seconds_has_the_sam
     assert history(store, there) == history(store, here)
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(120)
+def test_a_head_that_is_killed_is_noticed_within_seconds(host: Process, runner: Process) -> None:
+    """The last test of the cluster."""
+    with_nodes(host, runner, 1)
+    host.run(cluster_host.kill)
+    reason = runner.run(cluster_runner.reason_against, request(20_000, job_id="long"))
+    assert reason == "EvaluatorUnavailable: Ray was lost: the head of the cluster does not answer"
+
+
 def test_no_node_runs_here_of_a_cluster_that_does_not_exist() -> None:
     assert not ray_node.runs_here(1)
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import logging
 import os
 import pickle
+import shutil
 import signal
 import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from unittest.mock import Mock
@@ -158,18 +160,16 @@ def test_a_second_ray_in_the_same_process_is_refused(ray_evaluator: RayEvaluator
         RayEvaluator(cpus=1).wait_until_open(never)
 
 
-@pytest.mark.slow
-def test_ray_takes_over_is_lost_and_takes_over_again_with_the_same_bits_and_leaves_nothing(
-    tmp_path: Path,
-) -> None:
-    """In a process of its own: threads, Ray, threads while it is lost, Ray again, the end."""
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "HOME": str(tmp_path)}
+@contextmanager
+def driver(folder: Path, *options: str) -> Iterator[subprocess.Popen[str]]:
+    """A process of its own that simulates in threads, on Ray, and perhaps loses it."""
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "HOME": str(folder)}
     # Kernels are those of this home, not compiled again.
     environment.setdefault("XDG_CACHE_HOME", str(Path.home() / ".cache"))
     for name in [name for name in environment if name.startswith("RAY_")]:
         del environment[name]
     with subprocess.Popen(
-        [sys.executable, "-m", "tests.worker.driver"],
+        [sys.executable, "-m", "tests.worker.driver", *options],
         cwd=ROOT,
         env=environment,
         stdin=subprocess.PIPE,
@@ -179,22 +179,50 @@ def test_ray_takes_over_is_lost_and_takes_over_again_with_the_same_bits_and_leav
         start_new_session=True,
     ) as started:
         try:
-            steps = [output(started.stdout).readline().strip() for _ in range(4)]
-            assert steps == ["threads", "ray", "threads", "ray"], output(started.stderr).read()
-            below = descendants(started.pid)
-            # Ray's own default; workers of other tests run at a higher priority.
-            niceness = {os.getpriority(os.PRIO_PROCESS, p.pid) for p in walkers(started.pid)}
-            assert min(niceness) > 4
-            assert traces(started.pid)
-            said, log = started.communicate("now\n", timeout=60)
-            assert (started.returncode, said) == (0, "heard\n")
-            assert "Traceback" not in log
-            assert within(10.0, lambda: not any(p.alive for p in below))
-            assert not traces(started.pid)
-            assert not (tmp_path / ".ray").exists()
+            yield started
         finally:
             if started.poll() is None:
                 os.killpg(started.pid, signal.SIGKILL)
+
+
+def steps_of(started: subprocess.Popen[str], count: int) -> list[str]:
+    return [output(started.stdout).readline().strip() for _ in range(count)]
+
+
+@pytest.mark.slow
+def test_ray_takes_over_from_threads_to_the_same_bits_and_leaves_nothing(tmp_path: Path) -> None:
+    with driver(tmp_path) as started:
+        assert steps_of(started, 2) == ["threads", "ray"]
+        below = descendants(started.pid)
+        # Ray's own default; workers of other tests run at a higher priority.
+        niceness = {os.getpriority(os.PRIO_PROCESS, p.pid) for p in walkers(started.pid)}
+        assert min(niceness) > 4
+        assert traces(started.pid)
+        # Its handlers of signals are still its own.
+        assert started.communicate("now\n", timeout=60) == ("heard\n", "")
+        assert started.returncode == 0
+        assert within(10.0, lambda: not any(p.alive for p in below))
+        assert not traces(started.pid)
+        assert not (tmp_path / ".ray").exists()
+
+
+@pytest.mark.thorough(
+    "test_ray_takes_over_from_threads_to_the_same_bits_and_leaves_nothing",
+    "test_a_head_that_is_killed_is_noticed_within_seconds",
+)
+@pytest.mark.slow
+def test_a_local_ray_that_was_lost_is_opened_again_and_ends_with_its_process(
+    tmp_path: Path,
+) -> None:
+    with driver(tmp_path, "lose") as started:
+        assert steps_of(started, 4) == ["threads", "ray", "threads", "ray"]
+        titles = ("gcs_server", "raylet/raylet", "ray::")
+        vital = [p for p in descendants(started.pid) if any(t in p.title for t in titles)]
+        assert len(vital) >= 3
+        os.kill(started.pid, signal.SIGKILL)
+        assert within(5.0, lambda: not any(p.alive for p in vital))
+        for directory in traces(started.pid):
+            shutil.rmtree(directory, ignore_errors=True)
 
 
 def traces(pid: int) -> list[Path]:

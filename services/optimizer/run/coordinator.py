@@ -473,18 +473,12 @@ def _evaluation_of(state: Coordination, spec: Spec, designs: NDArray[np.float64]
     job, ask = _current(state)
     if state.provenance is None:
         raise ValueError(f"no job was claimed, while {state.phase}")
-    designs_per_iteration = len(ask.positions)
     request = EvaluationRequest(
         job_id=job.id,
         cases=spec.cases(state.recordings),
         designs=spec.design_space().simulated(designs),
         provenance=state.provenance.simulation.model_copy(update={"precision": spec.precision}),
-        # Assuming that the next iterations are as large as this one.
         iteration=ask.iteration,
-        iterations_left=max(
-            0,
-            -(-(spec.budget - state.evaluations - designs_per_iteration) // designs_per_iteration),
-        ),
     )
     return Evaluate(request, walk_keys(spec, request.provenance, request.designs))
 

@@ -46,7 +46,6 @@ class EvaluationRequest:
         job_id: jobs share the workers by their weights.
         designs: (n, v) float64.
         provenance: of this process; the workers must match it.
-        iterations_left: estimated number of later iterations.
         on_task: called after every task; must return at once.
         on_outcome: called for every case of a task with a result; must return at once, and not
             modify the arrays.
@@ -57,7 +56,6 @@ class EvaluationRequest:
     cases: tuple[Case, ...]
     designs: NDArray[np.float64]
     provenance: Provenance
-    iterations_left: int = 0
     iteration: int = 0
     on_task: OnTask | None = None
     on_outcome: OnOutcome | None = None

@@ -12,10 +12,10 @@ from gaitswarm.cli.exit_codes import JobEnded
 from gaitswarm.cli.output import note, show
 from gaitswarm.cli.progress import show_progress
 from gaitswarm.cli.tables import design_table, results_table, search_line, worth
+from gaitswarm.designs import SimulationRequest, run_simulation
 from gaitswarm.jobs.database import DatabaseJobs
 from gaitswarm.jobs.embedded import check_same, earlier_job, taken_up
 from gaitswarm.jobs.open import database_to_write
-from gaitswarm.requests.simulations import SimulationRequest, run_simulation
 from gaitswarm.services.optimizer.analysis.reference import note_reference
 from gaitswarm.services.optimizer.jobs.job import JobState
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from mpl_toolkits.mplot3d.axes3d import Axes3D
 
+    from gaitswarm.robustness_index import RobustnessView
     from gaitswarm.services.optimizer.analysis.front import FrontView, NormalisedDesignView
     from gaitswarm.services.optimizer.analysis.identifiability import (
         IdentifiabilityView,
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
     from gaitswarm.sim.drives import WalkFigures
     from gaitswarm.views import IterationView
     from gaitswarm.views.robots import RobotCheckView
-    from gaitswarm.views.robustness import RobustnessView
 
 _FORMATS: Final = ("png", "svg", "pdf")
 _INK: Final = "#1f3a5f"

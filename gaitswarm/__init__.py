@@ -48,8 +48,9 @@ if TYPE_CHECKING:
     from gaitswarm.jobs.server import ServerJobs
     from gaitswarm.optimization import OptimizationResult, optimize, optimizers
     from gaitswarm.preferences import robust_preferences
+    from gaitswarm.replay import WalkReplay
     from gaitswarm.requests.firmware import FirmwareOptions
-    from gaitswarm.requests.robustness import RobustnessOptions
+    from gaitswarm.robustness_index import RobustnessOptions, RobustnessView
     from gaitswarm.services.optimizer.analysis.certificate import CertificateView
     from gaitswarm.services.optimizer.analysis.comparison import JobComparisonView
     from gaitswarm.services.optimizer.analysis.front import FrontView
@@ -101,8 +102,6 @@ if TYPE_CHECKING:
     )
     from gaitswarm.views.analysis import SurfaceView
     from gaitswarm.views.firmware import FirmwareView
-    from gaitswarm.views.replay import WalkReplay
-    from gaitswarm.views.robustness import RobustnessView
     from gaitswarm.views.verification import VerificationView
 
     __version__: str
@@ -224,7 +223,6 @@ _MODULES: Final = {
     "gaitswarm.optimization": ("OptimizationResult", "optimize", "optimizers"),
     "gaitswarm.preferences": ("robust_preferences",),
     "gaitswarm.requests.firmware": ("FirmwareOptions",),
-    "gaitswarm.requests.robustness": ("RobustnessOptions",),
     "gaitswarm.simulation": ("robustness", "simulate"),
     "gaitswarm.simulation_result": ("ScenarioResult", "SimulationResult"),
     "gaitswarm.specs": ("SpecOptions", "job_spec"),
@@ -235,8 +233,6 @@ _MODULES: Final = {
     ),
     "gaitswarm.views.firmware": ("FirmwareView",),
     "gaitswarm.views.analysis": ("SurfaceView",),
-    "gaitswarm.views.replay": ("WalkReplay",),
-    "gaitswarm.views.robustness": ("RobustnessView",),
     "gaitswarm.views.verification": ("VerificationView",),
     "gaitswarm.services.optimizer.analysis.preferences": (
         "PreferenceForView", "RobustPreferencesView",
@@ -249,6 +245,8 @@ _MODULES: Final = {
     "gaitswarm.services.optimizer.analysis.targets": ("TargetsView",),
     "gaitswarm.services.optimizer.analysis.comparison": ("JobComparisonView",),
     "gaitswarm.services.optimizer.analysis.identifiability": ("IdentifiabilityView",),
+    "gaitswarm.replay": ("WalkReplay",),
+    "gaitswarm.robustness_index": ("RobustnessOptions", "RobustnessView"),
     "gaitswarm.services.optimizer.jobs.kinds.calibration": ("CalibrationSpec",),
     "gaitswarm.services.optimizer.jobs.kinds.certificate": ("CertificateSpec",),
     "gaitswarm.services.optimizer.jobs.labels": ("JobFilter",),

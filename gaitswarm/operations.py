@@ -30,7 +30,8 @@ from typing import (
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
-from gaitswarm.requests.design import resolved
+from gaitswarm.designs import SimulationRequest, resolved, run_simulation
+from gaitswarm.replay import ReplayRequest, run_replay
 from gaitswarm.requests.firmware import (
     FirmwareRequest,
     firmware_request_of_best,
@@ -38,16 +39,15 @@ from gaitswarm.requests.firmware import (
     run_firmware,
 )
 from gaitswarm.requests.identification import MeasuredWalkRequest, read_measured_walk
-from gaitswarm.requests.robustness import RobustnessRequest, run_robustness, sampled_indices
-from gaitswarm.requests.simulations import (
-    ReplayRequest,
-    SimulationRequest,
-    run_replay,
-    run_simulation,
-)
 from gaitswarm.requests.surface import SurfaceRequest, run_surface
 from gaitswarm.robots import RobotDraftRequest, run_robot_draft
 from gaitswarm.robots import check_robot as checked_robot
+from gaitswarm.robustness_index import (
+    RobustnessRequest,
+    RobustnessView,
+    run_robustness,
+    sampled_indices,
+)
 from gaitswarm.services.monitoring.activity import Activity
 from gaitswarm.services.optimizer.analysis.certificate import MOST_WORST, CertificateView
 from gaitswarm.services.optimizer.analysis.comparison import (
@@ -120,7 +120,6 @@ from gaitswarm.views.identification import MeasuredWalkView, RecordingEntryView,
 from gaitswarm.views.job import JobFacetsView, JobKind
 from gaitswarm.views.operations import ActivityView, AuditEntryView, Level, NotificationView
 from gaitswarm.views.robots import MeshFileView, RobotCheckView, RobotDraftView
-from gaitswarm.views.robustness import RobustnessView
 from gaitswarm.views.verification import HistoryVerificationView, VerificationRequest
 from gaitswarm.zip_archive import MEDIA_TYPE as ZIP
 from gaitswarm.zip_archive import zipped

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from gaitswarm.jobs.base import Jobs
-from gaitswarm.requests.robustness import Progress, sampled_indices
+from gaitswarm.robustness_index import Progress, sampled_indices
 from gaitswarm.services.optimizer.analysis.preferences import (
     PreferencesRequest,
     RobustPreferencesView,

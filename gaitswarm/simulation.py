@@ -9,14 +9,15 @@ from typing import Final, Protocol, TypeAlias, Unpack, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gaitswarm.designs import SimulationRequest
 from gaitswarm.errors import InvalidRequest, simulation_errors
-from gaitswarm.requests.robustness import (
+from gaitswarm.robustness_index import (
     Progress,
     RobustnessOptions,
     RobustnessRequest,
+    RobustnessView,
     run_robustness,
 )
-from gaitswarm.requests.simulations import SimulationRequest
 from gaitswarm.services.optimizer.jobs.preference import judge
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
 from gaitswarm.services.runtime import open_evaluator
@@ -40,7 +41,6 @@ from gaitswarm.specs import (
     ScenarioInput,
     checked,
 )
-from gaitswarm.views.robustness import RobustnessView
 
 Floats = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import gaitswarm
-from gaitswarm.views.replay import WalkReplay
+from gaitswarm.replay import WalkReplay
 
 PICTURE: Final = Path(__file__).parents[1] / "docs" / "images" / "walks.svg"
 

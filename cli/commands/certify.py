@@ -383,7 +383,7 @@ def _replayed(
     spec: CertificateSpec, world: int, log: Path | None
 ) -> tuple[dict[str, Any], Iterator[Table | str]]:
     """Simulate a certificate's design in one world."""
-    from gaitswarm.requests.simulations import SimulationRequest, run_simulation
+    from gaitswarm.designs import SimulationRequest, run_simulation
 
     request = SimulationRequest(
         robot=spec.robot,

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from gaitswarm.jobs.base import Jobs
-    from gaitswarm.requests.robustness import RobustnessRequest
+    from gaitswarm.robustness_index import RobustnessRequest
 
 Output = Annotated[
     Path, typer.Option("--output", "-o", metavar="FILE", help="FILE.png, .svg or .pdf.")

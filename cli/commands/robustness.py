@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     from gaitswarm.cli.inputs.design_file import GivenDesign
     from gaitswarm.cli.output import Printed
     from gaitswarm.cli.rich_table import Table
-    from gaitswarm.requests.robustness import Progress, RobustnessRequest
-    from gaitswarm.views.robustness import RobustnessView
+    from gaitswarm.robustness_index import Progress, RobustnessRequest, RobustnessView
 
 Samples = Annotated[int, typer.Option(help="Designs to sample around each given one.")]
 Radius = Annotated[
@@ -126,7 +125,7 @@ def robustness_request(
 
     from gaitswarm.cli.inputs.robots import robot_defaults, scenario_data
     from gaitswarm.errors import invalid_request
-    from gaitswarm.requests.robustness import RobustnessRequest
+    from gaitswarm.robustness_index import RobustnessRequest
 
     data: dict[str, Any] = {
         "controller": given.controller,
@@ -152,7 +151,7 @@ def robustness_request(
 
 def estimate(request: RobustnessRequest) -> RobustnessView:
     """Estimate the index, with progress on stderr."""
-    from gaitswarm.requests.robustness import run_robustness
+    from gaitswarm.robustness_index import run_robustness
 
     with shown_progress() as progress:
         return run_robustness(request, progress=progress)

@@ -71,8 +71,8 @@ def simulate(
     from gaitswarm.cli.inputs.design_file import given_design
     from gaitswarm.cli.inputs.robots import robot_defaults, scenario_data
     from gaitswarm.cli.inputs.spec_file import json_object
+    from gaitswarm.designs import SimulationRequest, run_simulation
     from gaitswarm.errors import invalid_request
-    from gaitswarm.requests.simulations import SimulationRequest, run_simulation
 
     given = given_design(design, controller, trajectory, robot=robot, place=place)
     data: dict[str, Any] = {

@@ -4,8 +4,9 @@ from types import TracebackType
 from typing import Self, Unpack
 
 from gaitswarm.jobs.base import JobEvent, Jobs
+from gaitswarm.replay import WalkReplay
 from gaitswarm.requests.firmware import FirmwareOptions
-from gaitswarm.requests.robustness import RobustnessOptions
+from gaitswarm.robustness_index import RobustnessOptions, RobustnessView
 from gaitswarm.services.optimizer.analysis.certificate import CertificateView
 from gaitswarm.services.optimizer.analysis.comparison import JobComparisonView
 from gaitswarm.services.optimizer.analysis.front import FrontView
@@ -46,8 +47,6 @@ from gaitswarm.views import (
 from gaitswarm.views.analysis import SurfaceView
 from gaitswarm.views.firmware import FirmwareView
 from gaitswarm.views.identification import RecordingEntryView, RecordingView
-from gaitswarm.views.replay import WalkReplay
-from gaitswarm.views.robustness import RobustnessView
 from gaitswarm.views.verification import HistoryVerificationView
 
 class AsyncJobs:

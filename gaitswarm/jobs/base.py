@@ -17,12 +17,13 @@ from pydantic import BaseModel, ConfigDict, field_validator
 from gaitswarm import operations
 from gaitswarm.errors import InvalidRequest
 from gaitswarm.operations import Operation
+from gaitswarm.replay import WalkReplay, decoded_replay
 from gaitswarm.requests.firmware import (
     FirmwareOptions,
     FirmwareRequest,
     firmware_request_of_best,
 )
-from gaitswarm.requests.robustness import RobustnessOptions
+from gaitswarm.robustness_index import RobustnessOptions, RobustnessView
 from gaitswarm.services.optimizer.analysis.certificate import CertificateView
 from gaitswarm.services.optimizer.analysis.comparison import JobComparisonView
 from gaitswarm.services.optimizer.analysis.front import FrontView
@@ -70,8 +71,6 @@ from gaitswarm.views import (
 from gaitswarm.views.analysis import SurfaceView
 from gaitswarm.views.firmware import FirmwareView
 from gaitswarm.views.identification import RecordingEntryView, RecordingView
-from gaitswarm.views.replay import WalkReplay, decoded_replay
-from gaitswarm.views.robustness import RobustnessView
 from gaitswarm.views.verification import HistoryVerificationView
 from gaitswarm.zip_archive import unzipped
 

@@ -7,8 +7,8 @@ from typing import Any, TypedDict
 
 from pydantic import Field, ValidationError
 
+from gaitswarm.designs import ScenariosRequest
 from gaitswarm.errors import invalid_request, simulation_errors
-from gaitswarm.requests.design import ScenariosRequest
 from gaitswarm.services.optimizer.errors import InvalidRequest, NotFound
 from gaitswarm.services.optimizer.jobs.documents import AnySpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from pydantic import Field
 
+from gaitswarm.designs import DesignRequest, resolved
 from gaitswarm.errors import simulation_errors
-from gaitswarm.requests.design import DesignRequest, resolved
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.sim.errors import MeasuredLogError
 from gaitswarm.sim.identification.recorded_walk import RecordedWalk, record

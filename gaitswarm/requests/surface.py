@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from gaitswarm.requests.design import PUBLISHED_DESIGN
+from gaitswarm.designs import PUBLISHED_DESIGN
 from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.sim.catalogue import check_design, design_numbers
 from gaitswarm.sim.controllers import CONTROLLERS, ControllerName, Inference

@@ -8,7 +8,6 @@ from pydantic import Field
 
 from gaitswarm.meshes import FoundMesh, MeshFormat
 from gaitswarm.services.optimizer.views import View
-from gaitswarm.sim.robot.shapes import VisualMesh
 from gaitswarm.sim.variables import Variable
 from gaitswarm.views.base import PREFIX
 
@@ -31,11 +30,6 @@ class LinkMeshView(View):
         description="Red, green, blue and opacity of its material, 0 to 1; null for none.",
         examples=[[0.1, 0.1, 0.1, 1.0]],
     )
-
-    @classmethod
-    def from_mesh(cls, mesh: VisualMesh) -> LinkMeshView:
-        """Make a view of a mesh."""
-        return cls(name=mesh.name, origin=mesh.origin, scale=mesh.scale, colour=mesh.colour)
 
 
 class MeshFileView(View):

@@ -11,7 +11,7 @@ import pytest
 
 from gaitswarm import meshes
 from gaitswarm.meshes import urdf_digest
-from gaitswarm.requests.simulations import ReplayRequest, run_replay
+from gaitswarm.replay import ReplayRequest, run_replay
 from tests.examples.commands import run_command
 from tests.examples.meshes import tetrahedron, with_mesh
 from tests.examples.paths import QUADRUPED

@@ -131,5 +131,5 @@ def test_a_taken_port_is_an_error_at_once(service: JobService) -> None:
 
 @pytest.mark.slow
 def test_the_api_brings_in_neither_ray_nor_a_database_nor_scipy() -> None:
-    statements = "import gaitswarm.api.app, gaitswarm.api.server, gaitswarm.requests.simulations"
+    statements = "import gaitswarm.api.app, gaitswarm.api.server, gaitswarm.designs"
     assert loaded_by(statements, ["ray", "sqlalchemy", "alembic", "scipy"]) == set()

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from gaitswarm.api.dependencies import ComputingCapacity
-from gaitswarm.requests.simulations import SimulationRequest, run_simulation
+from gaitswarm.designs import SimulationRequest, run_simulation
 from gaitswarm.sim.outcome import OBJECTIVE_NAMES, Status
 from gaitswarm.sim.scenario import find_scenario
 from gaitswarm.views import SimulationView

@@ -149,5 +149,5 @@ def test_a_best_that_was_found_in_single_is_shown_in_double_with_the_difference(
 
 @pytest.mark.slow
 def test_views_can_be_had_without_a_web_framework() -> None:
-    statements = "import gaitswarm.views, gaitswarm.requests.simulations"
+    statements = "import gaitswarm.views, gaitswarm.designs"
     assert loaded_by(statements, ["fastapi", "starlette", "uvicorn"]) == set()

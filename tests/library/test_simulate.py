@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import gaitswarm
-from gaitswarm.requests.simulations import SimulationRequest, run_simulation
+from gaitswarm.designs import SimulationRequest, run_simulation
 from gaitswarm.sim.outcome import MEASUREMENT_NAMES, OBJECTIVE_NAMES
 from tests.examples.paths import QUADRUPED
 

@@ -1,0 +1,235 @@
+"""Single designs in requests, and their simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, FiniteFloat, model_validator
+
+from gaitswarm.errors import simulation_errors
+from gaitswarm.robots import DEFAULT_CONTROLLER, DEFAULT_PREFERENCE
+from gaitswarm.services.optimizer.errors import InvalidRequest
+from gaitswarm.services.optimizer.jobs.preference import PREFERENCES, Preference, PreferenceChoice
+from gaitswarm.services.optimizer.views import Request
+from gaitswarm.sim.assembly import check_precision
+from gaitswarm.sim.catalogue import check_design, design_numbers
+from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
+from gaitswarm.sim.errors import SimulationInputError
+from gaitswarm.sim.gait.stability import static_stability
+from gaitswarm.sim.gait_variables import GAIT_CATALOGUE, with_gait
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.robot import DEFAULT_ROBOT, RobotSource, load_robot
+from gaitswarm.sim.scenario import SCENARIOS, Scenario, ScenarioChoice, find_scenario
+from gaitswarm.sim.simulate import Simulation, check_drives, check_reach, simulate
+from gaitswarm.sim.variables import VariableName, VariableValue
+from gaitswarm.sim.worlds import WorldWalk, check_worlds
+from gaitswarm.views.simulation import SimulationView
+
+PUBLISHED_DESIGN = dict(CONTROLLERS["fuzzy-pi"].published["A"])
+
+
+class DesignRequest(Request):
+    """A design and the robot that it drives."""
+
+    robot: RobotSource = Field(
+        default=DEFAULT_ROBOT,
+        description="Robot to simulate, by name, or a variant with another law of friction or with"
+        " backlash, or the text of the files of your own.",
+    )
+    controller: ControllerName = Field(
+        default=DEFAULT_CONTROLLER,
+        description="Motor controller that drives it; see /v1/controllers.",
+    )
+    design: dict[VariableName, VariableValue] = Field(
+        description="Value of each of the controller's variables, and of any gait variable, which"
+        " then replaces the scenario's value; names and units as in /v1/controllers. A categorical"
+        " one takes a choice's name or index.",
+        examples=[PUBLISHED_DESIGN],
+    )
+
+    @model_validator(mode="after")
+    def _design_fits(self) -> Self:
+        check_design(self.controller, self.design)
+        return self
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """The design as numbers: of categorical variables the index of a choice."""
+        return design_numbers(self.controller, self.design)
+
+    def simulated_seconds(self, scenarios: Sequence[Scenario]) -> float:
+        """Simulated time, the measure of the request's cost."""
+        cycle_time = self.numbers.get("cycle_time")
+        return sum(
+            scenario.cycles * (scenario.cycle_time if cycle_time is None else cycle_time)
+            for scenario in scenarios
+        )
+
+    def check_design(self) -> None:
+        """Check that the design suits the controller, and the controller the robot."""
+        try:
+            law = CONTROLLERS[self.controller].compile(self.numbers)
+        except SimulationInputError as error:
+            raise InvalidRequest(str(error), field="design") from error
+        with simulation_errors("controller"):
+            check_drives(law, self.robot)
+
+    def walked(self, scenario: Scenario) -> Scenario:
+        """A scenario with the design's gait parameters."""
+        gait = {name: value for name, value in self.numbers.items() if name in GAIT_CATALOGUE}
+        return with_gait(scenario, gait)
+
+    def check_reach(self, scenario: Scenario, *, field: str) -> None:
+        """Check that the legs reach the gait's trajectory."""
+        names, values = tuple(self.design), tuple(self.numbers.values())
+        try:
+            check_reach(scenario, names, values, robot=self.robot)
+        except SimulationInputError as error:
+            raise InvalidRequest(str(error), field=field) from error
+
+
+class ScenariosRequest(DesignRequest):
+    """A design and its scenarios."""
+
+    scenarios: tuple[ScenarioChoice, ...] = Field(
+        default=tuple(scenario.name for scenario in SCENARIOS),
+        min_length=1,
+        max_length=32,
+        description="Scenarios: names or numbers of presets (see /v1/scenarios), or your own.",
+        examples=[["normal-fast", "2"]],
+    )
+
+    @model_validator(mode="after")
+    def _names_are_unique(self) -> Self:
+        names = [scenario.name for scenario in self.resolved_scenarios()]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"scenarios: {name!r} is named twice")
+        return self
+
+    def resolved_scenarios(self) -> tuple[Scenario, ...]:
+        """The scenarios in full, presets looked up."""
+        return tuple(map(resolved, self.scenarios))
+
+    def check_gaits(self) -> None:
+        """Check every scenario's gait."""
+        for index, scenario in enumerate(self.resolved_scenarios()):
+            self.check_reach(scenario, field=f"scenarios.{index}")
+
+
+def resolved(entry: str | Scenario) -> Scenario:
+    """A scenario in full."""
+    return find_scenario(entry) if isinstance(entry, str) else entry
+
+
+class WorldRequest(DesignRequest):
+    """A design in a perturbed world, by default the nominal one."""
+
+    world: dict[VariableName, FiniteFloat] = Field(
+        default_factory=dict,
+        description="Perturbations of the model, as in a world of a certificate: values of"
+        " perturbations by name; those that are not named are nominal.",
+        examples=[{}, {"friction_factor": 0.75}],
+    )
+
+    @model_validator(mode="after")
+    def _world_can_be(self) -> Self:
+        try:
+            check_worlds(tuple(self.world), self._worlds)
+        except SimulationInputError as error:
+            raise ValueError(f"world.{error}") from error
+        return self
+
+    @property
+    def _worlds(self) -> NDArray[np.float64]:
+        return np.array([tuple(self.world.values())], dtype=np.float64)
+
+    def walk(
+        self,
+        scenario: Scenario,
+        *,
+        log: bool,
+        precision: Precision = "double",
+    ) -> Simulation:
+        """Simulate the design in a scenario of its world."""
+        names, values = tuple(self.design), tuple(self.numbers.values())
+        if self.world:
+            design, known = tuple(self.numbers.items()), tuple(self.world)
+            case = WorldWalk(self.robot, self.controller, design, scenario, known, precision)
+            return case.simulate(self._worlds, log=log)
+        return simulate(
+            scenario,
+            self.controller,
+            names,
+            np.array([values], dtype=np.float64),
+            robot=self.robot,
+            log=log,
+            precision=precision,
+        )
+
+
+class WalksRequest(ScenariosRequest):
+    """A design and the scenarios in which to simulate it."""
+
+    precision: Precision = Field(
+        default="double",
+        description="Of the physics' numbers: `double`, or `single`, which is about twice as fast"
+        " and needs a C compiler.",
+    )
+
+    def check_walks(self) -> None:
+        """Check every scenario before the first simulation."""
+        self.check_design()
+        try:
+            check_precision(load_robot(self.robot), self.precision)
+        except SimulationInputError as error:
+            text = str(error).removeprefix("precision: ")
+            raise InvalidRequest(text, field="precision") from error
+        self.check_gaits()
+
+
+class SimulationRequest(WalksRequest, WorldRequest):
+    """A design, its scenarios, and how to judge it."""
+
+    preference: PreferenceChoice = Field(
+        default=DEFAULT_PREFERENCE,
+        description="How objectives are weighed: A, B, C of table 4.5, chapter-3 for eq. 3.1, or"
+        " your own.",
+    )
+    log: bool = Field(
+        default=False,
+        description="Whether to return the 500 Hz log of every scenario; logs are large.",
+    )
+
+    def resolved_preference(self) -> Preference:
+        """The preference in full."""
+        return PREFERENCES[self.preference] if isinstance(self.preference, str) else self.preference
+
+
+def run_simulation(request: SimulationRequest) -> SimulationView:
+    """Simulate the design in every scenario."""
+    request.check_walks()
+    scenarios = request.resolved_scenarios()
+    walks = [
+        request.walk(scenario, log=request.log, precision=request.precision)
+        for scenario in scenarios
+    ]
+    return SimulationView.from_walks(
+        robot=request.robot,
+        controller=request.controller,
+        design=request.numbers,
+        preference=request.resolved_preference(),
+        precision=request.precision,
+        names=[scenario.name for scenario in scenarios],
+        statuses=np.concatenate([walk.outcome.statuses for walk in walks]),
+        objectives=np.concatenate([walk.outcome.objectives for walk in walks]),
+        measurements=np.concatenate([walk.measurements.array() for walk in walks]),
+        logs=[log for walk in walks for log in walk.logs],
+        gaits=[
+            static_stability(load_robot(request.robot), request.walked(scenario))
+            for scenario in scenarios
+        ],
+    )

@@ -1,0 +1,525 @@
+"""Robustness index: sensitivity of a design's objectives to small changes of its variables.
+
+The norm of the Jacobian of the normalised objectives with respect to the normalised variables, by
+scenario; the smaller, the more robust (thesis 4.4.3). The objectives are not smooth, so the
+Jacobian is that of a linear regression over a sample of designs around the given one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from typing import Annotated, Final, NamedTuple, TypedDict, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, ValidationError
+
+from gaitswarm.designs import WalksRequest
+from gaitswarm.errors import InvalidRequest, invalid_request, simulation_errors
+from gaitswarm.services.optimizer.analysis.evaluations import ObjectiveView
+from gaitswarm.services.optimizer.analysis.preferences import IndexView, PreferencesRequest
+from gaitswarm.services.optimizer.analysis.statistics import CONFIDENCE
+from gaitswarm.services.optimizer.analysis.utilities import NORMALISED_NAMES, NORMALISED_OBJECTIVES
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
+from gaitswarm.services.optimizer.search.random_stream import swarm_uniform
+from gaitswarm.services.optimizer.views import DesignValues, Finite, View
+from gaitswarm.sim.case import Walk
+from gaitswarm.sim.catalogue import design_catalogue, design_shown
+from gaitswarm.sim.controllers import CONTROLLERS, ControllerName
+from gaitswarm.sim.kernel.walk import Precision
+from gaitswarm.sim.near_names import instead_of
+from gaitswarm.sim.outcome import Outcome, Status
+from gaitswarm.sim.provenance import provenance_of
+from gaitswarm.sim.robot import RobotSource
+from gaitswarm.sim.variables import Variable, VariableChoice
+from gaitswarm.specs import RobotInput, ScenarioInput
+
+Floats = NDArray[np.float64]
+T = TypeVar("T")
+
+_RESAMPLES: Final = 400
+_SAMPLE, _RESAMPLE = 0x10CA1, 0xB0075
+
+_BLOCK: Final = 64
+"""Designs between two progress reports; a multiple of every kernel's lanes."""
+
+Progress = Callable[[int, int], None]
+"""Called with the number of simulations done and their total."""
+
+
+class RobustnessOptions(TypedDict, total=False):
+    """Fields of a `RobustnessRequest` as keywords.
+
+    Attributes:
+        scenarios: One scenario or several: names or numbers of presets, or `Scenario`; default the
+            six of table 4.2.
+        controller: Motor controller that drives the robot; default fuzzy-pi.
+        robot: A shipped robot by name, a `RobotVariant`, or the folder of another.
+        precision: Of the physics' numbers; default double.
+        variables: Variables to vary, normalised by their bounds: names, or `Variable` with
+            bounds of your own; default all of the controller's.
+        samples: Designs to sample around the given one; default 256.
+        radius: Largest distance from it, as a share of each variable's bounds; default
+            0.02.
+        seed: Of the sample; default 1.
+    """
+
+    scenarios: ScenarioInput | Iterable[ScenarioInput]
+    controller: ControllerName
+    robot: RobotInput
+    precision: Precision
+    variables: Sequence[str | Variable]
+    samples: int
+    radius: float
+    seed: int
+
+
+class RobustnessRequest(WalksRequest):
+    """A design, its scenarios, and the sample around it."""
+
+    variables: tuple[VariableChoice, ...] | None = Field(
+        default=None,
+        max_length=64,
+        description="Variables to vary, normalised by their bounds: names, whose"
+        " bounds are then those of /v1/controllers, or variables with bounds of your own. Null:"
+        " all of the controller's.",
+    )
+    samples: int = Field(
+        default=256, ge=8, le=4096, description="Designs to sample around the given one."
+    )
+    radius: float = Field(
+        default=0.02,
+        gt=0.0,
+        le=0.5,
+        description="Largest distance from it, as a share of each variable's bounds [1].",
+    )
+    seed: int = Field(default=1, ge=0, lt=2**63, description="Of the sample.")
+
+    def sample(self) -> LocalSample:
+        """Sample designs around the given one."""
+        try:
+            return local_sample(
+                self.numbers,
+                tuple(self._resolved_variables()),
+                radius=self.radius,
+                samples=self.samples,
+                seed=self.seed,
+            )
+        except ValueError as error:
+            field, _, message = str(error).partition(": ")
+            raise InvalidRequest(message, field=field) from error
+
+    def _resolved_variables(self) -> Iterator[Variable]:
+        catalogue = design_catalogue(self.controller)
+        own = CONTROLLERS[self.controller].variables
+        seen = set[str]()
+        for index, entry in enumerate(own if self.variables is None else self.variables):
+            name = entry if isinstance(entry, str) else entry.name
+            if name in seen:
+                raise ValueError(f"variables.{index}: {name!r} is named twice")
+            seen.add(name)
+            if name not in catalogue:
+                raise ValueError(
+                    f"variables.{index}: unknown variable {name!r}; {instead_of(name, catalogue)}"
+                )
+            if name not in self.design:
+                raise ValueError(f"variables.{index}: the design gives no {name}")
+            yield catalogue[name] if isinstance(entry, str) else entry
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LocalSample:
+    """Designs uniform in a box around a design, within the variables' bounds.
+
+    Attributes:
+        varied: the d varied variables.
+        held: names of fixed variables: categorical ones, and integers whose neighbors are outside
+            the box.
+        names: v columns of the designs.
+        designs: (1 + n, v), the center first.
+        shift: (1 + n, d) distance from the center, as a share of each variable's bounds.
+        radius: half the box's width, as a share of the bounds.
+    """
+
+    varied: tuple[Variable, ...]
+    held: tuple[str, ...]
+    names: tuple[str, ...]
+    designs: Floats
+    shift: Floats
+    radius: float
+
+
+ByVariable = Annotated[dict[str, Finite], Field(examples=[{"FI1R": 0.7, "FOR": 0.8}])]
+ByObjective = Annotated[dict[str, Finite], Field(examples=[{"torque": 0.2}])]
+
+
+class SampledVariableView(View):
+    """A sampled variable and its normalisation."""
+
+    name: str = Field(description="Name of the variable.", examples=["FI1R"])
+    unit: str = Field(description="Its unit.", examples=["counts"])
+    low: float = Field(description="Lower bound by which it is normalised.", examples=[1500.0])
+    high: float = Field(description="Upper bound by which it is normalised.", examples=[6000.0])
+    value: float = Field(description="Of the design.", examples=[5837.0])
+    least: float = Field(description="Least value of the sample.", examples=[5613.2])
+    most: float = Field(description="Greatest value of the sample.", examples=[5999.1])
+
+
+class ScenarioRobustnessView(View):
+    """Effect of small changes of the variables in one scenario.
+
+    Numbers are relative changes of an objective over a variable's whole bounds; null if too few of
+    the sample's simulations completed.
+    """
+
+    index: IndexView | None = Field(description="Frobenius norm of the Jacobian.")
+    spectral_norm: Finite = Field(
+        description="Largest singular value of the Jacobian: the greatest relative change of all"
+        " objectives together, by one step of length one [1].",
+        examples=[1.1],
+    )
+    by_objective: ByObjective = Field(description="Norms of the Jacobian's rows [1].")
+    by_variable: ByVariable = Field(description="Norms of the Jacobian's columns [1].")
+    jacobian: dict[str, ByVariable] = Field(
+        description="Of the objectives' logarithms, by objective and variable [1]."
+    )
+    standard_error: dict[str, ByVariable] = Field(description="Of the Jacobian's entries [1].")
+    unexplained: ByObjective = Field(
+        description="Standard deviation of the relative changes that the Jacobian does not explain"
+        " [1]: curvature and roughness."
+    )
+    walked: int = Field(description="Simulations with all objectives.", examples=[257])
+    failed: int = Field(description="Simulations without.", examples=[0])
+
+
+class Sensitivities(View):
+    """Sensitivities of a design in several scenarios."""
+
+    index: IndexView | None = Field(
+        description="Root mean square of the scenarios' indices; null if a scenario has none."
+    )
+    by_objective: ByObjective = Field(description="Root mean square over the scenarios [1].")
+    by_variable: ByVariable = Field(description="Root mean square over the scenarios [1].")
+    scenarios: dict[str, ScenarioRobustnessView] = Field(description="By the scenario's name.")
+
+
+class RobustnessView(Sensitivities):
+    """Robustness index: norm of the Jacobian of the normalised objectives (thesis 4.4.3).
+
+    Objectives are normalised by taking their logarithms, variables by their bounds.
+    """
+
+    robot: RobotSource = Field(description="The robot, as requested.", examples=["szabadka2"])
+    controller: str = Field(description="Controller that drives it.", examples=["fuzzy-pi"])
+    design: DesignValues
+    precision: Precision = Field(description="Of the physics' numbers.", examples=["double"])
+    samples: int = Field(description="Designs sampled around the given one.", examples=[256])
+    radius: float = Field(
+        description="Half the width of the box around the design, as a share of the bounds [1].",
+        examples=[0.02],
+    )
+    seed: int = Field(description="Of the sample.", examples=[1])
+    variables: list[SampledVariableView] = Field(description="Varied variables.")
+    held: list[str] = Field(
+        description="Fixed variables: categorical ones, and integers whose next value is farther"
+        " than the radius.",
+        examples=[["FOMF"]],
+    )
+    objectives: list[ObjectiveView] = Field(description="Normalised objectives, f1 to f5.")
+
+
+def run_robustness(
+    request: RobustnessRequest, *, cpus: int | None = None, progress: Progress | None = None
+) -> RobustnessView:
+    """Simulate a design and a sample around it, and estimate its robustness."""
+    request.check_walks()
+    sample = request.sample()
+    outcomes = _walked(request, sample, cpus, progress)
+    objectives = np.stack([outcome.objectives for outcome in outcomes], axis=1)
+    failed = np.stack([outcome.statuses != Status.OK for outcome in outcomes], axis=1)
+    scenarios = [scenario.name for scenario in request.resolved_scenarios()]
+    center = dict(zip(sample.names, sample.designs[0].tolist(), strict=True))
+    return RobustnessView(
+        **dict(sensitivities(sample, objectives, failed, scenarios)),
+        robot=request.robot,
+        controller=request.controller,
+        design=design_shown(request.controller, center),
+        precision=request.precision,
+        samples=len(sample.designs) - 1,
+        radius=sample.radius,
+        seed=request.seed,
+        variables=[
+            SampledVariableView(
+                name=variable.name,
+                unit=variable.unit,
+                low=variable.low,
+                high=variable.high,
+                value=values[0],
+                least=values.min(),
+                most=values.max(),
+            )
+            for variable in sample.varied
+            for values in (sample.designs[:, sample.names.index(variable.name)],)
+        ],
+        held=list(sample.held),
+        objectives=[ObjectiveView.model_validate(o) for o in NORMALISED_OBJECTIVES],
+    )
+
+
+def _walked(
+    request: RobustnessRequest, sample: LocalSample, cpus: int | None, progress: Progress | None
+) -> list[Outcome]:
+    """Simulate the sample; one outcome per scenario."""
+    from gaitswarm.services.runtime import open_evaluator
+
+    cases = tuple(
+        Walk(request.robot, request.controller, scenario, sample.names, request.precision)
+        for scenario in request.resolved_scenarios()
+    )
+    provenance = provenance_of(request.robot, precision=request.precision)
+    blocks: list[tuple[Outcome, ...]] = []
+    n = len(sample.designs)
+    with closing(open_evaluator("in-process", cpus=cpus)) as evaluator:
+        for first in range(0, n, _BLOCK):
+            designs = sample.designs[first : first + _BLOCK]
+            asked = EvaluationRequest("", cases, designs, provenance)
+            blocks.append(evaluator.evaluate(asked, lambda: False))
+            if progress is not None:
+                progress(min(first + _BLOCK, n) * len(cases), n * len(cases))
+    return [
+        Outcome(
+            np.concatenate([part.objectives for part in parts]),
+            np.concatenate([part.statuses for part in parts]),
+        )
+        for parts in zip(*blocks, strict=True)
+    ]
+
+
+def sampled_indices(
+    spec: JobSpec,
+    request: PreferencesRequest,
+    designs: list[dict[str, float | str]],
+    *,
+    progress: Progress | None = None,
+    check: Callable[[float], None] = lambda _seconds: None,
+) -> list[IndexView | None]:
+    """Simulate samples around designs of a job and estimate the robustness index of each.
+
+    `check` is called with the simulated time of all of them [s].
+    """
+    if spec.case is not None:
+        raise InvalidRequest(
+            f"the job's designs were evaluated by {spec.case.name}, and samples would use"
+            " gaitswarm's simulator; give 0",
+            field="samples",
+        )
+    document = {
+        "robot": spec.robot,
+        "controller": spec.controller,
+        "scenarios": spec.resolved_scenarios(),
+        "variables": spec.design_space().variables,
+        **request.model_dump(include={"samples", "radius", "seed", "precision"}),
+    }
+    try:
+        requests = [
+            RobustnessRequest.model_validate({**document, "design": design}) for design in designs
+        ]
+    except ValidationError as error:
+        raise invalid_request(error) from error
+    seconds = sum(one.simulated_seconds(one.resolved_scenarios()) for one in requests)
+    check(seconds * (1 + request.samples))
+    indices = []
+    for number, one in enumerate(requests):
+
+        def overall(done: int, planned: int, before: int = number) -> None:
+            if progress is not None:
+                progress(before * planned + done, len(requests) * planned)
+
+        with simulation_errors("job_id"):
+            indices.append(run_robustness(one, progress=overall).index)
+    return indices
+
+
+def least_samples(varied: int) -> int:
+    """Return the minimum sample size."""
+    return 4 * (varied + 1)
+
+
+def local_sample(
+    design: Mapping[str, float],
+    variables: Sequence[Variable],
+    *,
+    radius: float,
+    samples: int,
+    seed: int,
+) -> LocalSample:
+    """Sample designs around one.
+
+    Values are within `radius` times the width of the bounds on either side, and within the bounds.
+    A design outside its bounds is sampled on the side towards them. Larger samples extend smaller
+    ones.
+    """
+    varied = tuple(v for v in variables if _reaches_neighbours(v, radius))
+    if not varied:
+        raise ValueError("variables: none of them can vary; choose others or a greater radius")
+    if samples < least_samples(len(varied)):
+        raise ValueError(
+            f"samples: {len(varied)} variables require at least {least_samples(len(varied))}"
+        )
+    names = tuple(design)
+    designs = np.tile(np.array(list(design.values()), dtype=np.float64), (1 + samples, 1))
+    shift = np.zeros((1 + samples, len(varied)))
+    numbers = swarm_uniform(seed, _SAMPLE, iteration=0, particles=samples, count=len(varied))
+    for j, variable in enumerate(varied):
+        center, width = design[variable.name], variable.high - variable.low
+        values = _around(center, variable, radius, numbers[:, j])
+        designs[1:, names.index(variable.name)] = values
+        shift[1:, j] = (values - center) / width
+    moving = {variable.name for variable in varied}
+    held = tuple(v.name for v in variables if v.name not in moving)
+    return LocalSample(varied, held, names, designs, shift, radius)
+
+
+def _reaches_neighbours(variable: Variable, radius: float) -> bool:
+    if variable.kind == "integer":
+        return radius * (variable.high - variable.low) >= 1.0
+    return variable.kind == "continuous"
+
+
+def _around(center: float, variable: Variable, radius: float, numbers: Floats) -> Floats:
+    """Map numbers (n,) in [0, 1) to values of a variable."""
+    reach = radius * (variable.high - variable.low)
+    low = max(center - reach, min(variable.low, center))
+    high = min(center + reach, max(variable.high, center))
+    if variable.kind == "integer":
+        first, last = math.ceil(low), math.floor(high)
+        return np.asarray(first + np.floor(numbers * (last - first + 1)))
+    return np.asarray(low + numbers * (high - low))
+
+
+class _Norm(NamedTuple):
+    """Squared norm of a Jacobian.
+
+    biased: of the sample's regression; unbiased: (1 + B,) less the contribution of noise, of the
+    sample and of each resample.
+    """
+
+    biased: float
+    unbiased: Floats
+
+    def interval(self) -> IndexView:
+        """Interval of the norm. For a resample the sample's biased norm is the true one."""
+        estimate, *resampled = np.sqrt(np.maximum(self.unbiased, 0.0)).tolist()
+        errors = np.array(resampled) - math.sqrt(self.biased)
+        tail = (1.0 - CONFIDENCE) / 2.0
+        least, most = np.quantile(errors, [tail, 1.0 - tail]).tolist()
+        low, high = max(0.0, estimate - most), max(0.0, estimate - least)
+        return IndexView(value=estimate, low=min(low, estimate), high=max(high, estimate))
+
+
+def sensitivities(
+    sample: LocalSample,
+    objectives: Floats,
+    failed: NDArray[np.bool_],
+    scenarios: Sequence[str],
+) -> Sensitivities:
+    """Estimate the index from the results (1 + n, K, M) of a sample in K scenarios.
+
+    Logarithms of the objectives are fitted, so that derivatives are relative changes. The
+    contribution of noise to a squared norm is subtracted. Intervals are from a bootstrap over the
+    designs, the same for all scenarios.
+    """
+    values = objectives[:, :, : len(NORMALISED_OBJECTIVES)]
+    usable = ~failed & (np.isfinite(values) & (values > 0.0)).all(axis=2)
+    weights = _resamples(len(sample.designs))
+    variables = [variable.name for variable in sample.varied]
+    views: dict[str, ScenarioRobustnessView] = {}
+    norms: list[_Norm] = []
+    rows, columns = [], []
+    for k, name in enumerate(scenarios):
+        walked = int(usable[:, k].sum())
+        none = np.full((values.shape[2], len(variables)), np.nan)
+        jacobian, error, spectral, unexplained = none, none, math.nan, none[:, 0]
+        by_objective, by_variable, norm = none[:, 0], none[0], None
+        if walked >= least_samples(len(variables)):
+            shift = sample.shift[usable[:, k]] / sample.radius
+            logarithms = np.log(values[usable[:, k], k])
+            fits = _regressions(
+                np.hstack([np.ones((walked, 1)), shift]),
+                logarithms - logarithms.mean(axis=0),
+                weights[:, usable[:, k]],
+            )
+            slopes = fits.slopes / sample.radius
+            variances = fits.variances / sample.radius**2
+            squares = slopes**2 - variances
+            norm = _Norm(float((slopes[0] ** 2).sum()), squares.sum(axis=(1, 2)))
+            norms.append(norm)
+            jacobian, error = slopes[0].T, np.sqrt(variances[0]).T
+            spectral, unexplained = float(np.linalg.norm(slopes[0], 2)), fits.residual[0]
+            by_objective = np.sqrt(np.maximum(squares[0].sum(axis=0), 0.0))
+            by_variable = np.sqrt(np.maximum(squares[0].sum(axis=1), 0.0))
+        rows.append(by_objective)
+        columns.append(by_variable)
+        views[name] = ScenarioRobustnessView(
+            index=None if norm is None else norm.interval(),
+            spectral_norm=spectral,
+            by_objective=_named(NORMALISED_NAMES, by_objective),
+            by_variable=_named(variables, by_variable),
+            jacobian=_named(NORMALISED_NAMES, [_named(variables, row) for row in jacobian]),
+            standard_error=_named(NORMALISED_NAMES, [_named(variables, row) for row in error]),
+            unexplained=_named(NORMALISED_NAMES, unexplained),
+            walked=walked,
+            failed=len(usable) - walked,
+        )
+    mean = None
+    if len(norms) == len(views):
+        unbiased = np.mean([norm.unbiased for norm in norms], axis=0)
+        mean = _Norm(float(np.mean([norm.biased for norm in norms])), unbiased)
+    return Sensitivities(
+        index=None if mean is None else mean.interval(),
+        by_objective=_named(NORMALISED_NAMES, np.sqrt(np.mean(np.square(rows), axis=0))),
+        by_variable=_named(variables, np.sqrt(np.mean(np.square(columns), axis=0))),
+        scenarios=views,
+    )
+
+
+def _named(names: Iterable[str], values: Iterable[T]) -> dict[str, T]:
+    return dict(zip(names, values, strict=True))
+
+
+class _Regressions(NamedTuple):
+    """slopes and their variances: (1 + B, d, M); residual: (1 + B, M) standard deviation."""
+
+    slopes: Floats
+    variances: Floats
+    residual: Floats
+
+
+def _regressions(x: Floats, y: Floats, weights: Floats) -> _Regressions:
+    """Least squares by each row of weights: x (n, 1 + d) with a column of ones, y (n, M)."""
+    n, p = x.shape
+    gram = (weights @ (x[:, :, None] * x[:, None, :]).reshape(n, -1)).reshape(-1, p, p)
+    moments = (weights @ (x[:, :, None] * y[:, None, :]).reshape(n, -1)).reshape(len(gram), p, -1)
+    # A resample may have too few values of an integer variable.
+    inverse = np.linalg.pinv(gram, hermitian=True)
+    coefficients = inverse @ moments
+    squares = weights @ y**2 - (coefficients * moments).sum(axis=1)
+    freedom = np.maximum(weights.sum(axis=1) - p, 1.0)
+    residual_variance = np.maximum(squares, 0.0) / freedom[:, None]
+    diagonal = np.diagonal(inverse, axis1=1, axis2=2)[:, 1:]
+    return _Regressions(
+        slopes=coefficients[:, 1:],
+        variances=diagonal[:, :, None] * residual_variance[:, None, :],
+        residual=np.sqrt(residual_variance),
+    )
+
+
+def _resamples(n: int) -> Floats:
+    """(1 + B, n) multiplicity of each design: first 1, then as drawn by a bootstrap."""
+    drawn = swarm_uniform(0, _RESAMPLE, iteration=0, particles=_RESAMPLES, count=n)
+    picks = (drawn * n).astype(np.intp)
+    return np.vstack([np.ones(n), *(np.bincount(row, minlength=n) for row in picks)])

@@ -191,7 +191,7 @@ class Topic:
         job = self._service.job(self._job_id)
         if job.progress.iterations <= (-1 if after is None else after) + 1:
             return News(version, job, ())
-        page = self._service.iterations(self._job_id, after=after, limit=PAGE)
+        page = self._service.store.iterations(self._job_id, after=after, limit=PAGE)
         return News(version, job, page.items)
 
     def _read_is_done(self, question: _Question, task: asyncio.Task[News]) -> None:

@@ -410,7 +410,7 @@ async def fork_job(
 def list_iterations(
     job_id: JobId, service: Service, query: Annotated[operations.IterationsQuery, Query()]
 ) -> Response:
-    page = service.iterations(job_id, after=query.after, limit=query.limit)
+    page = service.store.iterations(job_id, after=query.after, limit=query.limit)
     items = b",".join(encoded_iterations(page.items))
     body = b'{"items":[' + items + b'],"next":' + to_json(page.next) + b"}"
     return Response(body, media_type="application/json")
@@ -418,7 +418,7 @@ def list_iterations(
 
 @by_hand(operations.list_evaluations)
 def list_evaluations(job: ExistingJob, service: Service, iteration: IterationIndex) -> Response:
-    body = encoded_evaluations(service.evaluations(job.id, iteration), job.spec)
+    body = encoded_evaluations(service.store.evaluations(job.id, iteration), job.spec)
     return Response(body, media_type="application/json")
 
 

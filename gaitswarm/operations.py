@@ -323,7 +323,7 @@ class Query(BaseModel):
 def full_view(service: JobService, job: Job) -> JobView:
     """Return the view of a job with its best design."""
     has_best = job.progress.best_fitness is not None
-    return JobView.from_job_and_best(job, service.best(job.id) if has_best else None)
+    return JobView.from_job_and_best(job, service.store.best(job.id) if has_best else None)
 
 
 # Core: submit a job, follow it, control it, and get the best design.
@@ -395,7 +395,7 @@ class JobsQuery(Query):
 @_operation("GET /jobs", "core", "List jobs")
 def list_jobs(service: JobService, query: JobsQuery) -> PageView[JobSummaryView]:
     """Return a page of jobs with their progress. New jobs do not shift later pages."""
-    page = service.jobs(
+    page = service.store.jobs(
         state=query.state,
         kind=query.kind,
         parent=query.parent,
@@ -428,7 +428,7 @@ def pause_job(service: JobService, job_id: str, *, actor: str = LOCAL) -> JobVie
 
     409 if it is already paused or has ended.
     """
-    return full_view(service, service.command(job_id, Command.PAUSE, actor=actor))
+    return full_view(service, service.store.command(job_id, Command.PAUSE, actor=actor))
 
 
 @_operation("POST /jobs/{job_id}/resume", "core", "Resume a job", access="command", status=202)
@@ -447,7 +447,9 @@ def resume_job(
     queued, running or has ended.
     """
     accept = request is not None and request.accept_changes
-    job = service.command(job_id, Command.RESUME, accept_changes=accept, actor=actor, quota=quota)
+    job = service.store.command(
+        job_id, Command.RESUME, accept_changes=accept, actor=actor, quota=quota
+    )
     return full_view(service, job)
 
 
@@ -457,7 +459,7 @@ def cancel_job(service: JobService, job_id: str, *, actor: str = LOCAL) -> JobVi
 
     409 if it has ended.
     """
-    return full_view(service, service.command(job_id, Command.CANCEL, actor=actor))
+    return full_view(service, service.store.command(job_id, Command.CANCEL, actor=actor))
 
 
 @_operation(
@@ -493,7 +495,7 @@ def list_iterations(
     service: JobService, job_id: str, query: IterationsQuery
 ) -> PageView[IterationView]:
     """Return a page of iterations with statistics of their fitness, for convergence plots."""
-    page = service.iterations(job_id, after=query.after, limit=query.limit)
+    page = service.store.iterations(job_id, after=query.after, limit=query.limit)
     items = [IterationView.model_validate(iteration) for iteration in page.items]
     return PageView[IterationView](items=items, next=page.next)
 
@@ -504,7 +506,7 @@ def get_best(service: JobService, job_id: str) -> BestView:
 
     404 while no design is feasible in every scenario.
     """
-    job, best = service.job(job_id), service.best(job_id)
+    job, best = service.job(job_id), service.store.best(job_id)
     if best is None:
         raise NotFound(
             f"job {job_id} has no feasible design yet; try again after its next iteration, or see"
@@ -566,7 +568,7 @@ def stream_events(
 def committed(service: JobService, job_id: str, after: int | None) -> Iterator[IterationView]:
     """List committed iterations, read by pages."""
     while True:
-        page = service.iterations(job_id, after=after)
+        page = service.store.iterations(job_id, after=after)
         yield from map(IterationView.model_validate, page.items)
         if page.next is None or not page.items:
             return
@@ -590,7 +592,7 @@ def list_evaluations(
     Objectives are raw; utilities follow from them and the job's preference.
     """
     spec = service.job(job_id).spec
-    return CatalogueView(items=evaluation_views(service.evaluations(job_id, iteration), spec))
+    return CatalogueView(items=evaluation_views(service.store.evaluations(job_id, iteration), spec))
 
 
 class ExportQuery(Query):
@@ -1070,7 +1072,7 @@ def get_firmware_summary(
 def _firmware_of_best(
     service: JobService, job_id: str, query: FirmwareQuery, limits: Limits
 ) -> FirmwareRequest:
-    job, best = service.job(job_id), service.best(job_id)
+    job, best = service.job(job_id), service.store.best(job_id)
     view = None if best is None else BestView.from_evaluation(best, job.spec)
     bits = None if query.table_bits is None else parsed_table_bits(query.table_bits)
     request = firmware_request_of_best(job.id, job.spec, view, {"table_bits": bits})
@@ -1230,7 +1232,7 @@ def add_recording(service: JobService, walk: RecordedWalk, *, actor: str = LOCAL
     The id is a hash of the content: the same walk yields the same recording. `gaitswarm record` and
     POST /v1/measured-walks make a recording from a measured log.
     """
-    return RecordingView.from_walk(service.record(walk, actor=actor), walk)
+    return RecordingView.from_walk(service.store.add_recording(walk, actor=actor), walk)
 
 
 class RecordingsQuery(Query):
@@ -1252,7 +1254,7 @@ def list_recordings(service: JobService, query: RecordingsQuery) -> PageView[Rec
 
     Every token with read access sees all of them, as with jobs.
     """
-    page = service.recordings(search=query.search, after=query.after, limit=query.limit)
+    page = service.store.recording_list(search=query.search, after=query.after, limit=query.limit)
     items = [RecordingEntryView.from_entry(entry) for entry in page.items]
     return PageView[RecordingEntryView](items=items, next=page.next)
 
@@ -1282,7 +1284,7 @@ def record_measured_walk(
     seconds = request.simulated_seconds([request.walk_scenario])
     limits.check(seconds, logged=True, field="scenario")
     measured = read_measured_walk(request)
-    recording_id = service.record(measured.walk, actor=actor)
+    recording_id = service.store.add_recording(measured.walk, actor=actor)
     recording = RecordingView.from_walk(recording_id, measured.walk)
     return MeasuredWalkView.from_log(recording, measured.log, measured.pair)
 
@@ -1344,7 +1346,7 @@ def label_job(
     service: JobService, job_id: str, change: LabelsChange, *, actor: str = LOCAL
 ) -> JobView:
     """Apply a JSON merge patch to the labels of a job. Its spec and results do not change."""
-    return full_view(service, service.label(job_id, change, actor=actor))
+    return full_view(service, service.store.label(job_id, change, actor=actor))
 
 
 @_operation(
@@ -1373,7 +1375,7 @@ def prioritize_job(
 )
 def keep_job(service: JobService, job_id: str, *, actor: str = LOCAL) -> JobView:
     """Protect a job from deletion by users and by retention."""
-    return full_view(service, service.keep(job_id, kept=True, actor=actor))
+    return full_view(service, service.store.keep(job_id, kept=True, actor=actor))
 
 
 @_operation(
@@ -1381,7 +1383,7 @@ def keep_job(service: JobService, job_id: str, *, actor: str = LOCAL) -> JobView
 )
 def release_job(service: JobService, job_id: str, *, actor: str = LOCAL) -> JobView:
     """Allow deletion again; a server with a retention time deletes the job when that has passed."""
-    return full_view(service, service.keep(job_id, kept=False, actor=actor))
+    return full_view(service, service.store.keep(job_id, kept=False, actor=actor))
 
 
 @_operation("DELETE /jobs/{job_id}", "operations", "Delete a job", access="command", status=204)
@@ -1392,7 +1394,7 @@ def delete_job(service: JobService, job_id: str, *, actor: str = LOCAL) -> None:
     of its events end with an event `deleted`. 409 for a job that is protected, or has neither ended
     nor is paused; cancel it first.
     """
-    service.delete(job_id, actor=actor)
+    service.store.delete_job(job_id, actor=actor)
 
 
 class FacetsQuery(Query):
@@ -1404,7 +1406,7 @@ class FacetsQuery(Query):
 @_operation("GET /job-facets", "operations", "Count jobs by facet", page=True)
 def count_jobs(service: JobService, query: FacetsQuery) -> JobFacetsView:
     """Count jobs by state, robot, controller, preference and tag."""
-    return JobFacetsView.model_validate(service.facets(archived=query.archived))
+    return JobFacetsView.model_validate(service.store.facets(archived=query.archived))
 
 
 class ActivityQuery(Query):

@@ -110,7 +110,7 @@ def summary_differs(
 def _finished(service: JobService) -> Iterator[Job]:
     after: str | None = None
     while True:
-        page = service.jobs(state=JobState.SUCCEEDED, kind="certificate", after=after)
+        page = service.store.jobs(state=JobState.SUCCEEDED, kind="certificate", after=after)
         yield from (job for job in page.items if job.readable)
         if page.next is None:
             return

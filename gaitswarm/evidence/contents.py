@@ -224,7 +224,7 @@ def _job(job: Job, best: Evaluation | None) -> dict[str, Any]:
 def _iterations(service: JobService, job: Job) -> Iterator[IterationView]:
     after: int | None = None
     while True:
-        page_of = service.iterations(job.id, after=after, limit=_PIECE)
+        page_of = service.store.iterations(job.id, after=after, limit=_PIECE)
         for iteration in page_of.items:
             if iteration.index < job.progress.iterations:
                 yield IterationView.model_validate(iteration)
@@ -254,7 +254,7 @@ def _asks(spec: AnySpec, asked: Sequence[NDArray[np.float64]]) -> bytes:
 def _reevaluated(service: JobService, job: Job, columns: EvaluationColumns) -> EvaluationColumns:
     """Designs that were reevaluated in double precision."""
     committed = job.progress.iterations
-    found = [(k, again) for k, again in service.reevaluations(job) if k < committed]
+    found = [(k, again) for k, again in service.store.reevaluations(job.id) if k < committed]
     if not found:
         return columns.rows(slice(0))
     starts = np.searchsorted(columns.iteration, [k for k, _ in found])

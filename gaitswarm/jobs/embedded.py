@@ -49,7 +49,7 @@ def taken_up(service: JobService, job_id: str, *, accept_changes: bool) -> Job:
         raise Conflict(f"job {job_id} was cancelled, which is final; start a new one")
     if job.state is not JobState.SUCCEEDED and not accept_changes:
         service.check_unchanged(job)
-    return service.command(job_id, Command.RESUME) if job.state in _RESUMED else job
+    return service.store.command(job_id, Command.RESUME) if job.state in _RESUMED else job
 
 
 def earlier_job(service: JobService, spec: Spec, *, any_budget: bool = False) -> Job | None:
@@ -60,7 +60,7 @@ def earlier_job(service: JobService, spec: Spec, *, any_budget: bool = False) ->
     wanted = spec.resolved()
     after: str | None = None
     while True:
-        page = service.jobs(search=spec.name, after=after)
+        page = service.store.jobs(search=spec.name, after=after)
         for job in page.items:
             if not job.readable or job.state is JobState.CANCELLED:
                 continue

@@ -89,13 +89,11 @@ from gaitswarm.services.optimizer.jobs.estimate import (
     estimate,
 )
 from gaitswarm.services.optimizer.jobs.fork import ForkRequest
-from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Iteration, Reevaluation
-from gaitswarm.services.optimizer.jobs.job import Claim, Command, Job, JobOrder, JobState, refusal
+from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Iteration
+from gaitswarm.services.optimizer.jobs.job import Claim, Job, refusal
 from gaitswarm.services.optimizer.jobs.kinds.calibration import CalibrationSpec
 from gaitswarm.services.optimizer.jobs.kinds.certificate import CertificateSpec
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
-from gaitswarm.services.optimizer.jobs.labels import ANY_JOB, FacetCounts, JobFilter, LabelsChange
-from gaitswarm.services.optimizer.jobs.listing import Page, RecordingEntry
 from gaitswarm.services.optimizer.jobs.priority import check_priority
 from gaitswarm.services.optimizer.jobs.provenance import JobProvenance, job_provenance
 from gaitswarm.services.optimizer.jobs.quota import Quota
@@ -219,18 +217,8 @@ class JobService:
             provenance=self.provenance(spec),
         )
 
-    def record(self, walk: RecordedWalk, *, actor: str = LOCAL) -> str:
-        """Store a recorded walk for identification jobs."""
-        return self.store.add_recording(walk, actor=actor)
-
     def recording(self, recording_id: str) -> RecordedWalk:
         return self.store.recordings([recording_id])[recording_id]
-
-    def recordings(
-        self, *, search: str = "", after: str | None = None, limit: int = 50
-    ) -> Page[RecordingEntry]:
-        """Return a page of recorded walks, newest first."""
-        return self.store.recording_list(search=search, after=after, limit=limit)
 
     def estimate(self, spec: Spec) -> Estimate:
         """Estimate a job's cost from similar jobs or a measured simulation."""
@@ -277,76 +265,9 @@ class JobService:
         cases = spec.cases(self.store.recordings(spec.recording_ids))
         return checked_length(spec, cases, self.longest_job)
 
-    def iterations(
-        self, job_id: str, *, after: int | None = None, limit: int = 100
-    ) -> Page[Iteration]:
-        return self.store.iterations(job_id, after=after, limit=limit)
-
-    def evaluations(self, job_id: str, iteration: int) -> tuple[Evaluation, ...]:
-        return self.store.evaluations(job_id, iteration)
-
-    def best(self, job_id: str) -> Evaluation | None:
-        return self.store.best(job_id)
-
-    def command(
-        self,
-        job_id: str,
-        command: Command,
-        *,
-        accept_changes: bool = False,
-        actor: str = LOCAL,
-        quota: Quota | None = None,
-    ) -> Job:
-        return self.store.command(
-            job_id, command, accept_changes=accept_changes, actor=actor, quota=quota
-        )
-
     def prioritize(self, job_id: str, priority: int, *, actor: str = LOCAL) -> Job:
         check_priority(priority)
         return self.store.prioritize(job_id, priority, actor=actor)
-
-    def keep(self, job_id: str, kept: bool, *, actor: str = LOCAL) -> Job:
-        return self.store.keep(job_id, kept, actor=actor)
-
-    def delete(self, job_id: str, *, actor: str = LOCAL) -> None:
-        """Delete a job and its history.
-
-        The job is invisible once this returns; housekeeping removes the remaining rows.
-        """
-        self.store.delete_job(job_id, actor=actor)
-
-    def jobs(
-        self,
-        *,
-        state: JobState | None = None,
-        kind: str | None = None,
-        parent: str | None = None,
-        search: str = "",
-        where: JobFilter = ANY_JOB,
-        order: JobOrder = JobOrder.CREATED,
-        after: str | None = None,
-        limit: int = 50,
-        reverse: bool = False,
-    ) -> Page[Job]:
-        """Return a page of jobs. Jobs submitted meanwhile do not shift later pages."""
-        return self.store.jobs(
-            state=state,
-            kind=kind,
-            parent=parent,
-            search=search,
-            where=where,
-            order=order,
-            after=after,
-            limit=limit,
-            reverse=reverse,
-        )
-
-    def facets(self, *, archived: bool | None = None) -> FacetCounts:
-        return self.store.facets(archived=archived)
-
-    def label(self, job_id: str, change: LabelsChange, *, actor: str = LOCAL) -> Job:
-        """Change a job's labels; results do not depend on them."""
-        return self.store.label(job_id, change, actor=actor)
 
     def columns(self, job: Job) -> EvaluationColumns:
         """Return every committed evaluation."""
@@ -384,10 +305,6 @@ class JobService:
         end = job.progress.iterations if iterations is None else iterations
         return self.store.asked(job.id, 0, end)
 
-    def reevaluations(self, job: Job) -> tuple[tuple[int, Reevaluation], ...]:
-        """Return the reevaluations in double precision."""
-        return self.store.reevaluations(job.id)
-
     def distribution(
         self, job_id: str, *, after: int | None = None, limit: int
     ) -> DistributionView:
@@ -420,7 +337,7 @@ class JobService:
         columns = self.columns(job)
         if not len(columns):
             raise Conflict(f"job {job_id} has no design yet; try again after its first iteration")
-        return importance(job.spec, columns, self.best(job_id))
+        return importance(job.spec, columns, self.store.best(job_id))
 
     def front(self, job_id: str, *, most: int = FRONT_DESIGNS) -> FrontView:
         """Find the Pareto front of a tuning job over f1 to f5; `most` designs of it are listed."""
@@ -488,7 +405,7 @@ class JobService:
         check_comparable(jobs)
         bests = None
         if spec.precision != "double":
-            bests = [best for job in jobs if (best := self.best(job.id)) is not None]
+            bests = [best for job in jobs if (best := self.store.best(job.id)) is not None]
         runs = [self.columns(job) for job in jobs]
         return target_results(job_ids, spec, runs, leave_out, bests=bests)
 
@@ -526,7 +443,7 @@ class JobService:
         iterations: list[Iteration] = []
         after: int | None = None
         while True:
-            page = self.iterations(job_id, after=after, limit=_PAGE)
+            page = self.store.iterations(job_id, after=after, limit=_PAGE)
             iterations += page.items
             if page.next is None or not page.items:
                 return convergence(job_id, iterations, points)

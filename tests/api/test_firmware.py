@@ -63,7 +63,7 @@ def test_a_jobs_best_is_written_with_the_jobs_scenarios(
     name = f'attachment; filename="{job.id}-firmware.zip"'
     assert answer.headers["Content-Disposition"] == name
     manifest = json.loads(members(answer.content)["firmware.json"])
-    best = service.best(job.id)
+    best = service.store.best(job.id)
     assert best is not None
     assert list(manifest["design"].values()) == best.design.tolist()
     assert [s["name"] for s in manifest["scenarios"]] == ["normal-fast", "turn-right-fast"]

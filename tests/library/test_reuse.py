@@ -50,7 +50,7 @@ def test_the_same_job_has_the_same_name_and_specification_and_was_not_cancelled(
     assert earlier_job(service, SPEC.model_copy(update={"name": "another"})) is None
     assert earlier_job(service, SPEC.model_copy(update={"iterations": 2})) is None
     unwanted, _ = service.submit(SPEC.model_copy(update={"name": "unwanted"}))
-    service.command(unwanted.id, Command.CANCEL)
+    service.store.command(unwanted.id, Command.CANCEL)
     assert earlier_job(service, unwanted.spec) is None
 
 

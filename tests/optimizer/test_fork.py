@@ -18,7 +18,7 @@ from gaitswarm.services.optimizer.errors import (
 )
 from gaitswarm.services.optimizer.jobs.estimate import time_left
 from gaitswarm.services.optimizer.jobs.fork import Fork, ForkRequest, Lineage, TakenHistory
-from gaitswarm.services.optimizer.jobs.job import Job, JobState
+from gaitswarm.services.optimizer.jobs.job import Job, JobOrder, JobState
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.run.embedded import run_embedded
 from gaitswarm.services.optimizer.service import JobService
@@ -132,10 +132,10 @@ def test_forks_are_found_by_their_parent(store: Store) -> None:
     job = parent(store)
     forks = [fork(store, job, k) for k in (1, 2)]
     fork(store, run(store, forks[0]), 3)
-    for order in ("created", "name"):
-        found = service(store).jobs(parent=job.id, order=order).items  # type: ignore[arg-type]
+    for order in (JobOrder.CREATED, JobOrder.NAME):
+        found = store.jobs(parent=job.id, order=order).items
         assert {one.id for one in found} == {one.id for one in forks}
-    assert service(store).jobs(parent="\0").items == ()
+    assert store.jobs(parent="\0").items == ()
 
 
 def test_a_fork_stays_when_its_parent_goes(store: Store, database: Path) -> None:

@@ -122,6 +122,6 @@ def _walked(scenario: Scenario, name: GaitName, duty: float | None) -> Scenario:
 def _planned(robot: Robot, scenario: Scenario) -> PlannedGaitView | None:
     """Plan a gait; None where a leg does not reach its path."""
     try:
-        return PlannedGaitView.from_stability(static_stability(robot, scenario))
+        return PlannedGaitView.model_validate(static_stability(robot, scenario))
     except (UnreachablePose, BeyondJointLimit):
         return None

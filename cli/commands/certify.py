@@ -16,6 +16,7 @@ from gaitswarm.cli.inputs.options import (
     JobName,
     Place,
     Precision,
+    PreferenceOption,
     RobotOption,
     WorkerOptions,
     full_id,
@@ -88,13 +89,7 @@ def certify(
     ] = None,
     controller: ControllerOption = None,
     robot: RobotOption = None,
-    preference: Annotated[
-        str | None,
-        typer.Option(
-            help="Weighting of objectives: A, B, C or chapter-3 [default: the job's, else that of"
-            " the robot's folder, else A]."
-        ),
-    ] = None,
+    preference: PreferenceOption = None,
     precision: Precision = None,
     engines: Annotated[
         list[str] | None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -16,6 +17,7 @@ from gaitswarm.cli.inputs.options import (
     Place,
     Precision,
     RobotOption,
+    TrajectoryOption,
     WorkerOptions,
 )
 from gaitswarm.cli.output import note
@@ -39,57 +41,51 @@ LARGEST_FILE: Final = 1 << 28
 
 _HUGE: Final = 1e300
 
-DesignOption = Annotated[
-    str,
-    typer.Option(
-        "--design",
-        metavar="JSON|FILE|published:NAME|job:ID",
-        help="Design as for `simulate`, or published:A.",
-    ),
-]
-ScenarioOption = Annotated[
-    str, typer.Option("--scenario", help="Name or number of the walk, or FILE.json.")
-]
-TrajectoryOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--trajectory", metavar="FILE", help="JSON object of gait parameters, added to the design."
-    ),
-]
-CyclesOption = Annotated[
-    int | None, typer.Option("--cycles", min=1, max=100, help="Walking cycles to simulate.")
-]
+
+@dataclass(frozen=True, slots=True)
+class WalkOptions:
+    """Options that describe a measured walk."""
+
+    design: Annotated[
+        str,
+        typer.Option(
+            metavar="JSON|FILE|published:NAME|job:ID",
+            help="Design as for `simulate`, or published:A.",
+        ),
+    ]
+    scenario: Annotated[str, typer.Option(help="Name or number of the walk, or FILE.json.")]
+    controller: ControllerOption = None
+    trajectory: TrajectoryOption = None
+    cycles: Annotated[
+        int | None, typer.Option(min=1, max=100, help="Walking cycles to simulate.")
+    ] = None
+    robot: RobotOption = None
+
+    def read(self, place: Place) -> MeasuredWalk:
+        """Return the walk; a job's best uses the job's robot by default."""
+        from gaitswarm.cli.inputs.design_file import given_design
+        from gaitswarm.cli.inputs.robots import one_scenario
+        from gaitswarm.sim.measurement.measured_log import MeasuredWalk
+        from gaitswarm.sim.robot import load_robot
+
+        given = given_design(
+            self.design, self.controller, self.trajectory, robot=self.robot, place=place
+        )
+        values: Mapping[str, Any] = given.values
+        for name, value in values.items():
+            number = isinstance(value, int | float) and not isinstance(value, bool)
+            if not (number and -_HUGE < value < _HUGE):
+                raise InvalidRequest("must be a finite number", field=f"design.{name}")
+        scenario = one_scenario(self.scenario, self.robot, preset=self.scenario)
+        if self.cycles is not None:
+            scenario = scenario.model_copy(update={"cycles": float(self.cycles)})
+        robot = load_robot(given.robot(self.robot))
+        return MeasuredWalk.of(robot, scenario, given.controller, given.values)
 
 
-def read_walk(
-    scenario: str,
-    controller: str | None,
-    design: str,
-    trajectory: Path | None,
-    cycles: int | None,
-    robot: str | None,
-    *,
-    place: Place,
-) -> MeasuredWalk:
-    """Return the walk of a design; a job's best uses the job's robot by default."""
-    from gaitswarm.cli.inputs.design_file import given_design
-    from gaitswarm.cli.inputs.robots import chosen_scenarios
-    from gaitswarm.sim.measurement.measured_log import MeasuredWalk
-    from gaitswarm.sim.robot import load_robot
-
-    given = given_design(design, controller, trajectory, robot=robot, place=place)
-    values: Mapping[str, Any] = given.values
-    for name, value in values.items():
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        if not (number and -_HUGE < value < _HUGE):
-            raise InvalidRequest("must be a finite number", field=f"design.{name}")
-    scenarios = chosen_scenarios(scenario, robot)
-    if len(scenarios) != 1:
-        raise InvalidRequest("must name one scenario", field="scenario")
-    (chosen,) = scenarios
-    if cycles is not None:
-        chosen = chosen.model_copy(update={"cycles": float(cycles)})
-    return MeasuredWalk.of(load_robot(given.robot(robot)), chosen, given.controller, given.values)
+Measured = Annotated[
+    Path, typer.Argument(metavar="MEASURED.csv", help="Log in the format of docs/validation.md.")
+]
 
 
 def synchronised(
@@ -136,23 +132,15 @@ Truth = Annotated[
 
 
 def record(
-    measured: Annotated[
-        Path,
-        typer.Argument(metavar="MEASURED.csv", help="Log in the format of docs/validation.md."),
-    ],
-    design: DesignOption,
-    scenario: ScenarioOption,
-    controller: ControllerOption = None,
-    trajectory: TrajectoryOption = None,
-    cycles: CyclesOption = None,
-    robot: RobotOption = None,
+    measured: Measured,
+    options: WalkOptions,
     *,
     place: Place,
 ) -> Printed:
     """Store a measured walk for identification, and print the recording's id."""
     from gaitswarm.sim.identification.recorded_walk import record as recorded
 
-    walk = read_walk(scenario, controller, design, trajectory, cycles, robot, place=place)
+    walk = options.read(place)
     log = read_measured(measured, walk.robot)
     pair = synchronised(measured, log, walk.simulated(), walk)
     recording = recorded(pair, walk.scenario, walk.controller, walk.design)
@@ -337,16 +325,8 @@ def recordings(
 
 
 def validate(
-    measured: Annotated[
-        Path,
-        typer.Argument(metavar="MEASURED.csv", help="Log in the format of docs/validation.md."),
-    ],
-    design: DesignOption,
-    scenario: ScenarioOption,
-    controller: ControllerOption = None,
-    trajectory: TrajectoryOption = None,
-    cycles: CyclesOption = None,
-    robot: RobotOption = None,
+    measured: Measured,
+    options: WalkOptions,
     repeat: Annotated[
         list[Path] | None,
         typer.Option(
@@ -370,7 +350,7 @@ def validate(
     )
     from gaitswarm.sim.validation import compare_synchronised
 
-    walk = read_walk(scenario, controller, design, trajectory, cycles, robot, place=place)
+    walk = options.read(place)
     logs = {path: read_measured(path, walk.robot) for path in (measured, *(repeat or ()))}
     simulated = walk.simulated()
     pairs = [synchronised(path, log, simulated, walk) for path, log in logs.items()]
@@ -397,15 +377,10 @@ def validate(
 
 
 def synthesize(
-    design: DesignOption,
-    scenario: ScenarioOption,
+    options: WalkOptions,
     output: Annotated[
         Path, typer.Option("--output", "-o", metavar="FILE.csv", help="Where to write the log.")
     ],
-    controller: ControllerOption = None,
-    trajectory: TrajectoryOption = None,
-    cycles: CyclesOption = None,
-    robot: RobotOption = None,
     seed: Annotated[
         int, typer.Option(min=0, max=(1 << 64) - 1, help="Seed of the sensor noise.")
     ] = 1,
@@ -426,7 +401,7 @@ def synthesize(
 
     if output.suffix != ".csv":
         raise InvalidRequest(f"{output} must end in .csv", field="output")
-    walk = read_walk(scenario, controller, design, trajectory, cycles, robot, place=place)
+    walk = options.read(place)
     twin = None
     if parameters is not None:
         names = {variable.name for variable in identifiable_variables(walk.robot)}

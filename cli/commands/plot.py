@@ -7,15 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gaitswarm.cli.commands.robustness import (
-    Radius,
-    Samples,
-    Scenarios,
-    Seed,
-    estimate,
-    robustness_request,
-)
-from gaitswarm.cli.inputs.options import ControllerOption, JobId, Place, Precision, RobotOption
+from gaitswarm.cli.commands.robustness import SampleOptions, estimate
+from gaitswarm.cli.inputs.options import JobId, Place
 from gaitswarm.cli.output import note
 from gaitswarm.services.optimizer.errors import InvalidRequest
 
@@ -75,13 +68,7 @@ def robustness(
         list[str], typer.Argument(metavar="DESIGN|ID", help="Designs as for `robustness`.")
     ],
     output: Output,
-    samples: Samples = 256,
-    radius: Radius = 0.02,
-    seed: Seed = 1,
-    scenarios: Scenarios = None,
-    controller: ControllerOption = None,
-    robot: RobotOption = None,
-    precision: Precision = None,
+    options: SampleOptions,
     title: Annotated[str, typer.Option(help="Title of the picture.")] = "Robustness",
     *,
     place: Place,
@@ -92,17 +79,9 @@ def robustness(
 
     requests: dict[str, RobustnessRequest] = {}
     for design in designs:
-        given = given_design(design, controller, robot=robot, place=place)
+        given = given_design(design, options.controller, robot=options.robot, place=place)
         label = f"{given.label} ({design})" if given.label in requests else given.label
-        requests[label] = robustness_request(
-            given,
-            samples=samples,
-            radius=radius,
-            seed=seed,
-            scenarios=scenarios,
-            robot=robot,
-            precision=precision,
-        )
+        requests[label] = options.request(given)
     if len({request.resolved_scenarios() for request in requests.values()}) > 1:
         raise InvalidRequest(
             "the designs' jobs have different scenarios; pass --scenarios", field="scenarios"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -24,13 +25,57 @@ Radius = Annotated[
     float, typer.Option(help="Radius of the sample, as a share of each variable's bounds.")
 ]
 Seed = Annotated[int, typer.Option(help="Seed of the sample.")]
-Scenarios = Annotated[
-    str | None,
-    typer.Option(
-        help="Names, numbers or FILE.json, separated by commas, or all.",
-        show_default="those of the job, else all of the robot",
-    ),
-]
+
+
+@dataclass(frozen=True, slots=True)
+class SampleOptions:
+    """Options of a sample around designs."""
+
+    samples: Samples = 256
+    radius: Radius = 0.02
+    seed: Seed = 1
+    scenarios: Annotated[
+        str | None,
+        typer.Option(
+            help="Names, numbers or FILE.json, separated by commas, or all.",
+            show_default="those of the job, else all of the robot",
+        ),
+    ] = None
+    controller: ControllerOption = None
+    robot: RobotOption = None
+    precision: Precision = None
+
+    def request(self, given: GivenDesign) -> RobustnessRequest:
+        """Return the request for a design; a job's best uses the job's scenarios and robot."""
+        from pydantic import ValidationError
+
+        from gaitswarm.cli.inputs.robots import robot_defaults, scenario_data
+        from gaitswarm.errors import invalid_request
+        from gaitswarm.robustness_index import RobustnessRequest
+
+        scenarios: Any = scenario_data(self.scenarios or "all", self.robot)
+        if given.spec is None:
+            controlled = robot_defaults(self.robot).of_controller(given.controller)
+            variables = controlled.get("variables")
+        else:
+            variables = given.spec.design_space().variables
+            if self.scenarios is None:
+                scenarios = given.spec.resolved_scenarios()
+        data: dict[str, Any] = {
+            "controller": given.controller,
+            "design": given.values,
+            "samples": self.samples,
+            "radius": self.radius,
+            "seed": self.seed,
+            "precision": self.precision or "double",
+            "scenarios": scenarios,
+            "robot": given.robot(self.robot),
+            "variables": variables,
+        }
+        try:
+            return RobustnessRequest.model_validate(data)
+        except ValidationError as error:
+            raise invalid_request(error) from error
 
 
 def robustness(
@@ -42,13 +87,7 @@ def robustness(
             " best.",
         ),
     ],
-    samples: Samples = 256,
-    radius: Radius = 0.02,
-    seed: Seed = 1,
-    scenarios: Scenarios = None,
-    controller: ControllerOption = None,
-    robot: RobotOption = None,
-    precision: Precision = None,
+    options: SampleOptions,
     *,
     place: Place,
 ) -> Printed:
@@ -59,18 +98,8 @@ def robustness(
     """
     from gaitswarm.cli.inputs.design_file import given_design
 
-    given = given_design(design, controller, robot=robot, place=place)
-    view = estimate(
-        robustness_request(
-            given,
-            samples=samples,
-            radius=radius,
-            seed=seed,
-            scenarios=scenarios,
-            robot=robot,
-            precision=precision,
-        )
-    )
+    given = given_design(design, options.controller, robot=options.robot, place=place)
+    view = estimate(options.request(given))
     return view, _parts(view)
 
 
@@ -108,45 +137,6 @@ def _parts(view: RobustnessView) -> Iterator[Table | str]:
     yield f"unexplained by the linear model, largest of all scenarios: {', '.join(shares)}"
     if view.held:
         yield f"fixed: {', '.join(view.held)}"
-
-
-def robustness_request(
-    given: GivenDesign,
-    *,
-    samples: int,
-    radius: float,
-    seed: int,
-    scenarios: str | None,
-    robot: str | None,
-    precision: str | None,
-) -> RobustnessRequest:
-    """Build the request for a design; a job's best uses the job's scenarios and robot."""
-    from pydantic import ValidationError
-
-    from gaitswarm.cli.inputs.robots import robot_defaults, scenario_data
-    from gaitswarm.errors import invalid_request
-    from gaitswarm.robustness_index import RobustnessRequest
-
-    data: dict[str, Any] = {
-        "controller": given.controller,
-        "design": given.values,
-        "samples": samples,
-        "radius": radius,
-        "seed": seed,
-        "precision": precision or "double",
-        "scenarios": scenario_data(scenarios or "all", robot),
-        "robot": given.robot(robot),
-    }
-    if given.spec is None:
-        data["variables"] = robot_defaults(robot).of_controller(given.controller).get("variables")
-    else:
-        data["variables"] = given.spec.design_space().variables
-        if scenarios is None:
-            data["scenarios"] = given.spec.resolved_scenarios()
-    try:
-        return RobustnessRequest.model_validate(data)
-    except ValidationError as error:
-        raise invalid_request(error) from error
 
 
 def estimate(request: RobustnessRequest) -> RobustnessView:

@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gaitswarm.cli.inputs.options import ControllerOption, Place, Precision, RobotOption
+from gaitswarm.cli.inputs.options import (
+    ControllerOption,
+    Place,
+    Precision,
+    PreferenceOption,
+    RobotOption,
+    TrajectoryOption,
+)
 from gaitswarm.cli.output import note
 from gaitswarm.cli.tables import gait_in_words, number, results_table, table, worth
 
@@ -36,17 +43,8 @@ def simulate(
             " if it has scenarios, else of table 4.2 [default: the job's, else all]."
         ),
     ] = None,
-    trajectory: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="JSON object of gait parameters, added to the design."),
-    ] = None,
-    preference: Annotated[
-        str | None,
-        typer.Option(
-            help="Weighting of objectives: A, B, C or chapter-3 [default: the job's, else that of"
-            " the robot's folder, else A]."
-        ),
-    ] = None,
+    trajectory: TrajectoryOption = None,
+    preference: PreferenceOption = None,
     world: Annotated[
         str | None,
         typer.Option(

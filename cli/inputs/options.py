@@ -163,6 +163,22 @@ ControllerOption = Annotated[
     ),
 ]
 
+TrajectoryOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--trajectory", metavar="FILE", help="JSON object of gait parameters, added to the design."
+    ),
+]
+
+PreferenceOption = Annotated[
+    str | None,
+    typer.Option(
+        "--preference",
+        help="Weighting of objectives: A, B, C or chapter-3 [default: the job's, else that of"
+        " the robot's folder, else A].",
+    ),
+]
+
 Precision = Annotated[
     str | None,
     typer.Option(

@@ -11,7 +11,7 @@ from pydantic import Field, WithJsonSchema
 
 from gaitswarm.services.optimizer.analysis.evaluations import ScenarioResultView, case_results
 from gaitswarm.services.optimizer.jobs.preference import Preference, figure_of_merit, judge
-from gaitswarm.services.optimizer.views import View, finite
+from gaitswarm.services.optimizer.views import Finite, View, finite
 from gaitswarm.sim.catalogue import design_shown
 from gaitswarm.sim.gait.stability import Stability
 from gaitswarm.sim.kernel.observation import WalkLog
@@ -69,7 +69,7 @@ class WalkLogView(View):
     @classmethod
     def from_log(cls, log: WalkLog) -> WalkLogView:
         """Make a view of all arrays of a log; what is not finite is null."""
-        # model_construct: hundreds of thousands of numbers that need no checking again.
+        # model_construct does not check hundreds of thousands of numbers.
         return cls.model_construct(
             rate=LOG_RATE,
             columns={
@@ -84,34 +84,26 @@ class WalkLogView(View):
 class MeasurementsView(View):
     """Measurements of a simulation besides its objectives; null where it ended early."""
 
-    peak_current: float | None = Field(
+    peak_current: Finite = Field(
         default=None,
         description="Largest absolute current of any motor at any physics step [A].",
         examples=[0.83],
     )
-    mean_current: float | None = Field(
-        default=None,
-        description="Mean over time and motors of the absolute current [A].",
-        examples=[0.12],
+    mean_current: Finite = Field(
+        default=None, description="Mean absolute current of all motors [A].", examples=[0.12]
     )
-    motor_heat: float | None = Field(
-        default=None,
-        description="Mean heat in the windings of all motors, R I^2 [W].",
-        examples=[1.6],
+    motor_heat: Finite = Field(
+        default=None, description="Mean heat in all windings, R I^2 [W].", examples=[1.6]
     )
-    power: float | None = Field(
-        default=None,
-        description="Mean electrical power of all motors, as far as it counts as spent [W].",
-        examples=[12.4],
+    power: Finite = Field(
+        default=None, description="Mean electrical power of all motors [W].", examples=[12.4]
     )
-    speed: float | None = Field(
-        default=None, description="Mean forward speed [m/s].", examples=[0.187]
-    )
+    speed: Finite = Field(default=None, description="Mean forward speed [m/s].", examples=[0.187])
 
     @classmethod
     def from_row(cls, row: NDArray[np.float64]) -> MeasurementsView:
         """Make a view of one walk's measurements."""
-        return cls(**dict(zip(MEASUREMENT_NAMES, map(finite, row.tolist()), strict=True)))
+        return cls(**dict(zip(MEASUREMENT_NAMES, row.tolist(), strict=True)))
 
 
 class PlannedGaitView(View):
@@ -122,22 +114,11 @@ class PlannedGaitView(View):
     )
     fewest_feet: int = Field(description="That stand at any moment.", examples=[3])
     margin: float | None = Field(
-        description="Static stability margin: least distance of the centre of mass, along gravity,"
-        " from the edge of the polygon of the feet that stand [m]; negative outside of it; null"
-        " while no foot stands.",
+        description="Least distance of the centre of mass from the edge of the support polygon [m],"
+        " negative outside; null while no foot stands.",
         examples=[0.041],
     )
     stable: bool = Field(description="Whether the gait is statically stable: margin above 0.")
-
-    @classmethod
-    def from_stability(cls, stability: Stability) -> PlannedGaitView:
-        """Make a view of a planned gait."""
-        return cls(
-            duty_factor=stability.duty_factor,
-            fewest_feet=stability.fewest_feet,
-            margin=stability.margin,
-            stable=stability.stable,
-        )
 
 
 class SimulatedScenarioView(ScenarioResultView):
@@ -204,7 +185,7 @@ class SimulationView(View):
             names, OBJECTIVE_NAMES, statuses, objectives, judged.log_utilities[0]
         )
         recorded = [None if log is None else WalkLogView.from_log(log) for log in logs]
-        planned = list[PlannedGaitView | None](map(PlannedGaitView.from_stability, gaits))
+        planned = list[PlannedGaitView | None](map(PlannedGaitView.model_validate, gaits))
         return cls(
             robot=robot,
             controller=controller,

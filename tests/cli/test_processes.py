@@ -27,7 +27,7 @@ SERVE = ("serve", "--port", "0", "--evaluator", "in-process")
 
 @pytest.fixture
 def server(db: Path) -> Iterator[str]:
-    process = start_python(*COMMAND_LINE, *SERVE, "--db", db)
+    process = ForkedCommand(*SERVE, "--db", db)
     url = line_with(process.stderr, r"(http://[\d.:]+) and runs queued jobs").group(1)
     yield url
     process.send_signal(signal.SIGINT)

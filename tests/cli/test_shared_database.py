@@ -13,7 +13,7 @@ import pytest
 from tests.cli.conftest import Gaitswarm, WriteJson
 from tests.examples.forked import ForkedCommand
 from tests.examples.jobs import SMALL_SPEC
-from tests.examples.processes import COMMAND_LINE, eventually, line_with, start_python
+from tests.examples.processes import eventually, line_with
 from tests.examples.walks import SHORT_WALK
 
 pytestmark = pytest.mark.slow
@@ -42,9 +42,7 @@ def server(db: Path) -> Iterator[str]:
 def test_optimize_keeps_its_job_while_a_server_runs(
     small_spec: Path, db: Path, server: str
 ) -> None:
-    process = start_python(
-        *COMMAND_LINE, "optimize", "--spec", small_spec, "--db", db, "--cpus", "1", "--json"
-    )
+    process = ForkedCommand("optimize", "--spec", small_spec, "--db", db, "--cpus", "1", "--json")
     out, err = process.communicate(timeout=120)
     assert process.returncode == 0, err
     assert json.loads(out)["state"] == "succeeded"

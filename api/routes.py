@@ -1,6 +1,6 @@
 """Routes of the table of operations, most of them generic.
 
-A route by hand needs more than its operation: headers, streams, or responses encoded for speed.
+A route by hand needs more than its operation: headers, or a stream.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from fastapi import APIRouter, Body, Depends, Header, Path, Query, Request, Resp
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, StreamingResponse
 from pydantic import TypeAdapter, ValidationError, WrapValidator
-from pydantic_core import to_json
 
 from gaitswarm import operations
 from gaitswarm.api.access import (
@@ -56,17 +55,15 @@ from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.input import with_known_keys
 from gaitswarm.sim.robot.check import MOST_ROBOTS, Location, check_files, files_of, objects_in
 from gaitswarm.tables import MEDIA_TYPES, encoded_table
-from gaitswarm.views import PREFIX, JobView, encoded_evaluations, encoded_iterations
+from gaitswarm.views import PREFIX, JobView
 
 T = TypeVar("T")
 
-IterationIndex = Annotated[
-    int, Path(ge=0, le=LARGEST_INDEX, description="Index of a committed iteration, from 0.")
-]
-
 _PATH: Final[Mapping[str, Any]] = {
     "job_id": JobId,
-    "iteration": IterationIndex,
+    "iteration": Annotated[
+        int, Path(ge=0, le=LARGEST_INDEX, description="Index of a committed iteration, from 0.")
+    ],
     "controller": Annotated[
         str,
         Path(
@@ -238,14 +235,11 @@ def _response(
         headers["ETag"] = f'"{hashlib.sha256(answer).hexdigest()}"'
         if received_tag is not None and headers["ETag"] in received_tag:
             return Response(status_code=status.HTTP_304_NOT_MODIFIED, headers=headers)
-    return Response(answer, operation.status, headers, operation.media_types[0])
+    return Response(answer, operation.status, headers, operation.media_type)
 
 
 def documented(
-    operation: Operation[Any],
-    *,
-    responses: Responses | None = None,
-    **options: Any,
+    operation: Operation[Any], *, responses: Responses | None = None, **options: Any
 ) -> dict[str, Any]:
     """Return the arguments of a route: those that follow from its operation, and others."""
     has_body = operation.request is not None and operation.method != "GET"
@@ -260,7 +254,7 @@ def documented(
     }
     documents = (responses or {}) | problems(*sorted(statuses))
     if operation.content:
-        documents = binary(operation.content, *operation.media_types) | documents
+        documents = binary(operation.content, operation.media_type) | documents
     if operation.cached:
         documents[status.HTTP_304_NOT_MODIFIED] = {"description": "`If-None-Match` has the ETag."}
     description = inspect.cleandoc(operation.answer.__doc__ or "")
@@ -404,22 +398,6 @@ async def fork_job(
         return _submitted(service, response, *service.fork(job_id, fork, sent=sent, **submission))
 
     return await computing.run(work)
-
-
-@by_hand(operations.list_iterations)
-def list_iterations(
-    job_id: JobId, service: Service, query: Annotated[operations.IterationsQuery, Query()]
-) -> Response:
-    page = service.store.iterations(job_id, after=query.after, limit=query.limit)
-    items = b",".join(encoded_iterations(page.items))
-    body = b'{"items":[' + items + b'],"next":' + to_json(page.next) + b"}"
-    return Response(body, media_type="application/json")
-
-
-@by_hand(operations.list_evaluations)
-def list_evaluations(job: ExistingJob, service: Service, iteration: IterationIndex) -> Response:
-    body = encoded_evaluations(service.store.evaluations(job.id, iteration), job.spec)
-    return Response(body, media_type="application/json")
 
 
 @by_hand(

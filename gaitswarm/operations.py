@@ -12,7 +12,7 @@ import inspect
 import math
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
 from types import NoneType, UnionType
@@ -201,7 +201,7 @@ class Operation(Generic[T]):
         status: Of a successful response.
         refusals: Statuses of errors, besides those that follow from the parameters.
         content: What the bytes are, for answers that are not JSON.
-        media_types: Types of those bytes.
+        media_type: Of those bytes.
         filename: Name of the download, with the parameters of the path.
         cached: Whether clients cache the bytes by their ETag.
         location: Path of what the operation creates, given its answer.
@@ -219,20 +219,21 @@ class Operation(Generic[T]):
     status: int = 200
     refusals: tuple[int, ...] = ()
     content: str = ""
-    media_types: tuple[str, ...] = (BINARY,)
+    media_type: str = BINARY
     filename: str | None = None
     cached: bool = False
     location: Callable[[T], str] | None = None
     page: bool = False
-    path_names: tuple[str, ...] = field(init=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "path_names", tuple(re.findall(r"\{(\w+)\}", self.path)))
 
     @property
     def id(self) -> str:
         """OpenAPI operation id."""
         return self.answer.__name__
+
+    @cached_property
+    def path_names(self) -> tuple[str, ...]:
+        """Parameters of the path."""
+        return tuple(re.findall(r"\{(\w+)\}", self.path))
 
     @cached_property
     def parameters(self) -> dict[str, inspect.Parameter]:
@@ -548,13 +549,16 @@ def stream_events(
     of a deleted job ends with an event `deleted`, whose data has its `id`. A stopping server sends
     a comment and the field `retry`. With a revoked token the stream ends within seconds.
     """
-    after, sent_state = query.after, None
+    after, sent_state, sent = query.after, None, 0
     while True:
         # The job is read first: the iterations that it counts are then among those read.
         job = service.job(job_id)
         for iteration in committed(service, job_id, after):
             after = iteration.index
             yield iteration
+            sent += 1
+            if sent == query.limit:
+                return
         if (job.state, job.waiting) != sent_state:
             sent_state = (job.state, job.waiting)
             yield StateView.from_job(job)
@@ -617,7 +621,7 @@ def export_job(service: JobService, job_id: str, query: ExportQuery) -> Iterator
     "Download evidence",
     heavy=True,
     content="The archive.",
-    media_types=(ZIP,),
+    media_type=ZIP,
     filename="{job_id}.zip",
 )
 def get_evidence(service: JobService, job_id: str) -> bytes:
@@ -1036,7 +1040,7 @@ class FirmwareQuery(Query):
     "Download the best design as firmware",
     heavy=True,
     content="The folder, as an archive.",
-    media_types=(ZIP,),
+    media_type=ZIP,
     filename="{job_id}-firmware.zip",
     cached=True,
 )
@@ -1087,7 +1091,7 @@ def _firmware_of_best(
     reads=True,
     heavy=True,
     content="The folder, as an archive.",
-    media_types=(ZIP,),
+    media_type=ZIP,
     filename="firmware.zip",
 )
 def write_firmware(

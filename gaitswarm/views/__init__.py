@@ -9,7 +9,6 @@ from gaitswarm.services.optimizer.analysis.evaluations import (
     EvaluationView,
     ObjectiveView,
     ScenarioResultView,
-    encoded_evaluations,
     evaluation_views,
 )
 from gaitswarm.services.optimizer.analysis.ranking import RankingView
@@ -42,7 +41,6 @@ from gaitswarm.views.history import (
     HistoryIterationView,
     IterationView,
     ParticlesHeaderView,
-    encoded_iterations,
     encoded_particles,
 )
 from gaitswarm.views.job import (
@@ -98,8 +96,6 @@ __all__ = [
     "WalkLogView",
     "case_views",
     "controller_views",
-    "encoded_evaluations",
-    "encoded_iterations",
     "encoded_particles",
     "evaluation_views",
     "field_errors",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, replace
 from datetime import datetime
 from typing import Literal
@@ -10,7 +10,6 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
-from pydantic_core import to_json
 
 from gaitswarm.services.optimizer.analysis.distribution import thinned
 from gaitswarm.services.optimizer.analysis.evaluations import EvaluationView, evaluation_views
@@ -104,11 +103,6 @@ class HistoryIterationView(IterationView):
         """Make a view of an iteration with its designs."""
         particles = evaluation_views(evaluations, spec)
         return cls.model_validate({**asdict(iteration), "evaluations": particles})
-
-
-def encoded_iterations(iterations: Sequence[Iteration]) -> Iterator[bytes]:
-    """Encode iterations as their views, of which none is made."""
-    return (to_json(asdict(iteration), inf_nan_mode="null") for iteration in iterations)
 
 
 class ParticleColumnView(View):

@@ -8,7 +8,6 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, TypeAdapter
-from pydantic_core import to_json
 
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation
 from gaitswarm.services.optimizer.jobs.judgement import exponential
@@ -77,11 +76,6 @@ def evaluation_views(evaluations: Sequence[Evaluation], spec: Spec) -> list[Eval
     """Make views of evaluations of one job."""
     # One validation for all: a call for each result would dominate.
     return _EVALUATIONS.validate_python(_documents(evaluations, spec))
-
-
-def encoded_evaluations(evaluations: Sequence[Evaluation], spec: Spec) -> bytes:
-    """Encode views of evaluations of one job, of which none is made."""
-    return to_json({"items": _documents(evaluations, spec)})
 
 
 def _documents(evaluations: Sequence[Evaluation], spec: Spec) -> list[dict[str, object]]:

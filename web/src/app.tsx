@@ -1,5 +1,6 @@
 /** Frame of every page: header, navigation and routing. */
 
+import type { VNode } from 'preact'
 import { useEffect, useLayoutEffect, useRef } from 'preact/hooks'
 import { Empty } from './components/feedback'
 import icon from './icon.svg'
@@ -9,8 +10,7 @@ import { forgetIgnored, IgnoredNotice } from './router/ignored'
 import { lazyPage } from './router/lazy-page'
 import { usePlace } from './router/navigation'
 import { type Route, routeOf } from './router/routes'
-import { useManual, useUnauthorized } from './session/session'
-import { SignIn } from './session/sign-in'
+import { SignIn, useManual, useUnauthorized } from './session/session'
 import { toggleTheme, useTheme } from './theme'
 import { setTitle } from './title'
 
@@ -27,15 +27,15 @@ const LINKS = [
   { page: 'controller', href: '/controller', label: 'Controller' },
 ] as const
 
-/** Titles until a page sets its own. */
-const TITLES: Readonly<Record<Route['page'], string>> = {
-  jobs: 'Jobs',
-  'new-job': 'New job',
-  job: 'Job',
-  compare: 'Compared jobs',
-  walk: 'Walk',
-  controller: 'Controller',
-  'not-found': 'Page not found',
+/** Pages, with their titles until they set their own. */
+const PAGES: Readonly<Record<Route['page'], readonly [string, (route: Route) => VNode]>> = {
+  jobs: ['Jobs', () => <JobsPage />],
+  'new-job': ['New job', () => <NewJobPage />],
+  job: ['Job', ({ id, tab }) => <JobPage id={id} tab={tab} />],
+  compare: ['Compared jobs', () => <ComparePage />],
+  walk: ['Walk', () => <WalkPage />],
+  controller: ['Controller', () => <ControllerPage />],
+  'not-found': ['Page not found', () => <NotFound />],
 }
 
 export function App() {
@@ -43,7 +43,7 @@ export function App() {
   const route = routeOf(place.path)
   const unauthorized = useUnauthorized()
   const manual = useManual()
-  const identity = 'id' in route ? `${route.page} ${route.id}` : route.page
+  const identity = `${route.page} ${route.id}`
   return (
     <>
       <a class="skip-link" href="#main">
@@ -85,7 +85,8 @@ export function App() {
 function Main({ route }: { route: Route }) {
   const main = useRef<HTMLElement>(null)
   // A layout effect runs before the effects of the page, which may set another title.
-  useLayoutEffect(() => setTitle(TITLES[route.page]), [route.page])
+  const [title, pageOf] = PAGES[route.page]
+  useLayoutEffect(() => setTitle(title), [title])
   useEffect(() => {
     if (navigated) main.current?.focus({ preventScroll: true })
     navigated = true
@@ -94,36 +95,21 @@ function Main({ route }: { route: Route }) {
   return (
     <main id="main" tabIndex={-1} ref={main} data-page={route.page}>
       <IgnoredNotice />
-      <Page route={route} />
+      {pageOf(route)}
     </main>
   )
 }
 
 let navigated = false
 
-function Page({ route }: { route: Route }) {
-  switch (route.page) {
-    case 'jobs':
-      return <JobsPage />
-    case 'new-job':
-      return <NewJobPage />
-    case 'job':
-      return <JobPage id={route.id} tab={route.tab} />
-    case 'compare':
-      return <ComparePage />
-    case 'walk':
-      return <WalkPage />
-    case 'controller':
-      return <ControllerPage />
-    case 'not-found':
-      return (
-        <Empty title="Page not found">
-          <p>
-            Go to the <a href="/jobs">list of jobs</a>.
-          </p>
-        </Empty>
-      )
-  }
+function NotFound() {
+  return (
+    <Empty title="Page not found">
+      <p>
+        Go to the <a href="/jobs">list of jobs</a>.
+      </p>
+    </Empty>
+  )
 }
 
 function ThemeToggle() {
@@ -142,6 +128,5 @@ function ThemeToggle() {
 }
 
 function isUnder(route: Route, page: Route['page']): boolean {
-  const under: readonly Route['page'][] = ['job', 'compare']
-  return route.page === page || (page === 'jobs' && under.includes(route.page))
+  return route.page === page || (page === 'jobs' && ['job', 'compare'].includes(route.page))
 }

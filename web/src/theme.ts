@@ -5,21 +5,21 @@ import { useEffect, useState } from 'preact/hooks'
 export type Theme = 'light' | 'dark'
 
 const KEY = 'gaitswarm.theme'
-const dark = matchMedia('(prefers-color-scheme: dark)')
+const DARK = '(prefers-color-scheme: dark)'
 const listeners = new Set<() => void>()
 const resolved = new Map<string, string>()
 
 export function currentTheme(): Theme {
   const chosen = document.documentElement.dataset.theme
   if (chosen === 'light' || chosen === 'dark') return chosen
-  return dark.matches ? 'dark' : 'light'
+  return matchMedia(DARK).matches ? 'dark' : 'light'
 }
 
 /** Apply the stored theme, and follow the system's otherwise. */
 export function startTheme(): void {
   const stored = localStorage.getItem(KEY)
   if (stored === 'light' || stored === 'dark') document.documentElement.dataset.theme = stored
-  dark.addEventListener('change', changed)
+  matchMedia(DARK).addEventListener('change', changed)
 }
 
 /** Switch the theme, now and on later visits. */

@@ -13,8 +13,7 @@ import { ALL_JOBS, Breadcrumbs } from '../router/breadcrumbs'
 import { usePlace } from '../router/navigation'
 import { idsOf } from '../router/query-value'
 import { jobPath } from '../router/routes'
-import { ConvergenceCard, DistributionCard } from './charts'
-import { type ComparedJob, colourOf } from './series'
+import { type ComparedJob, ConvergenceCard, colourOf, DistributionCard } from './charts'
 import './compare.css'
 
 /** Polling interval while a job is active [ms]. */

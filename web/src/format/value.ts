@@ -9,25 +9,18 @@ export type Value = number | string
 /** Values by variable. */
 export type Design = Readonly<Record<string, Value>>
 
-/** formatNumber; names in words. */
-export function formatValue(value: Value | null | undefined, digits?: number): string {
-  return typeof value === 'string' ? inWords(value) : formatNumber(value, digits)
+/** A number format that writes names in words. */
+function orName<A extends unknown[]>(
+  format: (value: number | null | undefined, ...rest: A) => string,
+) {
+  return (value: Value | null | undefined, ...rest: A) =>
+    typeof value === 'string' ? inWords(value) : format(value, ...rest)
 }
 
-/** formatExact; names in words. */
-export function formatExactValue(value: Value | null | undefined, digits?: number): string {
-  return typeof value === 'string' ? inWords(value) : formatExact(value, digits)
-}
-
-/** quantity; names, which have no unit, in words. */
-export function valueQuantity(value: Value, unit: string, digits?: number): string {
-  return typeof value === 'string' ? inWords(value) : quantity(value, unit, digits)
-}
-
-/** exactQuantity; names, which have no unit, in words. */
-export function exactValueQuantity(value: Value, unit: string, digits?: number): string {
-  return typeof value === 'string' ? inWords(value) : exactQuantity(value, unit, digits)
-}
+export const formatValue = orName(formatNumber)
+export const formatExactValue = orName(formatExact)
+export const valueQuantity = orName(quantity)
+export const exactValueQuantity = orName(exactQuantity)
 
 /** Name of the choice at an index; the number itself without choices. */
 export function named(value: number, choices: readonly string[] | undefined): Value {

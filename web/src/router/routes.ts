@@ -1,35 +1,23 @@
 /** Routes of the page. */
 
-/** A page with the parameters of its path. */
-export type Route =
-  | { readonly page: 'jobs' }
-  | { readonly page: 'new-job' }
-  | { readonly page: 'job'; readonly id: string; readonly tab: string }
-  | { readonly page: 'compare' }
-  | { readonly page: 'walk' }
-  | { readonly page: 'controller' }
-  | { readonly page: 'not-found' }
+const PAGES = ['jobs', 'compare', 'walk', 'controller'] as const
+
+/** A page; id and tab: of a job, otherwise empty. */
+export interface Route {
+  readonly page: (typeof PAGES)[number] | 'new-job' | 'job' | 'not-found'
+  readonly id: string
+  readonly tab: string
+}
 
 /** The route of a path such as `/jobs/k2q7/iterations`; trailing slashes are ignored. */
 export function routeOf(path: string): Route {
   const parts = path.split('/').filter((part) => part !== '')
-  const [first, second, ...rest] = parts.map(decoded)
-  switch (first) {
-    case undefined:
-      return { page: 'jobs' }
-    case 'jobs':
-      if (second === undefined) return { page: 'jobs' }
-      if (second === 'new' && rest.length === 0) return { page: 'new-job' }
-      return { page: 'job', id: second, tab: rest.join('/') }
-    case 'compare':
-      return second === undefined ? { page: 'compare' } : { page: 'not-found' }
-    case 'walk':
-      return second === undefined ? { page: 'walk' } : { page: 'not-found' }
-    case 'controller':
-      return second === undefined ? { page: 'controller' } : { page: 'not-found' }
-    default:
-      return { page: 'not-found' }
-  }
+  const [first = 'jobs', second, ...rest] = parts.map(decoded)
+  const at = (page: Route['page']) => ({ page, id: '', tab: '' })
+  if (second === undefined) return at(PAGES.find((page) => page === first) ?? 'not-found')
+  if (first !== 'jobs') return at('not-found')
+  if (second === 'new' && rest.length === 0) return at('new-job')
+  return { page: 'job', id: second, tab: rest.join('/') }
 }
 
 export function jobPath(id: string, tab = ''): string {

@@ -4,7 +4,7 @@ import {
   convergences,
   distributions,
   referencesOf,
-} from '../../src/compare/series'
+} from '../../src/compare/charts'
 
 const job = (changes: Partial<ComparedJob['convergence']>, fitness: number[]): ComparedJob => ({
   id: 'k2q7zr5dm9xw',

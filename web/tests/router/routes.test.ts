@@ -15,7 +15,7 @@ test.each([
   ['/nowhere', { page: 'not-found' }],
   ['/jobs/%E0%A4%A', { page: 'job', id: '%E0%A4%A', tab: '' }],
 ])('%s is its page', (path, route) => {
-  expect(routeOf(path)).toEqual(route)
+  expect(routeOf(path)).toMatchObject(route)
 })
 
 test('a path of a job leads back to the job', () => {

@@ -2,6 +2,7 @@
 
 import { useEffect, useId, useRef, useState } from 'preact/hooks'
 import { messageOf } from '../../api/problem'
+import { Select } from '../../components/fields/controls'
 import { Progress } from '../../components/state'
 import { fileStem } from '../../export/csv'
 import { saveFile } from '../../export/save'
@@ -149,20 +150,12 @@ export function FilmDialog({ playback, onRecord, onClose }: FilmDialogProps) {
             </p>
             <div class="row">
               <SpeedField playback={playback} speed={speed} />
-              <span class="speed">
-                <label for={`${id}-size`}>Size</label>
-                <select
-                  id={`${id}-size`}
-                  value={String(chosen)}
-                  onChange={(event) => setChosen(Number(event.currentTarget.value))}
-                >
-                  {SIZES.map(([width, height], k) => (
-                    <option key={width} value={String(k)}>
-                      {width} × {height}
-                    </option>
-                  ))}
-                </select>
-              </span>
+              <Select
+                label="Size"
+                value={String(chosen)}
+                options={SIZES.map(([width, height], k) => [String(k), `${width} × ${height}`])}
+                onChoose={(k) => setChosen(Number(k))}
+              />
             </div>
           </>
         )}

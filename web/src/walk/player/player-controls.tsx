@@ -1,7 +1,6 @@
 /** Playback and view controls of a replay. */
 
-import { useId } from 'preact/hooks'
-import { Check, Segmented } from '../../components/fields/controls'
+import { Check, Segmented, Select } from '../../components/fields/controls'
 import { formatExact } from '../../format/number'
 import type { ViewName } from '../scene/camera-rig'
 import type { SceneOptions } from '../scene/walk-scene'
@@ -126,23 +125,12 @@ function Transport({ playback }: { playback: Playback }) {
 
 /** Playback speed, as a multiple of real time. */
 export function SpeedField({ playback, speed }: { playback: Playback; speed: number }) {
-  const id = useId()
   return (
-    <span class="speed">
-      <label for={id} class="label">
-        Speed
-      </label>
-      <select
-        id={id}
-        value={String(speed)}
-        onChange={(event) => playback.setSpeed(Number(event.currentTarget.value))}
-      >
-        {SPEEDS.map((value) => (
-          <option key={value} value={String(value)}>
-            {formatExact(value)}×
-          </option>
-        ))}
-      </select>
-    </span>
+    <Select
+      label="Speed"
+      value={String(speed)}
+      options={SPEEDS.map((value) => [String(value), `${formatExact(value)}×`])}
+      onChoose={(value) => playback.setSpeed(Number(value))}
+    />
   )
 }

@@ -15,7 +15,7 @@ import type { Playback } from './playback'
 import { PlayerControls } from './player-controls'
 import { pressed } from './player-keys'
 import { SceneLegend } from './scene-legend'
-import { LONGEST_STEP, useScene } from './use-scene'
+import { LONGEST_STEP, NoScene, useScene } from './use-scene'
 
 /** Pixels of a saved picture per CSS pixel. */
 const PIXELS = 2
@@ -111,13 +111,11 @@ export function Player({ walks, playback, options, onOptions, camera, onCamera }
     <section class="card player" ref={element} aria-label="Replay" data-player data-meshes={count}>
       <div class="player-stage" ref={box}>
         {failure !== null && (
-          <div class="notice" data-tone="warn" role="alert">
-            <strong>Could not draw the walk in three dimensions.</strong>
-            <p>
-              {failure} Enable hardware acceleration or WebGL in the browser's settings. Playback
-              and the plots below work without it.
-            </p>
-          </div>
+          <NoScene
+            what="walk"
+            reason={failure}
+            rest="Playback and the plots below work without it."
+          />
         )}
       </div>
       <SceneLegend walks={walks} cell={extent.cell} newtons={newtons} options={options} />

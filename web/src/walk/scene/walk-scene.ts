@@ -91,7 +91,7 @@ export class WalkScene {
     private readonly extent: Extent,
     newtons: number,
     options: SceneOptions,
-    onChange: () => void,
+    private readonly onChange: () => void,
   ) {
     this.renderer = createRenderer()
     this.density = this.renderer.getPixelRatio()
@@ -230,6 +230,7 @@ export class WalkScene {
   resize(width: number, height: number): void {
     this.shownSize = [width, height]
     this.fit()
+    this.onChange()
   }
 
   /** Render at this size [px], scaled to the canvas; null for the canvas's size. */

@@ -1,6 +1,6 @@
 import { describe, expect, test } from 'vitest'
 import { nearest, shareOf } from '../../../src/charts/scale'
-import { placeNames, scaleOf } from '../../../src/charts/scatter/scatter-model'
+import { placeNames, scaleOf } from '../../../src/charts/scatter/scatter'
 
 const BOX = { left: 10, top: 20, width: 100, height: 200 }
 

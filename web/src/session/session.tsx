@@ -1,12 +1,13 @@
-/** Authentication by token, stored by the browser as a cookie. */
+/** Authentication by token, stored by the browser as a cookie, and its form. */
 
 import { useEffect, useState } from 'preact/hooks'
 import { get, onUnauthorized, post } from '../api/client'
+import { ErrorNotice } from '../components/feedback'
 
 const IN_FRAGMENT = '#token='
 
 /** Sign in with a token; throws ApiProblem if the server rejects it. */
-export async function signIn(token: string): Promise<void> {
+async function signIn(token: string): Promise<void> {
   await post('/v1/session', { body: { token } })
 }
 
@@ -43,4 +44,41 @@ export function useManual(): boolean {
     manual.then(setAvailable)
   }, [])
   return available
+}
+
+export function SignIn() {
+  const [token, setToken] = useState('')
+  const [error, setError] = useState<unknown>(null)
+  const submit = async (event: Event) => {
+    event.preventDefault()
+    try {
+      await signIn(token.trim())
+      // Repeats all rejected requests.
+      location.reload()
+    } catch (problem) {
+      setError(problem)
+    }
+  }
+  return (
+    <form class="sign-in" onSubmit={submit}>
+      <h1>Sign in</h1>
+      <p>
+        This server requires a token. Its owner creates one with{' '}
+        <code>gaitswarm token create NAME</code>.
+      </p>
+      <label>
+        Token
+        <input
+          type="password"
+          name="token"
+          autocomplete="current-password"
+          required
+          value={token}
+          onInput={(event) => setToken(event.currentTarget.value)}
+        />
+      </label>
+      {error !== null && <ErrorNotice error={error} what="The token was rejected." />}
+      <button type="submit">Sign in</button>
+    </form>
+  )
 }

@@ -12,11 +12,58 @@ import type { Playback } from './playback'
 /** Longest time step per frame [s], after a pause of a tab in the background. */
 export const LONGEST_STEP = 0.1
 
-interface Stage {
-  /** Receives the canvas. */
-  readonly box: RefObject<HTMLElement | null>
+interface Drawing {
+  readonly canvas: HTMLCanvasElement
+  resize(width: number, height: number): void
+  dispose(): void
+}
+
+type Box = RefObject<HTMLElement | null>
+
+/** A scene as large as its box once its code is loaded, or why it cannot be drawn. */
+export function useStage<S extends Drawing>(
+  box: Box,
+  load: () => Promise<() => S>,
+  onBuilt: (scene: S, signal: AbortSignal) => void,
+  inputs: readonly unknown[],
+) {
+  const [scene, setScene] = useState<S | null>(null)
+  const [failure, setFailure] = useState<string | null>(null)
+  useEffect(() => {
+    const parent = box.current!
+    const leave = new AbortController()
+    let built: S | null = null
+    const fill = () => {
+      const { clientWidth, clientHeight } = parent
+      if (clientWidth > 0 && clientHeight > 0) built?.resize(clientWidth, clientHeight)
+    }
+    const observer = new ResizeObserver(fill)
+    setScene(null)
+    setFailure(null)
+    load()
+      .then((build) => {
+        if (leave.signal.aborted) return
+        built = build()
+        parent.append(built.canvas)
+        fill()
+        observer.observe(parent)
+        onBuilt(built, leave.signal)
+        setScene(built)
+      })
+      .catch((error: unknown) => !leave.signal.aborted && setFailure(messageOf(error)))
+    return () => {
+      leave.abort()
+      observer.disconnect()
+      built?.dispose()
+    }
+  }, inputs)
+  return { scene, failure }
+}
+
+interface WalkStage {
+  readonly box: Box
   /** Receives data attributes with the state, which tests read. */
-  readonly element: RefObject<HTMLElement | null>
+  readonly element: Box
   readonly replays: readonly Replay[]
   readonly extent: Extent
   /** Force of an arrow per grid cell [N]. */
@@ -27,57 +74,30 @@ interface Stage {
   readonly onBuilt: (scene: WalkScene, signal: AbortSignal) => void
 }
 
-/** The scene once it is loaded, its driver, or why it cannot be drawn. */
-export function useScene(stage: Stage) {
-  const [scene, setScene] = useState<WalkScene | null>(null)
-  const [failure, setFailure] = useState<string | null>(null)
+/** A scene of walks animated by a playback, with its driver. */
+export function useScene({ box, element, playback, options, replays, ...stage }: WalkStage) {
   const [driver, setDriver] = useState<ReplayDriver | null>(null)
-  const latest = useRef(stage)
-  latest.current = stage
   const theme = useTheme()
-  const { replays, playback, options } = stage
   useEffect(() => {
-    const { extent, newtons } = latest.current
-    const [box, element] = [stage.box.current!, stage.element.current!]
-    const drive = new ReplayDriver(playback, replays[0], element)
-    const leave = new AbortController()
-    let built: WalkScene | null = null
-    const fill = () => {
-      if (!built || box.clientWidth === 0 || box.clientHeight === 0) return
-      built.resize(box.clientWidth, box.clientHeight)
-      drive.request()
-    }
-    const observer = new ResizeObserver(fill)
-    setScene(null)
-    setFailure(null)
+    const drive = new ReplayDriver(playback, replays[0], element.current!)
     setDriver(drive)
-    import('../scene/walk-scene')
-      .then(({ WalkScene }) => {
-        if (leave.signal.aborted) return
-        built = new WalkScene(replays, extent, newtons, latest.current.options, () =>
-          drive.request(),
-        )
-        box.append(built.canvas)
-        fill()
-        observer.observe(box)
-        latest.current.onBuilt(built, leave.signal)
-        drive.scene = built
-        drive.request()
-        setScene(built)
-      })
-      .catch((error: unknown) => !leave.signal.aborted && setFailure(messageOf(error)))
-    return () => {
-      leave.abort()
-      observer.disconnect()
-      drive.dispose()
-      built?.dispose()
-    }
+    return () => drive.dispose()
   }, [replays, playback])
+  const latest = useRef(driver)
+  latest.current = driver
+  const load = async () => {
+    const { WalkScene } = await import('../scene/walk-scene')
+    const redraw = () => latest.current?.request()
+    return () => new WalkScene(replays, stage.extent, stage.newtons, options, redraw)
+  }
+  const { scene, failure } = useStage(box, load, stage.onBuilt, [replays, playback])
   useEffect(() => {
-    scene?.setOptions(options)
-    scene?.recolour()
-    driver?.request()
-  }, [scene, options, theme])
+    if (!driver || !scene) return
+    driver.scene = scene
+    scene.setOptions(options)
+    scene.recolour()
+    driver.request()
+  }, [driver, scene, options, theme])
   return { scene, driver, failure }
 }
 
@@ -139,4 +159,16 @@ class ReplayDriver {
       dataset[axis] = String(Number(replay.value('link_pose', frame, k).toFixed(4)) + 0)
     }
   }
+}
+
+/** rest: what is possible without a scene. */
+export function NoScene(props: { what: string; reason: string; rest: string }) {
+  return (
+    <div class="notice" data-tone="warn" role="alert">
+      <strong>Could not draw the {props.what} in three dimensions.</strong>
+      <p>
+        {props.reason} Enable hardware acceleration or WebGL in the browser's settings. {props.rest}
+      </p>
+    </div>
+  )
 }

@@ -93,12 +93,11 @@ export function LineChart(props: LineChartProps) {
   }
   const theme = useTheme()
   const height = Math.round(((props.height ?? 260) / 14) * remPixels())
-  const width = Math.max(120, useWidth(box))
+  const width = useWidth(box)
 
   useEffect(() => {
-    const size = { width: Math.max(120, box.current!.clientWidth), height }
     const drawn = new uPlot(
-      { ...options(latest, zoom, onZoom, readout.current!), ...size },
+      { ...options(latest, zoom, onZoom, readout.current!), ...sizeOf(box.current!, height) },
       dataOf(latest.current),
       box.current!,
     )
@@ -123,7 +122,7 @@ export function LineChart(props: LineChartProps) {
     if (plot.current) renew(plot.current, dataOf(latest.current), zoom.current)
   }, [props.x, props.series, props.yRange?.join()])
   useEffect(() => {
-    if (plot.current && plot.current.width !== width) plot.current.setSize({ width, height })
+    if (width > 0) plot.current?.setSize(sizeOf(box.current!, height))
   }, [width])
   useEffect(() => plot.current?.redraw(false), [props.marker, props.paint, props.paintOver])
 
@@ -133,6 +132,10 @@ export function LineChart(props: LineChartProps) {
       <p class="readout" ref={readout} aria-hidden="true" />
     </div>
   )
+}
+
+function sizeOf({ clientWidth }: HTMLElement, height: number) {
+  return { width: Math.max(120, clientWidth), height }
 }
 
 type Zoom = readonly [number, number] | null

@@ -19,7 +19,8 @@ export function lineLabel({ label, fitness }: ReferenceLine): string {
 /** Draw the line if it is in the visible range. */
 export function paintReference(plot: uPlot, reference: ReferenceLine): void {
   const { ctx, bbox } = plot
-  const y = plot.valToPos(reference.fitness, 'y', true)
+  // On whole pixels, so that the line is sharp.
+  const y = Math.round(plot.valToPos(reference.fitness, 'y', true)) + (devicePixelRatio % 2) / 2
   if (y < bbox.top || y > bbox.top + bbox.height) return
   ctx.save()
   ctx.font = chartFont(Math.round(12 * devicePixelRatio))

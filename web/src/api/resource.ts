@@ -105,3 +105,13 @@ export function useSlowly(value: number, milliseconds: number): number {
   }, [value, shown, milliseconds])
   return shown
 }
+
+const responses = new Map<string, Promise<unknown>>()
+
+/** The response to a request that was sent before, since the page was loaded; failures are repeated. */
+export function cached<T>(key: string, request: () => Promise<T>): Promise<T> {
+  const response = (responses.get(key) as Promise<T> | undefined) ?? request()
+  responses.set(key, response)
+  response.catch(() => responses.delete(key))
+  return response
+}

@@ -42,7 +42,6 @@ export type CalibrationSpec = Schemas['CalibrationSpec']
 export type CertificateSpec = Schemas['CertificateSpec']
 export type AnySpec = JobSpec | IdentificationSpec | CalibrationSpec | CertificateSpec
 export type Certificate = Schemas['CertificateView']
-export type CertifiedScenario = Schemas['CertifiedScenarioView']
 export type ComparedEngine = Schemas['ComparedEngineView']
 export type Compared = Schemas['ComparedView']
 export type Spread = Schemas['SpreadView']

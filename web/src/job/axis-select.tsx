@@ -1,28 +1,31 @@
-/** Choice of the axes of a chart. */
+/** Choice of the two axes of a chart. */
 
 import { Select } from '../components/fields/controls'
 import { inWords } from '../format/words'
 
-/** Choice of one axis among names, other than that of the other axis. */
-export function AxisSelect({
-  label,
+export function AxisSelects({
   axes,
   x,
-  other,
+  y,
   onSelect,
 }: {
-  label: string
   axes: readonly { readonly name: string }[]
   x: string
-  other: string
-  onSelect: (name: string) => void
+  y: string
+  onSelect: (axes: { readonly x: string; readonly y: string }) => void
 }) {
-  return (
+  const select = (label: string, value: string, other: string, set: (name: string) => void) => (
     <Select
       label={label}
-      value={x}
+      value={value}
       options={axes.map(({ name }) => [name, inWords(name), name === other] as const)}
-      onChoose={onSelect}
+      onChoose={set}
     />
+  )
+  return (
+    <>
+      {select('Across', x, y, (name) => onSelect({ x: name, y }))}
+      {select('Up', y, x, (name) => onSelect({ x, y: name }))}
+    </>
   )
 }

@@ -3,7 +3,7 @@
 import { get, post } from '../api/client'
 import { jobSearch } from '../api/job-search'
 import { readableJob } from '../api/readable'
-import { useResource } from '../api/resource'
+import { cached, useResource } from '../api/resource'
 import { isPublished, NOT_PUBLISHED } from '../api/robots'
 import type { Controller, Job, JobSpec, ScenarioResult, Simulation } from '../api/types'
 import { Combobox } from '../components/fields/combobox'
@@ -13,8 +13,6 @@ export interface Reference {
   readonly label: string
   readonly scenarios: Readonly<Record<string, ScenarioResult>>
 }
-
-const simulated = new Map<string, Promise<Simulation>>()
 
 /** Load the reference for an address value: `published:fuzzy-pi:A`, `job:k2q7`, `none`. */
 export function useReference(job: Job, choice: string) {
@@ -48,17 +46,11 @@ export async function publishedReferences(job: Job): Promise<readonly Reference[
   return Promise.all(walks)
 }
 
-let controllers: Promise<readonly Controller[]> | null = null
-
 function catalogue(): Promise<readonly Controller[]> {
-  controllers ??= get('/v1/controllers').then((answer) => answer.items)
-  controllers.catch(() => {
-    controllers = null
-  })
-  return controllers
+  return cached('controllers', () => get('/v1/controllers').then(({ items }) => items))
 }
 
-/** Simulate a design in the job's scenarios; identical requests are sent once. */
+/** Simulate a design in the job's scenarios. */
 function walkOf(
   { robot, scenarios, preference }: JobSpec,
   controller: JobSpec['controller'],
@@ -66,13 +58,7 @@ function walkOf(
 ): Promise<Simulation> {
   const walks = { scenarios, preference, precision: 'double' as const, log: false }
   const body = { robot, controller, design: { ...design }, ...walks }
-  const key = JSON.stringify(body)
-  const cached = simulated.get(key)
-  if (cached) return cached
-  const request = post('/v1/simulations', { body })
-  simulated.set(key, request)
-  request.catch(() => simulated.delete(key))
-  return request
+  return cached(JSON.stringify(body), () => post('/v1/simulations', { body }))
 }
 
 export function ReferencePicker({

@@ -5,7 +5,7 @@ import type { JobFacets } from '../api/types'
 import { EmptyCard } from '../components/card'
 import { CopyBlock } from '../components/copy-button'
 import { Empty, ErrorNotice, Loading } from '../components/feedback'
-import { Table } from '../components/table/table'
+import { Pager, Table } from '../components/table/table'
 import { formatCount } from '../format/number'
 import { setQuery, usePlace } from '../router/navigation'
 import { idsOf } from '../router/query-value'
@@ -82,7 +82,17 @@ export function JobsPage() {
                 rowData={(job) => ({ 'data-job': job.id, 'data-state': job.state })}
               />
             )}
-            <Pages cursors={cursors} next={page.next} onPage={setCursors} />
+            {(cursors.length > 0 || page.next !== null) && (
+              <Pager
+                caption="Jobs"
+                shown={`page ${cursors.length + 1}`}
+                page=""
+                onPage={[
+                  cursors.length > 0 ? () => setCursors(cursors.slice(0, -1)) : null,
+                  page.next === null ? null : () => setCursors([...cursors, page.next!]),
+                ]}
+              />
+            )}
           </section>
         )}
       </div>
@@ -104,42 +114,6 @@ function countWords(
   if (!filtered && facets) return jobsInWords(facets.total)
   if (next === null) return jobsInWords(earlier * PAGE + shown)
   return `more than ${formatCount((earlier + 1) * PAGE)} jobs`
-}
-
-function Pages({
-  cursors,
-  next,
-  onPage,
-}: {
-  /** Cursors of all pages but the first. */
-  cursors: readonly string[]
-  next: string | null
-  onPage: (cursors: readonly string[]) => void
-}) {
-  if (cursors.length === 0 && next === null) return null
-  return (
-    <fieldset class="pager" aria-label="Pages of Jobs">
-      <span>page {cursors.length + 1}</span>
-      <span class="row">
-        <button
-          type="button"
-          class="compact"
-          disabled={cursors.length === 0}
-          onClick={() => onPage(cursors.slice(0, -1))}
-        >
-          Previous
-        </button>
-        <button
-          type="button"
-          class="compact"
-          disabled={next === null}
-          onClick={() => next !== null && onPage([...cursors, next])}
-        >
-          Next
-        </button>
-      </span>
-    </fieldset>
-  )
 }
 
 function NoJobs() {

@@ -75,6 +75,7 @@ export function Table<R>({
   const by = external ? undefined : columns.find(({ key }) => key === order?.column)?.value
   const inOrder = order && by ? sorted(rows, by, order.descending) : rows
   const page = paged(inOrder, requestedPage, pageSize)
+  const first = page.page * pageSize
   const reorder = (chosen: SortOrder) => {
     if (external) return external.onOrder(chosen.column)
     setOrder(chosen)
@@ -108,7 +109,18 @@ export function Table<R>({
           <tbody>
             {page.rows.map((row, index) => (
               <tr key={rowKey?.(row) ?? index} {...rowData?.(row)}>
-                {columns.map((column) => cell(column, row))}
+                {columns.map((column) => {
+                  const content = contentOf(column, row)
+                  return column.header ? (
+                    <th key={column.key} scope="row" class={classes(column)}>
+                      {content}
+                    </th>
+                  ) : (
+                    <td key={column.key} class={classes(column)}>
+                      {content}
+                    </td>
+                  )
+                })}
               </tr>
             ))}
           </tbody>
@@ -117,11 +129,12 @@ export function Table<R>({
       {page.pages > 1 && (
         <Pager
           caption={caption}
-          page={page.page}
-          pages={page.pages}
-          total={rows.length}
-          size={pageSize}
-          onPage={setRequestedPage}
+          shown={`${formatCount(first + 1)}–${formatCount(first + page.rows.length)} of ${formatCount(rows.length)}`}
+          page={`page ${page.page + 1} of ${page.pages}`}
+          onPage={[
+            page.page > 0 ? () => setRequestedPage(page.page - 1) : null,
+            page.page + 1 < page.pages ? () => setRequestedPage(page.page + 1) : null,
+          ]}
         />
       )}
     </div>
@@ -138,22 +151,6 @@ function contentOf<R>({ cell, value, digits, percent: share }: Column<R>, row: R
   const content = value?.(row)
   if (digits !== undefined) return formatNumber(content as number | null, digits)
   return share === undefined ? content : percent(content as number | null, share)
-}
-
-function cell<R>(column: Column<R>, row: R) {
-  const content = contentOf(column, row)
-  if (column.header) {
-    return (
-      <th key={column.key} scope="row" class={classes(column)}>
-        {content}
-      </th>
-    )
-  }
-  return (
-    <td key={column.key} class={classes(column)}>
-      {content}
-    </td>
-  )
 }
 
 function Header<R>({
@@ -199,46 +196,29 @@ function Header<R>({
   )
 }
 
-function Pager({
+/** Buttons to the pages before and after the one shown. onPage: null for a page that is missing. */
+export function Pager({
   caption,
+  shown,
   page,
-  pages,
-  total,
-  size,
   onPage,
 }: {
   caption: string
-  page: number
-  pages: number
-  total: number
-  size: number
-  onPage: (page: number) => void
+  /** What is shown on the page. */
+  shown: string
+  page: string
+  onPage: readonly [previous: (() => void) | null, next: (() => void) | null]
 }) {
-  const last = Math.min(total, (page + 1) * size)
   return (
     // A group, not a landmark: a page may have several tables.
     <fieldset class="pager" aria-label={`Pages of ${caption}`}>
-      <span>
-        {formatCount(page * size + 1)}–{formatCount(last)} of {formatCount(total)}
-      </span>
+      <span>{shown}</span>
       <span class="row">
-        <button
-          type="button"
-          class="compact"
-          disabled={page === 0}
-          onClick={() => onPage(page - 1)}
-        >
+        <button type="button" class="compact" disabled={!onPage[0]} onClick={() => onPage[0]?.()}>
           Previous
         </button>
-        <span>
-          page {page + 1} of {pages}
-        </span>
-        <button
-          type="button"
-          class="compact"
-          disabled={page >= pages - 1}
-          onClick={() => onPage(page + 1)}
-        >
+        {page !== '' && <span>{page}</span>}
+        <button type="button" class="compact" disabled={!onPage[1]} onClick={() => onPage[1]?.()}>
           Next
         </button>
       </span>

@@ -42,7 +42,38 @@ export default function ActivityPanel({ job }: { job: Job }) {
                   <Table caption="Workers of the job" rows={workers} columns={WORKER_COLUMNS} />
                 )}
               </Card>
-              <LogCard messages={messages} level={level} onLevel={setLevel} />
+              <Card
+                title="Log"
+                tools={
+                  <Select
+                    hidden
+                    label="Minimum level"
+                    value={level}
+                    options={LEVELS.map(
+                      (name) => [name, `${name.toLowerCase()} and above`] as const,
+                    )}
+                    onChoose={setLevel}
+                  />
+                }
+              >
+                {messages.length === 0 ? (
+                  <Empty title="No messages">
+                    <p>The server keeps a job’s latest messages at or above its log level.</p>
+                  </Empty>
+                ) : (
+                  // A scrollable box must be reachable by keyboard.
+                  <section class="log-lines" tabIndex={0} aria-label="Log messages, newest first">
+                    <ol>
+                      {[...messages].reverse().map((message, k) => (
+                        <li key={`${message.at} ${k}`} data-level={message.level}>
+                          <time dateTime={message.at}>{formatMoment(message.at)}</time>{' '}
+                          <strong>{message.level.toLowerCase()}</strong> {message.text}
+                        </li>
+                      ))}
+                    </ol>
+                  </section>
+                )}
+              </Card>
             </div>
           </div>
         )
@@ -80,46 +111,3 @@ const WORKER_COLUMNS: readonly Column<Worker>[] = [
   counted('failures'),
   { key: 'computed', unit: 's', digits: 3, value: ({ compute_seconds }) => compute_seconds },
 ]
-
-function LogCard({
-  messages,
-  level,
-  onLevel,
-}: {
-  messages: Activity['messages']
-  level: Level
-  onLevel: (level: Level) => void
-}) {
-  return (
-    <Card
-      title="Log"
-      tools={
-        <Select
-          hidden
-          label="Minimum level"
-          value={level}
-          options={LEVELS.map((name) => [name, `${name.toLowerCase()} and above`] as const)}
-          onChoose={onLevel}
-        />
-      }
-    >
-      {messages.length === 0 ? (
-        <Empty title="No messages">
-          <p>The server keeps a job’s latest messages at or above its log level.</p>
-        </Empty>
-      ) : (
-        // A scrollable box must be reachable by keyboard.
-        <section class="log-lines" tabIndex={0} aria-label="Log messages, newest first">
-          <ol>
-            {[...messages].reverse().map((message, k) => (
-              <li key={`${message.at} ${k}`} data-level={message.level}>
-                <time dateTime={message.at}>{formatMoment(message.at)}</time>{' '}
-                <strong>{message.level.toLowerCase()}</strong> {message.text}
-              </li>
-            ))}
-          </ol>
-        </section>
-      )}
-    </Card>
-  )
-}

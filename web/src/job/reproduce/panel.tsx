@@ -12,7 +12,7 @@ import { formatCount } from '../../format/number'
 import { type Design, formatExactValue } from '../../format/value'
 import { inWords, sentence } from '../../format/words'
 import { withQuery } from '../../router/routes'
-import { methodNamed, settingText, settingTexts } from '../../submission/draft/optimizer'
+import { methodNamed, settingText, settingTexts } from '../../submission/draft/settings'
 import { startDesigns } from '../facts'
 
 export default function ReproducePanel({ job }: { job: Job }) {

@@ -2,7 +2,7 @@
 
 import { useState } from 'preact/hooks'
 import { post } from '../../api/client'
-import { useResource } from '../../api/resource'
+import { cached, useResource } from '../../api/resource'
 import type {
   Job,
   JobSpec,
@@ -30,16 +30,6 @@ const LEAST_SAMPLES_EACH = 48
 
 /** Number of winners compared; servers limit the length of simulations. */
 const CANDIDATES = 5
-
-/** Responses since the page was loaded; they require simulations and do not change. */
-const cache = new Map<string, Promise<unknown>>()
-
-function cached<T>(key: string, request: () => Promise<T>): Promise<T> {
-  const response = (cache.get(key) as Promise<T> | undefined) ?? request()
-  cache.set(key, response)
-  response.catch(() => cache.delete(key))
-  return response
-}
 
 function samplesOf(job: Job, least: number): number {
   return Math.max(least, 4 * (searchedVariables(job.spec).length + 1))

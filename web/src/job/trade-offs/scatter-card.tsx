@@ -6,7 +6,7 @@ import { isPublished } from '../../api/robots'
 import type { Front, FrontDesign, Job, JobSpec } from '../../api/types'
 import { ChartCard, LegendEntry } from '../../charts/chart-card'
 import { Scatter } from '../../charts/scatter/scatter'
-import { ErrorNotice } from '../../components/feedback'
+import { Loaded } from '../../components/card'
 import { Check } from '../../components/fields/controls'
 import { type Column, Table } from '../../components/table/table'
 import { formatCount, NONE } from '../../format/number'
@@ -14,7 +14,7 @@ import { type Place, placeWord } from '../../format/place'
 import { inWords } from '../../format/words'
 import { setQuery, usePlace } from '../../router/navigation'
 import { flag, PAGE_NUMBER, useQueryValue } from '../../router/query-value'
-import { AxisSelect } from '../axis-select'
+import { AxisSelects } from '../axis-select'
 import { designColumn, objectiveColumns } from '../columns'
 import { type Particles, selectedRows } from '../designs/particles'
 import { publishedReferences } from '../reference'
@@ -44,6 +44,7 @@ export function ScatterCard({
 }) {
   const { query } = usePlace()
   const [logarithmic, setLogarithmic] = useQueryValue('log', flag(true), true)
+  const paging = useQueryValue('page', PAGE_NUMBER, 0)
   const [x, y] = axesOf(front, query.get('x'), query.get('y'))
   const brush = query.get('brush')
   const brushed = useMemo(() => all && selectedRows(all, brush), [all, brush])
@@ -79,20 +80,7 @@ export function ScatterCard({
       note={`Each objective is its geometric mean over the scenarios; lower is better.${listed} Click a design to find the preference that selects it.`}
       tools={
         <>
-          <AxisSelect
-            label="Across"
-            axes={front.objectives}
-            x={x}
-            other={y}
-            onSelect={(name) => setQuery({ x: name, y })}
-          />
-          <AxisSelect
-            label="Up"
-            axes={front.objectives}
-            x={y}
-            other={x}
-            onSelect={(name) => setQuery({ x, y: name })}
-          />
+          <AxisSelects axes={front.objectives} x={x} y={y} onSelect={setQuery} />
           {comparable && (
             <Check
               label="published designs"
@@ -130,13 +118,30 @@ export function ScatterCard({
             area
           />
           {published.data && <LegendEntry colour="--series-4" label="published designs" area />}
-          {published.loading && <span role="status">simulating published designs…</span>}
           {front.knees.length > 0 && <LegendEntry colour="--series-2" label="knees" area />}
         </>
       }
       table={() => (
         <>
-          <FrontTable job={job} front={front} selected={selected} onSelect={onSelect} />
+          <Table<FrontDesign>
+            caption="Designs of the front"
+            rows={front.designs}
+            rowKey={placeWord}
+            paging={paging}
+            order={{ column: 'property', descending: false }}
+            pageSize={20}
+            columns={[
+              designColumn(job, true),
+              {
+                key: 'property',
+                value: ({ marks }) => marks.join(', ') || null,
+                cell: ({ marks }) => marks.map(inWords).join(', ') || NONE,
+              },
+              ...objectiveColumns(front.objectives),
+              { key: 'fitness', digits: 5, value: ({ fitness }) => fitness },
+              fitColumn(selected, onSelect),
+            ]}
+          />
           {published.data && (
             <Table<PublishedDesign>
               caption="Published designs"
@@ -150,13 +155,7 @@ export function ScatterCard({
         </>
       )}
     >
-      {published.error && (
-        <ErrorNotice
-          what="Could not load the published designs."
-          error={published.error}
-          retry={published.reload}
-        />
-      )}
+      <Loaded resource={published} what="the published designs" />
       <Scatter
         label={`${formatCount(front.designs.length)} designs of the front by ${inWords(x)} and ${inWords(y)}`}
         xLabel={inWords(x)}
@@ -170,40 +169,6 @@ export function ScatterCard({
         onChoose={(k) => onSelect(front.designs[k])}
       />
     </ChartCard>
-  )
-}
-
-function FrontTable({
-  job,
-  front,
-  selected,
-  onSelect,
-}: {
-  job: Job
-  front: Front
-  selected: Place | null
-  onSelect: (place: Place) => void
-}) {
-  return (
-    <Table<FrontDesign>
-      caption="Designs of the front"
-      rows={front.designs}
-      rowKey={placeWord}
-      paging={useQueryValue('page', PAGE_NUMBER, 0)}
-      order={{ column: 'property', descending: false }}
-      pageSize={20}
-      columns={[
-        designColumn(job, true),
-        {
-          key: 'property',
-          value: ({ marks }) => (marks.length === 0 ? null : marks.join(', ')),
-          cell: ({ marks }) => (marks.length === 0 ? NONE : marks.map(inWords).join(', ')),
-        },
-        ...objectiveColumns(front.objectives),
-        { key: 'fitness', digits: 5, value: ({ fitness }) => fitness },
-        fitColumn(selected, onSelect),
-      ]}
-    />
   )
 }
 

@@ -12,7 +12,14 @@ import { formatCount, formatExact } from '../../format/number'
 import { inWords } from '../../format/words'
 import { setQuery, usePlace } from '../../router/navigation'
 import { flag, useQueryValue } from '../../router/query-value'
-import { AxisSelect } from '../axis-select'
+import { AxisSelects } from '../axis-select'
+
+type Cell = ReturnType<typeof cellsOf>[number]
+
+/** Range of an axis in a cell. */
+function stretch(axis: Axis, at: number): string {
+  return [at, at + 1].map((end) => formatExact(valueAt(axis, end / CELLS), 4)).join(' to ')
+}
 
 export function PairCard({
   model,
@@ -45,20 +52,7 @@ export function PairCard({
       note={`Drag to select designs in all charts; click a design to highlight it.${sampled}`}
       tools={
         <>
-          <AxisSelect
-            label="Across"
-            axes={model.axes}
-            x={across.name}
-            other={up.name}
-            onSelect={(name) => setQuery({ x: name })}
-          />
-          <AxisSelect
-            label="Up"
-            axes={model.axes}
-            x={up.name}
-            other={across.name}
-            onSelect={(name) => setQuery({ y: name })}
-          />
+          <AxisSelects axes={model.axes} x={across.name} y={up.name} onSelect={setQuery} />
           <Check
             label="mean rank by cell"
             checked={asCells}
@@ -75,7 +69,40 @@ export function PairCard({
           {isolines && <span>lines: mean rank by cell, in twelfths</span>}
         </>
       }
-      table={() => <CellTable model={model} rows={selected} x={x} y={y} />}
+      table={() => (
+        <Table<Cell>
+          caption="Designs by cell"
+          rows={cellsOf(model, selected, x, y)}
+          order={{ column: 'rank', descending: false }}
+          columns={[
+            {
+              key: 'x',
+              label: inWords(across.name),
+              unit: across.unit,
+              header: true,
+              value: ({ column }) => column,
+              data: ({ column }) => stretch(across, column),
+              cell: ({ column }) => stretch(across, column),
+            },
+            {
+              key: 'y',
+              label: inWords(up.name),
+              unit: up.unit,
+              value: ({ row }) => row,
+              data: ({ row }) => stretch(up, row),
+              cell: ({ row }) => stretch(up, row),
+            },
+            { key: 'designs', numeric: true, value: ({ designs }) => designs },
+            {
+              key: 'rank',
+              label: 'Mean rank, in twelfths',
+              digits: 3,
+              value: ({ bucket }) => (bucket === null ? null : bucket + 1),
+            },
+          ]}
+          pageSize={20}
+        />
+      )}
     >
       <PairMap
         model={model}
@@ -91,57 +118,5 @@ export function PairCard({
         onChoose={onMark}
       />
     </ChartCard>
-  )
-}
-
-function CellTable({
-  model,
-  rows,
-  x,
-  y,
-}: {
-  model: ParallelModel
-  rows: Uint32Array
-  x: number
-  y: number
-}) {
-  const cells = cellsOf(model, rows, x, y)
-  type Row = (typeof cells)[number]
-  const [across, up] = [model.axes[x], model.axes[y]]
-  const stretch = (axis: Axis, at: number) =>
-    [at, at + 1].map((end) => formatExact(valueAt(axis, end / CELLS), 4)).join(' to ')
-  return (
-    <Table<Row>
-      caption="Designs by cell"
-      rows={cells}
-      order={{ column: 'rank', descending: false }}
-      columns={[
-        {
-          key: 'x',
-          label: inWords(across.name),
-          unit: across.unit,
-          header: true,
-          value: ({ column }) => column,
-          data: ({ column }) => stretch(across, column),
-          cell: ({ column }) => stretch(across, column),
-        },
-        {
-          key: 'y',
-          label: inWords(up.name),
-          unit: up.unit,
-          value: ({ row }) => row,
-          data: ({ row }) => stretch(up, row),
-          cell: ({ row }) => stretch(up, row),
-        },
-        { key: 'designs', numeric: true, value: ({ designs }) => designs },
-        {
-          key: 'rank',
-          label: 'Mean rank, in twelfths',
-          digits: 3,
-          value: ({ bucket }) => (bucket === null ? null : bucket + 1),
-        },
-      ]}
-      pageSize={20}
-    />
   )
 }

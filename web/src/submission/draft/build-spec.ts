@@ -1,10 +1,9 @@
 /** Conversion of the form's draft to a spec, and of API errors to form fields. */
 
 import type { FieldError } from '../../api/problem'
-import type { JobSpec, Scenario, Variable } from '../../api/types'
+import type { JobSpec, Variable } from '../../api/types'
 import type { Draft } from './draft'
-import { optimizerSettings } from './optimizer'
-import { startOf } from './start'
+import { number, settingValues, startOf } from './settings'
 
 /** Errors by form field: `iterations`, `custom.0.radius`, `variables.FI1R.low`, ... */
 export type FieldErrors = ReadonlyMap<string, string>
@@ -27,13 +26,13 @@ export function specOf(draft: Draft): JobSpec {
     name: draft.name,
     robot: robotOf(draft),
     controller: draft.controller,
-    scenarios: [...draft.presets, ...draft.custom.map(scenarioOf)],
+    scenarios: [...draft.presets, ...draft.custom.map(settingValues)],
     variables,
     fixed: Object.fromEntries(fixed),
     preference: preferenceOf(draft),
-    ...(draft.case !== null && { case: optimizerSettings(draft.case) }),
+    ...(draft.case !== null && { case: settingValues(draft.case) }),
     ...(worlds !== undefined && { worlds }),
-    optimizer: optimizerSettings(draft.optimizer),
+    optimizer: settingValues(draft.optimizer),
     iterations: number(draft.iterations),
     seed: number(draft.seed),
     precision: draft.precision,
@@ -99,11 +98,8 @@ export function robotOf({ robot }: Pick<Draft, 'robot'>): JobSpec['robot'] {
 
 function preferenceOf({ preference }: Draft): JobSpec['preference'] {
   if (preference.kind !== 'custom') return preference.kind as JobSpec['preference']
-  const { bias, exponent } = preference
-  return {
-    bias: bias.map(number),
-    exponent: exponent.map(number),
-  } as unknown as JobSpec['preference']
+  const [bias, exponent] = [preference.bias.map(number), preference.exponent.map(number)]
+  return { bias, exponent } as unknown as JobSpec['preference']
 }
 
 /** undefined for a job evaluated in the nominal model only. */
@@ -112,31 +108,4 @@ function worldsOf({ worlds }: Draft): JobSpec['worlds'] | undefined {
   const values = Object.entries(worlds.values).map(([name, value]) => [name, number(value)])
   const ranges = worlds.ranges && { ranges: worlds.ranges }
   return { ...Object.fromEntries(values), ...ranges } as JobSpec['worlds']
-}
-
-function scenarioOf(draft: Readonly<Record<string, string>>): Scenario {
-  const { name, ...rest } = draft
-  return { name, ...numbers(rest) } as unknown as Scenario
-}
-
-/** Parse numbers and objects, keep other text, and omit empty values. */
-function numbers(values: Readonly<Record<string, string>>): Record<string, unknown> {
-  const filled = Object.entries(values).filter(([, value]) => value.trim() !== '')
-  return Object.fromEntries(filled.map(([name, value]) => [name, object(value) ?? number(value)]))
-}
-
-/** Parse a JSON object; null for anything else. */
-function object(text: string): unknown {
-  if (!text.trim().startsWith('{')) return null
-  try {
-    return JSON.parse(text)
-  } catch {
-    return null
-  }
-}
-
-/** A number, or the text itself if it is not one. */
-export function number(text: string): number | string {
-  const value = Number(text)
-  return text.trim() === '' || Number.isNaN(value) ? text : value
 }

@@ -2,11 +2,20 @@
 
 import type { JobSpec, Scenario, Variable } from '../../api/types'
 import type { SchemaField } from '../fields/schema-fields'
-import { type CaseDraft, caseOf } from './case'
 import { type Catalogue, ofLegGroups, variablesOf } from './catalogue'
-import { type OptimizerDraft, optimizerDraft } from './optimizer'
-import { NO_START, type StartDraft, startDraft } from './start'
-import { type WorldsDraft, worldsDraft } from './worlds'
+import {
+  type CaseDraft,
+  caseOf,
+  NO_START,
+  type OptimizerDraft,
+  optimizerDraft,
+  type StartDraft,
+  settingText,
+  settingTexts,
+  startDraft,
+  type WorldsDraft,
+  worldsDraft,
+} from './settings'
 
 /** `default` keeps a convention's default, or the scenarios' gait. */
 export type VariableMode = 'searched' | 'fixed' | 'default'
@@ -61,31 +70,31 @@ export interface Draft {
 /** Defaults of the API. */
 export function emptyDraft(catalogue: Catalogue): Draft {
   const { job, variant } = catalogue.fields
-  const controller = String(job.get('controller')?.default)
-  const preset = String(job.get('preference')?.default)
+  const usual = (name: string) => settingText(job.get(name)?.default)
+  const controller = usual('controller')
   return {
     name: '',
     robot: {
       kind: 'shipped',
-      name: text(variant.get('name')?.default),
-      contact_law: text(variant.get('contact_law')?.default),
-      planned_soles: text(variant.get('planned_soles')?.default),
-      backlash: list(variant.get('backlash')?.default, 3),
+      name: settingText(variant.get('name')?.default),
+      contact_law: settingText(variant.get('contact_law')?.default),
+      planned_soles: settingText(variant.get('planned_soles')?.default),
+      backlash: list(variant.get('backlash')?.default, ['0', '0', '0']),
       toml: '',
       urdf: '',
     },
     controller,
-    presets: names(job.get('scenarios')?.default),
+    presets: list(job.get('scenarios')?.default),
     custom: [],
     variables: defaultVariables(catalogue, controller),
-    preference: preferenceDraft(catalogue, preset),
+    preference: preferenceDraft(catalogue, usual('preference')),
     case: null,
     worlds: worldsDraft(catalogue.fields.worlds),
     optimizer: optimizerDraft(catalogue.optimizers, undefined, defaultMethod(catalogue)),
     start: NO_START,
-    iterations: text(job.get('iterations')?.default),
-    seed: text(job.get('seed')?.default),
-    precision: text(job.get('precision')?.default),
+    iterations: usual('iterations'),
+    seed: usual('seed'),
+    precision: usual('precision'),
   }
 }
 
@@ -115,9 +124,10 @@ export function variableDraft(
 ): VariableDraft {
   return {
     mode,
-    low: text(variable.low),
-    high: text(variable.high),
-    value: textOf(variable, value ?? variable.default ?? undefined) ?? text(middle(variable)),
+    low: settingText(variable.low),
+    high: settingText(variable.high),
+    value:
+      textOf(variable, value ?? variable.default ?? undefined) ?? settingText(middle(variable)),
     choices: variable.choices ?? [],
   }
 }
@@ -134,15 +144,15 @@ export function draftOf(spec: JobSpec, catalogue: Catalogue): Draft {
     robot: robotDraft(spec.robot, empty.robot),
     controller,
     presets: scenarios.filter((entry) => typeof entry === 'string'),
-    custom: scenarios.filter((entry) => typeof entry !== 'string').map(texts),
+    custom: scenarios.filter((entry) => typeof entry !== 'string').map(settingTexts),
     variables: variableDrafts(spec, catalogue, controller),
     preference: preferenceOf(spec.preference, catalogue) ?? empty.preference,
     case: caseOf(spec.case, catalogue.cases),
     worlds: worldsDraft(catalogue.fields.worlds, spec.worlds),
     optimizer: optimizerDraft(catalogue.optimizers, spec.optimizer, defaultMethod(catalogue)),
     start: startDraft(spec.start),
-    iterations: text(spec.iterations),
-    seed: text(spec.seed),
+    iterations: settingText(spec.iterations),
+    seed: settingText(spec.seed),
     precision: spec.precision ?? empty.precision,
   }
 }
@@ -160,16 +170,14 @@ export function scenarioDraft(
   start: Scenario | null,
   name: string,
 ): Readonly<Record<string, string>> {
-  const values = start === null ? {} : texts(start)
-  const match = Object.entries({ ...defaults(fields), ...values }).filter(([key]) =>
-    fields.has(key),
-  )
-  return { ...Object.fromEntries(match), name }
+  const values = start === null ? {} : settingTexts(start)
+  const texts = [...fields].map(([key, field]) => [key, values[key] ?? settingText(field.default)])
+  return { ...Object.fromEntries(texts), name }
 }
 
 export function preferenceDraft(catalogue: Catalogue, kind: string): PreferenceDraft {
   const preset = catalogue.preferences.find(({ name }) => name === kind) ?? catalogue.preferences[0]
-  return { kind, bias: preset.bias.map(text), exponent: preset.exponent.map(text) }
+  return { kind, bias: preset.bias.map(settingText), exponent: preset.exponent.map(settingText) }
 }
 
 /** Draft of a preference; a preset if the values match. */
@@ -184,11 +192,10 @@ export function preferenceOf(
       JSON.stringify([bias, exponent]) === JSON.stringify([preference.bias, preference.exponent]),
   )
   if (preset) return preferenceDraft(catalogue, preset.name)
-  return {
-    kind: 'custom',
-    bias: preference.bias.map(text),
-    exponent: preference.exponent.map(text),
-  }
+  const [bias, exponent] = [preference.bias, preference.exponent].map((part) =>
+    part.map(settingText),
+  )
+  return { kind: 'custom', bias, exponent }
 }
 
 function defaultMethod({ fields, optimizers }: Catalogue): string {
@@ -210,15 +217,17 @@ function variableDrafts(
   const groups = ofLegGroups(controllerVariables, [...named, ...Object.keys(spec.fixed ?? {})])
   for (const variable of groups) drafts[variable.name] = variableDraft(variable, 'default')
   const variables = new Map([...controllerVariables, ...groups].map((v) => [v.name, v]))
-  if (spec.variables) {
-    for (const entry of spec.variables) {
-      const name = typeof entry === 'string' ? entry : entry.name
-      const bounds =
-        typeof entry === 'string'
-          ? {}
-          : { low: text(entry.low), high: text(entry.high), choices: entry.choices ?? [] }
-      if (drafts[name]) drafts[name] = { ...drafts[name], ...bounds, mode: 'searched' }
-    }
+  for (const [k, name] of named.entries()) {
+    const entry = spec.variables![k]
+    const bounds =
+      typeof entry === 'string'
+        ? {}
+        : {
+            low: settingText(entry.low),
+            high: settingText(entry.high),
+            choices: entry.choices ?? [],
+          }
+    if (drafts[name]) drafts[name] = { ...drafts[name], ...bounds, mode: 'searched' }
   }
   for (const [name, value] of Object.entries(spec.fixed ?? {})) {
     const variable = variables.get(name)
@@ -238,7 +247,7 @@ function robotDraft(robot: JobSpec['robot'], empty: RobotDraft): RobotDraft {
     name: robot.name ?? empty.name,
     contact_law: robot.contact_law ?? empty.contact_law,
     planned_soles: robot.planned_soles ?? empty.planned_soles,
-    backlash: robot.backlash?.map(text) ?? empty.backlash,
+    backlash: robot.backlash?.map(settingText) ?? empty.backlash,
   }
 }
 
@@ -246,13 +255,9 @@ function robotDraft(robot: JobSpec['robot'], empty: RobotDraft): RobotDraft {
 function presetOf(scenario: Scenario, catalogue: Catalogue): string | null {
   const fields = [...catalogue.fields.scenario.keys()] as (keyof Scenario)[]
   const same = catalogue.scenarios.find((preset) =>
-    fields.every((field) => text(preset[field]) === text(scenario[field])),
+    fields.every((field) => settingText(preset[field]) === settingText(scenario[field])),
   )
   return same?.name ?? null
-}
-
-function defaults(fields: ReadonlyMap<string, SchemaField>): Record<string, string> {
-  return Object.fromEntries([...fields].map(([name, field]) => [name, text(field.default)]))
 }
 
 /** Middle of the bounds, or the first choice. */
@@ -265,22 +270,9 @@ export function middle({ low, high, kind, choices }: Variable): number | string 
 /** A value as text; the name of a choice if given by index. */
 function textOf({ choices }: Variable, value: number | string | undefined): string | null {
   if (value === undefined) return null
-  return choices?.[Number(value)] ?? text(value)
+  return choices?.[Number(value)] ?? settingText(value)
 }
 
-function texts(values: object): Record<string, string> {
-  return Object.fromEntries(Object.entries(values).map(([name, value]) => [name, text(value)]))
-}
-
-function list(values: unknown, length: number): readonly string[] {
-  return Array.isArray(values) ? values.map(text) : Array(length).fill('0')
-}
-
-function names(values: unknown): readonly string[] {
-  return Array.isArray(values) ? values.map(text) : []
-}
-
-function text(value: unknown): string {
-  if (value === undefined || value === null) return ''
-  return typeof value === 'object' ? JSON.stringify(value) : String(value)
+function list(values: unknown, empty: readonly string[] = []): readonly string[] {
+  return Array.isArray(values) ? values.map(settingText) : empty
 }

@@ -2,8 +2,8 @@
 
 import type { FieldError } from '../../api/problem'
 import type { OptimizerPreset } from '../../api/types'
-import { number } from '../draft/build-spec'
 import type { VariableDraft } from '../draft/draft'
+import { number } from '../draft/settings'
 import { fittedVariables, type Parameters } from './parameters'
 
 /** Form state; numbers as text. */

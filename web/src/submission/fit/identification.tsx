@@ -3,7 +3,7 @@
 import { useMemo, useState } from 'preact/hooks'
 import type { IdentificationSpec, OptimizerPreset, RobotSource } from '../../api/types'
 import { TextField } from '../../components/fields/field'
-import { number } from '../draft/build-spec'
+import { number } from '../draft/settings'
 import { EMPTY_FIT, type FitDraft, fitOf, words } from './fit'
 import { FitForm } from './fit-form'
 import type { FitProps } from './page'

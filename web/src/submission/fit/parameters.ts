@@ -2,8 +2,9 @@
 
 import type { FieldError } from '../../api/problem'
 import type { Variable } from '../../api/types'
-import { type FieldErrors, number } from '../draft/build-spec'
+import type { FieldErrors } from '../draft/build-spec'
 import { type VariableDraft, variableDraft } from '../draft/draft'
+import { number } from '../draft/settings'
 
 export interface Parameters {
   readonly fittable: readonly Variable[]

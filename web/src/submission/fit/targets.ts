@@ -1,7 +1,7 @@
 /** Targets of a calibration. */
 
 import type { CalibrationSpec, OptimizerPreset, RecordingView, RobotSource } from '../../api/types'
-import { number } from '../draft/build-spec'
+import { number } from '../draft/settings'
 import { type FitDraft, fitOf } from './fit'
 import type { Parameters } from './parameters'
 
@@ -17,21 +17,16 @@ export interface TargetDraft {
 
 /** Currents of a log as targets; peaks contain noise and are only predicted. */
 function targetsOf(recording: RecordingView, key: number): readonly TargetDraft[] {
-  const common = { recording: recording.id }
+  const { id, mean_current, peak_current } = recording
+  const value = (current: number) => String(Number(current.toPrecision(4)))
+  const [mean, peak] = [value(mean_current), value(peak_current)]
   return [
+    { key, recording: id, quantity: 'mean_current', value: mean, tolerance: '0.1', use: 'fit' },
     {
-      ...common,
-      key,
-      quantity: 'mean_current',
-      value: String(Number(recording.mean_current.toPrecision(4))),
-      tolerance: '0.1',
-      use: 'fit',
-    },
-    {
-      ...common,
       key: key + 1,
+      recording: id,
       quantity: 'peak_current',
-      value: String(Number(recording.peak_current.toPrecision(4))),
+      value: peak,
       tolerance: '0.2',
       use: 'predict',
     },

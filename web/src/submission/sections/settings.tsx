@@ -6,18 +6,21 @@ import { ChoiceField, Problems, TextField } from '../../components/fields/field'
 import { formatCount } from '../../format/number'
 import { sentence } from '../../format/words'
 import type { FieldErrors } from '../draft/build-spec'
-import { caseDraft, caseFields } from '../draft/case'
 import type { Catalogue } from '../draft/catalogue'
 import type { Draft } from '../draft/draft'
 import {
+  caseDraft,
+  hasEffect,
   methodNamed,
   methodsOf,
   presetsOf,
   settingsOf,
   settingText,
+  type WorldsDraft,
+  walksEach,
   withPreset,
-} from '../draft/optimizer'
-import { hasEffect, type WorldsDraft, walksEach, worldsFields } from '../draft/worlds'
+  worldsFields,
+} from '../draft/settings'
 import { describe } from '../fields/schema-fields'
 import { otherErrors, SchemaInput } from '../fields/schema-input'
 
@@ -74,7 +77,7 @@ function missing(needs: string | null): string {
 export function CaseSection({ draft, catalogue: { cases }, errors, onChange }: SectionProps) {
   if (cases.length === 0) return null
   const selected = cases.find(({ name }) => name === draft.case?.name)
-  const fields = caseFields(selected)
+  const fields = settingsOf(selected)
   return (
     <Card title="Case">
       <ChoiceField

@@ -9,7 +9,7 @@ import { Problems, TextField } from '../../components/fields/field'
 import { RemovableList } from '../../components/fields/removable-list'
 import { formatCount, formatNumber } from '../../format/number'
 import { errorsUnder } from '../draft/build-spec'
-import { NO_START, type StartDraft } from '../draft/start'
+import { NO_START, type StartDraft } from '../draft/settings'
 import type { SectionProps } from './settings'
 
 export function StartSection({ draft, errors, onChange }: SectionProps) {

@@ -1,9 +1,14 @@
 import { describe, expect, test } from 'vitest'
 import type { JobSpec } from '../../../src/api/types'
 import { specOf } from '../../../src/submission/draft/build-spec'
-import { caseDraft, caseFields } from '../../../src/submission/draft/case'
 import { type Draft, draftOf } from '../../../src/submission/draft/draft'
-import { hasEffect, walksEach, worldsFields } from '../../../src/submission/draft/worlds'
+import {
+  caseDraft,
+  hasEffect,
+  settingsOf,
+  walksEach,
+  worldsFields,
+} from '../../../src/submission/draft/settings'
 import { boundsInWords, fieldsOf } from '../../../src/submission/fields/schema-fields'
 import { ofKind, withRobotJob } from '../../../src/submission/robot/job'
 import { CATALOGUE, DOCUMENT } from '../catalogue-example'
@@ -90,7 +95,7 @@ describe('settings of a robot folder', () => {
 
 test('a plug-in case is chosen with its settings, and recognized in a spec', () => {
   const [damped] = CATALOGUE.cases
-  expect(caseFields(damped).map(({ name }) => name)).toEqual(['share'])
+  expect(settingsOf(damped).map(({ name }) => name)).toEqual(['share'])
   const spec = specOf({ ...EMPTY, case: { ...caseDraft(damped), share: '0.3' } })
   expect(spec.case).toEqual({ name: 'damped', share: 0.3 })
   expect(specOf(draftOf(spec, CATALOGUE)).case).toEqual({ name: 'damped', share: 0.3 })

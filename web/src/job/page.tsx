@@ -1,7 +1,7 @@
 /** Job page: header, commands and tabs, updated live. */
 
 import type { FunctionComponent } from 'preact'
-import { isReadable } from '../api/readable'
+import { isReadable } from '../api/jobs'
 import type { Job } from '../api/types'
 import { ErrorNotice, Loading } from '../components/feedback'
 import { capitalized } from '../format/words'

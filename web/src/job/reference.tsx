@@ -1,10 +1,8 @@
 /** Reference for a job's winner: a published design, or the winner of another job. */
 
 import { get, post } from '../api/client'
-import { jobSearch } from '../api/job-search'
-import { readableJob } from '../api/readable'
+import { isPublished, jobSearch, NOT_PUBLISHED, readableJob } from '../api/jobs'
 import { cached, useResource } from '../api/resource'
-import { isPublished, NOT_PUBLISHED } from '../api/robots'
 import type { Controller, Job, JobSpec, ScenarioResult, Simulation } from '../api/types'
 import { Combobox } from '../components/fields/combobox'
 import type { Design } from '../format/value'

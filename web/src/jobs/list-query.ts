@@ -34,17 +34,7 @@ export const FACETS = ['state', 'robot', 'controller', 'preference', 'tag'] as c
 
 export type Facet = (typeof FACETS)[number]
 
-export interface ListQuery {
-  readonly search?: string
-  readonly state?: JobState
-  readonly robot?: string
-  readonly controller?: string
-  readonly preference?: string
-  readonly tag?: string
-  readonly archived: boolean
-  readonly order: Order
-  readonly reverse: boolean
-}
+export type ListQuery = ReturnType<typeof listQuery>
 
 /** Orders that start with the greatest value; all others start with the smallest. */
 const DESCENDING: readonly Order[] = ['gain', 'priority', 'iterations', 'evaluations', 'rate']
@@ -62,7 +52,7 @@ export function reordered(
 }
 
 /** Parse a query such as `?controller=pi&order=fitness`. */
-export function listQuery(query: URLSearchParams): ListQuery {
+export function listQuery(query: URLSearchParams) {
   const text = (name: string) => query.get(name) || undefined
   const order = query.get('order') ?? 'created'
   return {

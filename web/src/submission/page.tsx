@@ -1,7 +1,7 @@
 /** New-job page, empty or prefilled from another job. */
 
 import { get } from '../api/client'
-import { readableJob } from '../api/readable'
+import { readableJob } from '../api/jobs'
 import { useResource } from '../api/resource'
 import type { Job, JobSpec } from '../api/types'
 import { Loaded } from '../components/card'

@@ -4,7 +4,7 @@ import { useRef, useState } from 'preact/hooks'
 import { post } from '../api/client'
 import { ApiProblem } from '../api/problem'
 import { useResource } from '../api/resource'
-import type { AnySpec, Estimate } from '../api/types'
+import type { AnySpec } from '../api/types'
 import { navigate } from '../router/navigation'
 import { jobPath } from '../router/routes'
 
@@ -12,19 +12,10 @@ const PAUSE_MS = 400
 
 export const NOTIFY = 'Notify-URL'
 
-export interface Submission {
-  readonly estimate: Estimate | null
-  /** Why the server rejects the spec; null if it does not, or is unknown. */
-  readonly problem: unknown
-  readonly sending: boolean
-  readonly priority: string
-  readonly setPriority: (text: string) => void
-  readonly notify: string
-  readonly setNotify: (text: string) => void
-  readonly submit: () => void
-}
+export type Submission = ReturnType<typeof useSubmission>
 
-export function useSubmission(spec: AnySpec): Submission {
+/** problem: why the server rejects the spec; null if it does not, or is unknown. */
+export function useSubmission(spec: AnySpec) {
   const [rejected, setRejected] = useState<{ text: string; error: unknown } | null>(null)
   const [sending, setSending] = useState(false)
   const [priority, setPriority] = useState('0')

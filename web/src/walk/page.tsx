@@ -2,8 +2,8 @@
 
 import { useEffect, useMemo, useState } from 'preact/hooks'
 import { get } from '../api/client'
+import { isPublished, NOT_PUBLISHED } from '../api/jobs'
 import { useResource } from '../api/resource'
-import { isPublished, NOT_PUBLISHED } from '../api/robots'
 import type { Scenario, ScenarioPreset } from '../api/types'
 import { ErrorNotice, Loading } from '../components/feedback'
 import { formatExact } from '../format/number'

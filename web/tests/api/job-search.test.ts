@@ -1,5 +1,5 @@
 import { afterEach, expect, test, vi } from 'vitest'
-import { jobSearch } from '../../src/api/job-search'
+import { jobSearch } from '../../src/api/jobs'
 
 afterEach(() => vi.unstubAllGlobals())
 

@@ -2,7 +2,7 @@
 
 import { useState } from 'preact/hooks'
 import { get, post, put, remove } from '../../api/client'
-import { isReadable } from '../../api/readable'
+import { isReadable } from '../../api/jobs'
 import type { StoredJob } from '../../api/types'
 import { ConfirmDialog } from '../../components/confirm-dialog'
 import { ErrorNotice } from '../../components/feedback'

@@ -47,30 +47,16 @@ function permissionNow(): NotificationPermission | 'missing' {
   return 'Notification' in globalThis ? Notification.permission : 'missing'
 }
 
-interface NoticeState {
-  /** Label of the button; null if there is none. */
-  readonly label: string | null
-  readonly on: boolean
-  /** Additional information; null for none. */
-  readonly hint: string | null
-}
-
-export function noticeState(
-  permission: NotificationPermission | 'missing',
-  enabled: boolean,
-): NoticeState {
-  if (permission === 'missing') {
-    return { label: null, on: false, hint: 'This browser does not support notifications.' }
+/** Label of the button and additional information; null for none. on: whether the button is pressed. */
+export function noticeState(permission: NotificationPermission | 'missing', on: boolean) {
+  const unavailable = {
+    missing: 'This browser does not support notifications.',
+    denied: 'Notifications from this site are blocked in the browser’s settings.',
   }
-  if (permission === 'denied') {
-    return {
-      label: null,
-      on: false,
-      hint: 'Notifications from this site are blocked in the browser’s settings.',
-    }
+  if (permission === 'missing' || permission === 'denied') {
+    return { label: null, on: false, hint: unavailable[permission] }
   }
-  if (!enabled) return { label: 'Notify me when it ends', on: false, hint: null }
-  return { label: 'Notify me when it ends', on: true, hint: 'while this page is open' }
+  return { label: 'Notify me when it ends', on, hint: on ? 'while this page is open' : null }
 }
 
 export function endInWords(

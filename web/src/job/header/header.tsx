@@ -1,7 +1,7 @@
 /** Name, state, figures and commands of a job. */
 
 import { get } from '../../api/client'
-import { isReadable } from '../../api/readable'
+import { isReadable } from '../../api/jobs'
 import { useNow, useResource } from '../../api/resource'
 import type { Job, JobSummary, StoredJob, TuningWorlds } from '../../api/types'
 import { Progress, StateBadge } from '../../components/state'

@@ -6,17 +6,7 @@ import { ApiProblem } from '../../api/problem'
 import type { Iteration, StoredJob } from '../../api/types'
 import { EventStream, type Followed, NOT_CONNECTED } from './event-stream'
 
-export interface LiveJob {
-  readonly job: StoredJob | null
-  readonly error: unknown
-  readonly followed: Followed
-  /** Show the response to a command, and follow the job if it continues. */
-  readonly replace: (job: StoredJob) => void
-  readonly reload: () => void
-  /** True while all requests are suspended, for example during deletion. */
-  readonly held: boolean
-  readonly hold: (held: boolean) => void
-}
+export type LiveJob = ReturnType<typeof useJob>
 
 /** Page sizes: a small first page, to show something early, and larger ones after it. */
 const FIRST = 100
@@ -24,7 +14,11 @@ const FURTHER = 1000
 
 const REQUEST_MS = 1000
 
-export function useJob(id: string): LiveJob {
+/**
+ * replace: shows the response to a command, and follows the job if it continues. held: whether all
+ * requests are suspended, for example during deletion.
+ */
+export function useJob(id: string) {
   const [job, setJob] = useState<StoredJob | null>(null)
   const [error, setError] = useState<unknown>(null)
   const [followed, setFollowed] = useState<Followed>(NOT_CONNECTED)

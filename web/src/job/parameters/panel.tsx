@@ -2,8 +2,8 @@
 
 import { useState } from 'preact/hooks'
 import { get } from '../../api/client'
+import { readableJob } from '../../api/jobs'
 import { ApiProblem } from '../../api/problem'
-import { readableJob } from '../../api/readable'
 import { usePolling, useResource } from '../../api/resource'
 import type { FittedParameter, Identifiability, Job } from '../../api/types'
 import { Card, EmptyCard } from '../../components/card'

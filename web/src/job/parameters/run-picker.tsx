@@ -1,7 +1,7 @@
 /** Choice of the runs to compare: this job and others with the same fit. */
 
 import { get } from '../../api/client'
-import { jobSearch } from '../../api/job-search'
+import { jobSearch } from '../../api/jobs'
 import { useResource } from '../../api/resource'
 import type { Job, JobSummary } from '../../api/types'
 import { Card } from '../../components/card'

@@ -1,8 +1,8 @@
 /** Utilities and objectives of the winner by scenario, compared with a reference. */
 
 import { get } from '../../api/client'
+import { isPublished } from '../../api/jobs'
 import { type Resource, useResource } from '../../api/resource'
-import { isPublished } from '../../api/robots'
 import type { Job, JobSpec, Preference, RecordingView, ScenarioResult } from '../../api/types'
 import { ChartCard, LegendEntry } from '../../charts/chart-card'
 import { Card, EmptyCard, Loaded } from '../../components/card'

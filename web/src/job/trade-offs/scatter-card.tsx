@@ -1,8 +1,8 @@
 /** Scatter chart of the front over two objectives, with marked designs; tables of both. */
 
 import { useMemo } from 'preact/hooks'
+import { isPublished } from '../../api/jobs'
 import { useResource } from '../../api/resource'
-import { isPublished } from '../../api/robots'
 import type { Front, FrontDesign, Job, JobSpec } from '../../api/types'
 import { ChartCard, LegendEntry } from '../../charts/chart-card'
 import { Scatter } from '../../charts/scatter/scatter'

@@ -1,32 +1,10 @@
 /** Options of the form, as listed by the API. */
 
 import { get } from '../../api/client'
-import type {
-  Controller,
-  OptimizerPreset,
-  PluginCase,
-  PreferencePreset,
-  RobotPreset,
-  ScenarioPreset,
-  Variable,
-} from '../../api/types'
-import { fieldsOf, type OpenApiDocument, type SchemaField } from '../fields/schema-fields'
+import type { Controller, Variable } from '../../api/types'
+import { fieldsOf, type OpenApiDocument } from '../fields/schema-fields'
 
-export interface Catalogue {
-  readonly controllers: readonly Controller[]
-  readonly robots: readonly RobotPreset[]
-  readonly scenarios: readonly ScenarioPreset[]
-  readonly preferences: readonly PreferencePreset[]
-  readonly optimizers: readonly OptimizerPreset[]
-  readonly cases: readonly PluginCase[]
-  readonly fields: {
-    readonly job: ReadonlyMap<string, SchemaField>
-    readonly scenario: ReadonlyMap<string, SchemaField>
-    readonly variant: ReadonlyMap<string, SchemaField>
-    readonly worlds: ReadonlyMap<string, SchemaField>
-    readonly target: ReadonlyMap<string, SchemaField>
-  }
-}
+export type Catalogue = Awaited<ReturnType<typeof loadCatalogue>>
 
 /** All variables that a job can search or fix with a controller. */
 export function variablesOf(controller: Controller | undefined): readonly Variable[] {
@@ -43,7 +21,7 @@ export function ofLegGroups(variables: readonly Variable[], names: Iterable<stri
   })
 }
 
-export async function loadCatalogue(signal: AbortSignal): Promise<Catalogue> {
+export async function loadCatalogue(signal: AbortSignal) {
   const [controllers, robots, scenarios, preferences, optimizers, cases, document] =
     await Promise.all([
       get('/v1/controllers', { signal }),

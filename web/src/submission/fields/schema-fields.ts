@@ -2,20 +2,7 @@
 
 import { formatExact } from '../../format/number'
 
-export interface SchemaField {
-  readonly name: string
-  readonly description: string
-  /** Unit in the brackets of the description; `1` if there is none. */
-  readonly unit: string
-  readonly type: 'number' | 'integer' | 'string' | 'boolean' | 'other'
-  readonly low: number | null
-  readonly high: number | null
-  readonly above: boolean
-  readonly below: boolean
-  readonly choices: readonly string[] | null
-  readonly default: unknown
-  readonly required: boolean
-}
+export type SchemaField = ReturnType<typeof fieldOf>
 
 interface Property {
   type?: string
@@ -76,7 +63,10 @@ export function describe({ description }: SchemaField): string {
   return description.replace(/\s*\[[^\]]*\]/, '').replaceAll('`', '')
 }
 
-function fieldOf(name: string, declared: Property, required: boolean): SchemaField {
+const PLAIN = ['number', 'integer', 'string', 'boolean'] as const
+
+/** `unit` is `1` if the description has none in brackets; `above` and `below` mark exclusive bounds. */
+function fieldOf(name: string, declared: Property, required: boolean) {
   const property = { ...declared, ...orNull(declared) }
   const description = property.description ?? ''
   const { type } = property
@@ -84,7 +74,7 @@ function fieldOf(name: string, declared: Property, required: boolean): SchemaFie
     name,
     description,
     unit: /\[([^\]]+)\]/.exec(description)?.[1] ?? '1',
-    type: isPlain(type) ? type : 'other',
+    type: PLAIN.find((plain) => plain === type) ?? 'other',
     low: property.minimum ?? property.exclusiveMinimum ?? null,
     high: property.maximum ?? property.exclusiveMaximum ?? null,
     above: property.exclusiveMinimum !== undefined,
@@ -95,10 +85,6 @@ function fieldOf(name: string, declared: Property, required: boolean): SchemaFie
     default: property.default,
     required,
   }
-}
-
-function isPlain(type: string | undefined): type is Exclude<SchemaField['type'], 'other'> {
-  return type !== undefined && ['number', 'integer', 'string', 'boolean'].includes(type)
 }
 
 /** The other alternative of a nullable property. */

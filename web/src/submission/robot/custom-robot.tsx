@@ -1,6 +1,6 @@
 /** Custom robot from a URDF; guessed settings are shown and can be edited. */
 
-import { NOT_PUBLISHED } from '../../api/robots'
+import { NOT_PUBLISHED } from '../../api/jobs'
 import type { CheckedLeg, RobotCheck } from '../../api/types'
 import { ErrorNotice } from '../../components/feedback'
 import { ChoiceField, FileField, TextField } from '../../components/fields/field'

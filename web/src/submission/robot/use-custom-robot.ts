@@ -1,4 +1,4 @@
-/** State of a custom robot: chosen files, proposal and check. */
+/** State of a custom robot: its files, proposal and check. */
 
 import { useEffect, useRef, useState } from 'preact/hooks'
 import { post } from '../../api/client'
@@ -14,7 +14,7 @@ interface TextFile {
   readonly text: string
 }
 
-export interface CustomRobot {
+interface State {
   readonly urdf: TextFile | null
   /** Uploaded robot.toml; null if generated. */
   readonly toml: TextFile | null
@@ -27,20 +27,7 @@ export interface CustomRobot {
   readonly guesses: readonly string[]
   /** Check result, and the robot that was checked. */
   readonly checked: { readonly robot: RobotDraft; readonly check: RobotCheck } | null
-  readonly chooseUrdf: (file: File) => void
-  readonly chooseToml: (file: File) => void
-  readonly chooseJob: (file: File) => void
-  readonly chooseActuator: (actuator: ActuatorChoice) => void
-  /** Generate robot.toml from the URDF, replacing the current one. */
-  readonly propose: () => void
-  readonly check: () => void
 }
-
-interface State
-  extends Pick<
-    CustomRobot,
-    'urdf' | 'toml' | 'job' | 'actuator' | 'busy' | 'problem' | 'guesses' | 'checked'
-  > {}
 
 const NOTHING: State = {
   urdf: null,
@@ -57,7 +44,7 @@ export function useCustomRobot(
   draft: Draft,
   catalogue: Catalogue,
   onChange: (changes: Partial<Draft>) => void,
-): CustomRobot {
+) {
   const [state, setState] = useState(NOTHING)
   // Responses are asynchronous; edits made meanwhile must be kept.
   const now = useRef({ draft, state })
@@ -115,8 +102,8 @@ export function useCustomRobot(
       async (signal) => {
         const answer = await post('/v1/robots/drafts', { body, signal })
         if (signal.aborted) return
-        const { draft: last, state: chosen } = now.current
-        const next = chosen.job ? last : withJob(last, catalogue, answer.job)
+        const { draft: last, state: latest } = now.current
+        const next = latest.job ? last : withJob(last, catalogue, answer.job)
         const robot = { ...next.robot, toml: answer.toml, urdf: answer.urdf }
         change({ ...next, robot })
         set({ guesses: answer.guesses })
@@ -125,7 +112,7 @@ export function useCustomRobot(
     if (succeeded) await check()
   }
 
-  const read = async (file: File, use: (chosen: TextFile) => unknown) => {
+  const read = async (file: File, use: (file: TextFile) => unknown) => {
     try {
       await use({ name: file.name, text: await textOf(file) })
     } catch (error) {
@@ -135,7 +122,7 @@ export function useCustomRobot(
 
   return {
     ...state,
-    chooseUrdf: (file) =>
+    chooseUrdf: (file: File) =>
       read(file, (urdf) => {
         const uploadedToml = now.current.state.toml
         set({ urdf, checked: null })
@@ -143,22 +130,23 @@ export function useCustomRobot(
         files({ urdf: urdf.text, toml: uploadedToml?.text ?? '' })
         return uploadedToml ? check() : propose()
       }),
-    chooseToml: (file) =>
+    chooseToml: (file: File) =>
       read(file, (toml) => {
         const { urdf } = now.current.state
         set({ toml, guesses: [], checked: null, problem: null })
         files({ toml: toml.text, ...(urdf && { urdf: urdf.text }) })
         return now.current.draft.robot.urdf === '' ? undefined : check()
       }),
-    chooseJob: (file) =>
+    chooseJob: (file: File) =>
       read(file, (job) => {
         change(withRobotJob(now.current.draft, catalogue, job.text))
         set({ job, problem: null })
       }),
-    chooseActuator: (actuator) => {
+    chooseActuator: (actuator: ActuatorChoice) => {
       set({ actuator })
       if (now.current.state.urdf && !now.current.state.toml) void propose()
     },
+    /** Generate robot.toml from the URDF, replacing the current one. */
     propose: () => void propose(),
     check: () => void check(),
   }

@@ -1,7 +1,7 @@
 /** Start designs: the best of earlier jobs, or those of a cloned job. */
 
 import { get } from '../../api/client'
-import { jobSearch } from '../../api/job-search'
+import { jobSearch } from '../../api/jobs'
 import { useResource } from '../../api/resource'
 import { Card } from '../../components/card'
 import { Combobox } from '../../components/fields/combobox'

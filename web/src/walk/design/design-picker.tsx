@@ -1,7 +1,7 @@
 /** Choice of a design: published ones, and the best ones of jobs. */
 
 import { get } from '../../api/client'
-import { jobSearch } from '../../api/job-search'
+import { jobSearch } from '../../api/jobs'
 import { useResource } from '../../api/resource'
 import { type ChoiceGroup, Combobox } from '../../components/fields/combobox'
 import { type DesignSource, sourceOfWord, wordOf } from './design-source'

@@ -1,8 +1,8 @@
 /** Loads designs of jobs and published designs. */
 
 import { get } from '../../api/client'
+import { readableJob } from '../../api/jobs'
 import { ApiProblem } from '../../api/problem'
-import { readableJob } from '../../api/readable'
 import type { Controller, Evaluation, Job, JobSpec, Scenario } from '../../api/types'
 import { placeWord } from '../../format/place'
 import type { Design } from '../../format/value'

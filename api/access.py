@@ -28,7 +28,7 @@ from gaitswarm.services.optimizer.errors import Forbidden, StoreUnavailable, Too
 from gaitswarm.services.optimizer.jobs.audit import LOCAL
 from gaitswarm.services.optimizer.jobs.priority import DEFAULT, HIGHEST, LOWEST
 from gaitswarm.services.optimizer.jobs.quota import Quota
-from gaitswarm.views import PREFIX
+from gaitswarm.views.base import PREFIX
 
 if TYPE_CHECKING:
     from gaitswarm.services.optimizer.store.tokens import Tokens

@@ -32,7 +32,7 @@ from gaitswarm.services.monitoring.metrics import Metrics
 from gaitswarm.services.optimizer.jobs.provenance import installed_version
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.settings import Settings
-from gaitswarm.views import PREFIX
+from gaitswarm.views.base import PREFIX
 
 # Event streams must not wait for a full block; binary numbers and long downloads gain little.
 _UNCOMPRESSED: Final = (

@@ -15,7 +15,8 @@ from gaitswarm.api.documentation import problems
 from gaitswarm.api.problems import unavailable
 from gaitswarm.services.optimizer.errors import StoreUnavailable
 from gaitswarm.services.optimizer.service import JobService
-from gaitswarm.views import PREFIX, FieldErrorView, View
+from gaitswarm.services.optimizer.views import View
+from gaitswarm.views.base import PREFIX, FieldErrorView
 
 _log = logging.getLogger("gaitswarm.api")
 

@@ -17,7 +17,7 @@ from starlette.responses import FileResponse, HTMLResponse, RedirectResponse
 
 from gaitswarm.api.documentation import policy_of
 from gaitswarm.api.problems import problem
-from gaitswarm.views import PREFIX
+from gaitswarm.views.base import PREFIX
 
 PAGE_FOLDER: Final = Path(__file__).parent / "page"
 """Built by `make page` from web/; part of wheels."""

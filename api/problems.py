@@ -52,7 +52,7 @@ from gaitswarm.services.optimizer.errors import (
 )
 from gaitswarm.sim.errors import SimulationError, SimulationInputError
 from gaitswarm.sim.robot.bounds import shortened
-from gaitswarm.views import FieldErrorView, ProblemView, field_errors
+from gaitswarm.views.base import FieldErrorView, ProblemView, field_errors
 
 _log = logging.getLogger("gaitswarm.api")
 

@@ -55,7 +55,8 @@ from gaitswarm.sim.errors import RobotFileError
 from gaitswarm.sim.input import with_known_keys
 from gaitswarm.sim.robot.check import MOST_ROBOTS, Location, check_files, files_of, objects_in
 from gaitswarm.tables import MEDIA_TYPES, encoded_table
-from gaitswarm.views import PREFIX, JobView
+from gaitswarm.views.base import PREFIX
+from gaitswarm.views.job import JobView
 
 T = TypeVar("T")
 

@@ -13,7 +13,8 @@ from gaitswarm.api.documentation import problems
 from gaitswarm.api.page import HasManual
 from gaitswarm.services.optimizer.access import Scope, Token
 from gaitswarm.services.optimizer.errors import Unauthorized
-from gaitswarm.views import PREFIX, View
+from gaitswarm.services.optimizer.views import View
+from gaitswarm.views.base import PREFIX
 
 router = APIRouter(prefix=PREFIX, tags=["operations"])
 

@@ -44,7 +44,8 @@ if TYPE_CHECKING:
     from gaitswarm.services.optimizer.run.evaluator import Evaluator
     from gaitswarm.services.optimizer.store import Store
     from gaitswarm.settings import Settings
-    from gaitswarm.views import JobView, SimulationView
+    from gaitswarm.views.job import JobView
+    from gaitswarm.views.simulation import SimulationView
 
 
 def resumed_job(

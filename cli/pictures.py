@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     )
     from gaitswarm.sim.controllers.surface import Surface
     from gaitswarm.sim.drives import WalkFigures
-    from gaitswarm.views import IterationView
+    from gaitswarm.views.history import IterationView
     from gaitswarm.views.robots import RobotCheckView
 
 _FORMATS: Final = ("png", "svg", "pdf")

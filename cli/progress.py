@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     from rich.progress import TaskID
 
     from gaitswarm.jobs.base import Jobs
-    from gaitswarm.views import StateView
-    from gaitswarm.views.job import Spent
+    from gaitswarm.views.job import Spent, StateView
 
 _LINE_SECONDS: Final = 2.0
 """Minimum interval of lines; the last iteration is always printed."""
@@ -86,7 +85,7 @@ def show_progress(
 
 def watch_with_progress(jobs: Jobs, job_id: str) -> None:
     """Follow a job until it ends; raise JobEnded unless it succeeds."""
-    from gaitswarm.views import IterationView
+    from gaitswarm.views.history import IterationView
 
     job = jobs.job(job_id)
     with show_progress(
@@ -109,7 +108,7 @@ def watch_with_progress(jobs: Jobs, job_id: str) -> None:
 
 def watch_as_json(jobs: Jobs, job_id: str) -> None:
     """Follow a job as JSON lines: `{"event": "iteration"|"state", "data": {...}}`."""
-    from gaitswarm.views import IterationView
+    from gaitswarm.views.history import IterationView
 
     last: StateView | None = None
     for event in jobs.follow(job_id):

@@ -7,22 +7,19 @@ from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     from gaitswarm.cli.rich_table import Table
+    from gaitswarm.services.optimizer.analysis.evaluations import (
+        EvaluationView,
+        ObjectiveView,
+        ScenarioResultView,
+    )
     from gaitswarm.services.optimizer.jobs.fork import Lineage
     from gaitswarm.services.optimizer.jobs.provenance import JobProvenance
     from gaitswarm.services.optimizer.jobs.spec import Spec
     from gaitswarm.sim.outcome import Objective
     from gaitswarm.sim.variables import Variable
-    from gaitswarm.views import (
-        BestView,
-        EvaluationView,
-        JobSummaryView,
-        JobView,
-        ObjectiveView,
-        PlannedGaitView,
-        ScenarioResultView,
-        SimulationView,
-    )
-    from gaitswarm.views.job import Spent
+    from gaitswarm.views.history import BestView
+    from gaitswarm.views.job import JobSummaryView, JobView, Spent
+    from gaitswarm.views.simulation import PlannedGaitView, SimulationView
 
 MISSING: Final = "–"
 

@@ -50,7 +50,7 @@ from gaitswarm.sim.errors import SimulationError, SimulationInputError
 if TYPE_CHECKING:
     from pydantic import ValidationError
 
-    from gaitswarm.views import JobView
+    from gaitswarm.views.job import JobView
 
 
 class JobEnded(GaitswarmError):
@@ -86,7 +86,7 @@ class Interrupted(KeyboardInterrupt):
 def invalid_request(error: ValidationError, model: Any = None) -> InvalidRequest:
     """Convert pydantic's errors to one InvalidRequest."""
     from gaitswarm.sim.input import with_known_keys
-    from gaitswarm.views import field_errors
+    from gaitswarm.views.base import field_errors
 
     found = with_known_keys(error.errors(include_url=False), model)
     first, *others = field_errors(found)

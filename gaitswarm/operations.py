@@ -56,6 +56,7 @@ from gaitswarm.services.optimizer.analysis.comparison import (
     JobComparisonView,
 )
 from gaitswarm.services.optimizer.analysis.distribution import DistributionView
+from gaitswarm.services.optimizer.analysis.evaluations import EvaluationView, evaluation_views
 from gaitswarm.services.optimizer.analysis.front import FRONT_DESIGNS, MOST_FRONT_DESIGNS, FrontView
 from gaitswarm.services.optimizer.analysis.identifiability import IdentifiabilityView
 from gaitswarm.services.optimizer.analysis.importance import ImportanceView
@@ -77,49 +78,48 @@ from gaitswarm.services.optimizer.jobs.labels import JobFilter, LabelsChange
 from gaitswarm.services.optimizer.jobs.quota import Quota
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.views import MEDIA_TYPE as BINARY
+from gaitswarm.services.optimizer.views import PageView
 from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.firmware import parsed_table_bits
 from gaitswarm.sim.identification.recorded_walk import RecordedWalk
 from gaitswarm.sim.robot import RobotFiles
 from gaitswarm.specs import checked
 from gaitswarm.tables import TableFormat, encoded_table
-from gaitswarm.views import (
-    BestView,
+from gaitswarm.views.analysis import SurfaceView
+from gaitswarm.views.catalogue import (
     CaseView,
     CatalogueView,
     ControllerView,
-    EstimateView,
-    EvaluationView,
-    ExtensionRequest,
-    IterationView,
-    JobSummaryView,
-    JobView,
     OptimizerView,
-    PageView,
     PluginView,
     PreferenceView,
-    PriorityRequest,
-    ResumeRequest,
     RobotView,
     ScenarioView,
-    SimulationView,
-    StateView,
     case_views,
     controller_views,
-    encoded_particles,
-    evaluation_views,
     optimizer_views,
     plugin_views,
     preference_views,
     robot_views,
     scenario_views,
 )
-from gaitswarm.views.analysis import SurfaceView
 from gaitswarm.views.firmware import FirmwareView
+from gaitswarm.views.history import BestView, IterationView, encoded_particles
 from gaitswarm.views.identification import MeasuredWalkView, RecordingEntryView, RecordingView
-from gaitswarm.views.job import JobFacetsView, JobKind
+from gaitswarm.views.job import (
+    EstimateView,
+    ExtensionRequest,
+    JobFacetsView,
+    JobKind,
+    JobSummaryView,
+    JobView,
+    PriorityRequest,
+    ResumeRequest,
+    StateView,
+)
 from gaitswarm.views.operations import ActivityView, AuditEntryView, Level, NotificationView
 from gaitswarm.views.robots import MeshFileView, RobotCheckView, RobotDraftView
+from gaitswarm.views.simulation import SimulationView
 from gaitswarm.views.verification import HistoryVerificationView, VerificationRequest
 from gaitswarm.zip_archive import MEDIA_TYPE as ZIP
 from gaitswarm.zip_archive import zipped

@@ -18,7 +18,9 @@ from gaitswarm.services.optimizer.run.evaluator import Evaluator
 from gaitswarm.services.runtime import EvaluatorKind
 from gaitswarm.specs import SpecInput, SpecOptions, job_spec
 from gaitswarm.tables import EvaluationTable, Table
-from gaitswarm.views import BestView, IterationView, JobView, OptimizerView, optimizer_views
+from gaitswarm.views.catalogue import OptimizerView, optimizer_views
+from gaitswarm.views.history import BestView, IterationView
+from gaitswarm.views.job import JobView
 
 
 @dataclass(frozen=True, slots=True)

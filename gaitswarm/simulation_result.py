@@ -16,7 +16,7 @@ from gaitswarm.sim.kernel.walk import Precision
 from gaitswarm.sim.outcome import MEASUREMENT_NAMES, OBJECTIVE_NAMES, Status
 from gaitswarm.sim.robot import RobotSource
 from gaitswarm.tables import Table
-from gaitswarm.views import SimulationView
+from gaitswarm.views.simulation import SimulationView
 
 if TYPE_CHECKING:
     import pandas as pd

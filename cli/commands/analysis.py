@@ -43,7 +43,7 @@ if TYPE_CHECKING:
         ScenarioFamiliesView,
     )
     from gaitswarm.sim.kernel.walk import Precision as PhysicsPrecision
-    from gaitswarm.views import SimulationView
+    from gaitswarm.views.simulation import SimulationView
 
 
 def rank(

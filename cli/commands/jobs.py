@@ -32,7 +32,8 @@ if TYPE_CHECKING:
     from gaitswarm.jobs.base import Jobs
     from gaitswarm.services.optimizer.analysis.comparison import JobComparisonView
     from gaitswarm.specs import ForkOptions
-    from gaitswarm.views import HistoryIterationView, JobSummaryView, JobView
+    from gaitswarm.views.history import HistoryIterationView
+    from gaitswarm.views.job import JobSummaryView, JobView
 
 
 def submit(

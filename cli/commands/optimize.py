@@ -24,7 +24,7 @@ from gaitswarm.services.optimizer.errors import InvalidRequest
 if TYPE_CHECKING:
     from gaitswarm.cli.output import Printed
     from gaitswarm.cli.rich_table import Table
-    from gaitswarm.views import CaseView, OptimizerView
+    from gaitswarm.views.catalogue import CaseView, OptimizerView
 
 
 def optimize(
@@ -99,7 +99,7 @@ def optimize(
 
 def optimizers() -> Printed:
     """List search methods and their settings."""
-    from gaitswarm.views import optimizer_views
+    from gaitswarm.views.catalogue import optimizer_views
 
     views = optimizer_views()
     rows = (
@@ -111,7 +111,7 @@ def optimizers() -> Printed:
 
 def plugins() -> Printed:
     """List installed plug-ins: controllers, cases and search methods of other packages."""
-    from gaitswarm.views import plugin_views
+    from gaitswarm.views.catalogue import plugin_views
 
     views = plugin_views()
     rows = (
@@ -126,7 +126,7 @@ def plugins() -> Printed:
 
 def cases() -> Printed:
     """List cases: plug-ins that evaluate designs instead of the simulator, and their settings."""
-    from gaitswarm.views import case_views
+    from gaitswarm.views.catalogue import case_views
 
     views = case_views()
     rows = []

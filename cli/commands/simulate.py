@@ -22,7 +22,7 @@ from gaitswarm.cli.tables import gait_in_words, number, results_table, table, wo
 if TYPE_CHECKING:
     from gaitswarm.cli.output import Printed
     from gaitswarm.cli.rich_table import Table
-    from gaitswarm.views import SimulationView
+    from gaitswarm.views.simulation import SimulationView
 
 
 def simulate(

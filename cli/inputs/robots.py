@@ -121,7 +121,7 @@ def _scenario(entry: str | dict[str, Any]) -> Scenario:
 
 
 def _refusal(error: ValidationError, option: str) -> InvalidRequest:
-    from gaitswarm.views import field_errors
+    from gaitswarm.views.base import field_errors
 
     first = field_errors(error.errors(include_url=False), prefix=option)[0]
     return InvalidRequest(first.message, field=first.field)

@@ -33,7 +33,7 @@ from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.sim.kernel.emitted.source import kernel_identity
 from gaitswarm.sim.robot import RobotFiles, RobotSource, RobotVariant, load_robot
 from gaitswarm.tables import encoded_table
-from gaitswarm.views import BestView, IterationView
+from gaitswarm.views.history import BestView, IterationView
 
 JOB: Final = "job.json"
 SPEC: Final = "spec.json"

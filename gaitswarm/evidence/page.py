@@ -23,7 +23,7 @@ from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.settings import place_of
 from gaitswarm.sim.robot import load_robot
-from gaitswarm.views import BestView, IterationView
+from gaitswarm.views.history import BestView, IterationView
 
 Floats = NDArray[np.float64]
 

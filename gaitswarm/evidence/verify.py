@@ -48,7 +48,7 @@ from gaitswarm.services.optimizer.search.registry import METHODS
 from gaitswarm.settings import place_of
 from gaitswarm.sim.kernel.emitted.source import kernel_identity
 from gaitswarm.sim.robot import load_robot
-from gaitswarm.views import BestView
+from gaitswarm.views.history import BestView
 from gaitswarm.views.verification import DIGEST, CheckView, DifferenceView, VerificationView
 from gaitswarm.zip_archive import LARGEST_ARCHIVE, BadArchive, unzipped
 

@@ -36,17 +36,11 @@ from gaitswarm.specs import (
     SpecOptions,
 )
 from gaitswarm.tables import EvaluationTable, TableFormat
-from gaitswarm.views import (
-    BestView,
-    EstimateView,
-    HistoryIterationView,
-    IterationView,
-    JobSummaryView,
-    JobView,
-)
 from gaitswarm.views.analysis import SurfaceView
 from gaitswarm.views.firmware import FirmwareView
+from gaitswarm.views.history import BestView, HistoryIterationView, IterationView
 from gaitswarm.views.identification import RecordingEntryView, RecordingView
+from gaitswarm.views.job import EstimateView, JobSummaryView, JobView
 from gaitswarm.views.verification import HistoryVerificationView
 
 class AsyncJobs:

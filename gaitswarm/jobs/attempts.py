@@ -26,7 +26,7 @@ from gaitswarm.errors import (
 )
 from gaitswarm.services.optimizer.masking import masked_url
 from gaitswarm.services.optimizer.run.outage import Backoff
-from gaitswarm.views import ProblemView
+from gaitswarm.views.base import ProblemView
 
 _TRANSIENT: Final = (httpx2.NetworkError, httpx2.ConnectTimeout, httpx2.RemoteProtocolError)
 """The connection was not established, or broke."""

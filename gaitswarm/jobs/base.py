@@ -41,6 +41,7 @@ from gaitswarm.services.optimizer.jobs.job import Command, JobOrder, JobState
 from gaitswarm.services.optimizer.jobs.labels import ANY_JOB, JobFilter
 from gaitswarm.services.optimizer.jobs.notification import unusable_url
 from gaitswarm.services.optimizer.jobs.priority import check_priority
+from gaitswarm.services.optimizer.views import PageView
 from gaitswarm.sim.controllers import ControllerName
 from gaitswarm.sim.identification.recorded_walk import RecordedWalk
 from gaitswarm.sim.kernel.walk import Precision
@@ -58,19 +59,11 @@ from gaitswarm.specs import (
     laid_options,
 )
 from gaitswarm.tables import EvaluationTable, TableFormat
-from gaitswarm.views import (
-    BestView,
-    EstimateView,
-    HistoryIterationView,
-    IterationView,
-    JobSummaryView,
-    JobView,
-    PageView,
-    StateView,
-)
 from gaitswarm.views.analysis import SurfaceView
 from gaitswarm.views.firmware import FirmwareView
+from gaitswarm.views.history import BestView, HistoryIterationView, IterationView
 from gaitswarm.views.identification import RecordingEntryView, RecordingView
+from gaitswarm.views.job import EstimateView, JobSummaryView, JobView, StateView
 from gaitswarm.views.verification import HistoryVerificationView
 from gaitswarm.zip_archive import unzipped
 

@@ -26,8 +26,9 @@ from gaitswarm.services.runtime import EvaluatorKind, open_evaluator, run_embedd
 from gaitswarm.settings import default_database, read_settings
 from gaitswarm.specs import SpecInput, chosen_spec
 from gaitswarm.tables import EvaluationTable
-from gaitswarm.views import HistoryIterationView, IterationView, JobView
 from gaitswarm.views.firmware import FirmwareView
+from gaitswarm.views.history import HistoryIterationView, IterationView
+from gaitswarm.views.job import JobView
 
 T = TypeVar("T")
 

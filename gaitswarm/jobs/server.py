@@ -21,7 +21,9 @@ from gaitswarm.jobs.base import JobEvent, Jobs, Stop, Submission
 from gaitswarm.operations import Operation
 from gaitswarm.services.optimizer.masking import masked_url
 from gaitswarm.services.optimizer.run.outage import Backoff
-from gaitswarm.views import PREFIX, IterationView, JobView, StateView
+from gaitswarm.views.base import PREFIX
+from gaitswarm.views.history import IterationView
+from gaitswarm.views.job import JobView, StateView
 
 T = TypeVar("T")
 

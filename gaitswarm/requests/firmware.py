@@ -16,8 +16,8 @@ from gaitswarm.sim.catalogue import design_numbers
 from gaitswarm.sim.controllers import ControllerName
 from gaitswarm.sim.firmware import Firmware, check_drives_by_pwm, check_table_bits, firmware_of
 from gaitswarm.specs import RobotInput, ScenarioInput
-from gaitswarm.views import BestView
 from gaitswarm.views.firmware import FirmwareView
+from gaitswarm.views.history import BestView
 
 
 class FirmwareOptions(TypedDict, total=False):

@@ -8,7 +8,7 @@ import pytest
 from pydantic import ValidationError
 
 from gaitswarm.services.optimizer.jobs.documents import SPECS
-from gaitswarm.views import field_errors
+from gaitswarm.views.base import field_errors
 
 
 def messages(document: dict[str, Any]) -> dict[str, str]:

@@ -21,7 +21,7 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.provenance import job_provenance
 from gaitswarm.services.optimizer.jobs.reference import Reference
 from gaitswarm.services.optimizer.store import Store
-from gaitswarm.views import JobSummaryView
+from gaitswarm.views.job import JobSummaryView
 from tests.api.conftest import Commit
 from tests.examples.walks import quadruped_files
 

@@ -17,7 +17,7 @@ from gaitswarm.api.dependencies import ComputingCapacity
 from gaitswarm.designs import SimulationRequest, run_simulation
 from gaitswarm.sim.outcome import OBJECTIVE_NAMES, Status
 from gaitswarm.sim.scenario import find_scenario
-from gaitswarm.views import SimulationView
+from gaitswarm.views.simulation import SimulationView
 from tests.api.conftest import Serve
 from tests.examples.walks import PUBLISHED_A, SHORT_WALK, short_walk, walk
 

@@ -13,7 +13,7 @@ from gaitswarm.services.optimizer.errors import Unreadable
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.store import Store
-from gaitswarm.views import JobView
+from gaitswarm.views.job import JobView
 from tests.api.conftest import Commit
 
 pytestmark = pytest.mark.slow

@@ -9,6 +9,7 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
+from gaitswarm.services.optimizer.analysis.evaluations import evaluation_views
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Reevaluation
 from gaitswarm.services.optimizer.jobs.job import Job
 from gaitswarm.services.optimizer.jobs.preference import PREFERENCES
@@ -16,14 +17,9 @@ from gaitswarm.services.optimizer.store import Store
 from gaitswarm.services.optimizer.views import StatusName
 from gaitswarm.sim.kernel.observation import WalkLog
 from gaitswarm.sim.outcome import N_MEASUREMENTS, N_OBJECTIVES, OBJECTIVES, Status
-from gaitswarm.views import (
-    BestView,
-    HistoryIterationView,
-    JobView,
-    SimulationView,
-    WalkLogView,
-    evaluation_views,
-)
+from gaitswarm.views.history import BestView, HistoryIterationView
+from gaitswarm.views.job import JobView
+from gaitswarm.views.simulation import SimulationView, WalkLogView
 from tests.api.conftest import Commit
 from tests.examples.processes import loaded_by
 
@@ -149,5 +145,5 @@ def test_a_best_that_was_found_in_single_is_shown_in_double_with_the_difference(
 
 @pytest.mark.slow
 def test_views_can_be_had_without_a_web_framework() -> None:
-    statements = "import gaitswarm.views, gaitswarm.designs"
+    statements = "import gaitswarm.views.job, gaitswarm.designs"
     assert loaded_by(statements, ["fastapi", "starlette", "uvicorn"]) == set()

@@ -11,7 +11,7 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.search.registry import METHODS, OPTIMIZERS
 from gaitswarm.sim.controllers import CONTROLLERS
 from gaitswarm.sim.plugins import find_plugins, version_of
-from gaitswarm.views import plugin_views
+from gaitswarm.views.catalogue import plugin_views
 from tests.examples.plugins import install, installed
 from tests.examples.processes import loaded_by, python
 

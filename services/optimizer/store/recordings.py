@@ -90,33 +90,19 @@ class Recordings(Aggregate):
                 words = scenario + "\n" + controller + "\n" + recordings.c.id
                 page = page.where(func.lower(words).contains(folded(search), autoescape=True))
             # Documents outside the page are not parsed.
-            rows = connection.execute(
-                select(
-                    *place,
-                    func.length(cast(document, Text)).label("size"),
-                    scenario.label("scenario"),
-                    controller.label("controller"),
-                    length_at(connection, document, "joints").label("joints"),
-                    length_at(connection, document, "current").label("rows"),
-                    text_at(connection, document, "synthetic").label("synthetic"),
-                )
-                .where(recordings.c.id.in_(page))
-                .order_by(*newest)
-            ).all()
-        items = tuple(
-            RecordingEntry(
-                id=row.id,
-                created_at=row.created_at,
-                size=row.size,
-                scenario=row.scenario or None,
-                controller=row.controller or None,
-                joints=row.joints,
-                rows=row.rows,
+            columns = (
+                func.length(cast(document, Text)).label("size"),
+                func.nullif(scenario, "").label("scenario"),
+                func.nullif(controller, "").label("controller"),
+                length_at(connection, document, "joints").label("joints"),
+                length_at(connection, document, "current").label("rows"),
                 # How each database spells a truth as text.
-                synthetic=row.synthetic in ("true", "1"),
+                text_at(connection, document, "synthetic").in_(("true", "1")).label("synthetic"),
             )
-            for row in rows[:limit]
-        )
+            # Documents outside the page are not parsed.
+            query = select(*place, *columns).where(recordings.c.id.in_(page)).order_by(*newest)
+            rows = connection.execute(query).mappings().all()
+        items = tuple(RecordingEntry(**row) for row in rows[:limit])
         if len(rows) <= limit:
             return Page(items, None)
         return Page(items, to_cursor("recording", items[-1].created_at, items[-1].id))

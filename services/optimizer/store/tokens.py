@@ -135,7 +135,8 @@ class Audit(Aggregate):
             job_id: only entries about this job, which may be deleted.
         """
         limit = checked_limit(limit)
-        query = select(audit).order_by(audit.c.id.desc()).limit(limit + 1)
+        others = (column for column in audit.c if column is not audit.c.id)
+        query = select(audit.c.id.label("index"), *others).order_by(audit.c.id.desc())
         if job_id is not None:
             query = query.where(audit.c.job_id == job_id)
         if after is not None:
@@ -146,12 +147,9 @@ class Audit(Aggregate):
                 )
             query = query.where(audit.c.id < int(after))
         with self._database.read("audit") as connection:
-            rows = connection.execute(query).mappings().all()
-        names = ("id", "at", "actor", "action", "job_id", "details")
-        values = ([row[name] for name in names] for row in rows[:limit])
+            rows = connection.execute(query.limit(limit + 1)).mappings().all()
         entries = tuple(
-            AuditEntry(index, at, actor, AuditAction(action), *rest)
-            for index, at, actor, action, *rest in values
+            AuditEntry(**{**row, "action": AuditAction(row["action"])}) for row in rows[:limit]
         )
         return Page(entries, str(entries[-1].index) if len(rows) > limit else None)
 

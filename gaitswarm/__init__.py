@@ -40,7 +40,7 @@ if TYPE_CHECKING:
         Unreadable,
     )
     from gaitswarm.evidence.verify import verify
-    from gaitswarm.firmware import write_firmware
+    from gaitswarm.firmware import FirmwareOptions, FirmwareView, write_firmware
     from gaitswarm.jobs.asynchronous import AsyncDatabaseJobs, AsyncJobs
     from gaitswarm.jobs.base import JobEvent, Jobs
     from gaitswarm.jobs.database import DatabaseJobs
@@ -49,7 +49,6 @@ if TYPE_CHECKING:
     from gaitswarm.optimization import OptimizationResult, optimize, optimizers
     from gaitswarm.preferences import robust_preferences
     from gaitswarm.replay import WalkReplay
-    from gaitswarm.requests.firmware import FirmwareOptions
     from gaitswarm.robustness_index import RobustnessOptions, RobustnessView
     from gaitswarm.services.optimizer.analysis.certificate import CertificateView
     from gaitswarm.services.optimizer.analysis.comparison import JobComparisonView
@@ -91,9 +90,8 @@ if TYPE_CHECKING:
     from gaitswarm.simulation import robustness, simulate
     from gaitswarm.simulation_result import ScenarioResult, SimulationResult
     from gaitswarm.specs import SpecOptions, job_spec
+    from gaitswarm.surface import SurfaceView
     from gaitswarm.tables import EvaluationTable, Table
-    from gaitswarm.views.analysis import SurfaceView
-    from gaitswarm.views.firmware import FirmwareView
     from gaitswarm.views.history import BestView, HistoryIterationView, IterationView
     from gaitswarm.views.job import JobSummaryView, JobView, StateView
     from gaitswarm.views.verification import VerificationView
@@ -129,7 +127,7 @@ _MODULES: Final = {
         "Unreadable",
     ),
     "gaitswarm.evidence.verify": ("verify",),
-    "gaitswarm.firmware": ("write_firmware",),
+    "gaitswarm.firmware": ("FirmwareOptions", "FirmwareView", "write_firmware"),
     "gaitswarm.jobs.asynchronous": ("AsyncDatabaseJobs", "AsyncJobs"),
     "gaitswarm.jobs.base": ("JobEvent", "Jobs"),
     "gaitswarm.jobs.database": ("DatabaseJobs",),
@@ -137,7 +135,6 @@ _MODULES: Final = {
     "gaitswarm.jobs.server": ("ServerJobs",),
     "gaitswarm.optimization": ("OptimizationResult", "optimize", "optimizers"),
     "gaitswarm.preferences": ("robust_preferences",),
-    "gaitswarm.requests.firmware": ("FirmwareOptions",),
     "gaitswarm.simulation": ("robustness", "simulate"),
     "gaitswarm.simulation_result": ("ScenarioResult", "SimulationResult"),
     "gaitswarm.specs": ("SpecOptions", "job_spec"),
@@ -145,8 +142,6 @@ _MODULES: Final = {
     "gaitswarm.services.optimizer.analysis.evaluations": ("EvaluationView",),
     "gaitswarm.views.history": ("BestView", "HistoryIterationView", "IterationView"),
     "gaitswarm.views.job": ("JobSummaryView", "JobView", "StateView"),
-    "gaitswarm.views.firmware": ("FirmwareView",),
-    "gaitswarm.views.analysis": ("SurfaceView",),
     "gaitswarm.views.verification": ("VerificationView",),
     "gaitswarm.services.optimizer.analysis.preferences": (
         "PreferenceForView", "RobustPreferencesView",
@@ -161,6 +156,7 @@ _MODULES: Final = {
     "gaitswarm.services.optimizer.analysis.identifiability": ("IdentifiabilityView",),
     "gaitswarm.replay": ("WalkReplay",),
     "gaitswarm.robustness_index": ("RobustnessOptions", "RobustnessView"),
+    "gaitswarm.surface": ("SurfaceView",),
     "gaitswarm.services.optimizer.jobs.kinds.calibration": ("CalibrationSpec",),
     "gaitswarm.services.optimizer.jobs.kinds.certificate": ("CertificateSpec",),
     "gaitswarm.services.optimizer.jobs.labels": ("JobFilter",),

@@ -8,19 +8,255 @@ import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Final
+from typing import Any, Final, TypedDict
 
-from gaitswarm.errors import InvalidRequest
-from gaitswarm.requests.firmware import FirmwareRequest, firmware_view, run_firmware
+from pydantic import Field, ValidationError
+
+from gaitswarm.designs import ScenariosRequest
+from gaitswarm.errors import InvalidRequest, NotFound, invalid_request, simulation_errors
+from gaitswarm.services.optimizer.jobs.documents import AnySpec
+from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
+from gaitswarm.services.optimizer.views import Finite, View
+from gaitswarm.sim.catalogue import design_numbers
 from gaitswarm.sim.controllers import ControllerName
-from gaitswarm.sim.firmware import FORMAT, MANIFEST
+from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
+from gaitswarm.sim.firmware import (
+    BUDGET,
+    FORMAT,
+    MANIFEST,
+    Firmware,
+    check_drives_by_pwm,
+    check_table_bits,
+    firmware_of,
+)
 from gaitswarm.sim.robot import DEFAULT_ROBOT
 from gaitswarm.simulation import ALL_SCENARIOS
 from gaitswarm.specs import RobotInput, ScenarioInput, checked
-from gaitswarm.views.firmware import FirmwareView
+from gaitswarm.views.history import BestView
 
 _BUILT: Final = "build"
 """Build folder of the folder's Makefile."""
+
+
+class FirmwareOptions(TypedDict, total=False):
+    """Fields of a `FirmwareRequest` as keywords.
+
+    Attributes:
+        scenarios: One scenario or several, whose trajectories are written and whose walks are
+            repeated: names or numbers of presets, or `Scenario`; default those of the job, of other
+            designs the six of table 4.2.
+        controller: Motor controller that drives the robot; default that of the job, or fuzzy-pi.
+        robot: A shipped robot by name, a `RobotVariant`, or the folder of another; default that of
+            the job, or the default robot.
+        label: Display name of the design.
+        table_bits: Of the indices of angle error and current in a fuzzy controller's table, in
+            place of 10 and 6, where there is less flash.
+    """
+
+    scenarios: ScenarioInput | Iterable[ScenarioInput]
+    controller: ControllerName
+    robot: RobotInput
+    label: str
+    table_bits: tuple[int, int] | None
+
+
+class FirmwareRequest(ScenariosRequest):
+    """A design and the scenarios whose trajectories and simulations its firmware includes."""
+
+    label: str = Field(default="design", max_length=200, description="Display name of the design.")
+    table_bits: tuple[int, int] | None = Field(
+        default=None,
+        description="Of the indices of angle error and current in a fuzzy controller's table, in"
+        " place of 10 and 6; simulations use this table.",
+        examples=[[8, 6]],
+    )
+
+    @property
+    def walked_seconds(self) -> float:
+        """Length of all simulations [s]; with another table each is compared with the default's."""
+        seconds = self.simulated_seconds(self.resolved_scenarios())
+        return seconds if self.table_bits is None else 2.0 * seconds
+
+    def check(self) -> None:
+        """Check the design, its gaits and its table before anything is simulated."""
+        with simulation_errors("robot"):
+            check_drives_by_pwm(self.robot)
+        self.check_design()
+        self.check_gaits()
+        if self.table_bits is not None:
+            with simulation_errors("table_bits"):
+                check_table_bits(self.controller, self.table_bits)
+
+
+def firmware_request_of_best(
+    job_id: str, spec: AnySpec, best: BestView | None, options: dict[str, Any]
+) -> FirmwareRequest:
+    """Request firmware of a job's best design, by default for its robot and scenarios."""
+    if not isinstance(spec, JobSpec):
+        raise InvalidRequest(
+            f"job {job_id} is of kind {spec.kind}, which tunes no drive", field="job_id"
+        )
+    if options.get("controller", spec.controller) != spec.controller:
+        raise InvalidRequest(
+            f"job {job_id} tunes {spec.controller}; leave it out", field="controller"
+        )
+    if best is None:
+        raise NotFound(f"job {job_id} has no design yet that walks in every scenario")
+    document = {
+        "robot": spec.robot,
+        "controller": spec.controller,
+        "design": design_numbers(spec.controller, best.design),
+        "scenarios": spec.resolved_scenarios(),
+        "label": spec.name or f"job {job_id}",
+        **options,
+    }
+    try:
+        return FirmwareRequest.model_validate(document)
+    except ValidationError as error:
+        raise invalid_request(error) from error
+
+
+def run_firmware(request: FirmwareRequest) -> Firmware:
+    """Write a design as C code, with simulations to test it."""
+    request.check()
+    with simulation_errors("scenarios"):
+        return firmware_of(
+            request.robot,
+            request.controller,
+            request.numbers,
+            request.resolved_scenarios(),
+            label=request.label,
+            table_bits=request.table_bits,
+        )
+
+
+class FirmwareTableView(View):
+    """A fuzzy table."""
+
+    name: str = Field(description="direct, or integrated.", examples=["direct"])
+    shape: list[int] = Field(description="Entries by angle error, current and change of error.")
+    bytes: int = Field(description="Memory, eq. 5.1 [B].", examples=[65536])
+
+
+class FirmwareTrajectoryView(View):
+    """Desired angles in a scenario."""
+
+    scenario: str = Field(description="Name of the scenario.", examples=["normal-fast"])
+    sample_rate: float = Field(description="Rows a second [Hz].", examples=[500.0])
+    rows: int = Field(description="Rows of the table.", examples=[755])
+    columns: int = Field(description="Angles of a row; joints that move alike share one.")
+    repeats_from: int | None = Field(
+        description="Row that follows the last one; null if the trajectory does not repeat."
+    )
+    bytes: int = Field(description="Memory of all joints, eq. 5.1 [B].", examples=[9060])
+    bytes_of_a_leg: int = Field(description="Memory of one leg's joints [B].", examples=[4530])
+
+
+class FirmwareWalkView(View):
+    """A simulation that the firmware's test repeats."""
+
+    scenario: str = Field(description="Name of the scenario.", examples=["normal-fast"])
+    status: str = Field(description="Its status.", examples=["ok"])
+    ticks: int = Field(description="Simulated control ticks.", examples=[2250])
+    samples: int = Field(description="Outputs that are compared.", examples=[40500])
+
+
+class FirmwareMemoryView(View):
+    """Memory that firmware needs on a leg's microcontroller, without its code."""
+
+    processor: str = Field(description="Type of the microcontroller.", examples=["MSP430F2618"])
+    flash: int = Field(description="Of the microcontroller [B].", examples=[118784])
+    ram: int = Field(description="Of the microcontroller [B].", examples=[8192])
+    cycles: int = Field(description="Of the microcontroller in a sample.", examples=[32000])
+    tables: int = Field(description="Of the fuzzy tables [B].", examples=[65536])
+    trajectories: int = Field(description="Of all joints and scenarios [B].", examples=[71820])
+    trajectories_of_a_leg: int = Field(description="Of one leg's joints in all scenarios [B].")
+    remembered: int = Field(description="RAM, from tick to tick [B].", examples=[40])
+    fits: bool = Field(description="Whether controller and tables fit, without trajectories.")
+    remarks: list[str] = Field(description="Problems with remedies.", examples=[[]])
+
+
+class FirmwareView(View):
+    """A folder of C for a microcontroller."""
+
+    folder: str | None = Field(default=None, description="Its path; null on a server.")
+    label: str = Field(description="Display name of the design.", examples=["published A"])
+    controller: ControllerName = Field(description="Of the design.", examples=["fuzzy-pi"])
+    design: dict[str, float] = Field(
+        description="Values by variable; of a categorical one the index of a choice.",
+        examples=[{"P": 0.454, "I": 0.147}],
+    )
+    files: dict[str, int] = Field(
+        description="Size of every file [B].", examples=[{"tick.c": 4600}]
+    )
+    integer_bits: int = Field(
+        description="Width of the numbers with 16 fraction bits, 32 or 64 [bit].", examples=[32]
+    )
+    tables: list[FirmwareTableView] = Field(description="Fuzzy tables; none for P, PI, PID.")
+    table_difference: dict[str, Finite] | None = Field(
+        description="By objective, largest relative difference from simulations with the table of"
+        " 10 x 6 bits [1]; null with that table."
+    )
+    trajectories: list[FirmwareTrajectoryView] = Field(description="By scenario.")
+    walks: list[FirmwareWalkView] = Field(description="By scenario.")
+    samples: int = Field(description="Of all simulations.", examples=[280800])
+    memory: FirmwareMemoryView = Field(description="Compared with the thesis's microcontroller.")
+
+
+def firmware_view(
+    request: FirmwareRequest, firmware: Firmware, folder: str | None = None
+) -> FirmwareView:
+    """Describe firmware."""
+    parts = {"direct": firmware.law.direct, "integrated": firmware.law.integrated}
+    memory = firmware.memory
+    return FirmwareView(
+        folder=folder,
+        label=request.label,
+        controller=request.controller,
+        design=request.numbers,
+        files={name: len(content) for name, content in firmware.files.items()},
+        integer_bits=firmware.law.fine_bits,
+        tables=[
+            FirmwareTableView(name=name, shape=list(part.values.shape), bytes=part.values.nbytes)
+            for name, part in parts.items()
+            if part is not None
+        ],
+        table_difference=firmware.table_difference,
+        trajectories=[
+            FirmwareTrajectoryView(
+                scenario=table.name,
+                sample_rate=1.0 / CONTROL_PERIOD,
+                rows=len(table.rows),
+                columns=table.rows.shape[1],
+                repeats_from=table.repeats_from if table.repeats else None,
+                bytes=table.bytes,
+                bytes_of_a_leg=table.bytes_of_a_leg,
+            )
+            for table in firmware.trajectories
+        ],
+        walks=[
+            FirmwareWalkView(
+                scenario=log.scenario.name,
+                status=log.status.label,
+                ticks=log.ticks,
+                samples=log.pwm.size,
+            )
+            for log in firmware.logs
+        ],
+        samples=firmware.samples,
+        memory=FirmwareMemoryView(
+            processor=BUDGET.name,
+            flash=BUDGET.flash,
+            ram=BUDGET.ram,
+            cycles=BUDGET.cycles,
+            tables=memory.tables,
+            trajectories=memory.trajectories,
+            trajectories_of_a_leg=memory.trajectories_of_a_leg,
+            remembered=memory.ram,
+            fits=memory.fits,
+            remarks=list(memory.remarks()),
+        ),
+    )
 
 
 def write_firmware(

@@ -31,15 +31,21 @@ from typing import (
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
 from gaitswarm.designs import SimulationRequest, resolved, run_simulation
-from gaitswarm.replay import ReplayRequest, run_replay
-from gaitswarm.requests.firmware import (
+from gaitswarm.firmware import (
     FirmwareRequest,
+    FirmwareView,
     firmware_request_of_best,
     firmware_view,
     run_firmware,
 )
-from gaitswarm.requests.identification import MeasuredWalkRequest, read_measured_walk
-from gaitswarm.requests.surface import SurfaceRequest, run_surface
+from gaitswarm.recordings import (
+    MeasuredWalkRequest,
+    MeasuredWalkView,
+    RecordingEntryView,
+    RecordingView,
+    read_measured_walk,
+)
+from gaitswarm.replay import ReplayRequest, run_replay
 from gaitswarm.robots import RobotDraftRequest, run_robot_draft
 from gaitswarm.robots import check_robot as checked_robot
 from gaitswarm.robustness_index import (
@@ -84,8 +90,8 @@ from gaitswarm.sim.firmware import parsed_table_bits
 from gaitswarm.sim.identification.recorded_walk import RecordedWalk
 from gaitswarm.sim.robot import RobotFiles
 from gaitswarm.specs import checked
+from gaitswarm.surface import SurfaceRequest, SurfaceView, run_surface
 from gaitswarm.tables import TableFormat, encoded_table
-from gaitswarm.views.analysis import SurfaceView
 from gaitswarm.views.catalogue import (
     CaseView,
     CatalogueView,
@@ -103,9 +109,7 @@ from gaitswarm.views.catalogue import (
     robot_views,
     scenario_views,
 )
-from gaitswarm.views.firmware import FirmwareView
 from gaitswarm.views.history import BestView, IterationView, encoded_particles
-from gaitswarm.views.identification import MeasuredWalkView, RecordingEntryView, RecordingView
 from gaitswarm.views.job import (
     EstimateView,
     ExtensionRequest,
@@ -1285,12 +1289,10 @@ def record_measured_walk(
     whole cycles that both share. The log itself is not stored. Bodies may be larger than elsewhere
     (GAITSWARM_API_MAX_LOG_BYTES).
     """
-    seconds = request.simulated_seconds([request.walk_scenario])
+    seconds = request.simulated_seconds([resolved(request.scenario)])
     limits.check(seconds, logged=True, field="scenario")
     measured = read_measured_walk(request)
-    recording_id = service.store.add_recording(measured.walk, actor=actor)
-    recording = RecordingView.from_walk(recording_id, measured.walk)
-    return MeasuredWalkView.from_log(recording, measured.log, measured.pair)
+    return measured.view(service.store.add_recording(measured.walk, actor=actor))
 
 
 @_operation("GET /recordings/{recording_id}", "robots", "Get a recording", 409)

@@ -15,7 +15,7 @@ from gaitswarm.cli.tables import table
 if TYPE_CHECKING:
     from gaitswarm.cli.output import Printed
     from gaitswarm.cli.rich_table import Table
-    from gaitswarm.views.firmware import FirmwareView
+    from gaitswarm.firmware import FirmwareView
 
 
 def firmware(

@@ -16,7 +16,6 @@ from gaitswarm.errors import Conflict
 from gaitswarm.evidence.archive import archived
 from gaitswarm.evidence.certificates import FOLDER, SUMMARY, certificates_of, summary
 from gaitswarm.evidence.page import CertificateOnPage, bars, convergence, heat_map, page
-from gaitswarm.requests.surface import SurfaceRequest, run_surface
 from gaitswarm.services.optimizer.analysis.certificate import CertificateView
 from gaitswarm.services.optimizer.analysis.fork import budgets_of
 from gaitswarm.services.optimizer.errors import InvalidRequest
@@ -32,6 +31,7 @@ from gaitswarm.services.optimizer.jobs.provenance import job_provenance
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.sim.kernel.emitted.source import kernel_identity
 from gaitswarm.sim.robot import RobotFiles, RobotSource, RobotVariant, load_robot
+from gaitswarm.surface import SurfaceRequest, run_surface
 from gaitswarm.tables import encoded_table
 from gaitswarm.views.history import BestView, IterationView
 

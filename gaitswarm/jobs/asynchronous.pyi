@@ -3,9 +3,10 @@ from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
 from types import TracebackType
 from typing import Self, Unpack
 
+from gaitswarm.firmware import FirmwareOptions, FirmwareView
 from gaitswarm.jobs.base import JobEvent, Jobs
+from gaitswarm.recordings import RecordingEntryView, RecordingView
 from gaitswarm.replay import WalkReplay
-from gaitswarm.requests.firmware import FirmwareOptions
 from gaitswarm.robustness_index import RobustnessOptions, RobustnessView
 from gaitswarm.services.optimizer.analysis.certificate import CertificateView
 from gaitswarm.services.optimizer.analysis.comparison import JobComparisonView
@@ -35,11 +36,9 @@ from gaitswarm.specs import (
     SpecInput,
     SpecOptions,
 )
+from gaitswarm.surface import SurfaceView
 from gaitswarm.tables import EvaluationTable, TableFormat
-from gaitswarm.views.analysis import SurfaceView
-from gaitswarm.views.firmware import FirmwareView
 from gaitswarm.views.history import BestView, HistoryIterationView, IterationView
-from gaitswarm.views.identification import RecordingEntryView, RecordingView
 from gaitswarm.views.job import EstimateView, JobSummaryView, JobView
 from gaitswarm.views.verification import HistoryVerificationView
 

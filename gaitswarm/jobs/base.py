@@ -16,13 +16,15 @@ from pydantic import BaseModel, ConfigDict, field_validator
 
 from gaitswarm import operations
 from gaitswarm.errors import InvalidRequest
-from gaitswarm.operations import Operation
-from gaitswarm.replay import WalkReplay, decoded_replay
-from gaitswarm.requests.firmware import (
+from gaitswarm.firmware import (
     FirmwareOptions,
     FirmwareRequest,
+    FirmwareView,
     firmware_request_of_best,
 )
+from gaitswarm.operations import Operation
+from gaitswarm.recordings import RecordingEntryView, RecordingView
+from gaitswarm.replay import WalkReplay, decoded_replay
 from gaitswarm.robustness_index import RobustnessOptions, RobustnessView
 from gaitswarm.services.optimizer.analysis.certificate import CertificateView
 from gaitswarm.services.optimizer.analysis.comparison import JobComparisonView
@@ -58,11 +60,9 @@ from gaitswarm.specs import (
     chosen_spec,
     laid_options,
 )
+from gaitswarm.surface import SurfaceView
 from gaitswarm.tables import EvaluationTable, TableFormat
-from gaitswarm.views.analysis import SurfaceView
-from gaitswarm.views.firmware import FirmwareView
 from gaitswarm.views.history import BestView, HistoryIterationView, IterationView
-from gaitswarm.views.identification import RecordingEntryView, RecordingView
 from gaitswarm.views.job import EstimateView, JobSummaryView, JobView, StateView
 from gaitswarm.views.verification import HistoryVerificationView
 from gaitswarm.zip_archive import unzipped

@@ -13,10 +13,10 @@ from pydantic import BaseModel
 
 from gaitswarm import operations
 from gaitswarm.errors import Interrupted, simulation_errors
+from gaitswarm.firmware import FirmwareRequest, FirmwareView, firmware_view, run_firmware
 from gaitswarm.jobs.base import JobEvent, Jobs, Stop, Submission
 from gaitswarm.jobs.embedded import check_workers, ctrl_c, earlier_job, taken_up
 from gaitswarm.operations import Operation
-from gaitswarm.requests.firmware import FirmwareRequest, firmware_view, run_firmware
 from gaitswarm.services.optimizer.analysis.reference import note_reference
 from gaitswarm.services.optimizer.jobs.job import Claim
 from gaitswarm.services.optimizer.masking import masked_url
@@ -26,7 +26,6 @@ from gaitswarm.services.runtime import EvaluatorKind, open_evaluator, run_embedd
 from gaitswarm.settings import default_database, read_settings
 from gaitswarm.specs import SpecInput, chosen_spec
 from gaitswarm.tables import EvaluationTable
-from gaitswarm.views.firmware import FirmwareView
 from gaitswarm.views.history import HistoryIterationView, IterationView
 from gaitswarm.views.job import JobView
 

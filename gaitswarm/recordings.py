@@ -1,33 +1,45 @@
-"""Recorded walks, without their numbers."""
+"""Recorded walks: views of them, and recordings made of measured logs."""
 
 from __future__ import annotations
 
 from datetime import datetime
+from typing import Annotated, NamedTuple
 
 from pydantic import Field
 
+from gaitswarm.designs import DesignRequest, resolved
+from gaitswarm.errors import InvalidRequest, simulation_errors
 from gaitswarm.services.optimizer.jobs.listing import RecordingEntry
 from gaitswarm.services.optimizer.views import View
 from gaitswarm.sim.controllers.fixed_point import CONTROL_PERIOD
-from gaitswarm.sim.identification.recorded_walk import RecordedWalk
-from gaitswarm.sim.measurement.measured_log import MeasuredLog, Quantity
-from gaitswarm.sim.measurement.synchronise import Synchronised
-from gaitswarm.sim.scenario import Scenario
+from gaitswarm.sim.errors import MeasuredLogError
+from gaitswarm.sim.identification.recorded_walk import RecordedWalk, record
+from gaitswarm.sim.measurement.measured_csv import parse_measured_log
+from gaitswarm.sim.measurement.measured_log import MeasuredLog, MeasuredWalk, Quantity
+from gaitswarm.sim.measurement.synchronise import Synchronised, synchronise
+from gaitswarm.sim.robot import load_robot
+from gaitswarm.sim.scenario import Scenario, ScenarioChoice
+
+RecordingId = Annotated[
+    str,
+    Field(
+        description="Identifier, as in `recordings` of a job.",
+        examples=["0f343b0931126a20f133d67c2b018a3b"],
+    ),
+]
+Synthetic = Annotated[bool, Field(description="Whether it was computed, not measured.")]
 
 
 class RecordingView(View):
     """A recorded walk without its numbers."""
 
-    id: str = Field(
-        description="Identifier, as in `recordings` of a job.",
-        examples=["0f343b0931126a20f133d67c2b018a3b"],
-    )
+    id: RecordingId
     scenario: str = Field(description="Name of its scenario.", examples=["normal-fast"])
     walk: Scenario = Field(description="That scenario in full.")
     controller: str = Field(description="Controller that drove it.", examples=["fuzzy-pi"])
     design: dict[str, float] = Field(
-        description="Value of each of its variables, and of any gait variable, as it walked; of"
-        " a categorical one the index of a choice.",
+        description="Value of each of its variables, and of any gait variable; of a categorical"
+        " one the index of a choice.",
         examples=[{"P": 0.454, "I": 0.147}],
     )
     joints: int = Field(description="Joints whose currents were measured.", examples=[18])
@@ -37,13 +49,10 @@ class RecordingView(View):
         description="Mean over rows and joints of the absolute current [A].", examples=[0.14]
     )
     peak_current: float = Field(description="Largest of these currents [A].", examples=[0.85])
-    synthetic: bool = Field(
-        description="Whether it was computed, not measured on a robot.", examples=[False]
-    )
+    synthetic: Synthetic
 
     @classmethod
     def from_walk(cls, recording_id: str, walk: RecordedWalk) -> RecordingView:
-        """Make a view of a recording."""
         return cls(
             id=recording_id,
             scenario=walk.scenario.name,
@@ -62,29 +71,19 @@ class RecordingView(View):
 class RecordingEntryView(View):
     """A recorded walk in a list. One that this server cannot read has an id, a time and a size."""
 
-    id: str = Field(
-        description="Identifier, as in `recordings` of a job.",
-        examples=["0f343b0931126a20f133d67c2b018a3b"],
-    )
+    id: RecordingId
     created_at: datetime = Field(description="When it was first stored.")
-    scenario: str | None = Field(
-        description="Name of its scenario; null if it cannot be read.", examples=["normal-fast"]
-    )
-    controller: str | None = Field(
-        description="Controller that drove it; null if it cannot be read.", examples=["fuzzy-pi"]
-    )
+    scenario: str | None = Field(description="Name of its scenario; null if unreadable.")
+    controller: str | None = Field(description="Controller that drove it; null if unreadable.")
     joints: int | None = Field(description="Joints whose currents were measured.", examples=[18])
     rows: int | None = Field(description="Rows.", examples=[1500])
     rate: float = Field(description="Rows a second [1/s].", examples=[500.0])
     seconds: float | None = Field(description="Time that is compared [s].", examples=[3.0])
     size: int = Field(description="Characters of the stored document.", examples=[206113])
-    synthetic: bool = Field(
-        description="Whether it was computed, not measured on a robot.", examples=[False]
-    )
+    synthetic: Synthetic
 
     @classmethod
     def from_entry(cls, entry: RecordingEntry) -> RecordingEntryView:
-        """Make a view of a recording in a list."""
         return cls(
             id=entry.id,
             created_at=entry.created_at,
@@ -104,29 +103,20 @@ class SignalView(View):
 
     name: str = Field(description="Its symbol, as in the headings.", examples=["I_M"])
     unit: str = Field(description="Unit.", examples=["A"])
-    description: str = Field(
-        description="What it is, for people.", examples=["absolute motor current"]
-    )
-    channels: int = Field(
-        description="Joints, legs or axes that were measured; 0 for a quantity that was not.",
-        examples=[18],
-    )
+    description: str = Field(description="Its meaning.", examples=["absolute motor current"])
+    channels: int = Field(description="Measured joints, legs or axes; 0 if it was not measured.")
 
 
 class MeasuredWalkView(View):
-    """What was read of a measured log, and the recording that was made of it."""
+    """Contents of a measured log, and the recording made of it."""
 
     recording: RecordingView = Field(description="The recording, for jobs to fit to.")
     rows: int = Field(description="Rows of the log, 500 a second.", examples=[2300])
     seconds: float = Field(description="Length of the log [s].", examples=[4.6])
     signals: list[SignalView] = Field(description="Every quantity that a log may have.")
-    offset: float = Field(
-        description="How much later the walk begins in the log than the simulated walk does [s].",
-        examples=[0.1],
-    )
+    offset: float = Field(description="Begin of the walk in the log, from the simulated one's [s].")
     cycles: int = Field(
-        description="Whole walking cycles that log and simulated walk share: those recorded.",
-        examples=[3],
+        description="Recorded cycles: whole ones that log and simulation share.", examples=[3]
     )
     cycle_time: float = Field(description="Time of a walking cycle [s].", examples=[1.5])
     correlation: float = Field(
@@ -134,26 +124,64 @@ class MeasuredWalkView(View):
         examples=[0.9998],
     )
 
-    @classmethod
-    def from_log(
-        cls, recording: RecordingView, log: MeasuredLog, pair: Synchronised
-    ) -> MeasuredWalkView:
-        """Make a view of what was read."""
-        return cls(
-            recording=recording,
-            rows=len(log.time),
-            seconds=len(log.time) * CONTROL_PERIOD,
+
+class MeasuredWalkRequest(DesignRequest):
+    """A measured log, and the design and scenario that it was measured with."""
+
+    scenario: ScenarioChoice = Field(
+        description="The walk: name or number of a preset (see /v1/scenarios), or your own, with as"
+        " many cycles as were measured."
+    )
+    log: str = Field(
+        min_length=1,
+        description="Text of the log: CSV with 500 rows a second and the unit in every heading, in"
+        " the format of docs/validation.md.",
+        examples=["time [s],q_D.right_front_coxa [rad]\n0.0,0.3217\n0.002,0.3218\n"],
+    )
+
+
+class ReadWalk(NamedTuple):
+    """The contents of a measured log; pair: its whole cycles, synchronised with simulated ones."""
+
+    log: MeasuredLog
+    pair: Synchronised
+    walk: RecordedWalk
+
+    def view(self, recording_id: str) -> MeasuredWalkView:
+        """Describe the log and its recording, stored under an id."""
+        return MeasuredWalkView(
+            recording=RecordingView.from_walk(recording_id, self.walk),
+            rows=len(self.log.time),
+            seconds=len(self.log.time) * CONTROL_PERIOD,
             signals=[
                 SignalView(
                     name=quantity.value,
                     unit=quantity.unit,
                     description=quantity.meaning,
-                    channels=len(log.channels(quantity)),
+                    channels=len(self.log.channels(quantity)),
                 )
                 for quantity in Quantity
             ],
-            offset=pair.lag_seconds,
-            cycles=pair.cycles,
-            cycle_time=pair.cycle_time,
-            correlation=pair.correlation,
+            offset=self.pair.lag_seconds,
+            cycles=self.pair.cycles,
+            cycle_time=self.pair.cycle_time,
+            correlation=self.pair.correlation,
         )
+
+
+def read_measured_walk(request: MeasuredWalkRequest) -> ReadWalk:
+    """Read a log, simulate the design, and find the lag between the two."""
+    request.check_design()
+    scenario, design = resolved(request.scenario), request.numbers
+    robot = load_robot(request.robot)
+    with simulation_errors("scenario"):
+        walk = MeasuredWalk.of(robot, scenario, request.controller, design)
+    # Before the simulation, which takes longer.
+    try:
+        log = parse_measured_log(request.log, robot)
+        with simulation_errors("scenario"):
+            simulated = walk.simulated()
+        pair = synchronise(log, simulated, walk.cycle_time)
+        return ReadWalk(log, pair, record(pair, scenario, request.controller, design))
+    except MeasuredLogError as error:
+        raise InvalidRequest(str(error), field="log") from error

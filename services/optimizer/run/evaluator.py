@@ -115,7 +115,11 @@ class Located(Protocol):
 
 
 def place_of(evaluator: object) -> str | None:
-    """Return where an evaluator simulates; None if unknown."""
+    """Return where an evaluator simulates; None if unknown.
+
+    Args:
+        evaluator: any `Evaluator`.
+    """
     return evaluator.place if isinstance(evaluator, Located) else None
 
 

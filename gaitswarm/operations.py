@@ -299,8 +299,6 @@ JobIdText = Annotated[
     str, Field(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9_-]+$", examples=["k2q7zr5dm9xw"])
 ]
 
-JobId = Annotated[JobIdText, Field(description="Id of the job, as POST /v1/jobs returned it.")]
-
 Index = Annotated[int, Field(ge=0, le=LARGEST_INDEX)]
 
 AfterIteration = Annotated[

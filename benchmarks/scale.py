@@ -116,7 +116,9 @@ def run_tasks(evaluator: RayEvaluator, slots: int, seconds: float) -> Tasks:
     vars(connection).update(_count=lambda _session: None, slots=slots)
     cases: Any = tuple(Sleep(f"sleep-{k}", seconds) for k in range(6))
     designs = -(-TASKS_PER_SLOT * slots // len(cases))
-    request = EvaluationRequest(f"{slots}", cases, np.zeros((designs, 2)), provenance_of())
+    request = EvaluationRequest(
+        f"{slots} {seconds}", cases, np.zeros((designs, 2)), provenance_of()
+    )
     before = processor_seconds("raylet/raylet"), processor_seconds("gcs_server")
     begun, own = time.perf_counter(), time.process_time()
     evaluator.evaluate(request, lambda: False)

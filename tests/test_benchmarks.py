@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from tests.examples.processes import python
 from tests.robots.known import QUADRUPEDS, urdf_of
 
 pytestmark = pytest.mark.thorough("benchmarks, which no job depends on")
@@ -140,3 +141,15 @@ def test_the_benchmark_of_statement_orders_compares_the_same_results(
     assert rows
     for row in rows:
         assert row["ratio"] == pytest.approx(row["as_derived"] / row["ordered"])
+
+
+@pytest.mark.slow
+def test_the_scale_benchmark_counts_the_costs_of_tasks_and_iterations() -> None:
+    """In a process of its own, as a process has one connection to Ray."""
+    options = ("--slots", "4", "--nodes", "1", "--cpus", "2", "--designs", "5", "--json")
+    done = python("-m", "benchmarks.scale", *options)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    (tasks,), (iterations,) = found["tasks"], found["iterations"]
+    assert tasks["tasks"] == 12
+    assert min(tasks["evaluator_ms"], iterations["iteration_ms"]) > 0.0

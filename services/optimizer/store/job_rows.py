@@ -43,6 +43,9 @@ _REMEDY: Final = (
     " job there; or submit a new one"
 )
 
+_LARGE_SPEC: Final = 65_536
+"""Length of a spec, in characters, from which it is parsed every time."""
+
 _DOCUMENTS: Final = ("spec", "provenance", "lineage")
 
 _SAME_NAME: Final = (
@@ -201,15 +204,18 @@ def shown_job(row: SqlRow[Any]) -> Job:
     """Build a job from the columns `SHOWN`. Equal documents are parsed once."""
     columns = dict(row._mapping)  # noqa: SLF001
     texts = [columns[name] for name in _DOCUMENTS]
+    small = len(texts[0]) < _LARGE_SPEC
     try:
-        return to_job(columns, _documents_from_text(*texts))
+        return to_job(columns, (_cached_documents if small else _documents_from_text)(*texts))
     except Unreadable:
         return to_job(columns | dict(zip(_DOCUMENTS, map(_parsed, texts), strict=True)))
 
 
-@lru_cache(maxsize=1024)
 def _documents_from_text(*texts: str | None) -> _Documents:
     return _read_documents(*map(_parsed, texts))
+
+
+_cached_documents: Final = lru_cache(maxsize=1024)(_documents_from_text)
 
 
 def _parsed(text: str | None) -> Any:

@@ -86,7 +86,8 @@ _PANELS: Final[dict[str, tuple[Callable[..., object] | str, ...]]] = {
     ),
     "Analysis of jobs": (
         *(analysis.rank, analysis.front, analysis.importance, analysis.scenarios),
-        *(analysis.preferences, "plot", evidence.export, evidence.evidence, evidence.verify),
+        *(analysis.failures, analysis.preferences, "plot"),
+        *(evidence.export, evidence.evidence, evidence.verify),
     ),
     "Designs": (compare.compare, certify.certify, robustness.robustness, firmware.firmware),
     "Robots and measurements": (

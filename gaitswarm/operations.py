@@ -63,6 +63,7 @@ from gaitswarm.services.optimizer.analysis.comparison import (
 )
 from gaitswarm.services.optimizer.analysis.distribution import DistributionView
 from gaitswarm.services.optimizer.analysis.evaluations import EvaluationView, evaluation_views
+from gaitswarm.services.optimizer.analysis.failures import FailuresView
 from gaitswarm.services.optimizer.analysis.front import FRONT_DESIGNS, MOST_FRONT_DESIGNS, FrontView
 from gaitswarm.services.optimizer.analysis.identifiability import IdentifiabilityView
 from gaitswarm.services.optimizer.analysis.importance import ImportanceView
@@ -513,7 +514,7 @@ def get_best(service: JobService, job_id: str) -> BestView:
     if best is None:
         raise NotFound(
             f"job {job_id} has no feasible design yet; try again after its next iteration, or see"
-            " the statuses of its evaluations"
+            " why designs fail by its failures"
         )
     return BestView.from_evaluation(best, job.spec)
 
@@ -752,6 +753,15 @@ def get_scenario_families(
     and for families of every size. From stored objectives; nothing is simulated.
     """
     return service.scenarios(job_id, tolerance=query.tolerance)
+
+
+@_operation("GET /jobs/{job_id}/failures", "analysis", "Get the failures of designs", heavy=True)
+def get_failures(service: JobService, job_id: str) -> FailuresView:
+    """Count failed designs by case and status, each with a design to replay, most failures first.
+
+    From stored statuses; nothing is simulated. For jobs of every kind.
+    """
+    return service.failures(job_id)
 
 
 @_operation(

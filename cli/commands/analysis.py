@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from gaitswarm.cli.output import Printed
     from gaitswarm.cli.rich_table import Table
     from gaitswarm.jobs.base import Jobs
+    from gaitswarm.services.optimizer.analysis.failures import FailuresView
     from gaitswarm.services.optimizer.analysis.front import (
         FrontView,
         FrontWinnerView,
@@ -311,6 +312,29 @@ def _importance_lines(view: ImportanceView) -> Iterator[str]:
             f"{variable.name}: the best design lies at the {variable.at} bound {bound:g}{unit};"
             f" {advice}"
         )
+
+
+def failures(job_id: JobId, *, jobs: Jobs) -> Printed:
+    """Show why designs of a job failed, by scenario, without simulation."""
+    view = jobs.failures(job_id)
+    return view, _failures(view)
+
+
+def _failures(view: FailuresView) -> Iterator[Table | str]:
+    """Yield statuses by case, most failures first, and the share of failed designs."""
+    rows = (
+        (
+            *(case.case, case.failed, case.alone),
+            *(ended.status, ended.designs, place(ended), ended.reason),
+        )
+        for case in view.cases
+        for ended in case.statuses
+    )
+    if view.cases:
+        heads = ["scenario", "failed", "in it\nalone", "<status", "designs", "latest", "<reason"]
+        yield table(heads, rows, gap=1)
+    recent = "" if view.recent is None else f"; {percent(view.recent, 2)} % of the latest quarter"
+    yield f"{view.failed} of {view.designs} designs failed in at least one scenario{recent}"
 
 
 def scenarios(

@@ -28,6 +28,7 @@ from gaitswarm.replay import WalkReplay, decoded_replay
 from gaitswarm.robustness_index import RobustnessOptions, RobustnessView
 from gaitswarm.services.optimizer.analysis.certificate import CertificateView
 from gaitswarm.services.optimizer.analysis.comparison import JobComparisonView
+from gaitswarm.services.optimizer.analysis.failures import FailuresView
 from gaitswarm.services.optimizer.analysis.front import FrontView
 from gaitswarm.services.optimizer.analysis.identifiability import IdentifiabilityView
 from gaitswarm.services.optimizer.analysis.importance import ImportanceView
@@ -545,6 +546,17 @@ class Jobs(ABC):
             Conflict: No design of it succeeds in all scenarios.
         """
         return self._call(operations.get_scenario_families, job_id, tolerance=tolerance)
+
+    def failures(self, job_id: str) -> FailuresView:
+        """Count the failed designs of a job by case and status; nothing is simulated.
+
+        Args:
+            job_id: Identifier of a job of any kind.
+
+        Returns:
+            Cases with failures, most failures first; each status with its latest design.
+        """
+        return self._call(operations.get_failures, job_id)
 
     def importance(self, job_id: str) -> ImportanceView:
         """Determine which variables of a job matter; nothing is simulated.

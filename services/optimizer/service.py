@@ -24,6 +24,7 @@ from gaitswarm.services.optimizer.analysis.distribution import (
     DistributionView,
     distribution,
 )
+from gaitswarm.services.optimizer.analysis.failures import FailuresView, failures
 from gaitswarm.services.optimizer.analysis.fork import (
     Parent,
     check_begun,
@@ -324,6 +325,11 @@ class JobService:
         require_success(job_id, judged)
         names = [scenario.name for scenario in spec.resolved_scenarios()]
         return scenario_families(columns, judged, names, tolerance=tolerance)
+
+    def failures(self, job_id: str) -> FailuresView:
+        """Count a job's failed designs by case and status."""
+        job = self.job(job_id)
+        return failures(self.columns(job), job.spec.case_names)
 
     def importance(self, job_id: str) -> ImportanceView:
         """Estimate which variables of a job matter."""

@@ -30,7 +30,6 @@ export function toggleTheme(): void {
   changed()
 }
 
-/** The current theme as component state. */
 export function useTheme(): Theme {
   const [theme, setTheme] = useState(currentTheme)
   useEffect(() => {

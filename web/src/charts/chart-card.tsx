@@ -16,7 +16,6 @@ interface ChartCardProps {
   note?: string
   /** The chart's numbers; rendered on demand. */
   table: () => ComponentChildren
-  /** All numbers of the chart, if the table holds only some of them. */
   data?: () => DataTable
   tools?: ComponentChildren
   legend?: ComponentChildren
@@ -95,14 +94,11 @@ export function LegendEntry({ colour, label, area = false }: LegendEntryProps) {
 export interface LineCardProps
   extends LineChartProps,
     Pick<ChartCardProps, 'title' | 'note' | 'tools' | 'legend'> {
-  /** Caption of the table. */
   readonly caption: string
   readonly order?: SortOrder
-  /** Text of a value in the table. */
   readonly format?: (value: number | null) => string
 }
 
-/** A line chart whose table and legend list its series. */
 export function LineCard({ title, note, tools, caption, order, ...props }: LineCardProps) {
   const { legend, format = (value) => formatNumber(value, 5), ...chart } = props
   const { x, xLabel, xUnit, yUnit, series } = chart

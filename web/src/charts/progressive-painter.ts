@@ -3,7 +3,6 @@
 import { BUCKETS, FAILED, type ParallelModel } from './parallel/parallel-model'
 
 export interface Palette {
-  /** Colours from best to worst. */
   readonly buckets: readonly string[]
   readonly failed: string
 }
@@ -28,7 +27,6 @@ export class ProgressivePainter {
 
   constructor(
     private readonly canvas: HTMLCanvasElement,
-    /** Called with the number of rows drawn. */
     private readonly progress: (drawn: number, of: number) => void,
   ) {
     // A software canvas: without a GPU, thousands of thin lines are slow on an accelerated one.
@@ -62,7 +60,6 @@ export class ProgressivePainter {
     })
   }
 
-  /** Adapt the batch size to the duration of the last frame. */
   private adapt(now: number): void {
     const took = this.before === 0 ? SLOW_FRAME_MS : now - this.before
     this.before = now

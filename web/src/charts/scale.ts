@@ -13,7 +13,6 @@ export function shareOf({ low, high, logarithmic }: Scale, value: number): numbe
   return logarithmic ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low)
 }
 
-/** Inverse of shareOf. */
 export function valueAt({ low, high, logarithmic }: Scale, share: number): number {
   return logarithmic ? low * (high / low) ** share : low + share * (high - low)
 }

@@ -18,7 +18,6 @@ import './compare.css'
 
 /** Polling interval while a job is active [ms]. */
 const RENEW_MS = 4000
-/** Most jobs named in the title. */
 const NAMED = 3
 
 export default function ComparePage() {

@@ -116,7 +116,6 @@ export function HeatMap({ layer, cell, onCell }: HeatMapProps) {
   )
 }
 
-/** The area of the cells. */
 function areaOf(width: number): Box {
   const left = Math.min(68, 0.2 * width)
   return { left, top: 8, width: width - left - 10, height: HEIGHT - 52 }
@@ -149,7 +148,6 @@ function drawCells(context: Context, area: Box, { values, limit }: Layer, theme:
   context.strokeRect(area.left, area.top, area.width, area.height)
 }
 
-/** A cross through the selected cell. */
 function drawCross(context: Context, area: Box, { values }: Layer, cell: Cell): void {
   const [wide, high] = [area.width / values.length, area.height / values[0].length]
   const x = area.left + cell.error * wide

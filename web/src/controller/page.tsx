@@ -183,7 +183,6 @@ function ControlLaw({ design: { controller, design } }: { design: ResolvedDesign
   )
 }
 
-/** The design's values with their meanings and search bounds. */
 function DesignCard({ design: { controller, design } }: { design: ResolvedDesign }) {
   const common = variablesOf(controller)
   const variables = [...common, ...ofLegGroups(common, Object.keys(design))]
@@ -204,7 +203,6 @@ function DesignCard({ design: { controller, design } }: { design: ResolvedDesign
   )
 }
 
-/** Bounds, or choices. */
 function searched({ low, high, choices = [] }: Variable): string {
   if (choices.length > 0) return choices.map(inWords).join(', ')
   return `${formatExact(low)} to ${formatExact(high)}`

@@ -30,7 +30,6 @@ import type { Cell, Layer } from './surface'
 /** Half the edge lengths of the box that the surface fills. */
 const HALF = { error: 0.75, current: 0.55, value: 0.36 } as const
 
-/** Number of grid lines across each axis. */
 const NET = 16
 
 const TEXT = 0.075
@@ -77,7 +76,6 @@ export class SurfaceScene {
     this.mark(cell)
   }
 
-  /** Move the marker to a cell. */
   mark(cell: Cell): void {
     this.cell = cell
     this.marker.position.copy(placeOf(this.layer, this.cell.error, this.cell.current))
@@ -102,7 +100,6 @@ export class SurfaceScene {
     this.request()
   }
 
-  /** Render immediately. */
   render(): void {
     this.renderer.render(this.scene, this.rig.camera)
   }

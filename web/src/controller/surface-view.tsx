@@ -18,7 +18,6 @@ const LAYER = oneOf<Layer['key']>(['inference', 'table', 'difference'], 'inferen
 
 interface SurfaceViewProps {
   layers: readonly Layer[]
-  /** Name of the output. */
   name: string
   cell: Cell
 }

@@ -11,7 +11,6 @@ export type Universe = Schemas['UniverseView']
 export type Output = Schemas['FuzzyOutputView']
 export type Rule = Schemas['RuleView']
 
-/** Values by error, then by current. */
 export type Matrix = readonly (readonly number[])[]
 
 /** A grid point, by index. */
@@ -73,7 +72,6 @@ export function inputOf(surface: SurfaceView, name: string): Universe {
   return match
 }
 
-/** Minimum and maximum of a matrix. */
 export function extent(values: Matrix): readonly [low: number, high: number] {
   let [low, high] = [Number.POSITIVE_INFINITY, Number.NEGATIVE_INFINITY]
   for (const row of values) {
@@ -85,7 +83,6 @@ export function extent(values: Matrix): readonly [low: number, high: number] {
   return [low, high]
 }
 
-/** Number of values. */
 export function cells(values: Matrix): number {
   return values.reduce((sum, row) => sum + row.length, 0)
 }
@@ -112,7 +109,6 @@ export function moved(cell: Cell, errors: number, currents: number, layer: Layer
   }
 }
 
-/** Index of the nearest value. */
 export function nearest(values: readonly number[], value: number): number {
   return values.reduce(
     (best, v, k) => (Math.abs(v - value) < Math.abs(values[best] - value) ? k : best),
@@ -137,7 +133,6 @@ export function indexOf(input: Universe, surface: SurfaceView, cell: Cell): numb
   return nearest(input.values, surface.velocity_error ?? 0)
 }
 
-/** A rule as a sentence. */
 export function ruleText(rule: Rule, output: string): string {
   const conditions = Object.entries(rule.if).map(([name, set]) => `${name} is ${set}`)
   return `If ${conditions.join(' and ')}, then ${output} is ${rule.then}`

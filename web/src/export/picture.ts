@@ -15,14 +15,12 @@ interface Picture {
 const LEFT_OUT =
   '[data-not-drawn], .visually-hidden, button:not(th > button), select, input, details, .readout, .u-select, [class*="u-cursor"]'
 
-/** Style properties of copied drawings. */
 const COPIED = 'fill fill-opacity stroke stroke-width stroke-dasharray vector-effect opacity'.split(
   ' ',
 )
 
 const ROOM = 12
 
-/** card: a rendered element. */
 export function pictureOf(card: HTMLElement): Picture {
   const scrolled = [...card.querySelectorAll('.parallel-scroll')].map(
     (box) => [box, box.scrollLeft] as const,

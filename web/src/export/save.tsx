@@ -14,13 +14,10 @@ export type Kind = 'csv' | 'svg' | 'png'
 export interface Chart {
   readonly title: string
   readonly card: HTMLElement
-  /** The chart's numbers as tables. */
   readonly table: () => ComponentChildren
-  /** All numbers of the chart, if the table holds only some of them. */
   readonly data?: () => DataTable
 }
 
-/** Save a chart; several tables become several files. */
 export async function saveChart(kind: Kind, chart: Chart): Promise<void> {
   const stem = fileStem(pageName(), chart.title)
   if (kind === 'csv') {
@@ -38,7 +35,6 @@ export async function saveChart(kind: Kind, chart: Chart): Promise<void> {
   saveFile(blob, `${stem}.${kind}`)
 }
 
-/** Download a file. */
 export function saveFile(content: Blob, name: string): void {
   const address = URL.createObjectURL(content)
   const link = document.createElement('a')

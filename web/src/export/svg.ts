@@ -53,7 +53,6 @@ export class SvgContext {
   textAlign = 'left'
   textBaseline = 'alphabetic'
   lineJoin = 'miter'
-  /** Elements drawn so far. */
   readonly parts: string[] = []
   private path = ''
   private matrix: Matrix = [1, 0, 0, 1, 0, 0]
@@ -199,7 +198,6 @@ export class SvgContext {
     return `${short(a * x + c * y + e)} ${short(b * x + d * y + f)}`
   }
 
-  /** Scale factor of lengths. */
   private get size(): number {
     return Math.hypot(this.matrix[0], this.matrix[1])
   }

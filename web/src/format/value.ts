@@ -6,7 +6,6 @@ import { inWords } from './words'
 /** A number, or the name of a choice of a categorical variable. */
 export type Value = number | string
 
-/** Values by variable. */
 export type Design = Readonly<Record<string, Value>>
 
 /** A number format that writes names in words. */

@@ -2,7 +2,6 @@
 
 import { useEffect, useState } from 'preact/hooks'
 
-/** Path and query of the address. */
 export interface Place {
   readonly path: string
   readonly query: URLSearchParams
@@ -35,7 +34,6 @@ export function setQuery(changes: QueryChanges, { replace = true } = {}): void {
   navigate(text === '' ? location.pathname : `${location.pathname}?${text}`, { replace })
 }
 
-/** The current place as component state. */
 export function usePlace(): Place {
   const [href, setHref] = useState(location.pathname + location.search)
   useEffect(() => {

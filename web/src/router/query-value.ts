@@ -4,11 +4,8 @@ import { useEffect, useRef, useState } from 'preact/hooks'
 import { ignore } from './ignored'
 import { setQuery } from './navigation'
 
-/** Conversion between values and query text. */
 export interface Codec<T> {
-  /** Undefined for invalid text. */
   readonly read: (text: string) => T | undefined
-  /** Null for values that are omitted. */
   readonly write: (value: T) => string | null
 }
 
@@ -62,7 +59,6 @@ export function oneOf<K extends string>(words: readonly K[], initial: K): Codec<
   }
 }
 
-/** Distinct ids, separated by commas. */
 export function idsOf(text: string | null): string[] {
   return [...new Set((text ?? '').split(/[\s,]+/))].filter((id) => id !== '')
 }

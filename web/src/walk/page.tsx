@@ -167,10 +167,8 @@ function addressOf(query: URLSearchParams) {
 }
 
 interface ScenarioPickerProps {
-  /** Scenarios of the design's job. */
   jobScenarios: readonly Scenario[]
   presets: readonly ScenarioPreset[]
-  /** Name of the chosen scenario. */
   chosen: string
 }
 
@@ -204,7 +202,6 @@ function ScenarioPicker({ jobScenarios, presets, chosen }: ScenarioPickerProps) 
   )
 }
 
-/** Name of a scenario with its distinguishing parameters. */
 function described(scenario: Scenario | ScenarioPreset): string {
   const { name, cycle_time, load, slope, turn, direction, drop, stuck_leg, shove } = scenario
   const parts = [

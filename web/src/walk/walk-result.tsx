@@ -8,7 +8,6 @@ import { inWords, sentence } from '../format/words'
 import type { Recorded } from './replay/recorded'
 import type { Replay } from './replay/replay'
 
-/** Descriptions of the objectives (table 4.1). */
 const MEANINGS: Readonly<Record<string, string>> = {
   torque: 'rms of the summed gear torques',
   acceleration: "rms of the body's acceleration",
@@ -18,7 +17,6 @@ const MEANINGS: Readonly<Record<string, string>> = {
   height_loss: "body's height at the start minus that at the end",
 }
 
-/** Notices for walks that did not finish. */
 export function FailureNotices({ walks }: { walks: readonly Recorded[] }) {
   const failed = walks.filter(({ replay }) => replay.header.status !== 'ok')
   return failed.map(({ label, replay }) => (

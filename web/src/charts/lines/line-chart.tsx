@@ -25,7 +25,6 @@ export interface Series {
   /** Line width [px]; 0 draws no line, as for the edges of a band. */
   readonly width?: number
   readonly dash?: readonly number[]
-  /** Hold each value until the next. */
   readonly stepped?: boolean
 }
 
@@ -38,7 +37,6 @@ export interface Band {
 }
 
 export interface LineChartProps {
-  /** Description for screen readers. */
   readonly label: string
   readonly x: ArrayLike<number>
   readonly xLabel: string
@@ -53,13 +51,10 @@ export interface LineChartProps {
   readonly counted?: boolean
   /** Margin before the first and after the last x, in the unit of x. */
   readonly xMargin?: number
-  /** Start the y axis at zero. */
   readonly fromZero?: boolean
   /** Range of the y axis; fitted to the values by default. */
   readonly yRange?: readonly [number, number] | null
-  /** Draw behind the lines. */
   readonly paint?: (plot: uPlot) => void
-  /** Draw over the lines. */
   readonly paintOver?: (plot: uPlot) => void
   /** Height [px] at the default font size; scales with the font size. */
   readonly height?: number
@@ -73,7 +68,6 @@ export interface LineChartProps {
   readonly sync?: string
 }
 
-/** Tick steps of an integer axis. */
 const WHOLE_STEPS = [0, 1, 2, 3, 4, 5, 6].flatMap((power) =>
   [1, 2, 5].map((factor) => factor * 10 ** power),
 )
@@ -148,7 +142,6 @@ function shapeOf(props: LineChartProps) {
   return JSON.stringify([lines, bands, axes])
 }
 
-/** Replace the data and keep the zoom. */
 function renew(plot: uPlot, data: uPlot.AlignedData, requested: Zoom) {
   const zoom = requested ?? zoomOf(plot)
   if (!zoom) {

@@ -16,7 +16,6 @@ export function lineLabel({ label, fitness }: ReferenceLine): string {
   return `${label} ${formatNumber(fitness)}`
 }
 
-/** Draw the line if it is in the visible range. */
 export function paintReference(plot: uPlot, reference: ReferenceLine): void {
   const { ctx, bbox } = plot
   // On whole pixels, so that the line is sharp.

@@ -6,7 +6,6 @@ import './isolines.css'
 /** Position as shares of both axes, from the lower left. */
 type Place = readonly [x: number, y: number]
 
-/** All segments of one level. */
 interface Isoline {
   readonly level: number
   readonly pieces: readonly (readonly [from: Place, to: Place])[]

@@ -36,16 +36,13 @@ interface PairMapProps {
   model: ParallelModel
   /** Selected rows, in the model's order. */
   rows: Uint32Array
-  /** Indices of the axes. */
   x: number
   y: number
   /** Show the mean rank by cell instead of points. */
   asCells: boolean
-  /** Show lines of equal mean rank. */
   isolines: boolean
   /** Selected ranges of the two axes; null for all. */
   brushes: readonly [Brush | null, Brush | null]
-  /** Highlighted row. */
   chosen: number | null
   label: string
   onSelect: (x: Brush, y: Brush) => void

@@ -15,7 +15,6 @@ import { nearest, shareOf, type Tick, ticksOf, valueAt } from '../scale'
 /** Rows considered; the first of the shuffled order, a fair sample. */
 export const SAMPLE = 4000
 
-/** Columns and rows of cells. */
 export const CELLS = 14
 
 export interface Cell {
@@ -27,7 +26,6 @@ export interface Cell {
   readonly bucket: number | null
 }
 
-/** Sample of the given rows, in the model's order. */
 export function sampleOf(rows: Uint32Array): Uint32Array {
   return rows.subarray(0, SAMPLE)
 }

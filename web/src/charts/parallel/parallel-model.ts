@@ -24,11 +24,9 @@ export interface Axis extends Scale {
   readonly places: Float32Array
 }
 
-/** A range of positions on an axis. */
 export type Brush = readonly [low: number, high: number]
 
 export const BUCKETS = 12
-/** Bucket of rows without a fitness. */
 export const FAILED = 255
 
 export interface ParallelModel {

@@ -19,12 +19,10 @@ export interface Cloud {
   readonly x: ArrayLike<number>
   readonly y: ArrayLike<number>
   readonly colour: `--${string}`
-  /** Radius [px]. */
   readonly radius: number
   readonly opacity: number
 }
 
-/** A labelled point. */
 export interface Mark {
   readonly x: number
   readonly y: number
@@ -34,7 +32,6 @@ export interface Mark {
 }
 
 interface ScatterProps {
-  /** Description for screen readers. */
   readonly label: string
   readonly xLabel: string
   readonly xUnit: string
@@ -121,7 +118,6 @@ export function Scatter(props: ScatterProps) {
   )
 }
 
-/** The area between the axes. */
 function areaOf(width: number, height: number, em: number, y: Scale): Box {
   const longest = Math.max(3, ...ticksOf(y).map(([, text]) => text.length))
   const left = Math.ceil(longest * 0.5 * em + 2.2 * em)
@@ -215,10 +211,8 @@ export function scaleOf(columns: readonly ArrayLike<number>[], logarithmic: bool
   return { low: low - room, high: high + room, logarithmic: false }
 }
 
-/** A label to place near a point. */
 interface Name {
   readonly at: readonly [number, number]
-  /** Width of the text [px]. */
   readonly width: number
 }
 

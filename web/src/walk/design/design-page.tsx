@@ -43,13 +43,10 @@ export function DesignPage<A>({ title, path, read, children }: DesignPageProps<A
 interface DesignHeadingProps {
   title: string
   path: string
-  /** Null while loading. */
   design: ResolvedDesign | null
-  /** Further parts of the document title. */
   details?: readonly string[]
 }
 
-/** Heading and breadcrumbs, below the job of the design. */
 export function DesignHeading({ title, path, design, details = [] }: DesignHeadingProps) {
   const progress = useProgress(design?.job)
   const shown = design ? [[design.label, ...details].join(', ')] : []

@@ -9,7 +9,6 @@ import { type DesignSource, sourceOfWord, wordOf } from './design-source'
 interface DesignPickerProps {
   label: string
   chosen: DesignSource | null
-  /** Label of the chosen design. */
   chosenLabel: string
   /** Label of choosing no design; required choice if missing. */
   none?: string

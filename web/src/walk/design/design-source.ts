@@ -8,7 +8,6 @@ export type DesignSource =
   | { readonly controller: string | null; readonly published: string }
   | { readonly controller: string; readonly design: Design }
 
-/** Default: the thesis's optimum A. */
 export const DEFAULT_SOURCE: DesignSource = { controller: 'fuzzy-pi', published: 'A' }
 
 /** An invalid address; the message describes the expected form. */

@@ -8,15 +8,12 @@ import { placeWord } from '../../format/place'
 import type { Design } from '../../format/value'
 import type { DesignSource } from './design-source'
 
-/** A design with everything needed to simulate it. */
 export interface ResolvedDesign {
   readonly source: DesignSource
-  /** For headings and legends. */
   readonly label: string
   readonly robot: JobSpec['robot']
   readonly controller: Controller
   readonly design: Design
-  /** Perturbations of the model, by name. */
   readonly world?: Readonly<Record<string, number>>
   readonly job?: Job
   /** Scenarios of its job; empty without a job. */

@@ -15,9 +15,7 @@ const LOOKS: readonly (readonly [ViewName, string])[] = [
 
 interface PlayerControlsProps {
   playback: Playback
-  /** Whether two walks are compared. */
   comparing: boolean
-  /** Whether meshes are available. */
   meshed: boolean
   options: SceneOptions
   onOptions: (options: SceneOptions) => void
@@ -123,7 +121,6 @@ function Transport({ playback }: { playback: Playback }) {
   )
 }
 
-/** Playback speed, as a multiple of real time. */
 export function SpeedField({ playback, speed }: { playback: Playback; speed: number }) {
   return (
     <Select

@@ -2,7 +2,6 @@
 
 import type { Playback } from './playback'
 
-/** Camera movements. */
 export interface View {
   turn(around: number, up: number): void
   zoom(factor: number): void

@@ -124,7 +124,6 @@ class ReplayDriver {
     this.publish()
   }
 
-  /** Schedule a redraw. */
   request(): void {
     this.requested ||= requestAnimationFrame((now) => this.draw(now / 1000))
   }

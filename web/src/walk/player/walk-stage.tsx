@@ -26,10 +26,8 @@ interface WalkStageProps {
   /** Identity of the walk; another name loads another walk. */
   name: string
   record: (signal: AbortSignal) => Promise<Recorded>
-  /** Description for screen readers. */
   label: string
   visible: boolean
-  /** Called when the walk has been loaded. */
   onWalked?: (replay: Replay) => void
 }
 

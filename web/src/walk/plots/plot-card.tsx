@@ -78,7 +78,6 @@ function PlotLegend({ series, curves, frame, unit }: PlotLegendProps) {
   })
 }
 
-/** Round numerical noise to zero. */
 function rounded(value: number | null): number | null {
   return value !== null && Math.abs(value) < 1e-6 ? 0 : value
 }

@@ -11,7 +11,6 @@ export interface Curve {
   readonly channel: string
   readonly index: number
   readonly colour: `--${string}`
-  /** Thin line, for desired values. */
   readonly thin?: boolean
 }
 

@@ -19,7 +19,6 @@ const UNSEEN = 0.5
 /** Grid spacing as a share of the span, before rounding. */
 const CELL = 0.18
 
-/** Extent of the largest robot in every direction. */
 export function extentOf(replays: readonly Replay[]): Extent {
   const edges = [0, 0, 0]
   for (const replay of replays) {

@@ -5,7 +5,6 @@ import type { Scenario } from '../../api/types'
 import type { ResolvedDesign } from '../design/resolve-design'
 import { parseReplay, type Replay } from './replay'
 
-/** The parts of a design needed to simulate it. */
 export type WalkingDesign = Pick<ResolvedDesign, 'label' | 'robot' | 'design' | 'world'> & {
   readonly controller: { readonly name: string }
 }

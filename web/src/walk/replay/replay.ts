@@ -9,7 +9,6 @@ export type Shape = Schemas['ShapeView']
 export type LinkMesh = Schemas['LinkMeshView']
 export type Channel = Schemas['ChannelView']
 
-/** Supported version of the format. */
 const REPLAY_VERSION = 1
 
 /** Required channels; charts of other missing channels are omitted. */
@@ -20,7 +19,6 @@ export class ReplayFormatError extends Error {
   override readonly name = 'ReplayFormatError'
 }
 
-/** A recorded walk. */
 export class Replay {
   /** Numbers per frame. */
   readonly stride: number
@@ -109,7 +107,6 @@ export class Replay {
   }
 }
 
-/** Whether the robot's URDF refers to meshes. */
 export function hasMeshes({ robot }: ReplayHeader): boolean {
   return robot.urdf !== null && robot.links.some(({ meshes }) => meshes.length > 0)
 }
@@ -154,7 +151,6 @@ function parseHeader(text: string): ReplayHeader {
   }
 }
 
-/** Numbers of a channel per frame. */
 function sizeOf({ shape }: Channel): number {
   return shape.reduce((product, n) => product * n, 1)
 }

@@ -40,7 +40,6 @@ export class CameraRig {
 
   constructor(
     canvas: HTMLCanvasElement,
-    /** Span of the robot [m]. */
     private readonly span: number,
     onChange: () => void,
   ) {
@@ -105,14 +104,12 @@ export class CameraRig {
     this.onPlaced(from === 'three-quarter' && this.following ? null : this.place)
   }
 
-  /** Rotate about the target [rad]. */
   turn(around: number, up: number): void {
     this.controls.rotateLeft(-around)
     this.controls.rotateUp(up)
     this.onPlaced(this.place)
   }
 
-  /** Zoom in by a factor. */
   zoom(factor: number): void {
     this.controls.dollyIn(1 / factor)
     this.onPlaced(this.place)

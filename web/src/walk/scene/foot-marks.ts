@@ -38,7 +38,6 @@ export class FootMarks {
     private readonly scale: number,
     /** Height of discs above the ground [m]; differs between walks, to avoid flicker. */
     private readonly height: number,
-    /** Span of the robot [m]. */
     span: number,
   ) {
     const legs = replay.header.robot.legs.length
@@ -53,7 +52,6 @@ export class FootMarks {
     }
   }
 
-  /** Show the feet at a time [s]. */
   show(time: number): void {
     this.replay.sample('foot_position', time, this.positions)
     this.replay.sample('foot_force', time, this.forces)

@@ -45,7 +45,6 @@ export function facingText(text: string, colour: string, height: number): Sprite
   return sprite
 }
 
-/** Aspect ratio of a texture. */
 export function proportion(texture: CanvasTexture): number {
   return texture.image.width / texture.image.height
 }

@@ -18,7 +18,6 @@ import type { LinkMesh, ReplayHeader } from '../replay/replay'
 import { disposeTree } from './renderer'
 
 export interface LoadedMesh {
-  /** Index of its link. */
   readonly link: number
   readonly object: Object3D
 }
@@ -103,7 +102,6 @@ function text(bytes: ArrayBuffer): string {
   return new TextDecoder().decode(bytes)
 }
 
-/** Apply the URDF's origin, scale and colour. */
 function placed(object: Object3D, { origin, scale, colour }: LinkMesh): Object3D {
   object.position.fromArray(origin)
   object.quaternion.fromArray(origin, 3)

@@ -2,7 +2,6 @@
 
 import { type Material, type Object3D, PCFShadowMap, Texture, WebGLRenderer } from 'three'
 
-/** Names of software renderers. */
 const SOFTWARE = /swiftshader|llvmpipe|software|basic render/i
 
 /** Throws without WebGL 2. */
@@ -15,7 +14,6 @@ export function createRenderer(): WebGLRenderer {
   return renderer
 }
 
-/** Queried from a temporary context. */
 function isSoftware(): boolean {
   const context = document.createElement('canvas').getContext('webgl2')
   if (!context) throw new Error('This browser does not support WebGL 2.')

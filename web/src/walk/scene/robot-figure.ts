@@ -18,7 +18,6 @@ import { RoundedBoxGeometry } from 'three/examples/jsm/geometries/RoundedBoxGeom
 import type { Replay, Shape } from '../replay/replay'
 import type { FigurePalette, Palette } from './palette'
 
-/** Parts with a common colour. */
 type Part = 'frame' | 'accent' | 'limb' | 'joint' | 'load'
 
 const PARTS: Readonly<Record<Shape['role'], Part>> = {
@@ -33,7 +32,6 @@ const PARTS: Readonly<Record<Shape['role'], Part>> = {
 /** Numbers per pose: x y z [m] and a unit quaternion x y z w. */
 const POSE = 7
 
-/** Opacity of the ghost walk. */
 const GHOST = 0.38
 
 export class RobotFigure {
@@ -70,7 +68,6 @@ export class RobotFigure {
     }
   }
 
-  /** Move the links to a time [s]. */
   show(time: number): void {
     const { values } = this.replay
     const { a, b, share } = this.replay.around('link_pose', time)
@@ -92,7 +89,6 @@ export class RobotFigure {
     for (const part of Object.keys(each) as Part[]) this.materials[part].color.copy(each[part])
   }
 
-  /** Make the robot transparent or opaque. */
   setGhost(ghost: boolean): void {
     this.ghost = ghost
     for (const material of [...Object.values(this.materials), ...this.meshMaterials()]) {
@@ -140,7 +136,6 @@ export class RobotFigure {
     }
   }
 
-  /** Add a stripe that marks the front. */
   private markFront(body: Mesh, [length, width, height]: readonly number[]): void {
     const stripe = this.mesh(new BoxGeometry(0.16 * length, 0.62 * width, 0.02 * height), 'accent')
     stripe.position.set(0.34 * length, 0, 0.51 * height)

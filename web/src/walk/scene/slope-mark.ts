@@ -37,7 +37,6 @@ export class SlopeMark {
     private readonly degrees: number,
     /** Uphill unit vector in the scene's frame. */
     uphill: Vector3,
-    /** Span of the robot [m]. */
     private readonly span: number,
   ) {
     const level = uphill.clone().setZ(0).normalize()
@@ -60,7 +59,6 @@ export class SlopeMark {
     this.corner.copy(corner)
   }
 
-  /** Follow the target. */
   moveTo(target: Vector3): void {
     this.object.position.addVectors(target, this.corner)
   }

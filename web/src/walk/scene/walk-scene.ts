@@ -194,7 +194,6 @@ export class WalkScene {
     return count
   }
 
-  /** Apply the page's colours. */
   recolour(): void {
     const colours = palette()
     this.scene.background = colours.background
@@ -258,7 +257,6 @@ export class WalkScene {
     this.renderer.render(this.scene, this.rig.camera)
   }
 
-  /** Release all resources; the scene cannot be used afterwards. */
   dispose(): void {
     this.rig.controls.dispose()
     this.sun.dispose()
@@ -301,7 +299,6 @@ function laneOf(replay: Replay, feet: FootMarks): Lane {
   return { replay, group, figure, feet, trail }
 }
 
-/** Path of the body. */
 function trailOf(replay: Replay): Lane['trail'] {
   const points = [0, 1, 2].map((i) => replay.column('link_pose', i))
   const places = Float32Array.from(

@@ -6,13 +6,13 @@ import { Empty } from './components/feedback'
 import icon from './icon.svg'
 import { JobsPage } from './jobs/page'
 import { Keys } from './palette/keys'
-import { forgetIgnored, IgnoredNotice } from './router/ignored'
+import { setTitle } from './router/breadcrumbs'
 import { lazyPage } from './router/lazy-page'
 import { usePlace } from './router/navigation'
+import { forgetIgnored, IgnoredNotice } from './router/query-value'
 import { type Route, routeOf } from './router/routes'
 import { SignIn, useManual, useUnauthorized } from './session/session'
 import { toggleTheme, useTheme } from './theme'
-import { setTitle } from './title'
 
 const NewJobPage = lazyPage('the form', () => import('./submission/page'))
 const JobPage = lazyPage('the job', () => import('./job/page'))

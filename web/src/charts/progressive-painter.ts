@@ -3,6 +3,7 @@
 import { BUCKETS, FAILED, type ParallelModel } from './parallel/parallel-model'
 
 export interface Palette {
+  /** From best to worst. */
   readonly buckets: readonly string[]
   readonly failed: string
 }
@@ -14,101 +15,61 @@ const FIRST_PART = 800
 const LEAST_PART = 100
 const LARGEST_PART = 6000
 
-/** Draw a first batch at once and one per frame afterwards; a new call to `paint` starts over. */
-export class ProgressivePainter {
-  private readonly context: CanvasRenderingContext2D
-  private rows: Uint32Array = new Uint32Array()
-  private model: ParallelModel | null = null
-  private palette: Palette | null = null
-  private drawn = 0
-  private part = FIRST_PART
-  private frame = 0
-  private before = 0
-
-  constructor(
-    private readonly canvas: HTMLCanvasElement,
-    private readonly progress: (drawn: number, of: number) => void,
-  ) {
-    // A software canvas: without a GPU, thousands of thin lines are slow on an accelerated one.
-    this.context = canvas.getContext('2d', { willReadFrequently: true })!
-  }
-
-  paint(model: ParallelModel, rows: Uint32Array, palette: Palette): void {
-    this.model = model
-    this.rows = rows
-    this.palette = palette
-    this.drawn = 0
-    this.context.clearRect(0, 0, this.canvas.width, this.canvas.height)
-    cancelAnimationFrame(this.frame)
-    this.before = 0
-    this.step()
-  }
-
-  stop(): void {
-    cancelAnimationFrame(this.frame)
-  }
-
-  private step(): void {
-    const end = Math.min(this.rows.length, this.drawn + this.part)
-    this.drawLines(this.rows.subarray(this.drawn, end))
-    this.drawn = end
-    this.progress(end, this.rows.length)
-    if (end === this.rows.length) return
-    this.frame = requestAnimationFrame((now) => {
-      this.adapt(now)
-      this.step()
+/** Draw a first batch of rows at once and one per frame afterwards; returns a function to stop. */
+export function paintProgressively(
+  canvas: HTMLCanvasElement,
+  model: ParallelModel,
+  rows: Uint32Array,
+  palette: Palette,
+): () => void {
+  // A software canvas: without a GPU, thousands of thin lines are slow on an accelerated one.
+  const context = canvas.getContext('2d', { willReadFrequently: true })!
+  context.clearRect(0, 0, canvas.width, canvas.height)
+  let [drawn, part, frame, before] = [0, FIRST_PART, 0, 0]
+  const step = () => {
+    const end = Math.min(rows.length, drawn + part)
+    drawLines(context, model, rows.subarray(drawn, end), rows.length, palette)
+    drawn = end
+    canvas.dataset.drawn = String(end)
+    canvas.dataset.rows = String(rows.length)
+    if (end === rows.length) return
+    frame = requestAnimationFrame((now) => {
+      const took = before === 0 ? SLOW_FRAME_MS : now - before
+      before = now
+      if (took > SLOW_FRAME_MS) part = Math.round(Math.max(LEAST_PART, part * 0.6))
+      else if (took < QUICK_FRAME_MS) part = Math.round(Math.min(LARGEST_PART, part * 1.3))
+      step()
     })
   }
-
-  private adapt(now: number): void {
-    const took = this.before === 0 ? SLOW_FRAME_MS : now - this.before
-    this.before = now
-    if (took > SLOW_FRAME_MS) this.part = Math.max(LEAST_PART, this.part * 0.6)
-    else if (took < QUICK_FRAME_MS) this.part = Math.min(LARGEST_PART, this.part * 1.3)
-    this.part = Math.round(this.part)
-  }
-
-  /** Draw the worst first, so that the best are on top; one stroke per colour. */
-  private drawLines(rows: Uint32Array): void {
-    const { axes, buckets } = this.model!
-    const { context, canvas, palette } = this
-    const groups = new Map<number, number[]>()
-    for (const row of rows) {
-      const bucket = buckets[row]
-      const group = groups.get(bucket)
-      if (group) group.push(row)
-      else groups.set(bucket, [row])
-    }
-    const gap = canvas.width / axes.length
-    const margin = 3 * devicePixelRatio
-    const height = canvas.height - 2 * margin
-    context.lineWidth = devicePixelRatio * (this.rows.length > 5000 ? 0.8 : 1)
-    context.globalAlpha = opacity(this.rows.length)
-    for (const bucket of [FAILED, ...Array(BUCKETS).keys()].sort((a, b) => b - a)) {
-      const group = groups.get(bucket)
-      if (!group) continue
-      context.strokeStyle = bucket === FAILED ? palette!.failed : palette!.buckets[bucket]
-      context.beginPath()
-      for (const row of group) {
-        let pen = false
-        for (let a = 0; a < axes.length; a++) {
-          const place = axes[a].places[row]
-          if (Number.isNaN(place)) {
-            pen = false
-            continue
-          }
-          const x = (a + 0.5) * gap
-          const y = margin + (1 - place) * height
-          if (pen) context.lineTo(x, y)
-          else context.moveTo(x, y)
-          pen = true
-        }
-      }
-      context.stroke()
-    }
-  }
+  step()
+  return () => cancelAnimationFrame(frame)
 }
 
-function opacity(rows: number): number {
-  return Math.min(0.85, Math.max(0.06, 18 / Math.sqrt(rows + 1)))
+/** Draw the worst first, so that the best are on top; one stroke per colour. */
+function drawLines(
+  context: CanvasRenderingContext2D,
+  { axes, buckets }: ParallelModel,
+  rows: Uint32Array,
+  total: number,
+  palette: Palette,
+): void {
+  const gap = context.canvas.width / axes.length
+  const margin = 3 * devicePixelRatio
+  const height = context.canvas.height - 2 * margin
+  context.lineWidth = devicePixelRatio * (total > 5000 ? 0.8 : 1)
+  context.globalAlpha = Math.min(0.85, Math.max(0.06, 18 / Math.sqrt(total + 1)))
+  for (const bucket of [FAILED, ...Array(BUCKETS).keys()].sort((a, b) => b - a)) {
+    context.strokeStyle = bucket === FAILED ? palette.failed : palette.buckets[bucket]
+    context.beginPath()
+    for (const row of rows.filter((each) => buckets[each] === bucket)) {
+      let pen = false
+      for (const [a, { places }] of axes.entries()) {
+        const [x, y] = [(a + 0.5) * gap, margin + (1 - places[row]) * height]
+        if (pen) context.lineTo(x, y)
+        else context.moveTo(x, y)
+        pen = !Number.isNaN(y)
+      }
+    }
+    context.stroke()
+  }
 }

@@ -5,7 +5,7 @@ import type { Cell } from '../components/table/rows'
 import { type Column, headingOf } from '../components/table/table'
 import { type CollectedTable, TableSink } from '../components/table/table-sink'
 import { withUnit } from '../format/number'
-import { pageName } from '../title'
+import { pageName } from '../router/breadcrumbs'
 import { csvOf, type DataTable, fileStem } from './csv'
 import { pictureOf, pngOf } from './picture'
 

@@ -1,7 +1,6 @@
 /** Breadcrumb navigation; also sets the document title. */
 
 import { useEffect } from 'preact/hooks'
-import { setTitle } from '../title'
 
 export type Crumb = readonly [label: string, href: string]
 
@@ -30,4 +29,16 @@ export function Breadcrumbs({
       </ol>
     </nav>
   )
+}
+
+let name = ''
+
+export function setTitle(...parts: readonly string[]): void {
+  name = parts[0] ?? ''
+  document.title = [...parts, 'gaitswarm'].join(' · ')
+}
+
+/** First part of the title, such as a job's name; saved files are named after it. */
+export function pageName(): string {
+  return name
 }

@@ -5,8 +5,7 @@ import { type Column, Table } from '../components/table/table'
 import { Unit } from '../components/text'
 import { change, formatNumber, NONE } from '../format/number'
 import { inWords, sentence } from '../format/words'
-import type { Recorded } from './replay/recorded'
-import type { Replay } from './replay/replay'
+import type { Recorded, Replay } from './replay/replay'
 
 const MEANINGS: Readonly<Record<string, string>> = {
   torque: 'rms of the summed gear torques',

@@ -5,7 +5,7 @@ import { BrokenName } from '../../components/text'
 import { formatExact, writtenUnit } from '../../format/number'
 import { themeColour, useTheme } from '../../theme'
 import { useWidth } from '../canvas'
-import { type Palette, ProgressivePainter } from '../progressive-painter'
+import { type Palette, paintProgressively } from '../progressive-painter'
 import { shareOf } from '../scale'
 import {
   type Brush,
@@ -33,7 +33,6 @@ interface ParallelCoordinatesProps {
 
 export function ParallelCoordinates({ model, brushes, onBrush, label }: ParallelCoordinatesProps) {
   const canvas = useRef<HTMLCanvasElement>(null)
-  const painter = useRef<ProgressivePainter | null>(null)
   const box = useRef<HTMLDivElement>(null)
   const width = useWidth(box)
   const theme = useTheme()
@@ -41,22 +40,12 @@ export function ParallelCoordinates({ model, brushes, onBrush, label }: Parallel
   const selected = useMemo(() => selectRows(model, brushes), [model, brushes])
 
   useEffect(() => {
-    painter.current = new ProgressivePainter(canvas.current!, (drawn, of) => {
-      canvas.current!.dataset.drawn = String(drawn)
-      canvas.current!.dataset.rows = String(of)
-    })
-    return () => painter.current?.stop()
-  }, [])
-
-  useEffect(() => {
     if (width === 0) return
     const element = canvas.current!
-    const [w, h] = [Math.round(width * devicePixelRatio), Math.round(HEIGHT_PX * devicePixelRatio)]
-    if (element.width !== w || element.height !== h) {
-      element.width = w
-      element.height = h
-    }
-    painter.current!.paint(model, selected, palette)
+    const [w, h] = [width, HEIGHT_PX].map((size) => Math.round(size * devicePixelRatio))
+    // Setting a size, even the same, allocates the canvas again.
+    if (element.width !== w || element.height !== h) Object.assign(element, { width: w, height: h })
+    return paintProgressively(element, model, selected, palette)
   }, [model, selected, palette, width])
 
   const least = model.axes.length * AXIS_WIDTH_PX
@@ -128,26 +117,24 @@ export function withBrush(brushes: Brushes, axis: number, brush: Brush | null): 
   return changed
 }
 
-function AxisBrush({
-  left,
-  brush,
-  title,
-  onBrush,
-}: {
+interface AxisBrushProps {
   /** Position of the axis as a share of the width. */
   left: number
   brush: Brush | null
   title: string
   onBrush: (brush: Brush | null) => void
-}) {
+}
+
+function AxisBrush({ left, brush, title, onBrush }: AxisBrushProps) {
   const start = useRef<number | null>(null)
   const place = (event: PointerEvent) => {
     const box = (event.currentTarget as HTMLElement).getBoundingClientRect()
     return Math.min(1, Math.max(0, 1 - (event.clientY - box.top) / box.height))
   }
-  const stretch = (event: PointerEvent): Brush | null => {
-    const [a, b] = [start.current!, place(event)]
-    return Math.abs(a - b) < LEAST_STROKE ? null : [Math.min(a, b), Math.max(a, b)]
+  const draw = (event: PointerEvent) => {
+    if (start.current === null) return
+    const [a, b] = [start.current, place(event)].sort((p, q) => p - q)
+    onBrush(b - a < LEAST_STROKE ? null : [a, b])
   }
   return (
     <div
@@ -158,11 +145,9 @@ function AxisBrush({
         event.currentTarget.setPointerCapture(event.pointerId)
         start.current = place(event)
       }}
-      onPointerMove={(event) => {
-        if (start.current !== null) onBrush(stretch(event))
-      }}
+      onPointerMove={draw}
       onPointerUp={(event) => {
-        if (start.current !== null) onBrush(stretch(event))
+        draw(event)
         start.current = null
       }}
       onPointerCancel={() => {

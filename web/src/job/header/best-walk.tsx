@@ -3,7 +3,7 @@
 import type { Job } from '../../api/types'
 import { resolveDesign } from '../../walk/design/resolve-design'
 import { RATE, WalkStage } from '../../walk/player/walk-stage'
-import { recordWalk } from '../../walk/replay/recorded'
+import { recordWalk } from '../../walk/replay/replay'
 
 export default function BestWalk({
   job,

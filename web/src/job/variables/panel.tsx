@@ -17,8 +17,7 @@ import { Empty } from '../../components/feedback'
 import { Check } from '../../components/fields/controls'
 import { formatCount } from '../../format/number'
 import { type Place, placeOf, placeWord } from '../../format/place'
-import { ignore } from '../../router/ignored'
-import { type Codec, flag, useDelayedQuery, useQueryValue } from '../../router/query-value'
+import { type Codec, flag, ignore, useDelayedQuery, useQueryValue } from '../../router/query-value'
 import {
   axesOf,
   brushesOf,

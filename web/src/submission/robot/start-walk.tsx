@@ -7,8 +7,7 @@ import { useVisible } from '../../components/use-visible'
 import { type Design, formatValue } from '../../format/value'
 import { sentence } from '../../format/words'
 import { RATE, WalkStage } from '../../walk/player/walk-stage'
-import { recordWalk } from '../../walk/replay/recorded'
-import type { ReplayHeader } from '../../walk/replay/replay'
+import { type ReplayHeader, recordWalk } from '../../walk/replay/replay'
 
 export function StartWalk({
   robot,

@@ -8,8 +8,7 @@ import { useVisible } from '../../components/use-visible'
 import { formatExact, formatNumber, quantity } from '../../format/number'
 import { inWords } from '../../format/words'
 import { type Playback, usePlayback } from '../player/playback'
-import type { Recorded } from '../replay/recorded'
-import { stances } from '../replay/replay'
+import { type Recorded, stances } from '../replay/replay'
 
 interface Row {
   readonly key: string

@@ -2,8 +2,7 @@
 
 import type { Series } from '../../charts/lines/line-chart'
 import { inWords } from '../../format/words'
-import type { Recorded } from '../replay/recorded'
-import type { Replay } from '../replay/replay'
+import type { Recorded, Replay } from '../replay/replay'
 
 /** One component of a channel over time. */
 export interface Curve {

@@ -1,6 +1,9 @@
 /** Replay format of `POST /v1/replays`: a JSON header, then float32 values by frame. */
 
+import { postBytes } from '../../api/client'
 import type { components } from '../../api/schema'
+import type { Scenario } from '../../api/types'
+import type { ResolvedDesign } from '../design/resolve-design'
 
 type Schemas = components['schemas']
 
@@ -176,4 +179,37 @@ export function stances(replay: Replay, leg: number): (readonly [from: number, t
   }
   if (from !== null) spans.push([from, replay.end])
   return spans
+}
+
+export type WalkingDesign = Pick<ResolvedDesign, 'label' | 'robot' | 'design' | 'world'> & {
+  readonly controller: { readonly name: string }
+}
+
+export interface Recorded {
+  readonly label: string
+  readonly replay: Replay
+}
+
+/** Recording rates [Hz]: for the eye, the charts, the controller. */
+export const RATES = [50, 100, 500] as const
+
+export const DEFAULT_RATE = 100
+
+/** Simulate a design in a scenario, given by preset name or in full. */
+export async function recordWalk(
+  { label, robot, controller, design, world = {} }: WalkingDesign,
+  scenario: string | Scenario,
+  rate: number,
+  signal: AbortSignal,
+): Promise<Recorded> {
+  const name = controller.name as 'fuzzy-pi'
+  const body = {
+    robot,
+    controller: name,
+    design: { ...design },
+    world: { ...world },
+    scenario,
+    rate,
+  }
+  return { label, replay: parseReplay(await postBytes('/v1/replays', { body, signal })) }
 }

@@ -1,7 +1,6 @@
 /** State stored in the address, so that links reproduce the view. */
 
 import { useEffect, useRef, useState } from 'preact/hooks'
-import { ignore } from './ignored'
 import { setQuery } from './navigation'
 
 export interface Codec<T> {
@@ -90,4 +89,54 @@ export const ORDER: Codec<{ readonly column: string; readonly descending: boolea
       ? { column: text.replace(/^-/, ''), descending: text.startsWith('-') }
       : undefined,
   write: ({ column, descending }) => (descending ? `-${column}` : column),
+}
+
+type Listener = () => void
+
+const ignored = new Map<string, string>()
+const listeners = new Set<Listener>()
+
+/** text: the invalid value. */
+export function ignore(name: string, text: string): void {
+  ignored.set(name, text)
+  notify()
+}
+
+export function forgetIgnored(): void {
+  if (ignored.size === 0) return
+  ignored.clear()
+  notify()
+}
+
+export function IgnoredNotice() {
+  const [parts, setParts] = useState(() => [...ignored])
+  useEffect(() => {
+    const update = () => setParts([...ignored])
+    listeners.add(update)
+    update()
+    return () => {
+      listeners.delete(update)
+    }
+  }, [])
+  if (parts.length === 0) return null
+  return (
+    <div class="notice" data-tone="warn" role="status">
+      <p>
+        Part of this address is invalid and was ignored:{' '}
+        {parts.map(([name, text], k) => (
+          <span key={name}>
+            {k > 0 && ', '}
+            <code>
+              {name}={text.slice(0, 60)}
+            </code>
+          </span>
+        ))}
+        .
+      </p>
+    </div>
+  )
+}
+
+function notify(): void {
+  for (const listener of [...listeners]) listener()
 }

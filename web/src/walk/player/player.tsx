@@ -75,7 +75,8 @@ export function Player({ walks, playback, options, onOptions, camera, onCamera }
       const target = event.target as Element
       const idle = target === document.body || target.id === 'main'
       if (!idle && !element.current?.contains(target)) return
-      if (pressed(event.key, event.shiftKey, target, playback, scene)) event.preventDefault()
+      const rig = scene?.rig ?? null
+      if (pressed(event.key, event.shiftKey, target, playback, rig)) event.preventDefault()
     }
     addEventListener('keydown', onKey)
     return () => removeEventListener('keydown', onKey)
@@ -134,7 +135,7 @@ export function Player({ walks, playback, options, onOptions, camera, onCamera }
         meshed={count > 0}
         options={options}
         onOptions={onOptions}
-        onLook={(view) => scene?.look(view)}
+        onLook={(view) => scene?.rig.look(view)}
         onFilm={scene && (() => setFilming(true))}
         onPicture={scene && (() => savePicture(scene))}
       />

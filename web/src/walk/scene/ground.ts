@@ -1,17 +1,10 @@
 /** Ground plane with a labelled grid that fades into the distance. */
 
-import {
-  Group,
-  Mesh,
-  type MeshBasicMaterial,
-  PlaneGeometry,
-  ShaderMaterial,
-  ShadowMaterial,
-  Vector2,
-} from 'three'
+import { Group, Mesh, PlaneGeometry, ShaderMaterial, ShadowMaterial, Vector2 } from 'three'
 import type { Extent } from '../replay/extent'
 import { lyingText } from './label'
 import type { Palette } from './palette'
+import { disposeTree } from './renderer'
 
 /** Edge of the plane, which moves with the robot, in spans. */
 const EDGE = 45
@@ -41,7 +34,7 @@ uniform vec3 ground;
 uniform vec3 background;
 uniform vec3 cell;
 uniform vec3 metre;
-uniform vec2 centre;
+uniform vec2 origin;
 uniform float size;
 uniform vec2 fades;
 varying vec2 place;
@@ -58,7 +51,7 @@ float grid(vec2 p, float size, float width) {
 void main() {
   vec3 colour = mix(ground, cell, grid(place, size, 1.1));
   colour = mix(colour, metre, grid(place, 5.0 * size, 1.5));
-  float far = smoothstep(fades.x, fades.y, distance(place, centre));
+  float far = smoothstep(fades.x, fades.y, distance(place, origin));
   gl_FragColor = vec4(mix(colour, background, far), 1.0);
   #include <colorspace_fragment>
 }`
@@ -87,7 +80,6 @@ export class Ground {
         cell: { value: null },
         metre: { value: null },
         origin: { value: new Vector2() },
-        centre: { value: new Vector2() },
         size: { value: extent.cell },
         fades: { value: new Vector2(...FADES).multiplyScalar(extent.span) },
       },
@@ -103,10 +95,9 @@ export class Ground {
 
   recolour(colours: Palette): void {
     const { uniforms } = this.plane.material
-    uniforms.ground.value = colours.ground
-    uniforms.background.value = colours.background
-    uniforms.cell.value = colours.cell
-    uniforms.metre.value = colours.metre
+    for (const name of ['ground', 'background', 'cell', 'metre'] as const) {
+      uniforms[name].value = colours[name]
+    }
     this.shade.material.opacity = colours.shadow
     this.relabel(colours.text)
   }
@@ -115,17 +106,11 @@ export class Ground {
   moveTo(x: number, y: number): void {
     this.plane.position.set(x, y, 0)
     this.shade.position.set(x, y, 0.5 * LIFT * this.extent.span)
-    const { origin, centre } = this.plane.material.uniforms
-    origin.value.set(x, y)
-    centre.value.set(x, y)
+    this.plane.material.uniforms.origin.value.set(x, y)
   }
 
   private relabel(colour: string): void {
-    for (const label of this.labels.children as Mesh<PlaneGeometry, MeshBasicMaterial>[]) {
-      label.material.map?.dispose()
-      label.material.dispose()
-      label.geometry.dispose()
-    }
+    disposeTree(this.labels)
     this.labels.clear()
     const { cell, span } = this.extent
     const every = LABEL_EVERY * cell

@@ -28,7 +28,7 @@ export class SlopeMark {
   readonly object = new Group()
   private readonly material = new LineBasicMaterial({ depthTest: false })
   /** Position of the corner relative to the camera's target [m]. */
-  private readonly corner = new Vector3()
+  readonly corner = new Vector3()
   private readonly label = new Sprite(
     new SpriteMaterial({ depthTest: false, transparent: false, alphaTest: 0.4 }),
   )
@@ -52,11 +52,6 @@ export class SlopeMark {
     this.object.add(this.label)
     // The horizontal line is below the ground: draw it above, but behind robots.
     for (const part of this.object.children) part.renderOrder = -1
-  }
-
-  /** Set the position of the corner relative to the target [m]. */
-  placeAt(corner: Vector3): void {
-    this.corner.copy(corner)
   }
 
   moveTo(target: Vector3): void {

@@ -15,7 +15,7 @@ import {
 } from 'three'
 import type { Extent } from '../replay/extent'
 import { hasMeshes, type Replay } from '../replay/replay'
-import { type CameraPlace, CameraRig, type ViewName } from './camera-rig'
+import { type CameraPlace, CameraRig } from './camera-rig'
 import { FootMarks } from './foot-marks'
 import { Ground } from './ground'
 import { palette } from './palette'
@@ -78,7 +78,7 @@ export class WalkScene {
   private readonly slope: SlopeMark | null
   private readonly sky = new HemisphereLight(0xffffff, 0x9aa4a9, 1.9)
   private readonly sun = new DirectionalLight(0xffffff, 2.4)
-  private readonly rig: CameraRig
+  readonly rig: CameraRig
   private readonly centre = new Vector3()
   /** Device pixels per CSS pixel. */
   private readonly density: number
@@ -170,7 +170,7 @@ export class WalkScene {
     const room = SLOPE * this.extent.width + (sideBySide ? this.spacing / 2 : 0)
     const foot = MARKS * this.extent.span - this.middle
     const corner = slopeCorner(ground, room, this.extent.span, foot)
-    this.slope?.placeAt(corner.applyQuaternion(this.world.quaternion))
+    this.slope?.corner.copy(corner.applyQuaternion(this.world.quaternion))
     this.slope?.moveTo(this.centre)
     this.rig.follow = options.follow
     const reach = REACH * this.extent.span + (sideBySide ? REACH_SIDE_BY_SIDE * this.spacing : 0)
@@ -207,23 +207,11 @@ export class WalkScene {
     })
   }
 
-  look(from: ViewName): void {
-    this.rig.look(from)
-  }
-
   /** place: initial camera, null for the default view; onPlaced: called when the user moves it. */
   placeCamera(place: CameraPlace | null, onPlaced: (place: CameraPlace | null) => void): void {
     if (place === null) this.rig.look('three-quarter')
     else this.rig.place = place
     this.rig.onPlaced = onPlaced
-  }
-
-  turn(around: number, up: number): void {
-    this.rig.turn(around, up)
-  }
-
-  zoom(factor: number): void {
-    this.rig.zoom(factor)
   }
 
   resize(width: number, height: number): void {

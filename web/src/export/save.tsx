@@ -2,8 +2,7 @@
 
 import { type ComponentChildren, render } from 'preact'
 import type { Cell } from '../components/table/rows'
-import { type Column, headingOf } from '../components/table/table'
-import { type CollectedTable, TableSink } from '../components/table/table-sink'
+import { type CollectedTable, type Column, headingOf, TableSink } from '../components/table/table'
 import { withUnit } from '../format/number'
 import { pageName } from '../router/breadcrumbs'
 import { csvOf, type DataTable, fileStem } from './csv'

@@ -87,46 +87,24 @@ export function fitnessUnit({
   return kind !== 'identification' ? '1' : (objectives?.[0]?.unit ?? 'A')
 }
 
-/** Terms for the components of the fitness. */
-export interface CaseWords {
-  /** What is evaluated: singular and plural. */
-  readonly item: string
-  readonly items: string
-  /** Its measure: singular and plural. */
-  readonly measure: string
-  readonly measures: string
-  /** How the fitness combines the measures. */
-  readonly note: string
+/** Terms for what is evaluated and its measure, and how the fitness combines the measures. */
+function terms(item: string, measure: string, measures: string, note: string) {
+  return { item, items: `${item}s`, measure, measures, note }
 }
 
 const MEAN = 'The fitness is their mean'
-
-const SCENARIOS: CaseWords = {
-  item: 'scenario',
-  items: 'scenarios',
-  measure: 'utility',
-  measures: 'utilities',
-  note: MEAN,
+const SCENARIOS = terms('scenario', 'utility', 'utilities', MEAN)
+const WORDS: Readonly<Partial<Record<Job['kind'], typeof SCENARIOS>>> = {
+  identification: terms('recording', 'error', 'errors', MEAN),
+  calibration: terms(
+    'walk',
+    'misfit',
+    'misfits',
+    'Root mean square of the deviations from the fitted targets of a walk, in tolerances',
+  ),
 }
 
-const WORDS: Readonly<Partial<Record<Job['kind'], CaseWords>>> = {
-  identification: {
-    item: 'recording',
-    items: 'recordings',
-    measure: 'error',
-    measures: 'errors',
-    note: MEAN,
-  },
-  calibration: {
-    item: 'walk',
-    items: 'walks',
-    measure: 'misfit',
-    measures: 'misfits',
-    note: 'Root mean square of the deviations from the fitted targets of a walk, in tolerances',
-  },
-}
-
-export function caseWords(kind: Job['kind']): CaseWords {
+export function caseWords(kind: Job['kind']): typeof SCENARIOS {
   return WORDS[kind] ?? SCENARIOS
 }
 

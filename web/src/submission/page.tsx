@@ -62,7 +62,7 @@ function NewTuning({ query }: { query: URLSearchParams }) {
           )}
         </div>
       </header>
-      <Loaded resource={start} what="the catalogue" failed="Could not load the form.">
+      <Loaded resource={start} what="the form">
         {({ catalogue, draft }) =>
           from && isDocument(from, catalogue) ? (
             <JsonForm key={String(query)} spec={from.spec} />

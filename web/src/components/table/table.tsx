@@ -1,12 +1,11 @@
 /** A table with sortable columns and paging. */
 
-import type { ComponentChildren } from 'preact'
+import { type ComponentChildren, createContext } from 'preact'
 import { useContext, useState } from 'preact/hooks'
 import { formatCount, formatNumber, percent } from '../../format/number'
 import { capitalized } from '../../format/words'
 import { Unit } from '../text'
 import { type Cell, paged, type SortOrder, sorted } from './rows'
-import { type CollectedTable, TableSink } from './table-sink'
 
 export interface Column<R> {
   readonly key: string
@@ -32,6 +31,15 @@ export interface Column<R> {
   /** Whether the cell is the row's header. */
   readonly header?: boolean
 }
+
+export interface CollectedTable {
+  readonly caption: string
+  readonly columns: readonly Column<unknown>[]
+  readonly rows: readonly unknown[]
+}
+
+/** Context in which tables pass their rows to an export instead of rendering. */
+export const TableSink = createContext<((table: CollectedTable) => void) | null>(null)
 
 export function Table<R>({
   caption,

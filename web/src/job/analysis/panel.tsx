@@ -44,11 +44,7 @@ export default function AnalysisPanel({ job }: { job: Job }) {
   }
   return (
     <div class="stack">
-      <Loaded
-        resource={importance}
-        what="variable importance"
-        failed="Could not load the variable importance."
-      >
+      <Loaded resource={importance} what="the variable importance">
         {(data) => (
           <>
             <ImportanceCard importance={data} />

@@ -167,7 +167,7 @@ function IterationPanel({ job, index }: { job: Job; index: number }) {
         </nav>
       }
     >
-      <Loaded resource={evaluations} what="designs" failed="Could not load the designs.">
+      <Loaded resource={evaluations} what="the designs">
         {(rows) => (
           <Table
             caption={`Designs of iteration ${index}`}

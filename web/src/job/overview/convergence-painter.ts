@@ -71,7 +71,8 @@ function paintEnd(plot: uPlot, end: Painted['end']): void {
   ctx.fillText(end.label, x - 2 * devicePixelRatio, y + (low ? -4 : 4) * devicePixelRatio)
 }
 
-function clipped(plot: uPlot, draw: () => void): void {
+/** Draw inside the axes only. */
+export function clipped(plot: uPlot, draw: () => void): void {
   const { ctx, bbox } = plot
   ctx.save()
   ctx.beginPath()

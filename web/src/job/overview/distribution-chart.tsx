@@ -10,6 +10,7 @@ import { percent } from '../../format/number'
 import { themeColour } from '../../theme'
 import { ByIteration } from '../by-iteration'
 import { fitnessUnit } from '../facts'
+import { clipped } from './convergence-painter'
 import { grouped, type Strip } from './model'
 import type { Distribution } from './use-distribution'
 
@@ -93,24 +94,21 @@ function paintStrips(plot: uPlot, quantiles: readonly number[], strips: readonly
   const { ctx, bbox } = plot
   const colour = themeColour('--series-1')
   const pixel = devicePixelRatio
-  ctx.save()
-  ctx.beginPath()
-  ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height)
-  ctx.clip()
-  for (const strip of strips) {
-    const left = plot.valToPos(strip.from - 0.5, 'x', true)
-    const right = plot.valToPos(strip.to + 0.5, 'x', true)
-    const gap = right - left > 6 * pixel ? pixel : 0
-    for (let q = 0; q + 1 < quantiles.length; q++) {
-      const [low, high] = [strip.fitness[q], strip.fitness[q + 1]]
-      if (low === null || high === null || low <= 0) continue
-      const bottom = plot.valToPos(low, 'y', true)
-      const top = plot.valToPos(high, 'y', true)
-      const tall = Math.max(bottom - top, pixel)
-      const density = (quantiles[q + 1] - quantiles[q]) / (tall / bbox.height)
-      ctx.fillStyle = withAlpha(colour, 0.1 + 0.8 * (1 - Math.exp(-density / 4)))
-      ctx.fillRect(left + gap, bottom - tall, right - left - gap, tall)
+  clipped(plot, () => {
+    for (const strip of strips) {
+      const left = plot.valToPos(strip.from - 0.5, 'x', true)
+      const right = plot.valToPos(strip.to + 0.5, 'x', true)
+      const gap = right - left > 6 * pixel ? pixel : 0
+      for (let q = 0; q + 1 < quantiles.length; q++) {
+        const [low, high] = [strip.fitness[q], strip.fitness[q + 1]]
+        if (low === null || high === null || low <= 0) continue
+        const bottom = plot.valToPos(low, 'y', true)
+        const top = plot.valToPos(high, 'y', true)
+        const tall = Math.max(bottom - top, pixel)
+        const density = (quantiles[q + 1] - quantiles[q]) / (tall / bbox.height)
+        ctx.fillStyle = withAlpha(colour, 0.1 + 0.8 * (1 - Math.exp(-density / 4)))
+        ctx.fillRect(left + gap, bottom - tall, right - left - gap, tall)
+      }
     }
-  }
-  ctx.restore()
+  })
 }

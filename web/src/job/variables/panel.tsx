@@ -48,7 +48,7 @@ export default function VariablesPanel({ job }: { job: Job }) {
     { keep: true },
   )
   return (
-    <Loaded resource={particles} what="all designs" failed="Could not load the designs.">
+    <Loaded resource={particles} what="the designs">
       {(data) =>
         data.rows === 0 ? (
           <EmptyCard title="No designs yet">

@@ -55,7 +55,7 @@ export function FitPage({ kind, query }: { kind: FitKind; query: URLSearchParams
           <OtherKinds kind={kind} recordings={ids} />
         </div>
       </header>
-      <Loaded resource={catalogue} what="the catalogue" failed="Could not load the form.">
+      <Loaded resource={catalogue} what="the form">
         {(data) => <Fit kind={kind} catalogue={data} ids={ids} />}
       </Loaded>
     </>

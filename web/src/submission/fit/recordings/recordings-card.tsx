@@ -22,7 +22,7 @@ export function RecordingsCard({
       {ids.length === 0 && (
         <p class="muted">None yet: upload a log above, or select a stored recording.</p>
       )}
-      <Loaded resource={recordings} what="the recordings" failed="Could not load a recording." />
+      <Loaded resource={recordings} what="the recordings" />
       <RemovableList ids={ids} short={shortId} onChange={onChange}>
         {(id) => inWords(recordings.data?.find((recording) => recording.id === id))}
       </RemovableList>

@@ -15,6 +15,7 @@ export interface Column<R> {
   readonly unit?: string
   readonly help?: string
   readonly numeric?: boolean
+  /** Least significant digits of numbers; integers are shown in full. */
   readonly digits?: number
   /** Digits of a numeric column of shares, shown in percent. */
   readonly percent?: number

@@ -7,7 +7,6 @@ import { Card, EmptyCard, Loaded } from '../../components/card'
 import { Empty } from '../../components/feedback'
 import { Select } from '../../components/fields/controls'
 import { type Column, Table } from '../../components/table/table'
-import { formatCount } from '../../format/number'
 import { formatMoment } from '../../format/time'
 import { sentence } from '../../format/words'
 import { oneOf, useQueryValue } from '../../router/query-value'
@@ -84,11 +83,6 @@ export default function ActivityPanel({ job }: { job: Job }) {
 
 type Worker = Activity['workers'][number]
 
-function counted(key: 'tasks' | 'walks' | 'failures'): Column<Worker> {
-  const value = (worker: Worker) => worker[key]
-  return { key, numeric: true, value, cell: (worker) => formatCount(value(worker)) }
-}
-
 const WORKER_COLUMNS: readonly Column<Worker>[] = [
   {
     key: 'machine',
@@ -106,8 +100,8 @@ const WORKER_COLUMNS: readonly Column<Worker>[] = [
     value: ({ last_seen_at }) => last_seen_at,
     cell: ({ last_seen_at }) => formatMoment(last_seen_at),
   },
-  counted('tasks'),
-  counted('walks'),
-  counted('failures'),
+  { key: 'tasks', digits: 1, value: ({ tasks }) => tasks },
+  { key: 'walks', digits: 1, value: ({ walks }) => walks },
+  { key: 'failures', digits: 1, value: ({ failures }) => failures },
   { key: 'computed', unit: 's', digits: 3, value: ({ compute_seconds }) => compute_seconds },
 ]

@@ -103,12 +103,7 @@ const SCENARIO_COLUMNS: readonly Column<Row>[] = [
     value: ({ name }) => name,
     cell: ({ name, heldOut }) => (heldOut ? `${name} (held out)` : name),
   },
-  {
-    key: 'failed',
-    numeric: true,
-    value: ({ failed }) => failed.count,
-    cell: ({ failed }) => formatCount(failed.count),
-  },
+  { key: 'failed', digits: 1, value: ({ failed }) => failed.count },
   { key: 'failure rate at most', percent: 2, minor: true, value: ({ failed }) => failed.high },
   { key: 'nominal', digits: 4, value: ({ spread }) => spread.nominal },
   { key: 'median', digits: 4, value: ({ spread }) => spread.quantiles[2] },

@@ -164,26 +164,12 @@ function Contents({ firmware: { walks, trajectories, samples, files } }: { firmw
         columns={[
           { key: 'scenario', header: true, value: ({ scenario }) => scenario },
           { key: 'rows', numeric: true, value: ({ rows }) => rows },
-          {
-            key: 'one leg',
-            unit: 'B',
-            numeric: true,
-            value: (row) => row.bytes_of_a_leg,
-            cell: (row) => formatCount(row.bytes_of_a_leg),
-          },
-          {
-            key: 'all joints',
-            unit: 'B',
-            numeric: true,
-            minor: true,
-            value: ({ bytes }) => bytes,
-            cell: ({ bytes }) => formatCount(bytes),
-          },
+          { key: 'one leg', unit: 'B', digits: 1, value: (row) => row.bytes_of_a_leg },
+          { key: 'all joints', unit: 'B', digits: 1, minor: true, value: ({ bytes }) => bytes },
           {
             key: 'samples compared',
-            numeric: true,
+            digits: 1,
             value: ({ scenario }) => walkOf(scenario)?.samples ?? null,
-            cell: ({ scenario }) => formatCount(walkOf(scenario)?.samples),
           },
           { key: 'status', value: ({ scenario }) => walkOf(scenario)?.status ?? null },
         ]}

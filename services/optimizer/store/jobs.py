@@ -117,7 +117,6 @@ class Jobs(Aggregate):
 
         Raises:
             Conflict: the parent of a fork is gone.
-            QuotaExceeded: the owner has too much unfinished.
             InvalidRequest: the key is empty, too long or not printable.
             IdempotencyConflict: the key was used for another request.
         """
@@ -170,9 +169,6 @@ class Jobs(Aggregate):
         Args:
             spec: resolved before it is stored.
             provenance: of the results; None if the runner is to record it.
-
-        Returns:
-            The claim.
         """
         with self._database.write("create_claimed_job") as connection:
             columns = {"provenance": provenance_document(first_record(provenance))}
@@ -231,7 +227,7 @@ class Jobs(Aggregate):
         actor: str = LOCAL,
         quota: Quota | None = None,
     ) -> Job:
-        """Apply a user's command; see `commanded`.
+        """Apply a user's command and return the changed job; see `commanded`.
 
         A job whose lease has expired is paused at once, and queued if resumed. Cancelling clears
         the lease, so the runner's next write is refused.
@@ -241,12 +237,8 @@ class Jobs(Aggregate):
             accept_changes: whether a resumed job may continue under a changed provenance.
             quota: of the owner's unfinished jobs, if an ended job is queued again.
 
-        Returns:
-            The changed job.
-
         Raises:
             Conflict: its state does not allow the command.
-            QuotaExceeded: its owner has too much unfinished.
             Unreadable: it would be queued, but is unreadable.
         """
         with self._database.write("command") as connection:
@@ -302,7 +294,6 @@ class Jobs(Aggregate):
 
         Raises:
             Conflict: the job was cancelled.
-            QuotaExceeded: its owner would have too much unfinished.
             InvalidRequest: the budget is spent already, or the job cannot have it.
             Unreadable: the job's spec is unreadable.
         """
@@ -323,13 +314,10 @@ class Jobs(Aggregate):
             return to_job(update_job(connection, row, changes))
 
     def prioritize(self, job_id: str, priority: int, *, actor: str = LOCAL) -> Job:
-        """Change the priority of an unfinished job; its runner reads it at the next renewal.
+        """Change an unfinished job's priority, which its runner reads at the next renewal.
 
         Args:
             priority: within bounds; higher ones are claimed first.
-
-        Returns:
-            The changed job.
 
         Raises:
             Conflict: the job has ended.
@@ -346,9 +334,6 @@ class Jobs(Aggregate):
 
         Args:
             change: new labels.
-
-        Returns:
-            The changed job.
         """
         with self._database.write("label") as connection:
             row = job_row(connection, job_id, lock=True)
@@ -376,9 +361,6 @@ class Jobs(Aggregate):
 
         Args:
             kept: whether it is protected.
-
-        Returns:
-            The changed job.
         """
         with self._database.write("keep") as connection:
             row = job_row(connection, job_id, lock=True)

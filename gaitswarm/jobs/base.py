@@ -8,6 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
+from functools import partial
 from itertools import islice
 from types import TracebackType
 from typing import Any, Final, Self, TypeAlias, TypeVar, Unpack
@@ -187,6 +188,10 @@ class Jobs(ABC):
             if page.next is None:
                 return
             after = page.next
+
+    def _decoded(self, decode: Callable[[bytes], T], content: bytes) -> T:
+        """Decode an answer that is not JSON."""
+        return decode(content)
 
     @property
     @abstractmethod
@@ -512,7 +517,8 @@ class Jobs(ABC):
             One row per evaluation: design, fitness, and status, utility and objectives by case.
         """
         spec = self.job(job_id).spec
-        return EvaluationTable.from_parquet(spec, b"".join(self.export(job_id)))
+        read = partial(EvaluationTable.from_parquet, spec)
+        return self._decoded(read, b"".join(self.export(job_id)))
 
     def ranking(self, job_id: str, preference: PreferenceInput, *, top: int = 20) -> RankingView:
         """Rank all designs of a job under another preference; nothing is simulated.
@@ -909,7 +915,7 @@ class Jobs(ABC):
             world=world,
             rate=rate,
         )
-        return decoded_replay(content)
+        return self._decoded(decoded_replay, content)
 
     def surface(
         self,
@@ -984,7 +990,8 @@ class Jobs(ABC):
     def _firmware(self, request: FirmwareRequest) -> tuple[FirmwareView, Mapping[str, bytes]]:
         """Compute firmware and its description."""
         view = self._send(operations.summarize_firmware, (), request)
-        return view, unzipped(self._send(operations.write_firmware, (), request))
+        archive = self._send(operations.write_firmware, (), request)
+        return view, self._decoded(unzipped, archive)
 
     def _call_about(self, operation: Operation[T], job_ids: Sequence[str], **arguments: Any) -> T:
         if isinstance(job_ids, str) or not job_ids:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ssl
 import time
 import uuid
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from socket import SHUT_RDWR
 from typing import Any, Final, TypeVar
@@ -118,7 +118,7 @@ class ServerJobs(Jobs):
 
     def _follow(self, job_id: str, after: int | None, stop: Stop) -> Iterator[JobEvent]:
         self.job(job_id)
-        failures, state = 0, None
+        failures, last, ended = 0, None, False
         while not stop.is_set():
             seconds = self._reconnect.first
             try:
@@ -126,11 +126,11 @@ class ServerJobs(Jobs):
                     failures = 0
                     if isinstance(event, IterationView):
                         after = event.index
-                    elif event.state is state:
+                    elif (event.state, event.waiting) == last:
                         # A new connection begins with the state that the previous one sent.
                         continue
                     else:
-                        state = event.state
+                        last, ended = (event.state, event.waiting), event.state.terminal
                     yield event
             except (httpx2.HTTPError, StoreUnavailable) as error:
                 failures += 1
@@ -138,7 +138,7 @@ class ServerJobs(Jobs):
                     seconds = self._pause(failures, error)
             except ValidationError as error:
                 raise foreign(self._url) from error
-            if state is not None and state.terminal:
+            if ended:
                 return
             stop.wait(seconds)
 
@@ -188,8 +188,11 @@ class ServerJobs(Jobs):
         """Decode a successful response."""
         if operation.result is bytes:
             return response.content  # type: ignore[return-value]
+        return self._decoded(operation.adapter.validate_json, response.content or b"null")
+
+    def _decoded(self, decode: Callable[[bytes], T], content: bytes) -> T:
         try:
-            return operation.adapter.validate_json(response.content or b"null")
+            return decode(content)
         except ValueError as error:
             raise foreign(self._url) from error
 

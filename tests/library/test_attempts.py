@@ -21,6 +21,7 @@ from gaitswarm.jobs.server import authorities
 from tests.library.conftest import SMALL, Finished
 
 URL = "http://127.0.0.1:1"
+PI = {"P": 0.45, "I": 0.1}
 QUICK = gaitswarm.Backoff(first=0.001, longest=0.001, attempts=3)
 
 LOST = (httpx2.ConnectError, httpx2.ReadError, httpx2.RemoteProtocolError, httpx2.ConnectTimeout)
@@ -268,11 +269,10 @@ def test_a_server_without_certificates_is_trusted_for_none() -> None:
 @pytest.mark.parametrize("body", [b"<html>", b"{}", b'{"items": 3}'])
 def test_another_kind_of_server_is_distinguished_from_gaitswarms(body: bytes) -> None:
     way = httpx2.MockTransport(lambda _: httpx2.Response(200, content=body))
-    with (
-        gaitswarm.ServerJobs(URL, transport=way) as jobs,
-        pytest.raises(gaitswarm.StoreUnavailable, match="does not answer as a gaitswarm server"),
-    ):
-        jobs.job("k2q7zr5dm9xw")
+    with gaitswarm.ServerJobs(URL, transport=way) as jobs:
+        for ask in (lambda: jobs.job("k2q7zr5dm9xw"), lambda: jobs.replay(PI, controller="pi")):
+            with pytest.raises(gaitswarm.StoreUnavailable, match="does not answer as a gaitswarm"):
+                ask()
 
 
 def test_headers_go_with_every_request() -> None:
@@ -323,9 +323,9 @@ def stream(events: str, *, breaks: bool = False) -> httpx2.Response:
     return httpx2.Response(200, headers=headers, stream=Stream(events, breaks=breaks))
 
 
-def state(name: str) -> str:
+def state(name: str, waiting: str | None = None) -> str:
     counts = {"iterations": 0, "evaluations": 0}
-    data = {"id": "k2q7zr5dm9xw", "state": name, "error": None, **counts}
+    data = {"id": "k2q7zr5dm9xw", "state": name, "error": None, "waiting": waiting, **counts}
     return f"event: state\ndata: {json.dumps(data)}\n\n"
 
 
@@ -393,6 +393,15 @@ def test_following_begins_after_what_is_known(
     script = Script(finished_once.result.job, stream(iteration(8) + state("succeeded")))
     assert follow(script, after=7) == [8, "succeeded"]
     assert script.last_ids == ["7"]
+
+
+@pytest.mark.slow
+def test_a_change_of_what_a_job_waits_for_is_an_event(
+    follow: Follow, finished_once: Finished
+) -> None:
+    states = [state("queued", "a worker"), state("queued", "a cluster"), state("succeeded")]
+    script = Script(finished_once.result.job, stream("".join(states)))
+    assert follow(script) == ["queued", "queued", "succeeded"]
 
 
 @pytest.mark.slow

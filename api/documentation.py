@@ -16,9 +16,9 @@ from pydantic.json_schema import JsonSchemaMode, models_json_schema
 from gaitswarm.api.middleware import security_policy
 from gaitswarm.api.problems import MEDIA_TYPE
 from gaitswarm.replay import ReplayHeaderView
+from gaitswarm.services.optimizer.analysis.particles import ParticlesHeaderView
 from gaitswarm.services.optimizer.views import MEDIA_TYPE as BINARY
 from gaitswarm.views.base import ProblemView
-from gaitswarm.views.history import ParticlesHeaderView
 
 DESCRIPTION: Final = """
 Finds robust drive controllers for walking robots: a controller is simulated in several walking

@@ -110,7 +110,7 @@ from gaitswarm.views.catalogue import (
     robot_views,
     scenario_views,
 )
-from gaitswarm.views.history import BestView, IterationView, encoded_particles
+from gaitswarm.views.history import BestView, IterationView
 from gaitswarm.views.job import (
     EstimateView,
     ExtensionRequest,
@@ -707,13 +707,8 @@ def get_particles(service: JobService, job_id: str, query: ParticlesQuery) -> by
 
     The header is a ParticlesHeaderView: it names the columns in order, with units and bounds.
     """
-    job = service.job(job_id)
-    return encoded_particles(
-        job,
-        service.columns(job),
-        after=query.after_iteration,
-        most=query.max_points,
-        objectives=query.objectives,
+    return service.particles(
+        job_id, after=query.after_iteration, most=query.max_points, objectives=query.objectives
     )
 
 

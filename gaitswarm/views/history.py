@@ -2,28 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
 from dataclasses import asdict, replace
 from datetime import datetime
-from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
-from gaitswarm.services.optimizer.analysis.distribution import thinned
 from gaitswarm.services.optimizer.analysis.evaluations import EvaluationView, evaluation_views
-from gaitswarm.services.optimizer.analysis.utilities import (
-    NORMALISED_OBJECTIVES,
-    objective_vectors,
-    utilities,
-)
-from gaitswarm.services.optimizer.jobs.columns import EvaluationColumns
 from gaitswarm.services.optimizer.jobs.iteration import Evaluation, Iteration
-from gaitswarm.services.optimizer.jobs.job import Job
-from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.spec import Spec
-from gaitswarm.services.optimizer.views import Finite, IterationIndex, JobName, View, framed
+from gaitswarm.services.optimizer.views import Finite, IterationIndex, View
 from gaitswarm.sim.kernel.walk import Precision
 
 
@@ -103,110 +90,3 @@ class HistoryIterationView(IterationView):
         """Make a view of an iteration with its designs."""
         particles = evaluation_views(evaluations, spec)
         return cls.model_validate({**asdict(iteration), "evaluations": particles})
-
-
-class ParticleColumnView(View):
-    """What one column of numbers is."""
-
-    name: str = Field(
-        description="`iteration`, `particle`, `fitness`, a searched variable's name,"
-        " `utility:<scenario>`, or `objective:<name>`.",
-        examples=["FI1R"],
-    )
-    unit: str = Field(description="Unit of its numbers.", examples=["counts"])
-    low: float | None = Field(description="Lower bound of a variable; else null.")
-    high: float | None = Field(description="Upper bound of a variable; else null.")
-    kind: Literal[
-        "index", "fitness", "continuous", "integer", "categorical", "utility", "objective"
-    ] = Field(
-        description="What its numbers are; `continuous`, `integer` and `categorical` are variables,"
-        " `objective` is an objective's geometric mean over the scenarios."
-    )
-    choices: list[str] = Field(
-        description="Names of a categorical variable's choices, whose indices its numbers are;"
-        " else none.",
-        examples=[["linear_zone", "karnopp", "stick"]],
-    )
-
-
-class ParticlesHeaderView(View):
-    """What the numbers after it are."""
-
-    job_id: JobName
-    rows: int = Field(description="Evaluations that follow: numbers of each column [1].")
-    total: int = Field(description="Evaluations there are, of which the rows are chosen [1].")
-    iterations: tuple[int, int] | None = Field(
-        description="First and last iteration among the rows; null without any.",
-        examples=[(0, 24)],
-    )
-    columns: list[ParticleColumnView] = Field(description="The columns, in order.")
-
-
-def encoded_particles(
-    job: Job,
-    columns: EvaluationColumns,
-    *,
-    after: int | None,
-    most: int,
-    objectives: bool = False,
-) -> bytes:
-    """Encode evaluations for pictures of the whole search."""
-    wanted = columns.after(after)
-    chosen = wanted.rows(thinned(wanted, most))
-    rows = len(chosen)
-    header = ParticlesHeaderView(
-        job_id=job.id,
-        rows=rows,
-        total=len(wanted),
-        iterations=(int(chosen.iteration[0]), int(chosen.iteration[-1])) if rows else None,
-        columns=[*_described(job), *(_objectives_described(job) if objectives else ())],
-    )
-    numbers = _numbers(job, chosen)
-    if objectives and isinstance(job.spec, JobSpec):
-        vectors = objective_vectors(chosen, worlds=job.spec.worlds).T
-        numbers = np.concatenate([numbers, np.where(np.isfinite(vectors), vectors, np.nan)])
-    return framed(header, numbers)
-
-
-def _described(job: Job) -> list[ParticleColumnView]:
-    def plain(kind: str, names: Iterable[str], unit: str) -> Iterator[ParticleColumnView]:
-        nothing: dict[str, object] = {"low": None, "high": None, "choices": []}
-        for name in names:
-            column = {"name": name, "unit": unit, "kind": kind, **nothing}
-            yield ParticleColumnView.model_validate(column)
-
-    unit = "A" if job.spec.kind == "identification" else "1"
-    return [
-        *plain("index", ("iteration", "particle"), "1"),
-        *plain("fitness", ("fitness",), unit),
-        *map(ParticleColumnView.model_validate, job.spec.design_space().variables),
-        *plain("utility", (f"utility:{name}" for name in job.spec.case_names), unit),
-    ]
-
-
-def _objectives_described(job: Job) -> list[ParticleColumnView]:
-    return [
-        ParticleColumnView(
-            name=f"objective:{objective.name}",
-            unit=objective.unit,
-            low=None,
-            high=None,
-            kind="objective",
-            choices=[],
-        )
-        for objective in (NORMALISED_OBJECTIVES if isinstance(job.spec, JobSpec) else ())
-    ]
-
-
-def _numbers(job: Job, chosen: EvaluationColumns) -> NDArray[np.float64]:
-    """(columns, rows)."""
-    searched = len(job.spec.design_space().variables)
-    numbers = np.concatenate(
-        [
-            [chosen.iteration, chosen.particle, chosen.fitness],
-            chosen.designs[:, :searched].T,
-            utilities(chosen, job.spec).T,
-        ]
-    )
-    numbers[~np.isfinite(numbers)] = np.nan
-    return numbers

@@ -49,6 +49,7 @@ from gaitswarm.services.optimizer.analysis.identifiability import (
     identifiability,
 )
 from gaitswarm.services.optimizer.analysis.importance import ImportanceView, importance
+from gaitswarm.services.optimizer.analysis.particles import encoded_particles
 from gaitswarm.services.optimizer.analysis.preferences import (
     Index,
     PreferenceForView,
@@ -313,6 +314,14 @@ class JobService:
         job = self.job(job_id)
         columns = self.columns(job).after(after)
         return distribution(columns, job.spec.design_space(), limit=limit)
+
+    def particles(
+        self, job_id: str, *, after: int | None = None, most: int, objectives: bool = False
+    ) -> bytes:
+        """Encode evaluations as columns: a `ParticlesHeaderView`, then float32 numbers."""
+        job = self.job(job_id)
+        columns = self.columns(job).after(after)
+        return encoded_particles(job, columns, most=most, objectives=objectives)
 
     def scenarios(self, job_id: str, *, tolerance: float = TOLERANCE) -> ScenarioFamiliesView:
         """Judge a tuning job's designs by fewer scenarios."""

@@ -15,9 +15,9 @@ from gaitswarm.sim.outcome import Status
 class StatusFailuresView(View):
     """Designs that end with one status in a case."""
 
-    status: StatusName
+    status: StatusName = Field(description="Status of their simulations.", examples=["fell"])
     reason: str = Field(description="The status in words, with a remedy.")
-    designs: int
+    designs: int = Field(description="Number of these designs.", examples=[12])
     iteration: IterationIndex
     particle: Particle
 
@@ -26,7 +26,7 @@ class CaseFailuresView(View):
     """Designs that fail in one case."""
 
     case: str = Field(description="Name of the scenario, world or walk.", examples=["loaded-fast"])
-    failed: int
+    failed: int = Field(description="Designs that fail in this case.", examples=[14])
     alone: int = Field(description="Designs that fail in this case alone.")
     statuses: list[StatusFailuresView] = Field(
         description="Most frequent first, each with its latest design."
@@ -36,7 +36,7 @@ class CaseFailuresView(View):
 class FailuresView(View):
     """Failures of a job's designs, by case."""
 
-    designs: int
+    designs: int = Field(description="Evaluated designs.", examples=[625])
     failed: int = Field(description="Designs that fail in at least one case.")
     recent: float | None = Field(
         description="Share of failed designs in the latest quarter of the designs [1]; null"

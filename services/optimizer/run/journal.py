@@ -63,8 +63,7 @@ class Journal:
         numbers, count = range(len(request.cases)), len(keys)
         if not self._known:
             return self._run(request, numbers, keys, should_stop)
-        with self._writing:
-            known = dict(self._known)
+        known = self._known
         missing = np.array([[(number, key) not in known for number in numbers] for key in keys])
         outcomes = [
             Outcome(np.empty((count, len(case.objectives))), np.empty(count, dtype=np.uint8))
@@ -82,8 +81,8 @@ class Journal:
                 cases=tuple(request.cases[number] for number in cases),
                 designs=request.designs[rows],
             )
-            found = self._run(part, cases, [keys[row] for row in rows], should_stop)
-            for number, outcome in zip(cases, found, strict=True):
+            evaluated = self._run(part, cases, [keys[row] for row in rows], should_stop)
+            for number, outcome in zip(cases, evaluated, strict=True):
                 outcomes[number].objectives[rows] = outcome.objectives
                 outcomes[number].statuses[rows] = outcome.statuses
         return tuple(outcomes)
@@ -96,8 +95,8 @@ class Journal:
         should_stop: Callable[[], bool],
     ) -> tuple[Outcome, ...]:
         def on_outcome(case: int, first: int, outcome: Outcome) -> None:
-            of = tuple(keys[first : first + len(outcome.statuses)])
-            self._finished.append(JournalEntry(cases[case], of, outcome))
+            of_designs = tuple(keys[first : first + len(outcome.statuses)])
+            self._finished.append(JournalEntry(cases[case], of_designs, outcome))
 
         return self._evaluator.evaluate(replace(request, on_outcome=on_outcome), should_stop)
 

@@ -34,35 +34,37 @@ export interface Layer {
 
 /** Inference, table, and their difference; the first two share a colour scale. */
 export function layersOf(surface: SurfaceView, output: Output): Layer[] {
+  const { inference, table, unit } = output
   const axes = { error: inputOf(surface, 'error'), current: inputOf(surface, 'current') }
-  const difference = output.table.map((row, i) => row.map((v, k) => v - output.inference[i][k]))
-  const limit = Math.max(largest(output.inference), largest(output.table))
-  const common = { ...axes, unit: output.unit }
+  const difference = table.map((row, i) => row.map((v, k) => v - inference[i][k]))
+  const limit = Math.max(largest(inference), largest(table))
+  const layer = (
+    key: Layer['key'],
+    title: string,
+    note: string,
+    values: Matrix,
+    limit: number,
+  ) => ({
+    ...axes,
+    unit,
+    ...{ key, title, note, values, limit },
+  })
   return [
-    {
-      ...common,
-      key: 'inference',
-      title: 'Inference',
-      note: 'Output of the fuzzy rules.',
-      values: output.inference,
+    layer('inference', 'Inference', 'Output of the fuzzy rules.', inference, limit),
+    layer(
+      'table',
+      'Quantised table',
+      'Output of the microcontroller’s lookup table.',
+      table,
       limit,
-    },
-    {
-      ...common,
-      key: 'table',
-      title: 'Quantised table',
-      note: 'Output of the microcontroller’s lookup table.',
-      values: output.table,
-      limit,
-    },
-    {
-      ...common,
-      key: 'difference',
-      title: 'Difference',
-      note: 'Table minus inference, on a separate colour scale.',
-      values: difference,
-      limit: largest(difference),
-    },
+    ),
+    layer(
+      'difference',
+      'Difference',
+      'Table minus inference, on a separate colour scale.',
+      difference,
+      largest(difference),
+    ),
   ]
 }
 

@@ -28,7 +28,7 @@ export function GaitChart({ walks, playback }: { walks: readonly Recorded[]; pla
   const end = playback.duration || 1
   const place = (moment: number) => `${(100 * moment) / end}%`
   return (
-    <div class="plot" ref={box} data-plot="gait">
+    <div class="plot" ref={box}>
       <ChartCard
         title="Gait diagram"
         note="Bars show stance phases."

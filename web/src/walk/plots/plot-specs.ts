@@ -14,7 +14,6 @@ export interface Curve {
 }
 
 export interface PlotSpec {
-  readonly key: string
   readonly title: string
   readonly note: string
   readonly quantity: string
@@ -35,73 +34,39 @@ const COLOURS = [
 export function plotSpecs(replay: Replay, leg: number): PlotSpec[] {
   const { legs } = replay.header.robot
   const name = inWords(legs[leg])
-  const specs: PlotSpec[] = [
-    {
-      key: 'angles',
-      title: `Joint angles, ${name}`,
-      note: 'Thin: desired. Thick: actual.',
-      quantity: 'angle',
-      unit: 'rad',
-      curves: ofJoints(replay, leg).flatMap(({ label, index, colour }) => [
-        { label: `${label} desired`, channel: 'desired_angle', index, colour, thin: true },
-        { label, channel: 'joint_angle', index, colour },
-      ]),
-    },
-    {
-      key: 'currents',
-      title: `Motor currents, ${name}`,
-      note: 'Of each motor of the leg.',
-      quantity: 'current',
-      unit: 'A',
-      curves: ofJoints(replay, leg).map((curve) => ({ ...curve, channel: 'current' })),
-    },
-    {
-      key: 'torques',
-      title: `Gear torques, ${name}`,
-      note: 'Torque of each gear on its joint.',
-      quantity: 'torque',
-      unit: 'N m',
-      curves: ofJoints(replay, leg).map((curve) => ({ ...curve, channel: 'load_torque' })),
-    },
-    {
-      key: 'acceleration',
-      title: 'Acceleration of the body',
-      note: "In the body's frame: x forward, y left, z up; without gravity.",
-      quantity: 'acceleration',
-      unit: 'm/s²',
-      curves: ofAxes('body_acceleration', 0),
-    },
-    {
-      key: 'leg-force',
-      title: `Ground reaction force, ${name}`,
-      note: 'x forward along the ground, y left, z normal to the ground.',
-      quantity: 'force',
-      unit: 'N',
-      curves: ofAxes('foot_force', 3 * leg),
-    },
-    {
-      key: 'normal-forces',
-      title: 'Ground reaction force, all feet',
-      note: 'Normal component.',
-      quantity: 'normal force',
-      unit: 'N',
-      curves: legs.map((each, k) => ({
-        label: inWords(each),
-        channel: 'foot_force',
-        index: 3 * k + 2,
-        colour: COLOURS[k % COLOURS.length],
-      })),
-    },
-    {
-      key: 'supply',
-      title: 'Battery voltage',
-      note: 'Under the load of all motors.',
-      quantity: 'voltage',
-      unit: 'V',
-      curves: [{ label: 'supply', channel: 'supply', index: 0, colour: '--series-1' }],
-    },
+  const joints = ofJoints(replay, leg)
+  const inBody = "In the body's frame: x forward, y left, z up; without gravity."
+  const onGround = 'x forward along the ground, y left, z normal to the ground.'
+  const angles = joints.flatMap(({ label, index, colour }) => [
+    { label: `${label} desired`, channel: 'desired_angle', index, colour, thin: true },
+    { label, channel: 'joint_angle', index, colour },
+  ])
+  const of = (channel: string) => joints.map((curve) => ({ ...curve, channel }))
+  const normal = legs.map((each, k) => ({
+    label: inWords(each),
+    channel: 'foot_force',
+    index: 3 * k + 2,
+    colour: COLOURS[k % COLOURS.length],
+  }))
+  const supply = { label: 'supply', channel: 'supply', index: 0, colour: COLOURS[0] }
+  const rows: readonly [title: string, note: string, quantity: string, unit: string, Curve[]][] = [
+    [`Joint angles, ${name}`, 'Thin: desired. Thick: actual.', 'angle', 'rad', angles],
+    [`Motor currents, ${name}`, 'Of each motor of the leg.', 'current', 'A', of('current')],
+    [
+      `Gear torques, ${name}`,
+      'Torque of each gear on its joint.',
+      'torque',
+      'N m',
+      of('load_torque'),
+    ],
+    ['Acceleration of the body', inBody, 'acceleration', 'm/s²', ofAxes('body_acceleration', 0)],
+    [`Ground reaction force, ${name}`, onGround, 'force', 'N', ofAxes('foot_force', 3 * leg)],
+    ['Ground reaction force, all feet', 'Normal component.', 'normal force', 'N', normal],
+    ['Battery voltage', 'Under the load of all motors.', 'voltage', 'V', [supply]],
   ]
-  return specs.filter(({ curves }) => curves.every(({ channel }) => replay.channel(channel)))
+  return rows
+    .filter(([, , , , curves]) => curves.every(({ channel }) => replay.channel(channel)))
+    .map(([title, note, quantity, unit, curves]) => ({ title, note, quantity, unit, curves }))
 }
 
 // A leg's joints start with its name.

@@ -47,7 +47,7 @@ export function WalkPlots({ walks, all, playback }: WalkPlotsProps) {
         <ObjectivesTable walks={all} />
         <GaitChart walks={walks} playback={playback} />
         {specs.map((spec) => (
-          <PlotCard key={spec.key} spec={spec} walks={walks} playback={playback} />
+          <PlotCard key={spec.quantity} spec={spec} walks={walks} playback={playback} />
         ))}
       </div>
     </section>
@@ -68,7 +68,7 @@ export function PlotCard({ spec, walks, playback }: PlotCardProps) {
   const { time } = usePlayback(playback, RENEWED, visible)
   const frame = Math.max(...walks.map(({ replay }) => replay.frameAt(time)))
   return (
-    <div class="plot" ref={box} data-plot={spec.key}>
+    <div class="plot" ref={box}>
       <LineCard
         title={spec.title}
         note={spec.note}

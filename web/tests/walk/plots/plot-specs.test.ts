@@ -9,13 +9,13 @@ const walk = (count: number, label: string) => ({
 })
 
 test('charts of channels that were not recorded are omitted', () => {
-  const keys = plotSpecs(walk(3, 'A').replay, 0).map(({ key }) => key)
-  expect(keys).toEqual(['leg-force', 'normal-forces'])
+  const keys = plotSpecs(walk(3, 'A').replay, 0).map(({ quantity }) => quantity)
+  expect(keys).toEqual(['force', 'normal force'])
 })
 
 test('the second walk has dashed curves, without values after its end', () => {
   const walks = [walk(4, 'A'), walk(2, 'B')]
-  const [spec] = plotSpecs(walks[0].replay, 0).filter(({ key }) => key === 'normal-forces')
+  const [spec] = plotSpecs(walks[0].replay, 0).filter(({ quantity }) => quantity === 'normal force')
   const [first, second] = seriesOf(spec.curves, walks)
   expect(Array.from(moments(walks))).toHaveLength(4)
   expect([first.label, first.dash, first.values]).toEqual(['leg', undefined, [0, 10, 20, 30]])

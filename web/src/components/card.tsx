@@ -7,22 +7,17 @@ import { Empty, ErrorNotice, Loading } from './feedback'
 
 type Data = Readonly<Record<`data-${string}`, string | number | boolean>>
 
-/** A region named by its title. note: below the title; tools: on the right; data: its attributes. */
-export function Card({
-  title,
-  note,
-  tools,
-  data,
-  class: more = '',
-  children,
-}: {
+interface CardProps {
   title: ComponentChildren
   note?: ComponentChildren
   tools?: ComponentChildren
   data?: Data
   class?: string
   children?: ComponentChildren
-}) {
+}
+
+/** A region named by its title. note: below the title; tools: on the right; data: its attributes. */
+export function Card({ title, note, tools, data, class: more = '', children }: CardProps) {
   const id = useId()
   const heading = <h2 id={id}>{title}</h2>
   return (

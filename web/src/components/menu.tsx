@@ -7,16 +7,14 @@ export interface MenuItem {
   readonly onChoose: () => void
 }
 
-export function Menu({
-  label,
-  of,
-  items,
-}: {
+interface MenuProps {
   label: string
   /** Subject of the commands, for screen readers only. */
   of: string
   items: readonly MenuItem[]
-}) {
+}
+
+export function Menu({ label, of, items }: MenuProps) {
   const [open, setOpen] = useState(false)
   const box = useRef<HTMLDivElement>(null)
   const button = useRef<HTMLButtonElement>(null)

@@ -20,17 +20,14 @@ export function StateBadge({ state }: { state: JobState }) {
   )
 }
 
-export function Progress({
-  done,
-  planned,
-  label,
-  state,
-}: {
+interface ProgressProps {
   done: number
   planned: number
   label: string
   state?: JobState
-}) {
+}
+
+export function Progress({ done, planned, label, state }: ProgressProps) {
   const share = planned > 0 ? Math.min(1, done / planned) : 0
   return (
     <span

@@ -3,17 +3,14 @@
 import { Select } from '../components/fields/controls'
 import { inWords } from '../format/words'
 
-export function AxisSelects({
-  axes,
-  x,
-  y,
-  onSelect,
-}: {
+interface AxisSelectsProps {
   axes: readonly { readonly name: string }[]
   x: string
   y: string
   onSelect: (axes: { readonly x: string; readonly y: string }) => void
-}) {
+}
+
+export function AxisSelects({ axes, x, y, onSelect }: AxisSelectsProps) {
   const select = (label: string, value: string, other: string, set: (name: string) => void) => (
     <Select
       label={label}

@@ -16,16 +16,14 @@ export interface BarRow {
   readonly bars: readonly Bar[]
 }
 
-/** most: value of the full length; output: name of what is shown, for tests. */
-export function Bars({
-  rows,
-  most,
-  output,
-}: {
+interface BarsProps {
   rows: readonly BarRow[]
   most: number
   output?: string
-}) {
+}
+
+/** most: value of the full length; output: name of what is shown, for tests. */
+export function Bars({ rows, most, output }: BarsProps) {
   const share = (part: number) => `${(part / most) * 100}%`
   return (
     <ul class="bars" data-output={output}>

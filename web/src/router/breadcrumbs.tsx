@@ -6,16 +6,14 @@ export type Crumb = readonly [label: string, href: string]
 
 export const ALL_JOBS: Crumb = ['All jobs', '/jobs']
 
-/** crumbs: outermost first; here: the current page; title: parts of the document title. */
-export function Breadcrumbs({
-  crumbs,
-  here,
-  title = [here],
-}: {
+interface BreadcrumbsProps {
   crumbs: readonly Crumb[]
   here: string
   title?: readonly string[]
-}) {
+}
+
+/** crumbs: outermost first; here: the current page; title: parts of the document title. */
+export function Breadcrumbs({ crumbs, here, title = [here] }: BreadcrumbsProps) {
   useEffect(() => setTitle(...title), [title.join()])
   return (
     <nav class="breadcrumbs small" aria-label="Breadcrumbs">

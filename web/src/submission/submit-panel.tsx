@@ -10,15 +10,13 @@ import { formatDuration } from '../format/time'
 import { HIGHEST, isPriority, LOWEST, PRIORITY_ERROR, PRIORITY_HELP } from '../job/facts'
 import { NOTIFY, type Submission } from './use-submission'
 
-export function SubmitPanel({
-  spec,
-  submission,
-  onJson,
-}: {
+interface SubmitPanelProps {
   spec: AnySpec
   submission: Submission
   onJson?: () => void
-}) {
+}
+
+export function SubmitPanel({ spec, submission, onJson }: SubmitPanelProps) {
   const { estimate, problem, sending } = submission
   const json = JSON.stringify(spec, null, 2)
   return (

@@ -3,20 +3,16 @@
 import type { ComponentChildren } from 'preact'
 import { useState } from 'preact/hooks'
 
-/** A checkbox; among the tools of a chart by default. */
-export function Check({
-  label,
-  checked,
-  disabled = false,
-  small = true,
-  onChange,
-}: {
+interface CheckProps {
   label: ComponentChildren
   checked: boolean
   disabled?: boolean
   small?: boolean
   onChange: (checked: boolean) => void
-}) {
+}
+
+/** A checkbox; among the tools of a chart by default. */
+export function Check({ label, checked, disabled = false, small = true, onChange }: CheckProps) {
   return (
     <label class={small ? 'check small' : 'check'}>
       <input

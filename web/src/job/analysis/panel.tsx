@@ -176,14 +176,13 @@ function importanceColumns(outputs: readonly string[]): readonly Column<Variable
   ]
 }
 
-/** Bounds that the winner touches, with a link to search beyond them. */
-function BoundsCard({
-  job,
-  importance: { variables, iteration },
-}: {
+interface BoundsCardProps {
   job: Job
   importance: Importance
-}) {
+}
+
+/** Bounds that the winner touches, with a link to search beyond them. */
+function BoundsCard({ job, importance: { variables, iteration } }: BoundsCardProps) {
   const active = variables.filter(({ at }) => at !== null)
   const widen = variables
     .flatMap(({ name, widened }) => (widened ? [`${name}:${widened.low}:${widened.high}`] : []))

@@ -11,17 +11,14 @@ import { columnNamed, type ParticleColumn, type Particles } from './particles'
 
 const DIGITS: Readonly<Record<string, number>> = { integer: 1, continuous: 4 }
 
-export function SelectedDesigns({
-  job,
-  particles,
-  rows,
-  marked = null,
-}: {
+interface SelectedDesignsProps {
   job: Job
   particles: Particles
   rows: readonly number[]
   marked?: number | null
-}) {
+}
+
+export function SelectedDesigns({ job, particles, rows, marked = null }: SelectedDesignsProps) {
   const iteration = columnNamed(particles, 'iteration')!.values
   const particle = columnNamed(particles, 'particle')!.values
   const numbers = particles.columns.filter(({ kind }) => kind !== 'index')

@@ -13,16 +13,14 @@ import { canFork, ExtendDialog, ForkButton, LabelDialog, PriorityDialog } from '
 
 type Dialog = 'cancel' | 'delete' | 'extend' | 'label' | 'priority' | null
 
-export function JobActions({
-  job,
-  onJob,
-  onDeleting,
-}: {
+interface JobActionsProps {
   job: StoredJob
   onJob: (job: StoredJob) => void
   /** Called with true when a deletion starts and with false if it fails; requests stop meanwhile. */
   onDeleting: (deleting: boolean) => void
-}) {
+}
+
+export function JobActions({ job, onJob, onDeleting }: JobActionsProps) {
   const [dialog, setDialog] = useState<Dialog>(null)
   const [busy, setBusy] = useState(false)
   const [error, setError] = useState<unknown>(null)

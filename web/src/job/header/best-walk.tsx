@@ -5,15 +5,13 @@ import { resolveDesign } from '../../walk/design/resolve-design'
 import { RATE, WalkStage } from '../../walk/player/walk-stage'
 import { recordWalk } from '../../walk/replay/replay'
 
-export default function BestWalk({
-  job,
-  best,
-  visible,
-}: {
+interface BestWalkProps {
   job: Job
   best: number
   visible: boolean
-}) {
+}
+
+export default function BestWalk({ job, best, visible }: BestWalkProps) {
   const record = async (signal: AbortSignal) => {
     const design = await resolveDesign({ job: job.id }, signal)
     return recordWalk(design, design.scenarios[0] ?? 'normal-fast', RATE, signal)

@@ -17,15 +17,13 @@ import type { Distribution } from './use-distribution'
 /** More strips could not be distinguished on a common screen. */
 const MOST_STRIPS = 250
 
-export function DistributionChart({
-  job,
-  iterations,
-  distribution,
-}: {
+interface DistributionChartProps {
   job: Job
   iterations: readonly Iteration[]
   distribution: Distribution
-}) {
+}
+
+export function DistributionChart({ job, iterations, distribution }: DistributionChartProps) {
   const { quantiles, items } = distribution
   const unit = fitnessUnit(job)
   const drawn = useMemo(() => {

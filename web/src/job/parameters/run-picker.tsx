@@ -15,18 +15,15 @@ import { furtherRuns, isSameFit, MOST_RUNS, repeatedSeeds } from './runs'
 
 const OFFERED = 100
 
-/** others: ids of the runs compared with the job; runs: the compared ones loaded so far. */
-export function RunPicker({
-  job,
-  runs,
-  others,
-  onSelect,
-}: {
+interface RunPickerProps {
   job: Job
   runs: readonly Job[]
   others: readonly string[]
   onSelect: (others: readonly string[]) => void
-}) {
+}
+
+/** others: ids of the runs compared with the job; runs: the compared ones loaded so far. */
+export function RunPicker({ job, runs, others, onSelect }: RunPickerProps) {
   const listed = useResource(`fits ${job.kind}`, (signal) =>
     get('/v1/jobs', { query: { kind: job.kind, limit: OFFERED }, signal }),
   )

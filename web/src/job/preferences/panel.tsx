@@ -157,15 +157,13 @@ function PreferenceSliders({
   )
 }
 
-function RankingResult({
-  job,
-  ranking,
-  preference,
-}: {
+interface RankingResultProps {
   job: Job
   ranking: Ranking
   preference: Preference
-}) {
+}
+
+function RankingResult({ job, ranking, preference }: RankingResultProps) {
   const [winner] = ranking.top
   if (!winner) {
     return (

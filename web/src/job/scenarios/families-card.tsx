@@ -92,13 +92,12 @@ function Families({ job, families }: { job: Job; families: ScenarioFamilies }) {
   )
 }
 
-function Smallest({
-  job,
-  families: { smallest, tolerance, scenarios },
-}: {
+interface SmallestProps {
   job: Job
   families: ScenarioFamilies
-}) {
+}
+
+function Smallest({ job, families: { smallest, tolerance, scenarios } }: SmallestProps) {
   if (!smallest) {
     return (
       <p>

@@ -72,16 +72,14 @@ export default function TradeOffsPanel({ job }: { job: Job }) {
   )
 }
 
-/** Best designs under A, B, C and the job's preference, and their positions relative to the front. */
-function WinnersCard({
-  job,
-  front,
-  onSelect,
-}: {
+interface WinnersCardProps {
   job: Job
   front: Front
   onSelect: (place: Place) => void
-}) {
+}
+
+/** Best designs under A, B, C and the job's preference, and their positions relative to the front. */
+function WinnersCard({ job, front, onSelect }: WinnersCardProps) {
   return (
     <Card title="Winners by preference">
       <Table<FrontWinner>

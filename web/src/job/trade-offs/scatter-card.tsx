@@ -29,19 +29,15 @@ import {
   selectedCloud,
 } from './designs'
 
-export function ScatterCard({
-  job,
-  front,
-  all,
-  selected,
-  onSelect,
-}: {
+interface ScatterCardProps {
   job: Job
   front: Front
   all: Particles | null
   selected: Place | null
   onSelect: (place: Place) => void
-}) {
+}
+
+export function ScatterCard({ job, front, all, selected, onSelect }: ScatterCardProps) {
   const { query } = usePlace()
   const [logarithmic, setLogarithmic] = useQueryValue('log', flag(true), true)
   const paging = useQueryValue('page', PAGE_NUMBER, 0)

@@ -8,15 +8,13 @@ import { BrokenName, Unit } from '../../components/text'
 import { inWords } from '../../format/words'
 import './brush-fields.css'
 
-export function BrushFields({
-  model,
-  brushes,
-  onBrush,
-}: {
+interface BrushFieldsProps {
   model: ParallelModel
   brushes: Brushes
   onBrush: (brushes: Brushes) => void
-}) {
+}
+
+export function BrushFields({ model, brushes, onBrush }: BrushFieldsProps) {
   return (
     <details class="brush-fields">
       <summary>Select by numbers</summary>
@@ -48,17 +46,14 @@ export function BrushFields({
   )
 }
 
-function Bound({
-  axis,
-  name,
-  place,
-  onChange,
-}: {
+interface BoundProps {
   axis: Axis
   name: 'from' | 'to'
   place: number
   onChange: (text: string) => void
-}) {
+}
+
+function Bound({ axis, name, place, onChange }: BoundProps) {
   const label = `${axis.name} ${name}`
   if (axis.choices.length > 0) {
     return (

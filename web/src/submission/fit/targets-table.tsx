@@ -9,17 +9,14 @@ import { nextKey, type TargetDraft, walkName } from './targets'
 
 type Change = (targets: readonly TargetDraft[]) => readonly TargetDraft[]
 
-export function TargetsTable({
-  catalogue,
-  recordings,
-  targets,
-  onChange,
-}: {
+interface TargetsTableProps {
   catalogue: Catalogue
   recordings: readonly RecordingView[]
   targets: readonly TargetDraft[]
   onChange: (change: Change) => void
-}) {
+}
+
+export function TargetsTable({ catalogue, recordings, targets, onChange }: TargetsTableProps) {
   const quantities = catalogue.fields.target.get('quantity')?.choices ?? []
   const add = () =>
     onChange((all) => [

@@ -9,17 +9,14 @@ import { sentence } from '../../format/words'
 import { RATE, WalkStage } from '../../walk/player/walk-stage'
 import { type ReplayHeader, recordWalk } from '../../walk/replay/replay'
 
-export function StartWalk({
-  robot,
-  controller,
-  design,
-  scenarios,
-}: {
+interface StartWalkProps {
   robot: JobSpec['robot']
   controller: string
   design: Design
   scenarios: readonly (string | Scenario)[]
-}) {
+}
+
+export function StartWalk({ robot, controller, design, scenarios }: StartWalkProps) {
   const box = useRef<HTMLDivElement>(null)
   const visible = useVisible(box)
   const [chosen, setChosen] = useState('')

@@ -122,19 +122,15 @@ function presetColumns(
   ]
 }
 
-function CustomScenario({
-  scenario,
-  index,
-  catalogue,
-  errors,
-  onChange,
-}: {
+interface CustomScenarioProps {
   scenario: CustomDraft
   index: number
   catalogue: Catalogue
   errors: FieldErrors
   onChange: (scenario: CustomDraft | null) => void
-}) {
+}
+
+function CustomScenario({ scenario, index, catalogue, errors, onChange }: CustomScenarioProps) {
   const at = `custom.${index}`
   const fields = [...catalogue.fields.scenario.values()].filter(({ name }) => name !== 'name')
   const change = (name: string) => (value: string) => onChange({ ...scenario, [name]: value })

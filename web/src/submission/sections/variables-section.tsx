@@ -83,14 +83,13 @@ export function VariablesSection({ draft, catalogue, errors, onChange }: Section
   )
 }
 
-/** Adds a gait variable for a group of legs: `stride[front]`. */
-function AddGroup({
-  variables,
-  onAdd,
-}: {
+interface AddGroupProps {
   variables: readonly Variable[]
   onAdd: (variable: Variable) => void
-}) {
+}
+
+/** Adds a gait variable for a group of legs: `stride[front]`. */
+function AddGroup({ variables, onAdd }: AddGroupProps) {
   const [name, setName] = useState(variables[0]?.name ?? '')
   const [group, setGroup] = useState('front')
   const [added] = ofLegGroups(variables, [`${name}[${group.trim()}]`])

@@ -8,15 +8,13 @@ import { RemovableList } from '../../../components/fields/removable-list'
 import { formatNumber } from '../../../format/number'
 import { idsIn, recordingSearch, shortId } from './recording-search'
 
-export function RecordingsCard({
-  ids,
-  recordings,
-  onChange,
-}: {
+interface RecordingsCardProps {
   ids: readonly string[]
   recordings: Resource<readonly RecordingView[]>
   onChange: (ids: readonly string[]) => void
-}) {
+}
+
+export function RecordingsCard({ ids, recordings, onChange }: RecordingsCardProps) {
   return (
     <Card class="stack" title="Recordings to fit">
       {ids.length === 0 && (

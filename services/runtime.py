@@ -7,8 +7,8 @@ import signal
 import threading
 from collections import deque
 from collections.abc import Callable, Collection, Iterator
-from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
+from dataclasses import dataclass, replace
 from functools import partial
 from queue import SimpleQueue
 from types import FrameType
@@ -19,11 +19,19 @@ from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.housekeeping import Housekeeping
 from gaitswarm.services.optimizer.jobs.job import QUARANTINE_AFTER
 from gaitswarm.services.optimizer.run.embedded import run_embedded
-from gaitswarm.services.optimizer.run.evaluator import Evaluator, Watched
+from gaitswarm.services.optimizer.run.evaluator import (
+    EvaluationRequest,
+    Evaluator,
+    OnTask,
+    TaskReport,
+    Watched,
+    place_of,
+)
 from gaitswarm.services.optimizer.run.runner import Runner
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import open_store
 from gaitswarm.services.worker import EvaluatorKind
+from gaitswarm.sim.outcome import Outcome
 
 if TYPE_CHECKING:
     from gaitswarm.services.monitoring.activity import Activity
@@ -78,6 +86,39 @@ def check_address(address: str | None) -> None:
             " it loses its tasks with its connection; use HOST:6379, or auto on a node",
             field="ray_address",
         )
+
+
+Observe = Callable[[EvaluationRequest], AbstractContextManager[OnTask | None]]
+"""Observes one evaluation, and each of its tasks by the function in the block, if there is one."""
+
+
+class ObservedEvaluator:
+    """An evaluator whose evaluations are observed."""
+
+    def __init__(self, inner: Evaluator, observe: Observe) -> None:
+        self._inner = inner
+        self._observe = observe
+        self.close = inner.close
+
+    @property
+    def slots(self) -> int:
+        return self._inner.slots
+
+    @property
+    def place(self) -> str | None:
+        return place_of(self._inner)
+
+    def evaluate(
+        self, request: EvaluationRequest, should_stop: Callable[[], bool]
+    ) -> tuple[Outcome, ...]:
+        with self._observe(request) as observe_task:
+
+            def on_task(report: TaskReport) -> None:
+                for observer in (observe_task, request.on_task):
+                    if observer is not None:
+                        observer(report)
+
+            return self._inner.evaluate(replace(request, on_task=on_task), should_stop)
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,10 +210,10 @@ def open_runtime(
         watched: Evaluator = workers
         if activity is not None:
             stack.enter_context(activity.recorded_log())
-            watched = activity.watched_evaluator(watched)
+            watched = ObservedEvaluator(watched, activity.observed)
         runner = Runner(
             store,
-            watched if tracing is None else tracing.traced_evaluator(watched),
+            watched if tracing is None else ObservedEvaluator(watched, tracing.observed),
             concurrency=concurrent_jobs,
             lease_seconds=lease_seconds,
             cache=cache,

@@ -12,21 +12,16 @@ import time
 from collections import OrderedDict, deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
-from typing import Final, cast
+from functools import partial
+from typing import Final
 
 from pydantic import Field
 
 from gaitswarm.services.optimizer.log_context import log_fields
-from gaitswarm.services.optimizer.run.evaluator import (
-    EvaluationRequest,
-    Evaluator,
-    TaskReport,
-    place_of,
-)
+from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, OnTask, TaskReport
 from gaitswarm.services.optimizer.views import IterationIndex, View
-from gaitswarm.sim.outcome import Outcome
 
 _JOBS: Final = 32
 """Number of jobs remembered, the most recently active ones."""
@@ -141,9 +136,16 @@ class Activity:
                 tuple(records.iterations), tuple(records.tasks), tuple(records.messages), workers
             )
 
-    def watched_evaluator(self, inner: Evaluator) -> Evaluator:
-        """Wrap an evaluator so that its requests are recorded."""
-        return cast(Evaluator, _WatchedEvaluator(inner, self))
+    @contextmanager
+    def observed(self, request: EvaluationRequest) -> Iterator[OnTask]:
+        """Record an evaluation and its tasks."""
+        self.begun(request)
+        try:
+            yield partial(self.task, request)
+        except BaseException as error:
+            self.ended(request, f"{type(error).__name__}: {error}".rstrip(": "))
+            raise
+        self.ended(request, None)
 
     @contextmanager
     def recorded_log(self) -> Iterator[None]:
@@ -211,40 +213,6 @@ class Activity:
         while len(self._jobs) > _JOBS:
             self._jobs.popitem(last=False)
         return records
-
-
-class _WatchedEvaluator:
-    def __init__(self, inner: Evaluator, activity: Activity) -> None:
-        self._inner = inner
-        self._activity = activity
-
-    @property
-    def slots(self) -> int:
-        return self._inner.slots
-
-    @property
-    def place(self) -> str | None:
-        return place_of(self._inner)
-
-    def evaluate(
-        self, request: EvaluationRequest, should_stop: Callable[[], bool]
-    ) -> tuple[Outcome, ...]:
-        def on_task(report: TaskReport) -> None:
-            self._activity.task(request, report)
-            if request.on_task is not None:
-                request.on_task(report)
-
-        self._activity.begun(request)
-        try:
-            outcomes = self._inner.evaluate(replace(request, on_task=on_task), should_stop)
-        except BaseException as error:
-            self._activity.ended(request, f"{type(error).__name__}: {error}".rstrip(": "))
-            raise
-        self._activity.ended(request, None)
-        return outcomes
-
-    def close(self) -> None:
-        self._inner.close()
 
 
 class _LogRecorder(logging.Handler):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from prometheus_client.metrics_core import GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
@@ -30,38 +30,37 @@ class QueueCollector(Collector):
         return []
 
     def collect(self) -> Iterator[Metric]:
-        up = GaugeMetricFamily("gaitswarm_database_up", "Whether the database answers: 1 or 0")
+        name, text = "gaitswarm_database_up", "Whether the database answers: 1 or 0"
         try:
             queue = self._store().queue()
         except StoreUnavailable:
-            up.add_metric([], 0)
-            yield up
+            yield _gauge(name, text, {(): 0})
             return
-        up.add_metric([], 1)
-        yield up
-        by_state = GaugeMetricFamily("gaitswarm_jobs", "Jobs in the database", labels=["state"])
-        for state, count in queue.jobs.items():
-            by_state.add_metric([state], count)
-        yield by_state
-        by_kind = GaugeMetricFamily(
-            "gaitswarm_queue_jobs", "Jobs that have not ended", labels=["state", "kind"]
-        )
-        for (state, kind), count in queue.under_way.items():
-            by_kind.add_metric([state, kind], count)
-        yield by_kind
-        failed = GaugeMetricFamily(
-            "gaitswarm_failed_jobs", "Jobs in the database that have failed", labels=["cause"]
-        )
         causes = Counter(map(failure_cause, queue.errors))
-        for cause in FAILURE_CAUSES:
-            failed.add_metric([cause], causes[cause])
-        yield failed
-        wait = GaugeMetricFamily(
+        yield _gauge(name, text, {(): 1})
+        by_state = {(state,): count for state, count in queue.jobs.items()}
+        yield _gauge("gaitswarm_jobs", "Jobs in the database", by_state, "state")
+        labels = ("state", "kind")
+        yield _gauge("gaitswarm_queue_jobs", "Jobs that have not ended", queue.under_way, *labels)
+        yield _gauge(
+            "gaitswarm_failed_jobs",
+            "Jobs in the database that have failed",
+            {(cause,): causes[cause] for cause in FAILURE_CAUSES},
+            "cause",
+        )
+        yield _gauge(
             "gaitswarm_queue_longest_wait_seconds",
             "Longest time that a queued job has waited for a runner",
+            {(): queue.longest_wait},
         )
-        wait.add_metric([], queue.longest_wait)
-        yield wait
+
+
+def _gauge(name: str, text: str, samples: Mapping[Any, float], *labels: str) -> GaugeMetricFamily:
+    """Return a metric; samples: values by tuples of labels."""
+    metric = GaugeMetricFamily(name, text, labels=labels)
+    for values, sample in samples.items():
+        metric.add_metric(values, sample)
+    return metric
 
 
 class WorkerLoad(Protocol):
@@ -87,15 +86,11 @@ class WorkersCollector(Collector):
         self._loads = loads
 
     def collect(self) -> Iterator[Metric]:
-        slots = GaugeMetricFamily(
-            "gaitswarm_worker_slots", "Tasks that can run concurrently", labels=["workers"]
-        )
-        used = GaugeMetricFamily("gaitswarm_worker_slots_used", "Slots in use", labels=["workers"])
-        waiting = GaugeMetricFamily(
-            "gaitswarm_worker_tasks_waiting", "Tasks waiting for a slot", labels=["workers"]
-        )
-        for name, load in self._loads().items():
-            slots.add_metric([name], load.slots)
-            used.add_metric([name], load.used)
-            waiting.add_metric([name], load.waiting)
-        yield from (slots, used, waiting)
+        loads = self._loads()
+        for name, text, attribute in (
+            ("slots", "Tasks that can run concurrently", "slots"),
+            ("slots_used", "Slots in use", "used"),
+            ("tasks_waiting", "Tasks waiting for a slot", "waiting"),
+        ):
+            samples = {(worker,): getattr(load, attribute) for worker, load in loads.items()}
+            yield _gauge(f"gaitswarm_worker_{name}", text, samples, "workers")

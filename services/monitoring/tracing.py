@@ -8,8 +8,9 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
 
 from opentelemetry.sdk.resources import Resource
 from opentelemetry.sdk.trace import SpanProcessor, TracerProvider
@@ -18,14 +19,8 @@ from opentelemetry.trace import Span, Status, StatusCode, set_span_in_context
 from gaitswarm.services.optimizer.errors import LeaseLost
 from gaitswarm.services.optimizer.jobs.iteration import CompletedIteration
 from gaitswarm.services.optimizer.jobs.job import Claim, JobState
-from gaitswarm.services.optimizer.run.evaluator import (
-    EvaluationRequest,
-    Evaluator,
-    TaskReport,
-    place_of,
-)
+from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, OnTask, TaskReport
 from gaitswarm.services.optimizer.store import Observer
-from gaitswarm.sim.outcome import Outcome
 
 
 def exporting_tracing() -> Tracing:
@@ -55,9 +50,11 @@ class Tracing(Observer):
         self._jobs: dict[str, Span] = {}
         self._iterations: dict[str, tuple[int, Span]] = {}
 
-    def traced_evaluator(self, evaluator: Evaluator) -> Evaluator:
-        """Wrap an evaluator so that evaluations and tasks have spans."""
-        return _TracedEvaluator(evaluator, self)
+    @contextmanager
+    def observed(self, request: EvaluationRequest) -> Iterator[OnTask | None]:
+        """Make spans of an evaluation and its tasks."""
+        span = self.iteration(request)
+        yield None if span is None else partial(self.task, span)
 
     def close(self) -> None:
         """Export pending spans. Idempotent."""
@@ -137,29 +134,3 @@ class Tracing(Observer):
         if report.error is not None:
             span.set_status(Status(StatusCode.ERROR, report.error))
         span.end(ended)
-
-
-class _TracedEvaluator:
-    def __init__(self, inner: Evaluator, tracing: Tracing) -> None:
-        self._inner = inner
-        self._tracing = tracing
-
-    @property
-    def slots(self) -> int:
-        return self._inner.slots
-
-    @property
-    def place(self) -> str | None:
-        return place_of(self._inner)
-
-    def evaluate(
-        self, request: EvaluationRequest, should_stop: Callable[[], bool]
-    ) -> tuple[Outcome, ...]:
-        span = self._tracing.iteration(request)
-        if span is None:
-            return self._inner.evaluate(request, should_stop)
-        observed = replace(request, on_task=lambda report: self._tracing.task(span, report))
-        return self._inner.evaluate(observed, should_stop)
-
-    def close(self) -> None:
-        self._inner.close()

@@ -17,6 +17,7 @@ from gaitswarm.services.optimizer.log_context import log_context
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest, TaskReport
 from gaitswarm.services.optimizer.service import JobService
 from gaitswarm.services.optimizer.store import Store
+from gaitswarm.services.runtime import ObservedEvaluator
 from gaitswarm.sim.outcome import Outcome
 from tests.examples.servers import Server
 
@@ -53,7 +54,7 @@ def test_iterations_tasks_and_workers_are_recorded(request_: EvaluationRequest) 
     reports: list[TaskReport] = []
     good = TaskReport(24, 2.0, 1.5, "node-1")
     bad = TaskReport(24, 3.0, error="it died")
-    watched = activity.watched_evaluator(Worker(good, bad, good))
+    watched = ObservedEvaluator(Worker(good, bad, good), activity.observed)
     watched.evaluate(replace(request_, on_task=reports.append), lambda: False)
 
     assert reports == [good, bad, good]
@@ -80,7 +81,7 @@ def test_iterations_tasks_and_workers_are_recorded(request_: EvaluationRequest) 
 
 def test_an_iteration_that_fails_says_why(request_: EvaluationRequest) -> None:
     activity = Activity()
-    watched = activity.watched_evaluator(Worker(error=ValueError("no such robot")))
+    watched = ObservedEvaluator(Worker(error=ValueError("no such robot")), activity.observed)
     with pytest.raises(ValueError, match="no such robot"):
         watched.evaluate(request_, lambda: False)
     found = activity.of("job")

@@ -16,7 +16,7 @@ from gaitswarm.services.optimizer.jobs.documents import SPECS
 from gaitswarm.services.optimizer.jobs.job import Command, JobState
 from gaitswarm.services.optimizer.run.execution import RunContext, run_claim
 from gaitswarm.services.optimizer.store import Store
-from gaitswarm.services.runtime import open_runtime
+from gaitswarm.services.runtime import ObservedEvaluator, open_runtime
 from tests.examples.jobs import SMALL_SPEC
 from tests.examples.processes import eventually, loaded_by
 from tests.optimizer.formula import HERE, SPEC, FormulaEvaluator
@@ -81,7 +81,9 @@ def test_a_job_that_fails_and_its_iteration_say_why(
     store.create_job(SPEC)
     claim = store.claim("runner", lease_seconds=30.0)
     assert claim is not None
-    evaluator = tracing.traced_evaluator(FormulaEvaluator([None, ZeroDivisionError("of the test")]))
+    evaluator = ObservedEvaluator(
+        FormulaEvaluator([None, ZeroDivisionError("of the test")]), tracing.observed
+    )
     run_claim(claim, RunContext(store, evaluator, provenance=lambda _: HERE))
     (job,) = named(exporter, "job")
     first, second = named(exporter, "iteration")

@@ -266,7 +266,8 @@ class _Connection:
         name = f"simulate {first}" + (f" and {len(cases) - 1} more" if len(cases) > 1 else "")
         options = {"name": name, "max_retries": attempts - 1}
         designs = request.designs[chunk.start : chunk.stop]
-        return self._remote.options(**options).remote((self._put(request),), cases, designs)
+        with self._reached():
+            return self._remote.options(**options).remote((self._put(request),), cases, designs)
 
     def wait(self, handles: Sequence[Any], seconds: float) -> Sequence[Any]:
         """Return all finished tasks, some unless the time is over."""
@@ -274,11 +275,12 @@ class _Connection:
         # A look at all tasks takes time in proportion to their number.
         least = 1 + len(waiting) // _TASKS_PER_LOOK
         done: list[Any]
-        done, _ = self._ray.wait(waiting, num_returns=least, timeout=seconds, fetch_local=False)
-        if least == len(done) < len(waiting):
-            done, _ = self._ray.wait(
-                waiting, num_returns=len(waiting), timeout=0.0, fetch_local=False
-            )
+        with self._reached():
+            done, _ = self._ray.wait(waiting, num_returns=least, timeout=seconds, fetch_local=False)
+            if least == len(done) < len(waiting):
+                done, _ = self._ray.wait(
+                    waiting, num_returns=len(waiting), timeout=0.0, fetch_local=False
+                )
         return done
 
     def answer(self, handle: Any) -> Answer:
@@ -295,14 +297,23 @@ class _Connection:
             raise unlike("the cluster", f"it cannot run this gaitswarm: {error.cause!r}") from error
         except (exceptions.WorkerCrashedError, exceptions.OutOfMemoryError) as error:
             raise WorkerDied from error
-        except exceptions.LocalRayletDiedError as error:
-            self._ended = "Ray was lost: its process on this machine has died"
-            raise EvaluatorUnavailable(self._ended) from error
+        except exceptions.LocalRayletDiedError:
+            with self._reached():
+                raise
         except exceptions.RayError as error:
             raise TaskLost(f"{type(error).__name__}") from error
         if isinstance(result, Failure):
             raise result.error
         return result
+
+    @contextmanager
+    def _reached(self) -> Iterator[None]:
+        """Take an error of Ray for the loss of the connection."""
+        try:
+            yield
+        except self._ray.exceptions.RayError as error:
+            self._ended = self._ended or f"Ray was lost: {error}"
+            raise EvaluatorUnavailable(self._ended) from error
 
     def abandon(self, handles: Sequence[Any]) -> None:
         """Cancel tasks soon, unless they end by themselves."""
@@ -361,6 +372,8 @@ class _Connection:
                     _, starting = session.ray.wait(starting, num_returns=len(starting), timeout=0.0)
                 if not starting:
                     self.warm.set()
+            if not session.raylet_runs():
+                raise EvaluatorUnavailable("its raylet has died")
             now = time.monotonic()
             if now >= next_pulse:
                 next_pulse = now + PULSE_SECONDS

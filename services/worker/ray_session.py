@@ -42,6 +42,8 @@ _BEFORE_IMPORT: Final = {
     "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
     # Errors of abandoned tasks are of no interest.
     "RAY_IGNORE_UNHANDLED_ERRORS": "1",
+    # As other deaths; by default, tasks that take too much memory are repeated for ever.
+    "RAY_task_oom_retries": "2",
     # A call after the connection has ended must not start another cluster.
     "RAY_ENABLE_AUTO_CONNECT": "0",
 }
@@ -78,6 +80,14 @@ class RaySession:
         Ray itself waits for it for a minute, and then ends the process.
         """
         return listens(*self.head)
+
+    def raylet_runs(self) -> bool:
+        """Return whether this process's own raylet runs; Ray ends the process some 16 s after it.
+
+        True for a raylet that others started.
+        """
+        started = self.ray._private.worker._global_node  # noqa: SLF001 - there is no other way
+        return started is None or all(kind != "raylet" for kind, _ in started.dead_processes())
 
     def nodes(self) -> list[dict[str, Any]]:
         """Return the nodes that are alive, as `ray.nodes`, which would wait for a lost head.

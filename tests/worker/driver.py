@@ -33,7 +33,7 @@ def main() -> None:
     evaluate("ray")
     if "lose" in sys.argv:
         for process in descendants(os.getpid()):
-            if "gcs_server" in process.title:
+            if "raylet/raylet" in process.title:
                 os.kill(process.pid, signal.SIGKILL)
 
         def in_threads() -> bool:

@@ -28,6 +28,7 @@ def finished(store: Store, wanted: CalibrationSpec) -> str:
 
 
 @pytest.mark.slow
+@pytest.mark.thorough("a whole search")
 def test_it_finds_hidden_parameters_and_the_hidden_law_of_friction(store: Store) -> None:
     wanted = spec(
         targets=true_targets(),

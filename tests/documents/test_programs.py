@@ -41,6 +41,7 @@ def reader(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Reader]:
         yield Reader(served.url)
 
 
+@pytest.mark.thorough("test_the_readmes_commands_do_what_they_say, with another page")
 def test_the_tutorial_does_what_it_says(reader: Reader) -> None:
     reader.read("docs/tutorial.md")
     assert Path("dog.svg").read_text(encoding="utf-8").startswith("<?xml")
@@ -80,6 +81,7 @@ def test_the_readmes_python_runs(reader: Reader) -> None:
 
 
 @pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
+@pytest.mark.thorough("test_the_readmes_python_runs, with notebooks")
 def test_a_notebook_runs_and_holds_no_outputs(notebook: Path, reader: Reader) -> None:
     assert "fitness" in reader.read_notebook(notebook.relative_to(ROOT).as_posix())
     cells = json.loads(notebook.read_text(encoding="utf-8"))["cells"]

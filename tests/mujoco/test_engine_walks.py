@@ -141,6 +141,7 @@ def test_what_parts_us_from_mujocos_own_steps_vanishes_with_their_length(
     ],
     ids=named,
 )
+@pytest.mark.thorough("test_a_walk_is_the_same_in_mujoco_to_rounding, with MuJoCo's steps")
 def test_in_mujocos_own_steps_a_walk_is_worth_the_same_within_two_percent(
     variant: RobotVariant, drive: str
 ) -> None:

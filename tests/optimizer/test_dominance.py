@@ -57,6 +57,7 @@ def test_what_has_no_objectives_is_on_no_front() -> None:
     assert not non_dominated(points[:1]).any()
 
 
+@pytest.mark.thorough("a large front")
 def test_a_hundred_thousand_points_of_which_none_is_dominated_take_seconds() -> None:
     directions = np.abs(np.random.default_rng(2).normal(size=(100_000, 5)))
     points = -directions / np.linalg.norm(directions, axis=1)[:, None]

@@ -80,10 +80,12 @@ IN_SCENARIOS = LOGARITHMS[: DESIGNS // 5, :, None].repeat(6, axis=2)
     ],
     ids=["fitness", "utilities", "judgement"],
 )
+@pytest.mark.thorough("long histories")
 def test_designs_are_judged_in_parts(compute: Callable[[], object]) -> None:
     assert computes_in_parts(compute)
 
 
+@pytest.mark.thorough("long histories")
 def test_a_certificate_is_summed_up_in_parts() -> None:
     worlds = DESIGNS // 3
     spec = small(worlds=worlds)

@@ -89,6 +89,7 @@ def test_the_interval_widens_where_the_answer_hangs_on_one_design() -> None:
     assert regret.high == regret.value
 
 
+@pytest.mark.thorough("long histories")
 def test_a_long_history_is_judged_in_the_memory_of_its_own() -> None:
     judged = np.random.default_rng(3).normal(size=(60_000, 6))
     columns = numbered(len(judged))

@@ -153,6 +153,7 @@ OTHERS: list[Kind] = [
 
 @pytest.mark.variants("all internal state")
 @pytest.mark.parametrize("kinds", [INTERNAL_STATE, OTHERS], ids=["all internal state", "others"])
+@pytest.mark.thorough("the kernel under sanitizers")
 def test_walks_and_falls_access_only_their_memory(kinds: list[Kind]) -> None:
     """And what they are compiled from gives no warning."""
     flags = (*sanitizers(), *WARNINGS)

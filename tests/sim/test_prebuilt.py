@@ -87,6 +87,9 @@ def walk_without_a_compiler(
     )
 
 
+@pytest.mark.thorough(
+    "test_a_prebuilt_library_saves_the_compilation_whatever_the_robot_is_called, from a wheel"
+)
 def test_a_machine_without_a_compiler_walks_on_the_wheels_kernels(
     installed: Path, tmp_path: Path
 ) -> None:

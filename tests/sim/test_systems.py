@@ -172,6 +172,9 @@ def test_without_posix_and_a_compiler_the_interpreter_runs_with_a_warning() -> N
 
 
 @pytest.mark.slow
+@pytest.mark.thorough(
+    "test_without_posix_and_a_compiler_the_interpreter_runs_with_a_warning, as a job"
+)
 def test_without_posix_a_job_is_optimized_in_this_process(tmp_path: Path) -> None:
     brief = tmp_path / "brief.json"
     brief.write_text(json.dumps(SHORT_WALK | {"cycle_time": 0.3}), encoding="utf-8")

@@ -18,6 +18,21 @@ from tests.store.postgres_server import PostgresServer, postgres_server, server_
 
 _DATABASES = ["sqlite", pytest.param("postgresql", marks=pytest.mark.slow)]
 
+_ON_POSTGRESQL = {"test_bits", "test_chain", "test_claims", "test_history", "test_job_list"}
+"""Modules that `make test` runs on PostgreSQL too; `make test-all` runs all of them."""
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Leave most tests on PostgreSQL to `make test-all`."""
+    here = Path(__file__).parent
+    for item in items:
+        if item.path.parent != here or item.path.stem in _ON_POSTGRESQL:
+            continue
+        parameters = getattr(item, "callspec", None)
+        if parameters is not None and "postgresql" in parameters.params.values():
+            item.add_marker(pytest.mark.thorough("the same statements on PostgreSQL"))
+
 
 @pytest.fixture(scope="session")
 def migrated_sqlite(tmp_path_factory: pytest.TempPathFactory) -> Path:

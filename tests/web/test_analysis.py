@@ -21,6 +21,7 @@ def importance_of(server: ServerProcess, job_id: str) -> Any:
     return server.client.get(f"/v1/jobs/{job_id}/importance").json()
 
 
+@pytest.mark.thorough("test_active_bounds_are_widened_in_the_form, with a longer job")
 def test_variables_are_sorted_by_importance_for_the_chosen_output(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:

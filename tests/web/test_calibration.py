@@ -116,6 +116,7 @@ def test_choices_are_shown_by_name_everywhere(
     expect(particles.get_by_role("row").filter(has_text="linear zone")).not_to_have_count(0)
 
 
+@pytest.mark.thorough("test_views_are_accessible_at_every_width, with another kind of job")
 def test_no_tab_scrolls_horizontally(
     server: ServerProcess, calibration: str, visit: Callable[..., Visit]
 ) -> None:

@@ -107,6 +107,7 @@ def test_a_queued_certificate_has_an_empty_state(
     expect(page.get_by_role("heading", name="No world yet")).to_be_visible()
 
 
+@pytest.mark.thorough("test_views_are_accessible_at_every_width, with another kind of job")
 def test_no_tab_scrolls_horizontally(
     server: ServerProcess, certificate: str, visit: Callable[..., Visit]
 ) -> None:

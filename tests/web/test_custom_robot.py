@@ -30,6 +30,7 @@ def green(image: NDArray[np.uint8]) -> int:
     return int(((g > 2 * r) & (g > 2 * b) & (g > 40)).sum())
 
 
+@pytest.mark.thorough("test_a_urdf_is_simulated_and_submitted, with meshes")
 def test_meshes_of_a_custom_robot_are_drawn_and_can_be_hidden(
     server: ServerProcess, robots: Path, visit: Callable[..., Visit]
 ) -> None:

@@ -95,6 +95,7 @@ def test_an_invalid_spec_is_not_submitted_and_its_field_is_marked(
     assert server.client.get("/v1/jobs").json()["items"] == jobs_before
 
 
+@pytest.mark.thorough("test_a_job_is_submitted_watched_paused_reloaded_and_resumed, by keyboard")
 def test_a_job_is_submitted_and_followed_by_keyboard_alone(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:

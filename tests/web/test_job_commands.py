@@ -125,6 +125,9 @@ def test_the_browser_notifies_of_the_end_of_a_job_on_request(
     ]
 
 
+@pytest.mark.thorough(
+    "test_the_priority_is_set_in_the_form_and_changed_on_the_page, with another field"
+)
 def test_a_webhook_is_set_in_the_form_unless_its_host_is_not_allowed(
     start_server: Callable[..., Server], visit: Callable[..., Visit]
 ) -> None:

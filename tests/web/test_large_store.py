@@ -130,6 +130,7 @@ def large_server(long_job: str, database: Path, _chromium: str) -> Iterator[Serv
 
 
 @pytest.mark.timeout(600)
+@pytest.mark.thorough("a database of many jobs")
 def test_the_first_view_of_the_list_is_small(
     large_server: Server, visit: Callable[..., Visit]
 ) -> None:
@@ -145,6 +146,7 @@ def test_the_first_view_of_the_list_is_small(
 
 
 @pytest.mark.timeout(600)
+@pytest.mark.thorough("a long job")
 def test_the_first_view_of_a_long_job_is_small_and_then_complete(
     large_server: Server, long_job: str, visit: Callable[..., Visit]
 ) -> None:
@@ -178,6 +180,7 @@ def test_the_benchmark_of_the_page_measures_first_views_and_animations(
 
 
 @pytest.mark.timeout(600)
+@pytest.mark.thorough("a database of many jobs")
 def test_a_picker_loads_pages_on_demand_and_searches_on_the_server(
     large_server: Server, visit: Callable[..., Visit]
 ) -> None:

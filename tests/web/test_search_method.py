@@ -87,6 +87,9 @@ def test_the_budget_of_a_job_with_small_iterations_is_counted_in_designs(
     expect(page.get_by_text("30 of 30 designs").first).to_be_visible()
 
 
+@pytest.mark.thorough(
+    "test_a_method_is_configured_in_the_form_and_shown_with_its_job, with start designs"
+)
 def test_a_search_starts_from_the_best_of_a_job(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:

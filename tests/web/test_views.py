@@ -151,6 +151,7 @@ def test_the_theme_follows_the_system_until_it_is_chosen(
     expect(body).to_have_css("background-color", light)
 
 
+@pytest.mark.thorough("two pages that are not ours")
 def test_the_api_documentation_complies_with_its_content_security_policy(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:

@@ -111,6 +111,7 @@ def test_a_replay_can_be_scrubbed_stepped_and_played(
     expect_frame(page, recording.header["frames"] - 1, recording)
 
 
+@pytest.mark.thorough("the browser's video encoder")
 def test_a_replay_is_saved_as_a_video_with_the_chosen_size_and_speed(
     server: ServerProcess, visit: Callable[..., Visit]
 ) -> None:
@@ -210,6 +211,7 @@ def test_additional_presets_are_shown_to_the_end(
     painted(player(page).locator("canvas"), colourful(200))
 
 
+@pytest.mark.thorough("test_a_replay_can_be_scrubbed_stepped_and_played, twice")
 def test_two_walks_are_compared(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:

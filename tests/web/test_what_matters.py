@@ -45,6 +45,7 @@ def test_a_job_with_one_scenario_has_an_empty_state(
     expect(page.get_by_role("heading", name="Only one scenario")).to_be_visible()
 
 
+@pytest.mark.thorough("simulations of all winners' neighbours")
 def test_winners_of_preferences_are_compared_and_simulated_on_request(
     server: ServerProcess, finished_job: str, visit: Callable[..., Visit]
 ) -> None:

@@ -52,7 +52,6 @@ export const put = jsonOf('put')
 export const patch = jsonOf('patch')
 export const remove = jsonOf('delete')
 
-/** GET a resource that is not JSON. */
 export async function getBytes<P extends PathOf<'get'>>(
   path: P,
   options: Options<P, 'get'> = {},
@@ -60,7 +59,6 @@ export async function getBytes<P extends PathOf<'get'>>(
   return (await send('get', path, options)).arrayBuffer()
 }
 
-/** POST a body; the response is not JSON. */
 export async function postBytes<P extends PathOf<'post'>>(
   path: P,
   options: Options<P, 'post'> = {},

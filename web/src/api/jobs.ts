@@ -26,9 +26,7 @@ export const NOT_PUBLISHED = 'There is no published design for this robot.'
 const PAGE = 20
 
 interface Options {
-  /** Ids of jobs that are not offered. */
   readonly exclude?: readonly string[]
-  /** Value of the choice; the job's id by default. */
   readonly value?: (id: string) => string
   readonly note?: (job: JobSummary) => string
 }

@@ -22,7 +22,6 @@ export function Empty({ title, children }: { title: string; children?: Component
   )
 }
 
-/** An error with its reason, and a retry button unless retrying cannot help. */
 export function ErrorNotice({
   error,
   what,
@@ -59,7 +58,6 @@ export function ErrorNotice({
   )
 }
 
-/** Whether the same request would fail again. */
 function isFinal(error: unknown): boolean {
   return error instanceof ApiProblem && error.status === 422
 }

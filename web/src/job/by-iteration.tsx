@@ -42,7 +42,6 @@ export function IterationChart<R extends Indexed>({
   ...card
 }: Omit<LineCardProps, 'x' | 'xLabel' | 'series' | 'caption' | 'yLabel'> & {
   rows: readonly R[]
-  /** Name of the values. */
   name: string
   value: (row: R) => number | null
   yLabel?: string

@@ -32,7 +32,6 @@ interface Part {
   readonly Panel: FunctionComponent<PanelProps>
 }
 
-/** A tab whose code is loaded when it is first shown. */
 function part(
   label: string,
   load: () => Promise<{ default: FunctionComponent<PanelProps> }>,

@@ -21,7 +21,6 @@ export function preferenceIn(query: URLSearchParams): Preference | undefined {
   return preferenceOf(query.get('preference') ?? '')
 }
 
-/** Parse a preference from JSON; undefined if invalid. */
 export function preferenceOf(text: string): Preference | undefined {
   try {
     const { bias, exponent } = JSON.parse(text) as Partial<Preference>

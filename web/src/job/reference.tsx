@@ -33,7 +33,6 @@ async function load(job: Job, choice: string, signal: AbortSignal): Promise<Refe
   return { label: `published ${study}`, scenarios: result.scenarios }
 }
 
-/** Simulate the published designs of the job's controller in its scenarios. */
 export async function publishedReferences(job: Job): Promise<readonly Reference[]> {
   const spec = job.spec as JobSpec
   const match = (await catalogue()).find(({ name }) => name === spec.controller)
@@ -48,7 +47,6 @@ function catalogue(): Promise<readonly Controller[]> {
   return cached('controllers', () => get('/v1/controllers').then(({ items }) => items))
 }
 
-/** Simulate a design in the job's scenarios. */
 function walkOf(
   { robot, scenarios, preference }: JobSpec,
   controller: JobSpec['controller'],

@@ -16,7 +16,6 @@ import {
   STATES,
 } from './list-query'
 
-/** Query changes that reset all filters. */
 export const NO_FILTER: Readonly<Record<string, null>> = {
   ...FIRST_PAGE,
   search: null,

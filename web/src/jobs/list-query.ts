@@ -68,10 +68,8 @@ export function listQuery(query: URLSearchParams) {
   }
 }
 
-/** Query change that returns to the first page. */
 export const FIRST_PAGE = { after: null } as const
 
-/** Whether any filter other than `archived` is active. */
 export function isFiltered(query: ListQuery): boolean {
   return query.search !== undefined || FACETS.some((facet) => query[facet] !== undefined)
 }

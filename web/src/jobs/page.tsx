@@ -1,7 +1,9 @@
-/** List of jobs, filtered, sorted and paged by the server. */
+/** List of jobs, filtered, sorted and paged by the server; polled while the tab is visible. */
 
-import { useNow } from '../api/resource'
-import type { JobFacets } from '../api/types'
+import { useEffect, useRef, useState } from 'preact/hooks'
+import { get } from '../api/client'
+import { useNow, usePolling, useResource } from '../api/resource'
+import type { JobFacets, JobState, JobSummary } from '../api/types'
 import { EmptyCard } from '../components/card'
 import { CopyBlock } from '../components/copy-button'
 import { Empty, ErrorNotice, Loading } from '../components/feedback'
@@ -11,11 +13,18 @@ import { setQuery, usePlace } from '../router/navigation'
 import { idsOf } from '../router/query-value'
 import { jobColumns } from './columns'
 import { Filters, NO_FILTER } from './filters'
+import {
+  descends,
+  isFiltered,
+  type ListQuery,
+  listQuery,
+  type Order,
+  PAGE,
+  reordered,
+} from './list-query'
 import { jobsInWords, Selection } from './selection'
-import './jobs.css'
-import { descends, isFiltered, listQuery, type Order, PAGE, reordered } from './list-query'
 import { useSparklines } from './sparkline'
-import { useFacets, useList } from './use-list'
+import './jobs.css'
 
 export function JobsPage() {
   const place = usePlace()
@@ -132,4 +141,43 @@ function NoJobs() {
       />
     </EmptyCard>
   )
+}
+
+const POLL_MS = 2000
+const FACETS_MS = 15_000
+const PAUSE_MS = 150
+
+function useList(query: ListQuery, after: string | null) {
+  const [announcement, setAnnouncement] = useState('')
+  const states = useRef(new Map<string, JobState>())
+  const list = useResource(
+    JSON.stringify([query, after]),
+    (signal) => get('/v1/jobs', { query: { ...query, after, limit: PAGE }, signal }),
+    { keep: true, pause: PAUSE_MS },
+  )
+  usePolling(list.reload, POLL_MS)
+  useEffect(() => {
+    const jobs = list.data?.items ?? []
+    const news = changeOfState(states.current, jobs)
+    if (news !== null) setAnnouncement(news)
+    for (const job of jobs) states.current.set(job.id, job.state)
+  }, [list.data])
+  return { page: list.data, error: list.error, announcement, reload: list.reload }
+}
+
+function useFacets(archived: boolean): JobFacets | null {
+  const counts = useResource(`facets ${archived}`, (signal) =>
+    get('/v1/job-facets', { query: { archived }, signal }),
+  )
+  usePolling(counts.reload, FACETS_MS)
+  return counts.data
+}
+
+function changeOfState(
+  before: ReadonlyMap<string, JobState>,
+  now: readonly JobSummary[],
+): string | null {
+  const changed = now.filter((j) => before.has(j.id) && before.get(j.id) !== j.state)
+  if (changed.length === 0) return null
+  return changed.map((job) => `${job.name || job.id} is ${job.state}`).join('; ')
 }

@@ -15,7 +15,6 @@ import {
   lostWith,
 } from './deletion'
 
-/** Most jobs that can be compared. */
 const MOST_COMPARED = 12
 
 export function Selection({
@@ -25,7 +24,6 @@ export function Selection({
   onSelect,
 }: {
   selected: readonly string[]
-  /** Whether the list shows archived jobs. */
   archived: boolean
   onDone: () => void
   onSelect: (selected: readonly string[]) => void

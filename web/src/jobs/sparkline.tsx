@@ -12,7 +12,6 @@ const HEIGHT = 20
 
 export type Sparklines = ReadonlyMap<string, Convergence>
 
-/** Convergence of the jobs with a result. */
 export function useSparklines(jobs: readonly JobSummary[]): Sparklines {
   const withResult = jobs.filter(({ best_fitness }) => best_fitness !== null)
   const iterations = withResult.reduce((sum, job) => sum + job.iterations, 0)

@@ -12,7 +12,6 @@ import type { Shown } from './keys'
 import './palette.css'
 import { type Entry, matchingEntries, SHORTCUTS, shortcutsOn, switchShortcuts } from './shortcuts'
 
-/** Most jobs listed. */
 const MOST_JOBS = 8
 const PAUSE_MS = 150
 

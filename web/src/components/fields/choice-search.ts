@@ -13,11 +13,9 @@ export interface Choice {
 
 export interface ChoicePage {
   readonly items: readonly Choice[]
-  /** Cursor of the next page; null on the last. */
   readonly next: string | null
 }
 
-/** Fetch a page of matches for a text. */
 export type Search = (
   text: string,
   after: string | null,
@@ -30,7 +28,6 @@ const PAUSE_MS = 150
 
 /** Search while `text` is not null; previous matches stay until the response arrives. */
 export function useChoiceSearch(text: string | null, search: Search | undefined) {
-  /** Matches before the page to request. */
   const [before, setBefore] = useState<ChoicePage & { text: string | null }>(NOTHING)
   const { items: earlier, next: after } = before.text === text ? before : NOTHING
   const { data, error } = useResource(

@@ -20,7 +20,6 @@ interface Props {
   readonly invalid?: boolean
   /** Local choices, filtered by the text typed. */
   readonly groups?: readonly ChoiceGroup[]
-  /** Server-side search, under a heading. */
   readonly remote?: { readonly label: string; readonly search: Search }
   readonly onChoose: (value: string) => void
   /** Handle pasted text; false to search for it instead. */
@@ -40,7 +39,6 @@ export function Combobox({
 }: Props) {
   const id = useId()
   const [open, setOpen] = useState(false)
-  /** Text typed since the list was opened; null for none. */
   const [typed, setTyped] = useState<string | null>(null)
   const [at, setAt] = useState(-1)
   const list = useRef<HTMLDivElement>(null)

@@ -7,11 +7,8 @@ import './fields.css'
 export interface FieldProps {
   readonly label: ComponentChildren
   readonly hint?: ComponentChildren
-  /** Why the value is rejected. */
   readonly error?: string
-  /** Whether the value differs from its default. */
   readonly changed?: boolean
-  /** Whether it takes a whole row of fields. */
   readonly wide?: boolean
 }
 

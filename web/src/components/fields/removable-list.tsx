@@ -9,9 +9,7 @@ export function RemovableList({
   onChange,
 }: {
   ids: readonly string[]
-  /** Displayed form of an id. */
   short?: (id: string) => string
-  /** Details shown after the id. */
   children: (id: string) => ComponentChildren
   onChange: (ids: readonly string[]) => void
 }) {

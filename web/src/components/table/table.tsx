@@ -27,9 +27,7 @@ export interface Column<R> {
   readonly sortable?: boolean
   /** Cell content; the sort key by default. */
   readonly cell?: (row: R) => ComponentChildren
-  /** Hidden on narrow screens. */
   readonly minor?: boolean
-  /** Whether the cell is the row's header. */
   readonly header?: boolean
 }
 
@@ -58,7 +56,6 @@ export function Table<R>({
   caption: string
   columns: readonly Column<R>[]
   rows: readonly R[]
-  /** The position by default. */
   rowKey?: (row: R) => string
   order?: SortOrder
   onOrder?: (order: SortOrder) => void
@@ -150,7 +147,6 @@ export function Table<R>({
   )
 }
 
-/** Heading of a column, without its unit. */
 export function headingOf({ key, label }: Pick<Column<unknown>, 'key' | 'label'>): string {
   return label ?? capitalized(key)
 }
@@ -213,7 +209,6 @@ export function Pager({
   onPage,
 }: {
   caption: string
-  /** What is shown on the page. */
   shown: string
   page: string
   onPage: readonly [previous: (() => void) | null, next: (() => void) | null]

@@ -27,7 +27,6 @@ export interface Timeline {
   readonly seconds: number
 }
 
-/** Timeline of the last `most` tasks. */
 export function timelineOf({ tasks, iterations }: Activity, most: number): Timeline {
   const shown = tasks.slice(-most).map((task) => ({ task, at: Date.parse(task.begun_at) / 1000 }))
   const first = Math.min(...shown.map(({ at }) => at))

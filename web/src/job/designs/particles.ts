@@ -22,7 +22,6 @@ export interface ParticleColumn {
   readonly kind: string
   /** Names of the choices that the values index; empty unless categorical. */
   readonly choices: readonly string[]
-  /** One value per design; NaN if missing. */
   readonly values: Float32Array
 }
 
@@ -55,7 +54,6 @@ export function columnNamed(particles: Particles, name: string): ParticleColumn 
   return particles.columns.find((column) => column.name === name) ?? null
 }
 
-/** The given rows with all columns, in the given order. */
 export function particlesTable({ columns }: Particles, rows: Iterable<number>): DataTable {
   return {
     name: 'Designs',
@@ -77,7 +75,6 @@ function written(value: number): number {
   return value
 }
 
-/** Kinds of columns that are variables. */
 const VARIABLES = new Set(['continuous', 'integer', 'categorical'])
 
 /** Query parameters shared by the tabs: the selection and the highlighted design. */

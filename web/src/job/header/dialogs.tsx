@@ -24,7 +24,6 @@ import {
 
 export interface DialogProps {
   readonly job: StoredJob
-  /** Run a command that returns the job, and close the dialog. */
   readonly onCommand: (send: () => Promise<StoredJob>) => void
   readonly onDismiss: () => void
 }
@@ -123,7 +122,6 @@ export function LabelDialog({ job, onCommand, onDismiss }: DialogProps) {
   )
 }
 
-/** Whether the server allows a fork from this iteration. */
 export function canFork(job: Pick<Job, 'links' | 'iterations'>, from: number): boolean {
   return 'fork' in job.links && from >= 1 && from <= job.iterations
 }

@@ -136,7 +136,6 @@ function iterationColumns(job: Job): readonly Column<Iteration>[] {
   ]
 }
 
-/** Designs of one iteration, with links to their simulations and controllers. */
 function IterationPanel({ job, index }: { job: Job; index: number }) {
   const evaluations = useResource(`${job.id} ${index}`, (signal) =>
     get('/v1/jobs/{job_id}/iterations/{iteration}/evaluations', {

@@ -129,7 +129,6 @@ export class EventStream {
     this.set({ connection: 'stale', staleSince: this.followed.staleSince ?? Date.now() })
   }
 
-  /** Close the connection and do not reconnect. */
   private drop(): void {
     clearTimeout(this.retry)
     this.source?.close()

@@ -8,7 +8,6 @@ import { isActive, progressInWords } from '../facts'
 
 const RENEW_MS = 4000
 
-/** Current progress of an active job; null for any other. */
 export function useProgress(initial: StoredJob | undefined): string | null {
   const [renewed, setRenewed] = useState(initial)
   const job = renewed?.id === initial?.id ? renewed : initial

@@ -120,7 +120,6 @@ export function ConvergenceChart({
   )
 }
 
-/** Load single designs when enabled, and refresh them while the job is running. */
 function useDots(job: Job, committed: number, enabled: boolean): Dots | null {
   const renewed = useSlowly(committed, RENEW_MS)
   const dots = useResource(

@@ -9,7 +9,6 @@ import type { Dots } from './model'
 export interface Painted {
   readonly dots: Dots | null
   readonly reference: ReferenceLine | null
-  /** End of the best line, with its label. */
   readonly end: { readonly x: number; readonly y: number; readonly label: string } | null
   readonly above: ReadonlySet<number>
 }
@@ -29,7 +28,6 @@ export function paintDots(plot: uPlot, { dots }: Painted): void {
   })
 }
 
-/** Draw the reference, marks and the label over the lines. */
 export function paintOver(plot: uPlot, painted: Painted): void {
   const { ctx } = plot
   if (painted.reference) paintReference(plot, painted.reference)
@@ -71,7 +69,6 @@ function paintEnd(plot: uPlot, end: Painted['end']): void {
   ctx.fillText(end.label, x - 2 * devicePixelRatio, y + (low ? -4 : 4) * devicePixelRatio)
 }
 
-/** Draw inside the axes only. */
 export function clipped(plot: uPlot, draw: () => void): void {
   const { ctx, bbox } = plot
   ctx.save()

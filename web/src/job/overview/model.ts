@@ -11,7 +11,6 @@ const ROOM = 0.06
 /** Most single designs drawn; beyond, the server returns every n-th iteration. */
 export const MOST_DOTS = 10_000
 
-/** Fitness by iteration; null if missing. */
 export type Line = ArrayLike<number | null>
 
 /** Range of the axis: all lines and reference levels, with a margin. */
@@ -41,7 +40,6 @@ export interface Dots {
   readonly total: number
 }
 
-/** The designs that succeeded in every scenario. */
 export function dotsOf(particles: Particles): Dots | null {
   const iterations = columnNamed(particles, 'iteration')?.values
   const fitness = columnNamed(particles, 'fitness')?.values
@@ -115,7 +113,6 @@ export interface WinnerVariable {
   readonly high: number | null
   /** Position between the bounds, 0 to 1; null without bounds. */
   readonly share: number | null
-  /** The bound at which the value is, if any. */
   readonly at: 'low' | 'high' | null
   readonly fixed: boolean
 }

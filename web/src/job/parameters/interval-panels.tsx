@@ -22,7 +22,6 @@ export function IntervalPanels({
   identifiability: Identifiability
   shown: readonly FittedParameter[]
   runs: number
-  /** Whether agreement is judged at the decisive threshold. */
   judged: boolean
 }) {
   const { thresholds } = identifiability

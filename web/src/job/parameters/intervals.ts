@@ -9,7 +9,6 @@ const TRUSTS: readonly Trust[] = ['trusted', 'rough', 'unknown']
 
 export const WIDTHS = [0.2, 0.1, 0.05, 0.02] as const
 
-/** Threshold at which a parameter is judged. */
 export const DECISIVE = 0.05
 
 export function isCategorical({ choices }: FittedParameter): boolean {
@@ -29,7 +28,6 @@ export function widthAt(
     : null
 }
 
-/** Sort key of the verdict; null without one. */
 export function rankOf({ trust }: FittedParameter): number | null {
   return trust === null ? null : TRUSTS.indexOf(trust)
 }
@@ -48,7 +46,6 @@ export function placeOf(threshold: number, thresholds: readonly number[]): numbe
   return Math.log(threshold / least) / Math.log(greatest / least)
 }
 
-/** Position of a value between the bounds, 0 to 1. */
 export function shareOf(value: Value, { low, high }: FittedParameter): number {
   return (Number(value) - low) / (high - low)
 }

@@ -176,7 +176,6 @@ function Parameters({
   )
 }
 
-/** Summary of the verdicts, and filters of the parameters. */
 function Verdicts({
   identifiability,
   trust: selected,
@@ -310,7 +309,6 @@ function parameterColumns(
 
 type Choice = FittedParameter['choices'][number] & { readonly parameter: string }
 
-/** Best fitness for each choice of the categorical parameters. */
 function ChoicesCard({
   parameters,
   labels,

@@ -206,7 +206,6 @@ function Digest({ digits, shown = 8 }: { digits: string; shown?: number }) {
   return <code title={digits}>{digits.slice(0, shown)}</code>
 }
 
-/** Digest of the history, and its verification on request. */
 function HistoryCheck({ id, head }: { id: string; head: string }) {
   const [verification, setVerification] = useState<HistoryVerification | null>(null)
   const [busy, setBusy] = useState(false)

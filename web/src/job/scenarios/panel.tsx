@@ -256,7 +256,6 @@ function Compared({
   )
 }
 
-/** A recording without its samples. */
 interface RecordingSummary extends RecordingView {
   /** Name in the results: the beginning of its id. */
   readonly name: string

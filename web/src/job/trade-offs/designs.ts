@@ -55,13 +55,11 @@ export function frontCloud({ designs }: Front, x: string, y: string): Cloud {
   }
 }
 
-/** A published design with its objectives over all scenarios. */
 export interface PublishedDesign {
   readonly label: string
   readonly objectives: Readonly<Record<string, number>>
 }
 
-/** Objectives of a published design; null if a simulation failed. */
 export function publishedDesign(front: Front, reference: Reference): PublishedDesign | null {
   const walks = Object.values(reference.scenarios)
   if (walks.some(({ status }) => status !== 'ok')) return null

@@ -16,7 +16,6 @@ import { AxisSelects } from '../axis-select'
 
 type Cell = ReturnType<typeof cellsOf>[number]
 
-/** Range of an axis in a cell. */
 function stretch(axis: Axis, at: number): string {
   return [at, at + 1].map((end) => formatExact(valueAt(axis, end / CELLS), 4)).join(' to ')
 }

@@ -84,7 +84,6 @@ function formField(field: string, draft: Draft, searched: readonly string[]): st
   return field
 }
 
-/** Robot of a draft, in the form used by jobs and simulations. */
 export function robotOf({ robot }: Pick<Draft, 'robot'>): JobSpec['robot'] {
   if (robot.kind === 'shipped') return robot.name as JobSpec['robot']
   if (robot.kind === 'files') return { toml: robot.toml, urdf: robot.urdf }

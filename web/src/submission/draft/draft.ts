@@ -43,7 +43,6 @@ export interface RobotDraft {
 }
 
 export interface PreferenceDraft {
-  /** Name of a preset, or `custom`. */
   readonly kind: string
   readonly bias: readonly string[]
   readonly exponent: readonly string[]
@@ -59,7 +58,6 @@ export interface Draft {
   readonly preference: PreferenceDraft
   readonly case: CaseDraft
   readonly worlds: WorldsDraft
-  /** Settings of the method, including its `name`. */
   readonly optimizer: OptimizerDraft
   readonly start: StartDraft
   readonly iterations: string
@@ -67,7 +65,6 @@ export interface Draft {
   readonly precision: string
 }
 
-/** Defaults of the API. */
 export function emptyDraft(catalogue: Catalogue): Draft {
   const { job, variant } = catalogue.fields
   const usual = (name: string) => settingText(job.get(name)?.default)
@@ -251,7 +248,6 @@ function robotDraft(robot: JobSpec['robot'], empty: RobotDraft): RobotDraft {
   }
 }
 
-/** Name of the preset that is equal in every field. */
 function presetOf(scenario: Scenario, catalogue: Catalogue): string | null {
   const fields = [...catalogue.fields.scenario.keys()] as (keyof Scenario)[]
   const same = catalogue.scenarios.find((preset) =>
@@ -260,7 +256,6 @@ function presetOf(scenario: Scenario, catalogue: Catalogue): string | null {
   return same?.name ?? null
 }
 
-/** Middle of the bounds, or the first choice. */
 export function middle({ low, high, kind, choices }: Variable): number | string {
   if (kind === 'categorical') return choices?.[0] ?? ''
   const value = Number(((low + high) / 2).toPrecision(4))

@@ -14,7 +14,6 @@ export function methodNamed(
   return optimizers.find((entry) => entry.name === name && entry.settings.name === name)
 }
 
-/** Entries with default settings, one per method. */
 export function methodsOf(optimizers: readonly OptimizerPreset[]): readonly OptimizerPreset[] {
   return optimizers.filter(({ name, settings }) => name === settings.name)
 }
@@ -117,7 +116,6 @@ export interface WorldsDraft {
   readonly ranges: TuningWorlds['ranges'] | null
 }
 
-/** Aggregates with a level. */
 const OF_A_LEVEL: readonly string[] = ['quantile', 'cvar']
 
 /** Fields that the form can set, in schema order: numbers and choices. */
@@ -125,7 +123,6 @@ export function worldsFields(fields: ReadonlyMap<string, SchemaField>): readonly
   return [...fields.values()].filter(({ type }) => type !== 'other')
 }
 
-/** Whether a field has an effect, given the others. */
 export function hasEffect({ name }: SchemaField, { values }: WorldsDraft): boolean {
   return name !== 'level' || OF_A_LEVEL.includes(values.aggregate)
 }
@@ -153,7 +150,6 @@ export function walksEach({ robust, values }: WorldsDraft): number {
 
 export interface StartDraft {
   readonly jobs: readonly string[]
-  /** Total number of designs of these jobs, at most. */
   readonly count: string
   /** Start designs of a cloned job; used if `jobs` is empty. */
   readonly designs: readonly Design[]

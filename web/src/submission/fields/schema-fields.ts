@@ -36,7 +36,6 @@ export function fieldsOf(
   return fieldsIn(objectSchema)
 }
 
-/** Fields of an object schema by name, in order. */
 export function fieldsIn(schema: ObjectSchema): ReadonlyMap<string, SchemaField> {
   const required = new Set(schema.required ?? [])
   return new Map(
@@ -87,7 +86,6 @@ function fieldOf(name: string, declared: Property, required: boolean) {
   }
 }
 
-/** The other alternative of a nullable property. */
 function orNull({ anyOf }: Property): Property | undefined {
   const others = anyOf?.filter(({ type }) => type !== 'null')
   return anyOf?.length === 2 && others?.length === 1 ? others[0] : undefined

@@ -6,7 +6,6 @@ import { capitalized, inWords } from '../../format/words'
 import { errorsUnder, type FieldErrors } from '../draft/build-spec'
 import { boundsInWords, describe, type SchemaField } from './schema-fields'
 
-/** A choice, or a text with the bounds of the field. */
 export function SchemaInput({
   field,
   label = capitalized(inWords(field.name)),

@@ -43,7 +43,6 @@ export function FitForm({
   /** Parts of the spec without fields here; their errors are shown together. */
   parts: readonly string[]
   before?: ComponentChildren
-  /** Additional fields, given the errors by part. */
   children?: (errors: Readonly<Record<string, string>>) => ComponentChildren
 }) {
   const [asJson, setAsJson] = useState(false)
@@ -108,7 +107,6 @@ export function FitForm({
 
 const MODES: readonly VariableMode[] = ['default', 'searched']
 
-/** Parameters to select for fitting, with bounds. */
 function ParametersTable({
   parameters,
   errors,

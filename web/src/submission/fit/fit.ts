@@ -41,7 +41,6 @@ export function fitOf(
   }
 }
 
-/** Whether a method has a number of designs per iteration. */
 export function hasParticles(method: string, methods: readonly OptimizerPreset[]): boolean {
   const entry = methods.find(({ settings }) => settings.name === method)
   return entry !== undefined && 'particles' in entry.settings

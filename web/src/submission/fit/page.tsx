@@ -25,7 +25,6 @@ const TITLES: Readonly<Record<FitKind, string>> = {
   calibration: 'New calibration',
 }
 
-/** Errors are shown by the forms below. */
 const NO_ERRORS: FieldErrors = new Map()
 
 const WORDS = {
@@ -108,7 +107,6 @@ function Fit({
   )
 }
 
-/** Links to the forms of other kinds of jobs; selected recordings are kept. */
 export function OtherKinds({
   kind,
   recordings = [],

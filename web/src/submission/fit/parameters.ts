@@ -8,7 +8,6 @@ import { number } from '../draft/settings'
 
 export interface Parameters {
   readonly fittable: readonly Variable[]
-  /** Names of those fitted by default; null for all. */
   readonly fittedByDefault: readonly string[] | null
   readonly edited: Readonly<Record<string, VariableDraft>>
 }
@@ -28,7 +27,6 @@ export function parameterDrafts({
   )
 }
 
-/** Names of the fitted parameters, in form order. */
 export function fittedNames(parameters: Parameters): readonly string[] {
   const drafts = parameterDrafts(parameters)
   return Object.keys(drafts).filter((name) => drafts[name].mode === 'searched')

@@ -16,14 +16,11 @@ interface TextFile {
 
 interface State {
   readonly urdf: TextFile | null
-  /** Uploaded robot.toml; null if generated. */
   readonly toml: TextFile | null
-  /** Uploaded job.json; null if its fields are generated. */
   readonly job: TextFile | null
   readonly actuator: ActuatorChoice
   readonly busy: 'proposing' | 'checking' | null
   readonly problem: { readonly what: string; readonly error: unknown } | null
-  /** Guessed values in the generated robot.toml. */
   readonly guesses: readonly string[]
   /** Check result, and the robot that was checked. */
   readonly checked: { readonly robot: RobotDraft; readonly check: RobotCheck } | null

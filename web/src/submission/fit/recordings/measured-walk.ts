@@ -26,7 +26,6 @@ export function emptyWalk({ scenarios, controllers }: Catalogue): WalkDraft {
   }
 }
 
-/** A published design as JSON; an empty object if there is none. */
 export function publishedDesign({ published }: Catalogue['controllers'][number], study: string) {
   return JSON.stringify(published[study] ?? {}, null, 1)
 }

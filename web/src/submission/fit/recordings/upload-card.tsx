@@ -131,7 +131,6 @@ export function UploadCard({
   )
 }
 
-/** Study of a published design; empty for a custom one. */
 function studyOf(controller: Catalogue['controllers'][number], design: string): string {
   const studies = Object.keys(controller.published)
   return studies.find((study) => publishedDesign(controller, study) === design) ?? ''

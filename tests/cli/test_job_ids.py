@@ -45,6 +45,7 @@ COMMANDS = {
     "evidence": "ID --output FILE.zip",
     "export": "ID --output FILE.csv",
     "extend": "ID --iterations 3",
+    "failures": "ID --json",
     "firmware": "ID --output FILE",
     "fork": "ID --from 1 --iterations 3",
     "front": "ID --json",

@@ -1,12 +1,12 @@
 /** Light and dark theme, and theme colours for canvases. */
 
-import { useEffect, useState } from 'preact/hooks'
+import { Changes, useFollowed } from './changes'
 
 export type Theme = 'light' | 'dark'
 
 const KEY = 'gaitswarm.theme'
 const DARK = '(prefers-color-scheme: dark)'
-const listeners = new Set<() => void>()
+const changes = new Changes()
 const resolved = new Map<string, string>()
 
 export function currentTheme(): Theme {
@@ -31,16 +31,7 @@ export function toggleTheme(): void {
 }
 
 export function useTheme(): Theme {
-  const [theme, setTheme] = useState(currentTheme)
-  useEffect(() => {
-    const update = () => setTheme(currentTheme())
-    listeners.add(update)
-    update()
-    return () => {
-      listeners.delete(update)
-    }
-  }, [])
-  return theme
+  return useFollowed(changes, currentTheme)
 }
 
 /** Resolve a custom property such as `--accent` to `rgb(...)`, for canvases and WebGL. */
@@ -59,5 +50,5 @@ export function themeColour(name: `--${string}`): string {
 
 function changed(): void {
   resolved.clear()
-  for (const listener of [...listeners]) listener()
+  changes.notify()
 }

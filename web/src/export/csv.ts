@@ -8,15 +8,10 @@ export interface DataTable {
   readonly rows: Iterable<readonly Cell[]>
 }
 
-export function csvOf({ header, rows }: DataTable): string {
-  const lines = [line(header)]
-  for (const row of rows) lines.push(line(row))
-  return `${lines.join('\r\n')}\r\n`
-}
-
 /** Missing values are empty fields. */
-function line(cells: readonly Cell[]): string {
-  return cells.map(field).join(',')
+export function csvOf({ header, rows }: DataTable): string {
+  const lines = [header, ...rows].map((cells) => cells.map(field).join(','))
+  return `${lines.join('\r\n')}\r\n`
 }
 
 function field(cell: Cell): string {
@@ -27,17 +22,7 @@ function field(cell: Cell): string {
 
 /** Stem of a file name: `Small job`, `Pareto front` -> `small-job-pareto-front`. */
 export function fileStem(...parts: readonly string[]): string {
-  const words = parts.map((part) =>
-    part
-      .normalize('NFKD')
-      .toLowerCase()
-      .replace(/[^\p{L}\p{N}]+/gu, '-')
-      .replace(/^-+|-+$/g, ''),
-  )
-  return (
-    words
-      .filter((word) => word !== '')
-      .join('-')
-      .slice(0, 100) || 'chart'
-  )
+  const words = parts.join('-').normalize('NFKD').toLowerCase()
+  const stem = words.replace(/[^\p{L}\p{N}]+/gu, '-').replace(/^-+|-+$/g, '')
+  return stem.slice(0, 100) || 'chart'
 }

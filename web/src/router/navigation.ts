@@ -1,21 +1,19 @@
 /** Client-side navigation and the address as state. */
 
-import { useEffect, useState } from 'preact/hooks'
+import { Changes, useFollowed } from '../changes'
 
 export interface Place {
   readonly path: string
   readonly query: URLSearchParams
 }
 
-type Listener = () => void
-
-const listeners = new Set<Listener>()
+const changes = new Changes()
 
 /** Go to an address of this page, for example `/jobs/new?clone=k2q7`. */
 export function navigate(href: string, { replace = false } = {}): void {
   if (replace) history.replaceState(null, '', href)
   else history.pushState(null, '', href)
-  for (const listener of [...listeners]) listener()
+  changes.notify()
 }
 
 /** Changes of a query: a value, several values of one name, or null to remove it. */
@@ -35,23 +33,14 @@ export function setQuery(changes: QueryChanges, { replace = true } = {}): void {
 }
 
 export function usePlace(): Place {
-  const [href, setHref] = useState(location.pathname + location.search)
-  useEffect(() => {
-    const update = () => setHref(location.pathname + location.search)
-    listeners.add(update)
-    addEventListener('popstate', update)
-    update()
-    return () => {
-      listeners.delete(update)
-      removeEventListener('popstate', update)
-    }
-  }, [])
-  const [path, query] = split(href)
-  return { path, query: new URLSearchParams(query) }
+  const href = useFollowed(changes, () => location.pathname + location.search)
+  const { pathname, searchParams } = new URL(href, location.origin)
+  return { path: pathname, query: searchParams }
 }
 
-/** Handle plain clicks on links to paths of this page without reloading. */
+/** Handle Back, and plain clicks on links to paths of this page, without reloading. */
 export function followLinks(): void {
+  addEventListener('popstate', () => changes.notify())
   document.addEventListener('click', (event) => {
     if (event.defaultPrevented || event.button !== 0) return
     if (event.metaKey || event.ctrlKey || event.shiftKey || event.altKey) return
@@ -73,9 +62,4 @@ function isHere({ pathname, search }: HTMLAnchorElement): boolean {
 /** Whether a path is handled here; others, such as /docs and /v1, are left to the browser. */
 function isOwnPath(path: string): boolean {
   return path === '/' || /^\/(jobs|compare|walk|controller)(\/|$)/.test(path)
-}
-
-function split(href: string): [path: string, query: string] {
-  const at = href.indexOf('?')
-  return at < 0 ? [href, ''] : [href.slice(0, at), href.slice(at)]
 }

@@ -1,6 +1,7 @@
 /** State stored in the address, so that links reproduce the view. */
 
 import { useEffect, useRef, useState } from 'preact/hooks'
+import { Changes, useFollowed } from '../changes'
 import { setQuery } from './navigation'
 
 export interface Codec<T> {
@@ -91,33 +92,23 @@ export const ORDER: Codec<{ readonly column: string; readonly descending: boolea
   write: ({ column, descending }) => (descending ? `-${column}` : column),
 }
 
-type Listener = () => void
-
 const ignored = new Map<string, string>()
-const listeners = new Set<Listener>()
+const changes = new Changes()
 
 /** text: the invalid value. */
 export function ignore(name: string, text: string): void {
   ignored.set(name, text)
-  notify()
+  changes.notify()
 }
 
 export function forgetIgnored(): void {
   if (ignored.size === 0) return
   ignored.clear()
-  notify()
+  changes.notify()
 }
 
 export function IgnoredNotice() {
-  const [parts, setParts] = useState(() => [...ignored])
-  useEffect(() => {
-    const update = () => setParts([...ignored])
-    listeners.add(update)
-    update()
-    return () => {
-      listeners.delete(update)
-    }
-  }, [])
+  const parts = useFollowed(changes, () => [...ignored])
   if (parts.length === 0) return null
   return (
     <div class="notice" data-tone="warn" role="status">
@@ -135,8 +126,4 @@ export function IgnoredNotice() {
       </p>
     </div>
   )
-}
-
-function notify(): void {
-  for (const listener of [...listeners]) listener()
 }

@@ -74,26 +74,10 @@ export function selectRows(
   brushes: ReadonlyMap<number, Brush>,
 ): Uint32Array {
   if (brushes.size === 0) return order
-  const tests = [...brushes].map(([axis, [low, high]]) => ({
-    places: axes[axis].places,
-    low,
-    high,
-  }))
-  const selected = new Uint32Array(order.length)
-  let count = 0
-  for (let k = 0; k < order.length; k++) {
-    const row = order[k]
-    let inside = true
-    for (const { places, low, high } of tests) {
-      const place = places[row]
-      if (!(place >= low && place <= high)) {
-        inside = false
-        break
-      }
-    }
-    if (inside) selected[count++] = row
-  }
-  return selected.subarray(0, count)
+  const tests = [...brushes].map(([axis, brush]) => [axes[axis].places, ...brush] as const)
+  return order.filter((row) =>
+    tests.every(([places, low, high]) => places[row] >= low && places[row] <= high),
+  )
 }
 
 /** The best of the given rows by fitness, at most `most`. */

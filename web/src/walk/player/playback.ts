@@ -1,6 +1,7 @@
 /** Clock of a replay, independent of the browser. */
 
 import { useEffect, useState } from 'preact/hooks'
+import { Changes } from '../../changes'
 
 /** Playback speeds, as multiples of real time. */
 export const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4] as const
@@ -8,19 +9,20 @@ export const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4] as const
 /** Tolerance for float32 times, as a share of a frame. */
 const ROUNDING = 1e-3
 
-export class Playback {
+export class Playback extends Changes {
   /** [s] */
   time = 0
   playing = false
   speed = 1
-  private readonly listeners = new Set<() => void>()
 
   constructor(
     /** End of the longest walk [s]. */
     readonly duration: number,
     /** Recorded frames per second [Hz]. */
     readonly frameRate: number,
-  ) {}
+  ) {
+    super()
+  }
 
   get frame(): number {
     return Math.floor(this.time * this.frameRate + ROUNDING)
@@ -35,13 +37,13 @@ export class Playback {
     if (this.duration <= 0) return
     if (this.time >= this.duration) this.time = 0
     this.playing = true
-    this.changed()
+    this.notify()
   }
 
   pause(): void {
     if (!this.playing) return
     this.playing = false
-    this.changed()
+    this.notify()
   }
 
   toggle(): void {
@@ -51,7 +53,7 @@ export class Playback {
 
   setSpeed(speed: number): void {
     this.speed = Math.min(SPEEDS[SPEEDS.length - 1], Math.max(SPEEDS[0], speed))
-    this.changed()
+    this.notify()
   }
 
   /** Advance by real time [s]; stops at the end. */
@@ -59,13 +61,13 @@ export class Playback {
     if (!this.playing) return
     this.time = Math.min(this.duration, this.time + seconds * this.speed)
     if (this.time >= this.duration) this.playing = false
-    this.changed()
+    this.notify()
   }
 
   /** Seek to a time [s], clamped to the walk. */
   seek(time: number): void {
     this.time = Math.min(this.duration, Math.max(0, time))
-    this.changed()
+    this.notify()
   }
 
   /** Stop, and move by a number of frames. */
@@ -73,18 +75,6 @@ export class Playback {
     this.playing = false
     const frame = Math.min(this.lastFrame, Math.max(0, this.frame + frames))
     this.seek(frame / this.frameRate)
-  }
-
-  /** Subscribe to changes; returns the unsubscribe function. */
-  subscribe(listener: () => void): () => void {
-    this.listeners.add(listener)
-    return () => {
-      this.listeners.delete(listener)
-    }
-  }
-
-  private changed(): void {
-    for (const listener of [...this.listeners]) listener()
   }
 }
 

@@ -76,7 +76,6 @@ def head_alone(spec: dict[str, Any], folder: Path) -> str | None:
 
 @pytest.mark.thorough(
     "test_a_runner_that_waits_for_its_cluster_ends_when_it_is_stopped",
-    "test_a_head_that_is_killed_is_noticed_within_seconds",
 )
 def test_a_server_waits_for_its_cluster_and_a_job_whose_head_is_killed_has_the_same_bits(
     host: Process, database: Path, tmp_path: Path

@@ -208,7 +208,6 @@ def test_ray_takes_over_from_threads_to_the_same_bits_and_leaves_nothing(tmp_pat
 
 @pytest.mark.thorough(
     "test_ray_takes_over_from_threads_to_the_same_bits_and_leaves_nothing",
-    "test_a_head_that_is_killed_is_noticed_within_seconds",
 )
 @pytest.mark.slow
 def test_a_local_ray_whose_raylet_dies_is_opened_again_and_ends_with_its_process(

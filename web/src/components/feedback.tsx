@@ -22,16 +22,14 @@ export function Empty({ title, children }: { title: string; children?: Component
   )
 }
 
-export function ErrorNotice({
-  error,
-  what,
-  retry,
-}: {
+interface ErrorNoticeProps {
   error: unknown
   /** Short summary, such as "Could not load the jobs." */
   what: string
   retry?: () => void
-}) {
+}
+
+export function ErrorNotice({ error, what, retry }: ErrorNoticeProps) {
   const fields = error instanceof ApiProblem ? error.errors.filter((e) => e.field !== '') : []
   return (
     <div class="notice" data-tone="bad" role="alert">

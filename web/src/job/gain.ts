@@ -13,8 +13,6 @@ export interface Gain {
   readonly reason: string | null
 }
 
-const UNKNOWN: Gain = { reference: null, share: null, reason: null }
-
 /** Use the reference stored with the job; otherwise request it, which simulates one design. */
 export function useGain(job: StoredJob | null): Gain {
   const stored = job?.reference ?? null
@@ -31,7 +29,7 @@ export function gainOf(
   best: number | null,
   reason: string | null,
 ): Gain {
-  if (reference === null || reference.fitness === null) return { ...UNKNOWN, reason }
+  if (reference?.fitness == null) return { reference: null, share: null, reason }
   const { fitness } = reference
   const share = best === null || !(fitness > 0) ? null : 1 - best / fitness
   return { reference: { label: referenceLabel(reference), fitness }, share, reason }

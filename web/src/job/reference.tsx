@@ -57,17 +57,14 @@ function walkOf(
   return cached(JSON.stringify(body), () => post('/v1/simulations', { body }))
 }
 
-export function ReferencePicker({
-  job,
-  choice,
-  label,
-  onChoose,
-}: {
+interface ReferencePickerProps {
   job: Job
   choice: string
   label: string | null
   onChoose: (choice: string) => void
-}) {
+}
+
+export function ReferencePicker({ job, choice, label, onChoose }: ReferencePickerProps) {
   const tuning = job.kind === 'tuning'
   const hasPublished = tuning && isPublished((job.spec as JobSpec).robot)
   const published = useResource(hasPublished ? 'controllers' : null, catalogue)

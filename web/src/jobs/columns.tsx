@@ -35,13 +35,7 @@ export function jobColumns(
     },
     { key: 'name', sortable: true, header: true, cell: (job) => <NameCell job={job} /> },
     { key: 'state', sortable: true, cell: ({ state }) => <StateBadge state={state} /> },
-    {
-      key: 'priority',
-      sortable: true,
-      numeric: true,
-      minor: true,
-      cell: ({ priority }) => String(priority),
-    },
+    { key: 'priority', sortable: true, numeric: true, minor: true, cell: (job) => job.priority },
     { key: 'iterations', sortable: true, cell: (job) => <ProgressCell job={job} /> },
     {
       key: 'fitness',

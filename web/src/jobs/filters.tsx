@@ -23,23 +23,13 @@ export const NO_FILTER: Readonly<Record<string, null>> = {
   ...Object.fromEntries(FACETS.map((facet) => [facet, null])),
 }
 
-const COUNTS = {
-  state: 'states',
-  robot: 'robots',
-  controller: 'controllers',
-  preference: 'preferences',
-  tag: 'tags',
-} as const
-
-export function Filters({
-  query,
-  facets,
-  children,
-}: {
+interface FiltersProps {
   query: ListQuery
   facets: JobFacets | null
   children: ComponentChildren
-}) {
+}
+
+export function Filters({ query, facets, children }: FiltersProps) {
   return (
     <search class="row filters">
       <label>
@@ -75,17 +65,15 @@ export function Filters({
   )
 }
 
-function FacetFilter({
-  facet,
-  query,
-  facets,
-}: {
+interface FacetFilterProps {
   facet: Facet
   query: ListQuery
   facets: JobFacets | null
-}) {
+}
+
+function FacetFilter({ facet, query, facets }: FacetFilterProps) {
   const selected = query[facet]
-  const counts: Readonly<Record<string, number>> = facets?.[COUNTS[facet]] ?? {}
+  const counts: Readonly<Record<string, number>> = facets?.[`${facet}s`] ?? {}
   const names: string[] =
     facet === 'state' ? STATES.filter((s) => s in counts) : Object.keys(counts).sort()
   if (selected !== undefined && !names.includes(selected)) names.push(selected)
@@ -98,7 +86,7 @@ function FacetFilter({
       label={capitalized(facet)}
       value={selected ?? ''}
       options={[
-        ['', `all ${COUNTS[facet]}${total}`],
+        ['', `all ${facet}s${total}`],
         ...names.map((name) => [name, `${name} (${formatCount(counts[name] ?? 0)})`] as const),
       ]}
       onChoose={(name) => setQuery({ ...FIRST_PAGE, [facet]: name || null })}

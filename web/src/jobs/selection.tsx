@@ -17,17 +17,14 @@ import {
 
 const MOST_COMPARED = 12
 
-export function Selection({
-  selected,
-  archived,
-  onDone,
-  onSelect,
-}: {
+interface SelectionProps {
   selected: readonly string[]
   archived: boolean
   onDone: () => void
   onSelect: (selected: readonly string[]) => void
-}) {
+}
+
+export function Selection({ selected, archived, onDone, onSelect }: SelectionProps) {
   const [error, setError] = useState<unknown>(null)
   const [preview, setPreview] = useState<DeletionPreview | null>(null)
   const [deletion, setDeletion] = useState<Deletion | null>(null)

@@ -26,7 +26,6 @@ export function useSparklines(jobs: readonly JobSummary[]): Sparklines {
   return shown.current
 }
 
-/** Best so far over the evaluations, logarithmic. */
 export function Sparkline({ line }: { line: Convergence | undefined }) {
   const points = (line?.best_so_far ?? []).flatMap((best, k) =>
     best !== null && best > 0 ? [[line!.evaluations[k], Math.log(best)] as const] : [],

@@ -2,17 +2,14 @@
 
 import type { ComponentChildren } from 'preact'
 
-export function RemovableList({
-  ids,
-  short = (id) => id,
-  children,
-  onChange,
-}: {
+interface RemovableListProps {
   ids: readonly string[]
   short?: (id: string) => string
   children: (id: string) => ComponentChildren
   onChange: (ids: readonly string[]) => void
-}) {
+}
+
+export function RemovableList({ ids, short = (id) => id, children, onChange }: RemovableListProps) {
   if (ids.length === 0) return null
   return (
     <ul class="stack-tight">

@@ -201,18 +201,15 @@ function Header<R>({
   )
 }
 
-/** Buttons to the pages before and after the one shown. onPage: null for a page that is missing. */
-export function Pager({
-  caption,
-  shown,
-  page,
-  onPage,
-}: {
+interface PagerProps {
   caption: string
   shown: string
   page: string
   onPage: readonly [previous: (() => void) | null, next: (() => void) | null]
-}) {
+}
+
+/** Buttons to the pages before and after the one shown. onPage: null for a page that is missing. */
+export function Pager({ caption, shown, page, onPage }: PagerProps) {
   return (
     // A group, not a landmark: a page may have several tables.
     <fieldset class="pager" aria-label={`Pages of ${caption}`}>

@@ -9,8 +9,14 @@ import { formatCount, formatNumber } from '../../format/number'
 import { formatMoment } from '../../format/time'
 import { type Bar, type Lane, type Timeline, timelineOf } from './timeline'
 
-/** Most tasks drawn; more would blur. */
 const MOST = 300
+
+const LEGEND = [
+  ['task-computed', 'computing'],
+  ['task-waiting', 'in transit or waiting'],
+  ['task-failed', 'failed'],
+]
+
 /** Width of a lane's coordinate system, stretched to its box. */
 const WIDTH = 1000
 
@@ -21,13 +27,12 @@ export function TimelineCard({ activity }: { activity: Activity }) {
     <ChartCard
       title="Timeline"
       note={`The last ${formatCount(drawn)} tasks over ${formatNumber(timeline.seconds, 3)} s by machine; lines mark the starts of iterations.`}
-      legend={
-        <>
-          <LegendEntry of="task-computed" label="computing" />
-          <LegendEntry of="task-waiting" label="in transit or waiting" />
-          <LegendEntry of="task-failed" label="failed" />
-        </>
-      }
+      legend={LEGEND.map(([name, label]) => (
+        <span key={name}>
+          <i class={`swatch ${name}`} aria-hidden="true" />
+          {label}
+        </span>
+      ))}
       table={() => (
         <Table
           caption="Tasks, newest first"
@@ -53,15 +58,6 @@ export function TimelineCard({ activity }: { activity: Activity }) {
         </div>
       )}
     </ChartCard>
-  )
-}
-
-function LegendEntry({ of, label }: { of: string; label: string }) {
-  return (
-    <span>
-      <i class={`swatch ${of}`} aria-hidden="true" />
-      {label}
-    </span>
   )
 }
 

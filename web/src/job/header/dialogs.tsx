@@ -106,18 +106,16 @@ export function LabelDialog({ job, onCommand, onDismiss }: DialogProps) {
       onConfirm={save}
       onDismiss={onDismiss}
     >
-      <div class="stack-tight">
-        <TextField label="Name" maxLength={200} value={name} onChange={setName} />
-        <TextField label="Tags, comma-separated" value={tags} onChange={setTags} />
-        <TextField label="Note" rows={4} maxLength={10_000} value={note} onChange={setNote} />
-        <Check
-          small={false}
-          label="archived: hidden in lists, but not deleted"
-          checked={archived}
-          onChange={setArchived}
-        />
-        <p class="muted small">Labels do not affect results.</p>
-      </div>
+      <TextField label="Name" maxLength={200} value={name} onChange={setName} />
+      <TextField label="Tags, comma-separated" value={tags} onChange={setTags} />
+      <TextField label="Note" rows={4} maxLength={10_000} value={note} onChange={setNote} />
+      <Check
+        small={false}
+        label="archived: hidden in lists, but not deleted"
+        checked={archived}
+        onChange={setArchived}
+      />
+      <p class="muted small">Labels do not affect results.</p>
     </ConfirmDialog>
   )
 }

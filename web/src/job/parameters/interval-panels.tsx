@@ -13,17 +13,14 @@ import { DECISIVE, outline, placeOf, shareOf, type Trust } from './intervals'
 const WIDTH = 100
 const HEIGHT = 60
 
-export function IntervalPanels({
-  identifiability,
-  shown,
-  runs,
-  judged,
-}: {
+interface IntervalPanelsProps {
   identifiability: Identifiability
   shown: readonly FittedParameter[]
   runs: number
   judged: boolean
-}) {
+}
+
+export function IntervalPanels({ identifiability, shown, runs, judged }: IntervalPanelsProps) {
   const { thresholds } = identifiability
   const [least, most] = [Math.min(...thresholds), Math.max(...thresholds)]
   return (

@@ -94,15 +94,13 @@ function isMissing(error: Error): boolean {
   return error instanceof ApiProblem && error.status === 404
 }
 
-function Parameters({
-  job,
-  identifiability,
-  labels,
-}: {
+interface ParametersProps {
   job: Job
   identifiability: Identifiability
   labels: readonly string[]
-}) {
+}
+
+function Parameters({ job, identifiability, labels }: ParametersProps) {
   const [text, setText] = useState('')
   const [trust, setTrust] = useState<Trust | null>(null)
   const judged = identifiability.jobs.length > 1
@@ -176,19 +174,15 @@ function Parameters({
   )
 }
 
-function Verdicts({
-  identifiability,
-  trust: selected,
-  onTrust,
-  text,
-  onText,
-}: {
+interface VerdictsProps {
   identifiability: Identifiability
   trust: Trust | null
   onTrust: (trust: Trust | null) => void
   text: string
   onText: (text: string) => void
-}) {
+}
+
+function Verdicts({ identifiability, trust: selected, onTrust, text, onText }: VerdictsProps) {
   const all = verdicts(identifiability)
   const judged = identifiability.jobs.length > 1
   return (
@@ -309,15 +303,13 @@ function parameterColumns(
 
 type Choice = FittedParameter['choices'][number] & { readonly parameter: string }
 
-function ChoicesCard({
-  parameters,
-  labels,
-  unit,
-}: {
+interface ChoicesCardProps {
   parameters: readonly FittedParameter[]
   labels: readonly string[]
   unit: string
-}) {
+}
+
+function ChoicesCard({ parameters, labels, unit }: ChoicesCardProps) {
   const byRun = labels.map(
     (label, run): Column<Choice> => ({
       key: `run ${run}`,

@@ -21,7 +21,6 @@ export function isSameFit(one: Fitted, other: Fitted): boolean {
   return one.kind === other.kind && cases(one) === cases(other)
 }
 
-/** Other jobs of the same fit that have a result. */
 export function furtherRuns(
   jobs: readonly JobSummary[],
   reference: Fitted & Pick<JobSummary, 'id'>,

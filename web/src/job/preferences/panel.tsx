@@ -218,7 +218,6 @@ function RankingResult({ job, ranking, preference }: RankingResultProps) {
   )
 }
 
-/** Comparison of the new winner with the job's, and a link to start a job from it. */
 function Winners({
   job,
   ranking: { fitness_of_present_best: old, evaluations, correlation },

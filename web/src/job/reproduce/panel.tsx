@@ -87,7 +87,6 @@ function EvidenceCard({ job: { id } }: { job: Job }) {
   )
 }
 
-/** Search method and its settings, next to the defaults. */
 function OptimizerCard({ job: { optimizer, spec } }: { job: Job }) {
   const catalogue = useResource('optimizers', (signal) => get('/v1/optimizers', { signal }))
   const method = methodNamed(catalogue.data?.items ?? [], optimizer ?? '')
@@ -156,7 +155,6 @@ function StartCard({ designs }: { designs: readonly Design[] }) {
   )
 }
 
-/** Provenance of the numbers by iteration, and verification of the history. */
 function ProvenanceCard({ job }: { job: Job }) {
   return (
     <Card title="Provenance">

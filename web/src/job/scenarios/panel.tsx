@@ -107,7 +107,6 @@ function rowsOf(
   })
 }
 
-/** Relative fitness over the scenarios in which both succeeded. */
 function Summary({ job, rows, label }: { job: Job; rows: readonly Row[]; label: string }) {
   const words = caseWords(job.kind)
   const both = rows.filter((row) => row.utility !== null && row.otherUtility !== null)
@@ -134,16 +133,14 @@ function Summary({ job, rows, label }: { job: Job; rows: readonly Row[]; label: 
   )
 }
 
-/** Bars of the winner's utilities, with those of a reference. label: of the reference, if any. */
-function UtilityCard({
-  job,
-  rows,
-  label,
-}: {
+interface UtilityCardProps {
   job: Job
   rows: readonly Row[]
   label: string | null
-}) {
+}
+
+/** Bars of the winner's utilities, with those of a reference. label: of the reference, if any. */
+function UtilityCard({ job, rows, label }: UtilityCardProps) {
   const unit = fitnessUnit(job)
   const { item, measure, note } = caseWords(job.kind)
   const title = `${capitalized(measure)} by ${item}`
@@ -230,15 +227,13 @@ function objectiveColumns(job: Job, compared: boolean): readonly Column<Row>[] {
   ]
 }
 
-function Compared({
-  ranked,
-  winner,
-  other,
-}: {
+interface ComparedProps {
   ranked: boolean
   winner: number | null
   other: number | null | undefined
-}) {
+}
+
+function Compared({ ranked, winner, other }: ComparedProps) {
   if (other === undefined) return <>{formatNumber(winner)}</>
   // A ratio of values with different signs is meaningless.
   const comparable = winner !== null && other !== null && winner > 0 && other > 0
@@ -257,7 +252,6 @@ function Compared({
 }
 
 interface RecordingSummary extends RecordingView {
-  /** Name in the results: the beginning of its id. */
   readonly name: string
 }
 

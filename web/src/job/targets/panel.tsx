@@ -57,7 +57,6 @@ export default function TargetsPanel({ job }: { job: Job }) {
   )
 }
 
-/** Whether a difference in tolerances is at most one; false for a failure. */
 function isWithin(difference: number | null): boolean {
   return difference !== null && Math.abs(difference) <= 1
 }

@@ -20,21 +20,16 @@ function stretch(axis: Axis, at: number): string {
   return [at, at + 1].map((end) => formatExact(valueAt(axis, end / CELLS), 4)).join(' to ')
 }
 
-export function PairCard({
-  model,
-  selected,
-  brushes,
-  onBrush,
-  marked,
-  onMark,
-}: {
+interface PairCardProps {
   model: ParallelModel
   selected: Uint32Array
   brushes: Brushes
   onBrush: (brushes: Brushes) => void
   marked: number | null
   onMark: (row: number) => void
-}) {
+}
+
+export function PairCard({ model, selected, brushes, onBrush, marked, onMark }: PairCardProps) {
   const { query } = usePlace()
   const index = (name: string | null) => model.axes.findIndex((axis) => axis.name === name)
   const x = Math.max(0, index(query.get('x')))

@@ -82,6 +82,13 @@ function Designs({ job, particles }: { job: Job; particles: Particles }) {
     const rows = bestRows(model, selected, 20)
     return marked === null || rows.includes(marked) ? rows : [marked, ...rows]
   }, [model, selected, marked])
+  const axes = (label: string, checked: boolean, set: (on: boolean) => void) => {
+    const change = (on: boolean) => {
+      set(on)
+      setBrushes(NONE)
+    }
+    return <Check label={label} checked={checked} onChange={change} />
+  }
   const thinned = particles.rows < particles.total
   const count = `${formatCount(selected.length)} of ${formatCount(particles.rows)} designs`
   return (
@@ -95,24 +102,8 @@ function Designs({ job, particles }: { job: Job; particles: Particles }) {
         }`}
         tools={
           <>
-            <Check
-              label={`${words.measures} by ${words.item}`}
-              checked={utilities}
-              onChange={(on) => {
-                setUtilities(on)
-                setBrushes(NONE)
-              }}
-            />
-            {job.kind === 'tuning' && (
-              <Check
-                label="objectives"
-                checked={objectives}
-                onChange={(on) => {
-                  setObjectives(on)
-                  setBrushes(NONE)
-                }}
-              />
-            )}
+            {axes(`${words.measures} by ${words.item}`, utilities, setUtilities)}
+            {job.kind === 'tuning' && axes('objectives', objectives, setObjectives)}
             <button
               type="button"
               class="compact"

@@ -107,15 +107,13 @@ export function FitForm({
 
 const MODES: readonly VariableMode[] = ['default', 'searched']
 
-function ParametersTable({
-  parameters,
-  errors,
-  onEdit,
-}: {
+interface ParametersTableProps {
   parameters: Parameters
   errors: FieldErrors
   onEdit: (edited: Readonly<Record<string, VariableDraft>>) => void
-}) {
+}
+
+function ParametersTable({ parameters, errors, onEdit }: ParametersTableProps) {
   const { fittable, edited } = parameters
   const drafts = parameterDrafts(parameters)
   const fitted = fittedNames(parameters).length

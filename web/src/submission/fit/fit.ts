@@ -6,10 +6,8 @@ import type { VariableDraft } from '../draft/draft'
 import { number } from '../draft/settings'
 import { fittedVariables, type Parameters } from './parameters'
 
-/** Form state; numbers as text. */
 export interface FitDraft {
   readonly name: string
-  /** Edited parameters; all others have their defaults. */
   readonly edited: Readonly<Record<string, VariableDraft>>
   readonly method: string
   readonly particles: string

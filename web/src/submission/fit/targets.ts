@@ -5,7 +5,6 @@ import { number } from '../draft/settings'
 import { type FitDraft, fitOf } from './fit'
 import type { Parameters } from './parameters'
 
-/** Form state of a target; numbers as text. */
 export interface TargetDraft {
   readonly key: number
   readonly recording: string

@@ -110,7 +110,6 @@ export function CaseSection({ draft, catalogue: { cases }, errors, onChange }: S
   )
 }
 
-/** Worlds of a robust job, and the aggregation over them. */
 export function WorldsSection({ draft, catalogue, errors, onChange }: SectionProps) {
   const { worlds } = draft
   const { robust, ranges } = worlds
@@ -173,7 +172,6 @@ export function WorldsSection({ draft, catalogue, errors, onChange }: SectionPro
   )
 }
 
-/** Search method and its settings; changed ones show their defaults. */
 export function OptimizerSection({ draft, catalogue, errors, onChange }: SectionProps) {
   const { optimizers } = catalogue
   const { optimizer } = draft

@@ -4,7 +4,6 @@ import type { FieldError } from '../../../api/problem'
 import type { MeasuredWalkRequest, RobotSource } from '../../../api/types'
 import type { Catalogue } from '../../draft/catalogue'
 
-/** Form state; numbers as text. */
 export interface WalkDraft {
   readonly scenario: string
   /** Empty for the preset's value. */

@@ -17,15 +17,13 @@ import {
   walkErrors,
 } from './measured-walk'
 
-export function UploadCard({
-  catalogue,
-  robot,
-  onRead,
-}: {
+interface UploadCardProps {
   catalogue: Catalogue
   robot: RobotSource
   onRead: (read: MeasuredWalk) => void
-}) {
+}
+
+export function UploadCard({ catalogue, robot, onRead }: UploadCardProps) {
   const [draft, setDraft] = useState(() => emptyWalk(catalogue))
   const [file, setFile] = useState<File | null>(null)
   const [read, setRead] = useState<MeasuredWalk | null>(null)

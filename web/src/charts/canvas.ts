@@ -16,7 +16,6 @@ export interface Box {
 }
 
 interface CanvasSource {
-  /** Redraw the chart in CSS pixels; missing if only pixels are available. */
   readonly draw?: (context: Context) => void
   /** Redraw before pixels are read: WebGL discards them after each frame. */
   readonly refresh?: () => void

@@ -14,7 +14,6 @@ import { LineChart, type LineChartProps } from './lines/line-chart'
 interface ChartCardProps {
   title: string
   note?: string
-  /** The chart's numbers; rendered on demand. */
   table: () => ComponentChildren
   data?: () => DataTable
   tools?: ComponentChildren

@@ -25,7 +25,6 @@ const AXES: Readonly<Record<Axis, { label: string; unit?: string }>> = {
 
 const BY = oneOf(Object.keys(AXES) as Axis[], 'iterations')
 
-/** Shares listed in the table of the distribution. */
 const LISTED = [0, 0.05, 0.25, 0.5, 0.75, 0.95, 1]
 
 function seriesOf(jobs: readonly ComparedJob[], lines: readonly (number | null)[][], width = 1.5) {
@@ -95,7 +94,6 @@ export function ConvergenceCard({ jobs, comparable }: Pick<JobComparison, 'jobs'
   )
 }
 
-/** Cumulative distribution of the fitness. */
 export function DistributionCard({ jobs }: { jobs: readonly ComparedJob[] }) {
   const { x, series } = useMemo(() => {
     const { x, lines } = distributions(jobs)
@@ -141,7 +139,6 @@ export function DistributionCard({ jobs }: { jobs: readonly ComparedJob[] }) {
   )
 }
 
-/** Distinct reference fitness values of the jobs. */
 export function referencesOf(jobs: readonly ComparedJob[]): readonly ReferenceLine[] {
   const references = new Map<string, ReferenceLine>()
   for (const { reference } of jobs) {
@@ -171,7 +168,6 @@ export function convergences(jobs: readonly ComparedJob[], axis: Axis) {
   return { x, lines }
 }
 
-/** Share of each job's designs with at most each fitness. */
 export function distributions(jobs: readonly ComparedJob[]) {
   const x = union(jobs.map(({ fitness }) => fitness))
   const lines = jobs.map(({ fitness, shares }) => {

@@ -54,7 +54,6 @@ export default function ComparePage() {
   )
 }
 
-/** The first jobs by name, and the number of active ones. */
 function titleOf(jobs: readonly ComparedJob[]): readonly string[] {
   const names = jobs.slice(0, NAMED).map(({ name, id }) => name || id)
   if (jobs.length > NAMED) names.push(`${jobs.length - NAMED} more`)

@@ -61,7 +61,6 @@ export function FuzzyPanel({ surface, output }: FuzzyPanelProps) {
   )
 }
 
-/** Rules with their weights and firing strengths at the selected point. */
 function Rules({ surface, output, cell }: FuzzyPanelProps & { cell: Cell }) {
   const rows = output.rules.map((rule, k) => ({
     number: k + 1,
@@ -104,7 +103,6 @@ function Rules({ surface, output, cell }: FuzzyPanelProps & { cell: Cell }) {
   )
 }
 
-/** Memory use and accuracy of the quantised table. */
 function LookupTable({ output }: { output: Output }) {
   const { quantisation: q, unit, range } = output
   const inputs = [
@@ -149,7 +147,6 @@ function LookupTable({ output }: { output: Output }) {
 interface MembershipCardProps {
   universe: Universe
   side: 'Input' | 'Output'
-  /** Value at the selected point. */
   marker: number
 }
 

@@ -109,7 +109,6 @@ function Outputs({ surface }: { surface: SurfaceView }) {
   )
 }
 
-/** Slider for the velocity error at which the surfaces are evaluated. */
 function VelocityChoice({ surface, velocity }: { surface: SurfaceView; velocity: number }) {
   const { range, unit, values } = inputOf(surface, 'velocity')
   return (

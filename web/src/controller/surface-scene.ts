@@ -60,7 +60,6 @@ export class SurfaceScene {
     return this.renderer.domElement
   }
 
-  /** Show a layer in the theme's colours. */
   show(layer: Layer, cell: Cell): void {
     this.layer = layer
     disposeTree(this.drawn)
@@ -159,7 +158,6 @@ function surfaceOf(layer: Layer): Mesh {
   return new Mesh(geometry, material)
 }
 
-/** Lines of equal error and of equal current. */
 function netOf(layer: Layer, theme: 'light' | 'dark'): LineSegments {
   const [columns, rows] = [layer.error.values.length, layer.current.values.length]
   const points: Vector3[] = []

@@ -100,7 +100,6 @@ function Stage({ layer, cell }: { layer: Layer; cell: Cell }) {
   )
 }
 
-/** Ranges of the layers. */
 function Summary({ layers }: { layers: readonly Layer[] }) {
   return (
     <>

@@ -94,7 +94,6 @@ function largest(values: Matrix): number {
   return Math.max(Math.abs(low), Math.abs(high))
 }
 
-/** The initial cell: at three quarters of the error's range and one quarter of the current's. */
 export function firstCell({ error, current }: Layer): Cell {
   return {
     error: Math.floor((3 * error.values.length) / 4),

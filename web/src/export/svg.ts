@@ -22,7 +22,6 @@ export function escaped(text: string): string {
   return text.replace(/[&<>"]/g, (character) => entities[character])
 }
 
-/** Round to a hundredth of a pixel. */
 function short(value: number): string {
   return String(Math.round(value * 100) / 100)
 }

@@ -47,12 +47,10 @@ export interface LineChartProps {
   readonly bands?: readonly Band[]
   readonly logarithmic?: boolean
   readonly xLogarithmic?: boolean
-  /** Integer ticks only. */
   readonly counted?: boolean
   /** Margin before the first and after the last x, in the unit of x. */
   readonly xMargin?: number
   readonly fromZero?: boolean
-  /** Range of the y axis; fitted to the values by default. */
   readonly yRange?: readonly [number, number] | null
   readonly paint?: (plot: uPlot) => void
   readonly paintOver?: (plot: uPlot) => void
@@ -60,7 +58,6 @@ export interface LineChartProps {
   readonly height?: number
   /** Position of a vertical line, such as the current time of a replay. */
   readonly marker?: number | null
-  /** Called with the x under the pointer on a click. */
   readonly onPick?: (x: number) => void
   /** Query parameter of the zoom; charts with the same one zoom together. */
   readonly zoomName?: string

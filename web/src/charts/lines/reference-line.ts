@@ -5,7 +5,6 @@ import { formatNumber } from '../../format/number'
 import { themeColour } from '../../theme'
 import { chartFont, strokeLine } from '../canvas'
 
-/** The fitness that a job is compared with. */
 export interface ReferenceLine {
   /** `published A` or `start design`, for example. */
   readonly label: string

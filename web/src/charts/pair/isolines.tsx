@@ -55,7 +55,6 @@ function piecesIn(corners: readonly Corner[], level: number): (readonly [Place, 
   ]
 }
 
-/** Position between two corners at which a level is crossed. */
 function crossing(from: Corner, to: Corner, level: number): Place {
   const share = (level - from.value) / (to.value - from.value)
   const between = (k: 0 | 1) => from.at[k] + share * (to.at[k] - from.at[k])

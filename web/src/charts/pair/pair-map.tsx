@@ -38,7 +38,6 @@ interface PairMapProps {
   rows: Uint32Array
   x: number
   y: number
-  /** Show the mean rank by cell instead of points. */
   asCells: boolean
   isolines: boolean
   /** Selected ranges of the two axes; null for all. */

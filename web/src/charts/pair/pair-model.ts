@@ -56,7 +56,6 @@ export function cellsOf(model: ParallelModel, rows: Uint32Array, x: number, y: n
   )
 }
 
-/** Ranges of both axes selected by dragging between two positions. */
 export function dragged(
   from: readonly [number, number],
   to: readonly [number, number],

@@ -41,7 +41,6 @@ interface ScatterProps {
   readonly clouds: readonly Cloud[]
   readonly marks: readonly Mark[]
   readonly logarithmic: boolean
-  /** Index in the last cloud. */
   readonly chosen: number | null
   readonly onChoose: (index: number) => void
 }

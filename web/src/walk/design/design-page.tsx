@@ -11,7 +11,6 @@ import type { ResolvedDesign } from './resolve-design'
 
 interface DesignPageProps<A> {
   title: string
-  /** Path of the page; without a query it shows the published optimum. */
   path: string
   /** Throws AddressError. */
   read: (query: URLSearchParams) => A
@@ -81,7 +80,6 @@ interface DesignLinksProps {
   label: string
 }
 
-/** Links to the design's other page and to its job. */
 export function DesignLinks({ source, path, label }: DesignLinksProps) {
   const query = Object.entries(queryOf(source)).map(([name, value]) => [name, value ?? undefined])
   return (

@@ -28,7 +28,6 @@ interface PlayerProps {
   playback: Playback
   options: SceneOptions
   onOptions: (options: SceneOptions) => void
-  /** Initial camera; null for the default view. */
   camera: CameraPlace | null
   onCamera: (camera: CameraPlace | null) => void
 }

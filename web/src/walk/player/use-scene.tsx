@@ -70,7 +70,6 @@ interface WalkStage {
   readonly newtons: number
   readonly playback: Playback
   readonly options: SceneOptions
-  /** Called before the first frame. */
   readonly onBuilt: (scene: WalkScene, signal: AbortSignal) => void
 }
 

@@ -4,7 +4,6 @@ import type { Series } from '../../charts/lines/line-chart'
 import { inWords } from '../../format/words'
 import type { Recorded, Replay } from '../replay/replay'
 
-/** One component of a channel over time. */
 export interface Curve {
   readonly label: string
   readonly channel: string

@@ -96,7 +96,6 @@ export function PlotCard({ spec, walks, playback }: PlotCardProps) {
 
 interface PlotLegendProps {
   series: readonly Series[]
-  /** Number of curves per walk. */
   curves: number
   frame: number
   unit: string

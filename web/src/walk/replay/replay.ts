@@ -59,7 +59,6 @@ export class Replay {
     return channel ? this.values[frame * this.stride + channel.offset + index] : Number.NaN
   }
 
-  /** One component of a channel in all frames. */
   column(name: string, index: number): Float32Array {
     const column = new Float32Array(this.frames)
     for (let frame = 0; frame < this.frames; frame++) column[frame] = this.value(name, frame, index)

@@ -22,7 +22,6 @@ export interface LoadedMesh {
   readonly object: Object3D
 }
 
-/** Colour if neither URDF nor file specifies one. */
 const PLAIN = 0xb8bec2
 
 type Format = 'stl' | 'obj' | 'dae'

@@ -38,7 +38,6 @@ export function disposeTree(root: Object3D): void {
   })
 }
 
-/** Dispose of a scene with its renderer and canvas. */
 export function disposeScene(scene: Object3D, renderer: WebGLRenderer): void {
   disposeTree(scene)
   renderer.dispose()

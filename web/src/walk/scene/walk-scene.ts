@@ -179,7 +179,6 @@ export class WalkScene {
     this.rig.look('three-quarter')
   }
 
-  /** Load the robots' meshes; returns their number. */
   async loadMeshes(shown: () => boolean, signal: AbortSignal): Promise<number> {
     let count = 0
     for (const { replay, figure } of this.lanes) {

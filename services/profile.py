@@ -25,24 +25,16 @@ from gaitswarm.sim.robot import DEFAULT_ROBOT, load_robot
 
 @dataclass(frozen=True, slots=True)
 class JobProfile:
-    """Distribution of a job's time from its first committed iteration to its last.
-
-    Attributes:
-        walks: designs times scenarios.
-        seconds: wall time [s].
-        walks_per_second: of all slots together.
-        lane_use: used share of the kernel's lanes [1].
-        shares: of the slots' time [1]; the sum is 1.
-    """
+    """Distribution of a job's time from its first committed iteration to its last."""
 
     evaluator: EvaluatorKind
     slots: int
     precision: Precision
-    walks: int
-    seconds: float
-    walks_per_second: float
-    lane_use: float
-    shares: dict[str, float]
+    walks: int  # designs times scenarios
+    seconds: float  # wall time [s]
+    walks_per_second: float  # of all slots together
+    lane_use: float  # used share of the kernel's lanes [1]
+    shares: dict[str, float]  # of the slots' time [1]; the sum is 1
 
 
 @dataclass(frozen=True, slots=True)

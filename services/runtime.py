@@ -50,20 +50,7 @@ def open_evaluator(
     should_stop: Callable[[], bool] = lambda: False,
     lasting: bool = False,
 ) -> InProcessEvaluator | AutoEvaluator | RayEvaluator:
-    """Create the evaluator of a kind.
-
-    Args:
-        kind: Where simulations run.
-        address: Ray cluster.
-        cpus: Number of tasks that run concurrently on this machine.
-        should_stop: Polled while Ray is opened.
-        lasting: Whether it is for a server or runner: `auto` then starts a local Ray, and a
-            cluster that is away is waited for.
-
-    Raises:
-        EvaluatorUnavailable: Ray cannot be opened.
-        EvaluationStopped: `should_stop` returned true.
-    """
+    """Create the evaluator of a kind."""
     from gaitswarm.services.worker.auto import AutoEvaluator  # noqa: PLC0415
     from gaitswarm.services.worker.in_process import InProcessEvaluator  # noqa: PLC0415
     from gaitswarm.services.worker.ray_evaluator import RayEvaluator  # noqa: PLC0415
@@ -123,16 +110,11 @@ class ObservedEvaluator:
 
 @dataclass(frozen=True, slots=True)
 class Runtime:
-    """An opened runtime.
-
-    Attributes:
-        evaluator: None in a process that runs no jobs.
-        runner: None in a process that runs no jobs.
-    """
+    """An opened runtime."""
 
     service: JobService
-    evaluator: Evaluator | None
-    runner: Runner | None
+    evaluator: Evaluator | None  # None in a process that runs no jobs
+    runner: Runner | None  # None in a process that runs no jobs
 
     @property
     def slots(self) -> int:

@@ -37,19 +37,11 @@ class AuditAction(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class AuditEntry:
-    """One change, written in the transaction that made it.
+    """One change, written in the transaction that made it."""
 
-    Attributes:
-        index: ascending with time.
-        at: UTC, by the database's clock.
-        actor: name of the token, or `LOCAL`, or `RETENTION`.
-        job_id: None for an action on no job; the job may have been deleted since.
-        details: further content, such as the new budget.
-    """
-
-    index: int
-    at: datetime
-    actor: str
+    index: int  # ascending with time
+    at: datetime  # UTC, by the database's clock
+    actor: str  # name of the token, or `LOCAL`, or `RETENTION`
     action: AuditAction
-    job_id: str | None = None
-    details: dict[str, Any] = field(default_factory=dict)
+    job_id: str | None = None  # None for an action on no job; the job may have been deleted since
+    details: dict[str, Any] = field(default_factory=dict)  # further content, such as the new budget

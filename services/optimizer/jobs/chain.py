@@ -38,16 +38,11 @@ _DIMENSIONS, _UINT8, _FLOAT64 = 40, 64, 86
 
 @dataclass(frozen=True, slots=True)
 class ChainDocuments:
-    """Documents other than iterations that a job's chain depends on, as stored in JSON.
+    """Documents other than iterations that a job's chain depends on, as stored in JSON."""
 
-    Attributes:
-        spec: as submitted.
-        lineage: of a fork; None for other jobs.
-        provenance: records, each with its `from_iteration`; None if there are none.
-    """
-
-    spec: Any
-    lineage: Any = None
+    spec: Any  # as submitted
+    lineage: Any = None  # of a fork; None for other jobs
+    # records, each with its `from_iteration`; None if there are none
     provenance: Sequence[Mapping[str, Any]] | None = None
 
     @property
@@ -63,54 +58,33 @@ class ChainDocuments:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Link:
-    """What is stored of an iteration besides its evaluations.
+    """What is stored of an iteration besides its evaluations."""
 
-    Attributes:
-        iteration: index, from 0.
-        positions: (n, d) asked for by the search.
-        ask_digest: of the positions and the optimizer's state; None if unknown.
-        digest: of the iteration; None before it is committed.
-    """
-
-    iteration: int
-    positions: Floats
-    ask_digest: str | None
-    digest: str | None = None
+    iteration: int  # index, from 0
+    positions: Floats  # (n, d) asked for by the search
+    ask_digest: str | None  # of the positions and the optimizer's state; None if unknown
+    digest: str | None = None  # of the iteration; None before it is committed
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StoredLink:
-    """A stored iteration without its evaluations.
+    """A stored iteration without its evaluations."""
 
-    Attributes:
-        link: the content of its digest.
-        state: the optimizer's, empty once cleared.
-        summary: by name of `SUMMARY`.
-    """
-
-    link: Link
+    link: Link  # the content of its digest
     committed: bool
-    state: Any
-    summary: Mapping[str, Any]
+    state: Any  # the optimizer's, empty once cleared
+    summary: Mapping[str, Any]  # by name of `SUMMARY`
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outcomes:
-    """Results of an iteration's designs.
+    """Results of an iteration's designs."""
 
-    Attributes:
-        designs: (n, v).
-        objectives: (n, K, m), NaN or infinite if missing.
-        statuses: (n, K) values of `gaitswarm.sim.outcome.Status`.
-        fitness: (n,), +inf for a failed design.
-        reevaluation: of the best design in double precision, if any.
-    """
-
-    designs: Floats
-    objectives: Floats
-    statuses: NDArray[np.uint8]
-    fitness: Floats
-    reevaluation: Reevaluation | None
+    designs: Floats  # (n, v)
+    objectives: Floats  # (n, K, m), NaN or infinite if missing
+    statuses: NDArray[np.uint8]  # (n, K) values of `gaitswarm.sim.outcome.Status`
+    fitness: Floats  # (n,), +inf for a failed design
+    reevaluation: Reevaluation | None  # of the best design in double precision, if any
 
     @classmethod
     def of(cls, done: CompletedIteration) -> Outcomes:

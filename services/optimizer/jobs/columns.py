@@ -14,24 +14,15 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EvaluationColumns:
-    """Evaluations, one per row, ordered by iteration and particle; read-only.
+    """Evaluations, one per row, ordered by iteration and particle; read-only."""
 
-    Attributes:
-        iteration: (r,) from 0.
-        particle: (r,) from 0.
-        designs: (r, v) values of `Spec.design_space().names`, in the variables' units.
-        objectives: (r, K, m) raw objectives, cases and objectives in the spec's order, NaN if
-            missing.
-        statuses: (r, K) values of `gaitswarm.sim.outcome.Status`.
-        fitness: (r,) by the job's own measure, minimized, +inf if a case failed.
-    """
-
-    iteration: NDArray[np.int64]
-    particle: NDArray[np.int64]
-    designs: Floats
+    iteration: NDArray[np.int64]  # (r,) from 0
+    particle: NDArray[np.int64]  # (r,) from 0
+    designs: Floats  # (r, v) values of `Spec.design_space().names`, in the variables' units
+    # (r, K, m) raw objectives, cases and objectives in the spec's order, NaN if missing
     objectives: Floats
-    statuses: NDArray[np.uint8]
-    fitness: Floats
+    statuses: NDArray[np.uint8]  # (r, K) values of `gaitswarm.sim.outcome.Status`
+    fitness: Floats  # (r,) by the job's own measure, minimized, +inf if a case failed
 
     def __len__(self) -> int:
         return len(self.fitness)

@@ -22,16 +22,12 @@ class DesignSpace:
     A *position* is a point of the box, (d,) in the variables' units. A *design* is what is judged
     and stored: integer variables rounded, categorical ones as the index of a choice, fixed values
     appended; its columns are `names`.
-
-    Attributes:
-        variables: the d searched variables.
-        fixed: names and values of the others.
-        catalogue: all of these in the simulator's catalogue, ordered as `names`, categorical ones
-            with all of their choices.
     """
 
-    variables: tuple[Variable, ...]
-    fixed: tuple[tuple[str, float], ...]
+    variables: tuple[Variable, ...]  # the d searched variables
+    fixed: tuple[tuple[str, float], ...]  # names and values of the others
+    # all of these in the simulator's catalogue, ordered as `names`, categorical ones with all of
+    # their choices
     catalogue: tuple[Variable, ...]
 
     @classmethod

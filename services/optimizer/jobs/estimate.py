@@ -35,20 +35,16 @@ _LATE: Final = 2.0
 
 @dataclass(frozen=True, slots=True)
 class TimeLeft:
-    """Rates so far, and the time to the end of the budget at the recent pace.
+    """Rates so far, and the time to the end of the budget at the recent pace."""
 
-    Attributes:
-        eta_seconds: [s]; 0 for a job that succeeded, None unless it is running, waits for nothing
-            and has committed an iteration.
-        evaluations_per_second: [1/s]; None before the first commit.
-        simulations_per_second: simulations that were not cached [1/s]; None before the first commit
-            or if the spec is unreadable.
-        basis: what `eta_seconds` is derived from, or why it is unknown, for people.
-    """
-
+    # [s]; 0 for a job that succeeded, None unless it is running, waits for nothing and has
+    # committed an iteration
     eta_seconds: float | None
-    evaluations_per_second: float | None
+    evaluations_per_second: float | None  # [1/s]; None before the first commit
+    # simulations that were not cached [1/s]; None before the first commit or if the spec is
+    # unreadable
     simulations_per_second: float | None
+    # what `eta_seconds` is derived from, or why it is unknown, for people
     basis: str = field(default="", compare=False)
 
 
@@ -124,19 +120,13 @@ _MOST_WALKS: Final = 1_000_000
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """Predicted cost of a job.
-
-    Attributes:
-        simulated_seconds: of all simulations together [s].
-        seconds: wall time [s], None if unknown.
-        basis: what the wall time is derived from, for people.
-    """
+    """Predicted cost of a job."""
 
     evaluations: int
     walks: int
-    simulated_seconds: float
-    seconds: float | None
-    basis: str
+    simulated_seconds: float  # of all simulations together [s]
+    seconds: float | None  # wall time [s], None if unknown
+    basis: str  # what the wall time is derived from, for people
 
 
 def estimate(

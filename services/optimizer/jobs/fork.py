@@ -126,30 +126,21 @@ class Lineage(BaseModel):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TakenHistory:
-    """What a fork takes over besides its parent's rows.
+    """What a fork takes over besides its parent's rows."""
 
-    Attributes:
-        state: the optimizer's dump after the last ask taken over.
-        fitness: (n,) of each iteration if rejudged; None: unchanged.
-        accepts_changes: whether the fork continues under another provenance.
-    """
-
-    state: dict[str, Any]
+    state: dict[str, Any]  # the optimizer's dump after the last ask taken over
+    # (n,) of each iteration if rejudged; None: unchanged
     fitness: tuple[NDArray[np.float64], ...] | None
     provenance: ProvenanceRecords
-    accepts_changes: bool = False
+    accepts_changes: bool = False  # whether the fork continues under another provenance
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fork:
-    """Origin of a forked job, as stored.
-
-    Attributes:
-        taken: None if the fork starts from designs.
-    """
+    """Origin of a forked job, as stored."""
 
     lineage: Lineage
-    taken: TakenHistory | None = None
+    taken: TakenHistory | None = None  # None if the fork starts from designs
 
 
 def forked_spec(parent: AnySpec, request: ForkRequest) -> AnySpec:

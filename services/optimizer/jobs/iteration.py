@@ -20,65 +20,45 @@ SUMMARY: Final = ("best", "mean", "median", "worst", "best_so_far", "failed")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reevaluation:
-    """A design of a single-precision search, reevaluated in double precision.
-
-    Attributes:
-        objectives: (K, m) raw objectives by case, as in `Evaluation`.
-        statuses: (K,) values of `gaitswarm.sim.outcome.Status`.
-        fitness: minimized, +inf if any case failed.
-    """
+    """A design of a single-precision search, reevaluated in double precision."""
 
     particle: int
-    objectives: NDArray[np.float64]
-    statuses: NDArray[np.uint8]
-    fitness: float
+    objectives: NDArray[np.float64]  # (K, m) raw objectives by case, as in `Evaluation`
+    statuses: NDArray[np.uint8]  # (K,) values of `gaitswarm.sim.outcome.Status`
+    fitness: float  # minimized, +inf if any case failed
 
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """A design's results in all cases of its job.
-
-    Attributes:
-        design: (v,) values of `Job.spec.design_space().names`.
-        objectives: (K, m) raw objectives by case, columns as in `Job.spec.objectives`, NaN if
-            missing.
-        statuses: (K,) values of `gaitswarm.sim.outcome.Status`.
-        fitness: minimized, +inf if any case failed.
-        reevaluation: for a job's best design if the search uses single precision.
-    """
+    """A design's results in all cases of its job."""
 
     iteration: int
     particle: int
-    design: NDArray[np.float64]
+    design: NDArray[np.float64]  # (v,) values of `Job.spec.design_space().names`
+    # (K, m) raw objectives by case, columns as in `Job.spec.objectives`, NaN if missing
     objectives: NDArray[np.float64]
-    statuses: NDArray[np.uint8]
-    fitness: float
+    statuses: NDArray[np.uint8]  # (K,) values of `gaitswarm.sim.outcome.Status`
+    fitness: float  # minimized, +inf if any case failed
+    # for a job's best design if the search uses single precision
     reevaluation: Reevaluation | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Iteration:
-    """A committed iteration as listed, without its designs.
-
-    Attributes:
-        best: least fitness, None if every design failed; `mean`, `median` and `worst` likewise,
-            over finite values.
-        best_so_far: least fitness of this and all earlier iterations.
-        failed: number of designs that failed in at least one case.
-        evaluate_seconds: duration of the evaluation [s].
-        committed_at: UTC.
-    """
+    """A committed iteration as listed, without its designs."""
 
     index: int
     designs: int
+    # least fitness, None if every design failed; `mean`, `median` and `worst` likewise, over finite
+    # values
     best: float | None
     mean: float | None
     median: float | None
     worst: float | None
-    best_so_far: float | None
-    failed: int
-    evaluate_seconds: float
-    committed_at: datetime
+    best_so_far: float | None  # least fitness of this and all earlier iterations
+    failed: int  # number of designs that failed in at least one case
+    evaluate_seconds: float  # duration of the evaluation [s]
+    committed_at: datetime  # UTC
     digest: str | None = None
 
 
@@ -87,15 +67,11 @@ class Ask:
     """An iteration to be evaluated, stored before evaluation.
 
     Positions and state are stored as standard JSON, so every number in them is finite.
-
-    Attributes:
-        positions: (particles, d) in the variables' units.
-        state: the optimizer's dump after the ask.
     """
 
     iteration: int
-    positions: NDArray[np.float64]
-    state: dict[str, Any]
+    positions: NDArray[np.float64]  # (particles, d) in the variables' units
+    state: dict[str, Any]  # the optimizer's dump after the ask
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,57 +84,37 @@ class Answered:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CachedOutcome:
-    """A design's results in all cases of some job.
+    """A design's results in all cases of some job."""
 
-    Attributes:
-        objectives: (K, m) raw objectives by case, NaN if missing.
-        statuses: (K,) values of `gaitswarm.sim.outcome.Status`.
-    """
-
-    objectives: NDArray[np.float64]
-    statuses: NDArray[np.uint8]
+    objectives: NDArray[np.float64]  # (K, m) raw objectives by case, NaN if missing
+    statuses: NDArray[np.uint8]  # (K,) values of `gaitswarm.sim.outcome.Status`
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JournalEntry:
-    """Outcomes of a task of an iteration that is not committed yet.
+    """Outcomes of a task of an iteration that is not committed yet."""
 
-    Attributes:
-        case: index of the case.
-        keys: of the designs, see `walk_keys`.
-        outcome: of these designs in the case.
-    """
-
-    case: int
-    keys: tuple[bytes, ...]
-    outcome: Outcome
+    case: int  # index of the case
+    keys: tuple[bytes, ...]  # of the designs, see `walk_keys`
+    outcome: Outcome  # of these designs in the case
 
 
 @dataclass(frozen=True, slots=True)
 class CompletedIteration:
-    """All that one transaction commits of an iteration.
-
-    Attributes:
-        designs: (n, v) values of `Job.spec.design_space().names`.
-        outcomes: K, one per case, of n designs each.
-        fitness: (n,), +inf for a failed design.
-        evaluate_seconds: duration of the evaluation [s].
-        reevaluation: of the best design, if the search uses single precision and no earlier design
-            is as good.
-        keys: n keys of `walk_keys`, None for a design whose outcome was cached; empty for an
-            iteration that is not cached.
-        evaluated_on: where it was simulated, for people; None if unknown.
-    """
+    """All that one transaction commits of an iteration."""
 
     iteration: int
-    designs: NDArray[np.float64]
-    outcomes: tuple[Outcome, ...]
-    fitness: NDArray[np.float64]
-    evaluate_seconds: float
+    designs: NDArray[np.float64]  # (n, v) values of `Job.spec.design_space().names`
+    outcomes: tuple[Outcome, ...]  # K, one per case, of n designs each
+    fitness: NDArray[np.float64]  # (n,), +inf for a failed design
+    evaluate_seconds: float  # duration of the evaluation [s]
     precision: Precision = "double"
+    # of the best design, if the search uses single precision and no earlier design is as good
     reevaluation: Reevaluation | None = None
+    # n keys of `walk_keys`, None for a design whose outcome was cached; empty for an iteration that
+    # is not cached
     keys: tuple[bytes | None, ...] = ()
-    evaluated_on: str | None = None
+    evaluated_on: str | None = None  # where it was simulated, for people; None if unknown
 
     @property
     def saved(self) -> int:
@@ -188,13 +144,7 @@ def best_particle(fitness: NDArray[np.float64]) -> int | None:
 def fitness_summary(
     fitness: NDArray[np.float64], best: float | None, best_before: float | None
 ) -> dict[str, Any]:
-    """Return the columns `SUMMARY`: statistics over finite fitness, None if there is none.
-
-    Args:
-        fitness: (n,) of the designs, +inf for a failed one.
-        best: least fitness in double precision; None if every design failed.
-        best_before: the same of all earlier iterations.
-    """
+    """Return the columns `SUMMARY`: statistics over finite fitness, None if there is none."""
     finite = fitness[np.isfinite(fitness)]
     summary: dict[str, Any] = dict.fromkeys(SUMMARY)
     summary["failed"] = len(fitness) - len(finite)

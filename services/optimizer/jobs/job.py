@@ -129,26 +129,18 @@ def extended(state: JobState, committed: int, iterations: int) -> JobState:
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """Committed iterations of a job.
-
-    Attributes:
-        best_fitness: in double precision; None while every design has failed.
-        compute_seconds: time spent evaluating [s].
-        evaluations_saved: designs whose outcome was cached.
-        recent_seconds: moving average of the time per design [s], see `recent_pace`; None if
-            unknown.
-        head: digest of the last iteration; None if there is none.
-    """
+    """Committed iterations of a job."""
 
     iterations: int = 0
     evaluations: int = 0
-    best_fitness: float | None = None
+    best_fitness: float | None = None  # in double precision; None while every design has failed
     best_iteration: int | None = None
     best_particle: int | None = None
-    compute_seconds: float = 0.0
-    evaluations_saved: int = 0
+    compute_seconds: float = 0.0  # time spent evaluating [s]
+    evaluations_saved: int = 0  # designs whose outcome was cached
+    # moving average of the time per design [s], see `recent_pace`; None if unknown
     recent_seconds: float | None = None
-    head: str | None = None
+    head: str | None = None  # digest of the last iteration; None if there is none
 
     @property
     def evaluations_walked(self) -> int:
@@ -158,61 +150,43 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class UnreadableSpec:
-    """What is known of a stored spec that this version cannot read.
+    """What is known of a stored spec that this version cannot read."""
 
-    Attributes:
-        reason: why it cannot be read.
-        name: "" if unknown.
-        iterations: the current budget, 0 if unknown.
-        particles: 0 if unknown.
-    """
-
-    reason: str
-    name: str = ""
-    iterations: int = 0
-    particles: int = 0
+    reason: str  # why it cannot be read
+    name: str = ""  # "" if unknown
+    iterations: int = 0  # the current budget, 0 if unknown
+    particles: int = 0  # 0 if unknown
 
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A job as stored; times are UTC.
+    """A job as stored; times are UTC."""
 
-    Attributes:
-        id: twelve letters and digits.
-        stored_spec: resolved; its `iterations` are the current budget. An `UnreadableSpec` if this
-            version cannot read it.
-        updated_at: time of the last change of state or progress.
-        provenance: provenance of the results, by first iteration.
-        accepts_changes: whether the user has accepted a changed provenance; cleared by the claim.
-        lineage: origin of a fork.
-        waiting: reason for waiting while running, such as unreachable workers; None if it does not
-            wait.
-        priority: see `priority.py`.
-        reference: None until determined.
-        evaluated_on: where the last iteration was simulated; None if unknown.
-    """
-
-    id: str
+    id: str  # twelve letters and digits
+    # resolved; its `iterations` are the current budget. An `UnreadableSpec` if this version cannot
+    # read it
     stored_spec: AnySpec | UnreadableSpec
     state: JobState
     created_at: datetime
-    updated_at: datetime
+    updated_at: datetime  # time of the last change of state or progress
     started_at: datetime | None = None
     finished_at: datetime | None = None
     error: str | None = None
     progress: Progress = field(default_factory=Progress)
-    provenance: ProvenanceRecords = ()
+    provenance: ProvenanceRecords = ()  # provenance of the results, by first iteration
+    # whether the user has accepted a changed provenance; cleared by the claim
     accepts_changes: bool = False
-    lineage: Lineage | None = None
+    lineage: Lineage | None = None  # origin of a fork
     owner: str | None = None
     kept: bool = False
     submitted_iterations: int = 0
+    # reason for waiting while running, such as unreachable workers; None if it does not wait
     waiting: str | None = None
-    priority: int = 0
+    priority: int = 0  # see `priority.py`
     labels: Labels = field(default_factory=Labels)
     archived: bool = False
-    reference: Reference | None = None
-    evaluated_on: str | None = None
+    reference: Reference | None = None  # None until determined
+    evaluated_on: str | None = None  # where the last iteration was simulated; None if unknown
 
     @property
     def gain(self) -> float | None:
@@ -265,25 +239,17 @@ def refusal(job: Job, now: JobProvenance) -> str | None:
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """A lease on a job.
-
-    Attributes:
-        token: fencing token: the store rejects writes under an older one.
-        ask: the stored ask to continue with; None for a new job or one extended after its budget
-            was spent.
-        answered: the last committed ask, if there is no open one.
-        journal: what an earlier run has stored of the ask's evaluation.
-        taken_from: previous runner, whose lease had expired; None for a queued job.
-    """
+    """A lease on a job."""
 
     job: Job
     runner: str
-    token: int
+    token: int  # fencing token: the store rejects writes under an older one
+    # the stored ask to continue with; None for a new job or one extended after its budget was spent
     ask: Ask | None
     recordings: Recordings = field(default_factory=dict)
-    answered: Answered | None = None
-    taken_from: str | None = None
-    journal: tuple[JournalEntry, ...] = ()
+    answered: Answered | None = None  # the last committed ask, if there is no open one
+    taken_from: str | None = None  # previous runner, whose lease had expired; None for a queued job
+    journal: tuple[JournalEntry, ...] = ()  # what an earlier run has stored of the ask's evaluation
 
 
 @dataclass(frozen=True, slots=True)

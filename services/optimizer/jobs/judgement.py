@@ -19,15 +19,10 @@ _PIECE: Final = 4096
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Judgement:
-    """Fitness and utilities of n designs in K cases; all minimized.
+    """Fitness and utilities of n designs in K cases; all minimized."""
 
-    Attributes:
-        fitness: (n,), +inf if a case failed.
-        log_utilities: (n, K) logarithms of the utilities, +inf if the case failed.
-    """
-
-    fitness: Floats
-    log_utilities: Floats
+    fitness: Floats  # (n,), +inf if a case failed
+    log_utilities: Floats  # (n, K) logarithms of the utilities, +inf if the case failed
 
     @property
     def utilities(self) -> Floats:

@@ -65,17 +65,12 @@ class LabelsChange(BaseModel):
 
 @dataclass(frozen=True, slots=True)
 class JobFilter:
-    """Criteria of a job list; None for any.
-
-    Attributes:
-        robot: name, or `own` for any custom robot.
-        preference: name, or `own` for any other.
-    """
+    """Criteria of a job list; None for any."""
 
     archived: bool | None = None
-    robot: str | None = None
+    robot: str | None = None  # name, or `own` for any custom robot
     controller: str | None = None
-    preference: str | None = None
+    preference: str | None = None  # name, or `own` for any other
     tag: str | None = None
 
     @property
@@ -84,11 +79,7 @@ class JobFilter:
         return any((self.robot, self.controller, self.preference, self.tag))
 
     def admits(self, facets: Facets) -> bool:
-        """Return whether a job with these facets passes.
-
-        Args:
-            facets: Of the job.
-        """
+        """Return whether a job with these facets passes."""
         criteria = (self.robot, self.controller, self.preference)
         robot = OWN if self.robot == OWN and facets.own_robot else facets.robot
         values = (robot, facets.controller, facets.preference)
@@ -102,21 +93,14 @@ ANY_JOB: Final = JobFilter()
 
 @dataclass(frozen=True, slots=True)
 class Facets:
-    """Properties by which a job is found.
-
-    Attributes:
-        robot: None if unnamed or unreadable.
-        controller: None for a job that tunes none.
-        preference: name, `own` for any other; None for none.
-        own_robot: whether the robot is custom.
-    """
+    """Properties by which a job is found."""
 
     state: str
-    robot: str | None = None
-    controller: str | None = None
-    preference: str | None = None
+    robot: str | None = None  # None if unnamed or unreadable
+    controller: str | None = None  # None for a job that tunes none
+    preference: str | None = None  # name, `own` for any other; None for none
     tags: tuple[str, ...] = ()
-    own_robot: bool = False
+    own_robot: bool = False  # whether the robot is custom
 
 
 @dataclass(slots=True)

@@ -17,52 +17,34 @@ _LARGEST_PAGE: Final = 10_000
 
 @dataclass(frozen=True, slots=True)
 class Page(Generic[T]):
-    """A page of a list.
-
-    Attributes:
-        next: the `after` of the following page; None on the last.
-    """
+    """A page of a list."""
 
     items: tuple[T, ...]
-    next: str | None
+    next: str | None  # the `after` of the following page; None on the last
 
 
 @dataclass(frozen=True, slots=True)
 class Queue:
-    """Numbers of jobs, and how long they wait.
+    """Numbers of jobs, and how long they wait."""
 
-    Attributes:
-        jobs: by state, for all states.
-        under_way: jobs that have not ended, by state and kind.
-        longest_wait: of a queued job for a runner [s]; 0 if none waits.
-        errors: beginnings of the errors of failed jobs.
-    """
-
-    jobs: Mapping[JobState, int]
-    under_way: Mapping[tuple[JobState, str], int]
-    longest_wait: float
-    errors: tuple[str, ...] = ()
+    jobs: Mapping[JobState, int]  # by state, for all states
+    under_way: Mapping[tuple[JobState, str], int]  # jobs that have not ended, by state and kind
+    longest_wait: float  # of a queued job for a runner [s]; 0 if none waits
+    errors: tuple[str, ...] = ()  # beginnings of the errors of failed jobs
 
 
 @dataclass(frozen=True, slots=True)
 class RecordingEntry:
-    """A recorded walk in a list. What follows `size` is None if the walk is unreadable.
-
-    Attributes:
-        size: of the stored document, in characters.
-        joints: number of joints with currents.
-        rows: number of control ticks.
-        synthetic: whether it was computed, not measured.
-    """
+    """A recorded walk in a list. What follows `size` is None if the walk is unreadable."""
 
     id: str
     created_at: datetime
-    size: int
+    size: int  # of the stored document, in characters
     scenario: str | None
     controller: str | None
-    joints: int | None
-    rows: int | None
-    synthetic: bool
+    joints: int | None  # number of joints with currents
+    rows: int | None  # number of control ticks
+    synthetic: bool  # whether it was computed, not measured
 
 
 def checked_limit(limit: int) -> int:

@@ -21,25 +21,17 @@ _LONGEST_URL: Final = 2000
 
 @dataclass(frozen=True, slots=True)
 class Notification:
-    """A message about a job that has ended.
+    """A message about a job that has ended."""
 
-    Attributes:
-        id: the same for every attempt, so that receivers can detect repetitions.
-        document: sent as JSON.
-        next_attempt_at: None once delivered or given up.
-        delivered_at: None unless delivered.
-        error: cause of the last failed attempt; None after a success.
-    """
-
-    id: str
+    id: str  # the same for every attempt, so that receivers can detect repetitions
     job_id: str
     url: str
-    document: dict[str, Any]
+    document: dict[str, Any]  # sent as JSON
     created_at: datetime
     attempts: int = 0
-    next_attempt_at: datetime | None = None
-    delivered_at: datetime | None = None
-    error: str | None = None
+    next_attempt_at: datetime | None = None  # None once delivered or given up
+    delivered_at: datetime | None = None  # None unless delivered
+    error: str | None = None  # cause of the last failed attempt; None after a success
 
 
 def pause_after(attempts: int) -> float | None:

@@ -13,13 +13,10 @@ class Quota:
 
     A job is unfinished until it has succeeded, failed or been cancelled; its whole budget counts,
     whatever part of it has been spent.
-
-    Attributes:
-        seconds: simulated time of all their simulations [s].
     """
 
     jobs: int
-    seconds: float
+    seconds: float  # simulated time of all their simulations [s]
 
     def check(self, jobs: int, seconds: float, *, new_jobs: int, new_seconds: float) -> None:
         """Raise QuotaExceeded if new jobs or simulated time exceed the limits."""

@@ -23,15 +23,11 @@ START: Final = "start design"
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """The published or start design, evaluated in the cases of a job.
+    """The published or start design, evaluated in the cases of a job."""
 
-    Attributes:
-        name: study or preference for which it was published, or `START`; None if there is none.
-        fitness: by the job's measure, in double precision; None if it fails in a case.
-    """
-
+    # study or preference for which it was published, or `START`; None if there is none
     name: str | None
-    fitness: float | None
+    fitness: float | None  # by the job's measure, in double precision; None if it fails in a case
     kind: ReferenceKind = "published"
 
     def gain(self, fitness: float | None) -> float | None:

@@ -64,30 +64,20 @@ from gaitswarm.sim.provenance import Provenance
 
 @dataclass(frozen=True, slots=True)
 class Claimed:
-    """The job was claimed by this process.
-
-    Attributes:
-        provenance: of results computed by this process.
-        accepts_changes: whether to continue under a changed provenance.
-    """
+    """The job was claimed by this process."""
 
     claim: Claim
-    provenance: JobProvenance
-    accepts_changes: bool = False
+    provenance: JobProvenance  # of results computed by this process
+    accepts_changes: bool = False  # whether to continue under a changed provenance
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evaluated:
-    """The ask was evaluated.
-
-    Attributes:
-        seconds: duration [s].
-        keys: see `CompletedIteration`.
-    """
+    """The ask was evaluated."""
 
     outcomes: tuple[Outcome, ...]
-    seconds: float
-    keys: tuple[bytes | None, ...] = ()
+    seconds: float  # duration [s]
+    keys: tuple[bytes | None, ...] = ()  # see `CompletedIteration`
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,51 +158,34 @@ class Begin:
 
 @dataclass(frozen=True, slots=True)
 class Evaluate:
-    """Evaluate the stored ask.
-
-    Attributes:
-        keys: of its designs, see `walk_keys`.
-    """
+    """Evaluate the stored ask."""
 
     request: EvaluationRequest
-    keys: tuple[bytes, ...] = ()
+    keys: tuple[bytes, ...] = ()  # of its designs, see `walk_keys`
 
 
 @dataclass(frozen=True, slots=True)
 class Commit:
-    """Store the iteration and the next ask.
-
-    Attributes:
-        following: None at the end of the budget.
-    """
+    """Store the iteration and the next ask."""
 
     done: CompletedIteration
-    following: Ask | None
+    following: Ask | None  # None at the end of the budget
 
 
 @dataclass(frozen=True, slots=True)
 class Wait:
-    """Pause.
+    """Pause."""
 
-    Attributes:
-        seconds: [s].
-    """
-
-    seconds: float
+    seconds: float  # [s]
     reason: str
 
 
 @dataclass(frozen=True, slots=True)
 class Release:
-    """Give up the lease.
+    """Give up the lease."""
 
-    Attributes:
-        state: in which the job is left.
-        error: cause of failure, for people; None if it did not fail.
-    """
-
-    state: JobState
-    error: str | None = None
+    state: JobState  # in which the job is left
+    error: str | None = None  # cause of failure, for people; None if it did not fail
 
 
 Action = Record | Begin | Evaluate | Commit | Wait | Release
@@ -270,13 +243,6 @@ class Coordination:
 
     The optimizer is not stored: it is created from the stored ask when needed, so that continuing
     and resuming follow the same path.
-
-    Attributes:
-        answered: the last answered ask, if the claim had no open one.
-        best_fitness: of the best committed design, in double precision; +inf if there is none.
-        done: the evaluated iteration until it is committed.
-        following: the ask after the commit in progress.
-        failures: consecutive failures of the workers.
     """
 
     backoff: Backoff = field(default_factory=Backoff)
@@ -284,13 +250,14 @@ class Coordination:
     job: Job | None = None
     recordings: Recordings = field(default_factory=dict)
     provenance: JobProvenance | None = None
-    answered: Answered | None = None
+    answered: Answered | None = None  # the last answered ask, if the claim had no open one
+    # of the best committed design, in double precision; +inf if there is none
     best_fitness: float = math.inf
     evaluations: int = 0
     ask: Ask | None = None
-    done: CompletedIteration | None = None
-    following: Ask | None = None
-    failures: int = 0
+    done: CompletedIteration | None = None  # the evaluated iteration until it is committed
+    following: Ask | None = None  # the ask after the commit in progress
+    failures: int = 0  # consecutive failures of the workers
 
 
 def handle(state: Coordination, event: Event) -> tuple[Coordination, tuple[Action, ...]]:

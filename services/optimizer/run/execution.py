@@ -158,30 +158,22 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class RunContext:
-    """Dependencies of a run besides its job.
-
-    Attributes:
-        lease_seconds: time without renewal after which another runner may take the job over [s].
-        backoff: pauses while workers are unreachable.
-        provenance: provenance of what this process computes for a spec.
-        cache: whether to reuse outcomes of other jobs.
-        journal_seconds: duration from which on iterations are journaled [s].
-        clock: monotonic time [s], injectable in tests.
-        sleep: injectable in tests.
-    """
+    """Dependencies of a run besides its job."""
 
     store: Store
     evaluator: Evaluator
+    # time without renewal after which another runner may take the job over [s]
     lease_seconds: float = 30.0
-    backoff: Backoff = field(default_factory=Backoff)
+    backoff: Backoff = field(default_factory=Backoff)  # pauses while workers are unreachable
     on_commit: OnCommit | None = None
     on_retry: OnRetry | None = None
+    # provenance of what this process computes for a spec
     provenance: Callable[[Spec], JobProvenance] = job_provenance
     accepts_changes: bool = False
-    cache: bool = False
-    journal_seconds: float = JOURNAL_SECONDS
-    clock: Callable[[], float] = time.monotonic
-    sleep: Callable[[float], None] = time.sleep
+    cache: bool = False  # whether to reuse outcomes of other jobs
+    journal_seconds: float = JOURNAL_SECONDS  # duration from which on iterations are journaled [s]
+    clock: Callable[[], float] = time.monotonic  # monotonic time [s], injectable in tests
+    sleep: Callable[[float], None] = time.sleep  # injectable in tests
 
 
 def run_claim(

@@ -43,18 +43,12 @@ ChoiceName: TypeAlias = Annotated[str, KnownName(CHOICES)]
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """Conditions under which a method is chosen.
+    """Conditions under which a method is chosen."""
 
-    Attributes:
-        settings: Settings of the method; its `particles` are replaced by the job's.
-        largest_budget: Largest number of evaluations.
-        largest_dimension: Largest number of variables.
-        kinds: Kinds of variables allowed.
-    """
-
-    settings: OptimizerSettings
-    largest_budget: float = math.inf
-    largest_dimension: float = math.inf
+    settings: OptimizerSettings  # Settings of the method; its `particles` are replaced by the job's
+    largest_budget: float = math.inf  # Largest number of evaluations
+    largest_dimension: float = math.inf  # Largest number of variables
+    # Kinds of variables allowed
     kinds: frozenset[Kind] = frozenset({"continuous", "integer", "categorical"})
 
     def suits(self, space: Space, budget: int) -> bool:

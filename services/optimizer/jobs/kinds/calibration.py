@@ -104,14 +104,11 @@ _NO_EVIDENCE: Final = 4.0
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Cases of a job, and the cases that each walk requires.
+    """Cases of a job, and the cases that each walk requires."""
 
-    Attributes:
-        cases: name, walk and scenario of each of the K cases; identical walks share one.
-        of_walk: indices of a walk's cases, in the order of its scenarios, by the walk's name.
-    """
-
+    # name, walk and scenario of each of the K cases; identical walks share one
     cases: tuple[tuple[str, TargetWalk, Scenario], ...]
+    # indices of a walk's cases, in the order of its scenarios, by the walk's name
     of_walk: dict[str, tuple[int, ...]]
 
 
@@ -224,11 +221,7 @@ class CalibrationSpec(Spec):
         return Layout(tuple(cases), of_walk)
 
     def catalogue(self) -> tuple[Variable, ...]:
-        """Return all variables of the robot, the controllers and the gait.
-
-        Raises:
-            ValueError: Two of them have the same name.
-        """
+        """Return all variables of the robot, the controllers and the gait."""
         try:
             of_robot = robot_variables(self.robot_sources)
             of_walks = walk_variables(walk.controller for walk in self.walks)
@@ -344,12 +337,7 @@ class CalibrationSpec(Spec):
         return [(i, cases[k]) for i, walk in enumerate(self.walks) for k in of_walk[walk.name]]
 
     def simulated(self, objectives: Floats, failed: NDArray[np.bool_]) -> Floats:
-        """Return (n, T) simulated values of `targets`, NaN after a failure.
-
-        Args:
-            objectives: (n, K, m) raw results of simulations.
-            failed: (n, K), true for a simulation without a result.
-        """
+        """Return (n, T) simulated values of `targets`, NaN after a failure."""
         of_walk = self.layout().of_walk
         columns = [simulated_values(target, objectives, failed, of_walk) for target in self.targets]
         return np.stack(columns, axis=1)

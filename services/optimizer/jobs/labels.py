@@ -65,12 +65,17 @@ class LabelsChange(BaseModel):
 
 @dataclass(frozen=True, slots=True)
 class JobFilter:
-    """Criteria of a job list; None for any."""
+    """Criteria of a job list; None for any.
+
+    Attributes:
+        robot: name, or `own` for any custom robot.
+        preference: name, or `own` for any other.
+    """
 
     archived: bool | None = None
-    robot: str | None = None  # name, or `own` for any custom robot
+    robot: str | None = None
     controller: str | None = None
-    preference: str | None = None  # name, or `own` for any other
+    preference: str | None = None
     tag: str | None = None
 
     @property
@@ -79,7 +84,11 @@ class JobFilter:
         return any((self.robot, self.controller, self.preference, self.tag))
 
     def admits(self, facets: Facets) -> bool:
-        """Return whether a job with these facets passes."""
+        """Return whether a job with these facets passes.
+
+        Args:
+            facets: Of the job.
+        """
         criteria = (self.robot, self.controller, self.preference)
         robot = OWN if self.robot == OWN and facets.own_robot else facets.robot
         values = (robot, facets.controller, facets.preference)

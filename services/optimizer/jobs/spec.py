@@ -131,7 +131,11 @@ class Spec(BaseModel):
         return self.iterations * self.optimizer.particles
 
     def with_budget(self, iterations: int) -> Self:
-        """Return the job with another budget."""
+        """Return the job with another budget.
+
+        Args:
+            iterations: Of `particles` designs each.
+        """
         return self.model_copy(update={"iterations": iterations})
 
     @property
@@ -167,7 +171,13 @@ class Spec(BaseModel):
         return self
 
     def start_positions(self) -> Floats:
-        """Return the (k, d) start positions; none while earlier jobs are not looked up yet."""
+        """Return the (k, d) start positions; none while earlier jobs are not looked up yet.
+
+        Raises:
+            ValueError: A start design does not fit the job, or they exceed the budget; names the
+            design
+                and the variable. Never for a validated spec.
+        """
         if isinstance(self.start, EarlierJobs) or not self.start:
             return np.empty((0, 0))
         if len(self.start) > self.budget:
@@ -188,11 +198,20 @@ class Spec(BaseModel):
 
     @abstractmethod
     def design_space(self) -> DesignSpace:
-        """Return searched and fixed variables, checked against the catalogue."""
+        """Return searched and fixed variables, checked against the catalogue.
+
+        Raises:
+            ValueError: Invalid choice; names the variable. Never for a validated spec.
+        """
 
     @abstractmethod
     def check_can_be_simulated(self) -> None:
-        """Check what only the simulator can decide: whether designs can be simulated."""
+        """Check what only the simulator can decide: whether designs can be simulated.
+
+        Raises:
+            InvalidRequest: Bounds, values or a precision that cannot be simulated here; names the
+            field.
+        """
 
     def check_precision(self) -> None:
         """Raise InvalidRequest if this machine has no compiled kernel for the precision."""
@@ -214,7 +233,14 @@ class Spec(BaseModel):
             )
 
     def check_recordings(self, find: Callable[[str], RecordedWalk]) -> None:
-        """Check that the robot has the joints of each recording, and reaches its gait."""
+        """Check that the robot has the joints of each recording, and reaches its gait.
+
+        Args:
+            find: Returns the recorded walk of an id; raises NotFound.
+
+        Raises:
+            InvalidRequest: A recording does not fit; names its index in `recordings`.
+        """
         joints = load_robot(self.robot).joint_names if self.recording_ids else ()
         for index, name in enumerate(self.recording_ids):
             field = f"recordings.{index}"
@@ -238,7 +264,11 @@ class Spec(BaseModel):
 
     @abstractmethod
     def cases(self, recordings: Recordings) -> tuple[Case, ...]:
-        """Return the K cases, in the order of `case_names`."""
+        """Return the K cases, in the order of `case_names`.
+
+        Args:
+            recordings: Those named by `recording_ids`, by id.
+        """
 
     @property
     def search_libraries(self) -> dict[str, str]:
@@ -262,21 +292,43 @@ class Spec(BaseModel):
 
     @abstractmethod
     def judge(self, objectives: Floats, failed: NDArray[np.bool_]) -> Judgement:
-        """Return fitness and utilities of n designs."""
+        """Return fitness and utilities of n designs.
+
+        Args:
+            objectives: (n, K, m) raw objectives.
+            failed: (n, K), true for a case without a result.
+        """
 
     def search_feedback(
         self, objectives: Floats, failed: NDArray[np.bool_], fitness: Floats
     ) -> Floats:
-        """Return the values that the search learns from, a function of what is stored."""
+        """Return the values that the search learns from, a function of what is stored.
+
+        Args:
+            objectives: (n, K, m) raw objectives; non-finite ones may be NaN.
+            failed: (n, K), true for a case without a result.
+            fitness: (n,) of `judge`.
+
+        Returns:
+            The fitness; for a multi-objective method (n, M) objective vectors.
+        """
         del objectives, failed  # Used by kinds with objective vectors.
         return fitness
 
     def figure_of_merit(self, fitness: float) -> float | None:  # noqa: ARG002 - kinds may have one
-        """Return a fitness as a figure that is maximized; None for jobs without one."""
+        """Return a fitness as a figure that is maximized; None for jobs without one.
+
+        Args:
+            fitness: Minimized.
+        """
         return None
 
     def as_good_as(self, fitness: float) -> float:
-        """Return the greatest fitness that counts as equally good."""
+        """Return the greatest fitness that counts as equally good.
+
+        Args:
+            fitness: The best one.
+        """
         return fitness * (1.0 + DECISIVE)
 
     def in_double(self) -> Self:

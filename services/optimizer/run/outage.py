@@ -44,19 +44,33 @@ _CONNECTED_SECONDS: Final = 5.0
 
 @dataclass(frozen=True, slots=True)
 class Backoff:
-    """Exponential backoff: `first` [s], doubled at each attempt up to `longest` [s]."""
+    """Exponential backoff: `first` [s], doubled at each attempt up to `longest` [s].
 
-    first: float = 1.0  # first pause [s]
-    longest: float = 60.0  # upper bound on pauses [s]
-    attempts: int = 8  # number of retries of `delay`. Jobs retry indefinitely
+    Attributes:
+        first: first pause [s].
+        longest: upper bound on pauses [s].
+        attempts: number of retries of `delay`. Jobs retry indefinitely.
+    """
+
+    first: float = 1.0
+    longest: float = 60.0
+    attempts: int = 8
 
     def pause(self, failures: int) -> float:
-        """Return the pause before the next attempt [s]."""
+        """Return the pause before the next attempt [s].
+
+        Args:
+            failures: In a row, so far (>= 1).
+        """
         # The exponent is bounded, so that many attempts cannot overflow.
         return float(min(self.first * 2.0 ** min(failures - 1, 60), self.longest))
 
     def delay(self, failures: int) -> float | None:
-        """Return the pause before the next attempt [s]; None to give up."""
+        """Return the pause before the next attempt [s]; None to give up.
+
+        Args:
+            failures: In a row, so far (>= 1).
+        """
         return None if failures > self.attempts else self.pause(failures)
 
 

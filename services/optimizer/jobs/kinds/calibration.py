@@ -221,7 +221,11 @@ class CalibrationSpec(Spec):
         return Layout(tuple(cases), of_walk)
 
     def catalogue(self) -> tuple[Variable, ...]:
-        """Return all variables of the robot, the controllers and the gait."""
+        """Return all variables of the robot, the controllers and the gait.
+
+        Raises:
+            ValueError: Two of them have the same name.
+        """
         try:
             of_robot = robot_variables(self.robot_sources)
             of_walks = walk_variables(walk.controller for walk in self.walks)
@@ -337,7 +341,12 @@ class CalibrationSpec(Spec):
         return [(i, cases[k]) for i, walk in enumerate(self.walks) for k in of_walk[walk.name]]
 
     def simulated(self, objectives: Floats, failed: NDArray[np.bool_]) -> Floats:
-        """Return (n, T) simulated values of `targets`, NaN after a failure."""
+        """Return (n, T) simulated values of `targets`, NaN after a failure.
+
+        Args:
+            objectives: (n, K, m) raw results of simulations.
+            failed: (n, K), true for a simulation without a result.
+        """
         of_walk = self.layout().of_walk
         columns = [simulated_values(target, objectives, failed, of_walk) for target in self.targets]
         return np.stack(columns, axis=1)

@@ -254,7 +254,19 @@ class CertificateSpec(WalksSpec):
         worlds: int = 1000,
         seed: int = 1,
     ) -> Self:
-        """Build the certificate of a design that a job found."""
+        """Build the certificate of a design that a job found.
+
+        Args:
+            spec: The job. The certificate takes its robot, controller and preference, and adds
+                held-out scenarios to its scenarios.
+            design: Value of every variable, by name.
+            name: Name of the certificate's job.
+            worlds: Number of worlds to draw.
+            seed: Seed of the worlds.
+
+        Returns:
+            The specification of the certificate.
+        """
         numbers = design_numbers(spec.controller, design)
         return cls(
             kind="certificate",
@@ -282,7 +294,11 @@ class CertificateSpec(WalksSpec):
         return (*((LIBRARY,) if self.engines else ()), *CONTROLLERS.distribution(self.controller))
 
     def world(self, index: int) -> dict[str, float]:
-        """Return the perturbations of a drawn world, by name."""
+        """Return the perturbations of a drawn world, by name.
+
+        Args:
+            index: Its number, from 0.
+        """
         space = self.world_space()
         drawn = sample_worlds(index + 1, self.seed, space.variables)[index:]
         (values,) = space.simulated(space.designs(drawn)).tolist()

@@ -111,7 +111,11 @@ class IdentificationSpec(Spec):
         return self.recordings
 
     def cases(self, recordings: Recordings) -> tuple[Case, ...]:
-        """Return one fit for each recorded walk."""
+        """Return one fit for each recorded walk.
+
+        Args:
+            recordings: Those named by `recording_ids`, by id.
+        """
         names = self.design_space().names
         return tuple(
             CurrentFit(name, self.robot, recordings[recording], names, self.precision)

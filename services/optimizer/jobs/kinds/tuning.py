@@ -235,7 +235,12 @@ class JobSpec(WalksSpec):
         return (*CONTROLLERS.distribution(self.controller), *case)
 
     def judge(self, objectives: Floats, failed: NDArray[np.bool_]) -> Judgement:
-        """Judge designs by the preference and the aggregate over worlds."""
+        """Judge designs by the preference and the aggregate over worlds.
+
+        Args:
+            objectives: (n, K, 6) raw objectives.
+            failed: (n, K), true for a simulation without a result.
+        """
         judged = super().judge(objectives, failed)
         return judged if self.worlds is None else self.worlds.judged(judged.log_utilities)
 

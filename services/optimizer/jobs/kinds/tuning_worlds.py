@@ -64,7 +64,11 @@ class TuningWorlds(BaseModel):
         return self
 
     def variables(self) -> tuple[Variable, ...]:
-        """Return the perturbations with their bounds."""
+        """Return the perturbations with their bounds.
+
+        Raises:
+            ValueError: Unknown, repeated or out of bounds. Never for a validated set.
+        """
         perturbations = {variable.name: variable for variable in PERTURBATIONS}
         chosen = PERTURBATIONS if self.ranges is None else self.ranges
         variables: dict[str, Variable] = {}
@@ -88,7 +92,12 @@ class TuningWorlds(BaseModel):
         return _drawn(self)
 
     def judged(self, log_utilities: Floats) -> Judgement:
-        """Judge designs by the geometric mean of the aggregates (eq. 4.2)."""
+        """Judge designs by the geometric mean of the aggregates (eq. 4.2).
+
+        Args:
+            log_utilities: (n, K W) logarithms, worlds varying fastest, +inf for a failed
+            simulation.
+        """
         logarithms = self.aggregated(log_utilities)
         return Judgement(geometric_mean(logarithms), log_utilities)
 

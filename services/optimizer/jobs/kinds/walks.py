@@ -53,7 +53,14 @@ class WalksSpec(Spec):
         return PREFERENCES[self.preference] if isinstance(self.preference, str) else self.preference
 
     def check_drives(self, law: ControlLaw) -> None:
-        """Check that the controller can drive the robot's actuators."""
+        """Check that the controller can drive the robot's actuators.
+
+        Args:
+            law: Of any design of the controller.
+
+        Raises:
+            InvalidRequest: It cannot; the field is `controller`.
+        """
         try:
             check_drives(law, self.robot)
         except SimulationInputError as error:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
+from functools import partial
 from typing import Final
 
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector
@@ -55,6 +56,8 @@ class Metrics:
     def __init__(self) -> None:
         self.registry = CollectorRegistry(auto_describe=False)
         registry = self.registry
+        counter = partial(Counter, registry=registry)
+        histogram = partial(Histogram, registry=registry)
         ProcessCollector(registry=registry)
         Gauge(
             "gaitswarm_build_info",
@@ -62,82 +65,63 @@ class Metrics:
             ["version"],
             registry=registry,
         ).labels(installed_version()).set(1)
-        self.iterations = Counter(
-            "gaitswarm_iterations_committed_total",
-            "Committed iterations",
-            ["kind"],
-            registry=registry,
+        self.iterations = counter(
+            "gaitswarm_iterations_committed_total", "Committed iterations", ["kind"]
         )
-        self.iteration_seconds = Histogram(
+        self.iteration_seconds = histogram(
             "gaitswarm_iteration_evaluation_seconds",
             "Duration of the evaluation of a committed iteration",
             buckets=_ITERATION_BUCKETS,
-            registry=registry,
         )
-        self.walks = Counter(
+        self.walks = counter(
             "gaitswarm_walks_total",
             "Simulations run for committed iterations, by status",
             ["status"],
-            registry=registry,
         )
         for status in Status:
             # A series that starts with 0 has a rate from its first increment.
             self.walks.labels(status.label)
-        self.simulated_seconds = Counter(
-            "gaitswarm_simulated_seconds_total",
-            "Simulated time of committed iterations",
-            registry=registry,
+        self.simulated_seconds = counter(
+            "gaitswarm_simulated_seconds_total", "Simulated time of committed iterations"
         )
-        self.jobs_ended = Counter(
-            "gaitswarm_jobs_ended_total", "Jobs that ended", ["state", "kind"], registry=registry
+        self.jobs_ended = counter(
+            "gaitswarm_jobs_ended_total", "Jobs that ended", ["state", "kind"]
         )
-        self.job_failures = Counter(
-            "gaitswarm_job_failures_total", "Jobs that failed", ["cause"], registry=registry
-        )
+        self.job_failures = counter("gaitswarm_job_failures_total", "Jobs that failed", ["cause"])
         for cause in FAILURE_CAUSES:
             self.job_failures.labels(cause)
-        self.lease_losses = Counter(
-            "gaitswarm_lease_losses_total",
-            "Leases that another runner took over from this process",
-            registry=registry,
+        self.lease_losses = counter(
+            "gaitswarm_lease_losses_total", "Leases that another runner took over from this process"
         )
-        self.lease_takeovers = Counter(
+        self.lease_takeovers = counter(
             "gaitswarm_lease_takeovers_total",
             "Jobs that this process took over from a runner with an expired lease",
-            registry=registry,
         )
-        self.database_seconds = Histogram(
+        self.database_seconds = histogram(
             "gaitswarm_database_operation_duration_seconds",
             "Duration of a store operation, with all its statements",
             ["operation"],
             buckets=_DATABASE_BUCKETS,
-            registry=registry,
         )
-        self.database_errors = Counter(
+        self.database_errors = counter(
             "gaitswarm_database_errors_total",
             "Store operations that found the database unavailable",
             ["operation"],
-            registry=registry,
         )
         self.streams = Gauge("gaitswarm_event_streams", "Open event streams", registry=registry)
-        self.stream_lag = Histogram(
+        self.stream_lag = histogram(
             "gaitswarm_event_stream_lag_seconds",
             "Time from the commit of an iteration to its event, on streams open at the commit",
             buckets=_LAG_BUCKETS,
-            registry=registry,
         )
-        self.http_requests = Counter(
-            "gaitswarm_http_requests_total",
-            "Answered requests",
-            ["method", "route", "status"],
-            registry=registry,
+        self.http_requests = counter(
+            "gaitswarm_http_requests_total", "Answered requests", ["method", "route", "status"]
         )
-        self.http_seconds = Histogram(
+        self.http_seconds = histogram(
             "gaitswarm_http_request_duration_seconds",
             "Time from a request to the start of its response",
             ["method", "route"],
             buckets=_HTTP_BUCKETS,
-            registry=registry,
         )
 
     @contextmanager

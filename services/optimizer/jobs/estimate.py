@@ -272,13 +272,10 @@ def _kind_of_walk(spec: Spec) -> str:
     if isinstance(spec, CertificateSpec):
         fields = {"controller", "robot", "precision", "engines"}
         return f"world {spec.model_dump_json(include=fields)}"
-    controller = spec.controller if isinstance(spec, JobSpec) else _fitted_walks(spec)
+    # Simulations of recordings are logged, others are not.
+    fitted = "recorded" if spec.recording_ids else "calibrated"
+    controller = spec.controller if isinstance(spec, JobSpec) else fitted
     return f"{controller} {spec.model_dump_json(include={'robot', 'precision', 'case'})}"
-
-
-def _fitted_walks(spec: Spec) -> str:
-    """Of a fit: simulations of recordings are logged, others are not."""
-    return "recorded" if spec.recording_ids else "calibrated"
 
 
 def _simulated_seconds(job: Job, fitted: float) -> float:
@@ -286,8 +283,7 @@ def _simulated_seconds(job: Job, fitted: float) -> float:
 
     fitted: simulated time of one design of the new job [s]; fits to the same recordings share it.
     """
-    recorded = bool(job.spec.recording_ids)
-    one = fitted if recorded else duration(job.spec, job.spec.cases({}))
+    one = fitted if job.spec.recording_ids else duration(job.spec, job.spec.cases({}))
     return job.progress.evaluations_walked * one
 
 

@@ -11,7 +11,8 @@ Spec
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Annotated, ClassVar, Final, Literal, Self
 
 import numpy as np
@@ -335,13 +336,24 @@ class Spec(BaseModel):
         """Return the job in double precision, in which its best design is reevaluated."""
         return self.model_copy(update={"precision": "double"})
 
-    @abstractmethod
     def resolved(self) -> Self:
         """Return the job with presets written out, so that later changes of them do not affect it.
 
         Scenarios, preference, variables and an `auto` optimizer are; robot and controller are not.
         """
+        space = self.design_space()
+        chosen = {"variables": space.variables, "fixed": space.shown_fixed}
+        return self.model_copy(update=chosen | {"optimizer": self.search})
 
 
 def judge_outcomes(spec: Spec, outcomes: tuple[Outcome, ...]) -> Judgement:
     return spec.judge(*by_design(outcomes))
+
+
+@contextmanager
+def requested(field: str) -> Iterator[None]:
+    """Convert a simulator's error to one that names the field of the request."""
+    try:
+        yield
+    except SimulationInputError as error:
+        raise InvalidRequest(str(error), field=field) from error

@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Final, Self
 
 from gaitswarm.services.optimizer.errors import LeaseLost
-from gaitswarm.services.optimizer.jobs.job import Claim, JobState
+from gaitswarm.services.optimizer.jobs.job import Claim
 from gaitswarm.services.optimizer.log_context import log_context
 from gaitswarm.services.optimizer.run.outage import Outage, is_infrastructure
 
@@ -49,8 +49,8 @@ class Heartbeat:
         self._interval = min(lease_seconds / _BEATS_PER_LEASE, _LONGEST_INTERVAL)
         self._ended = threading.Event()
         self._lost = threading.Event()
-        self._state = claim.job.state
-        self._priority = claim.job.priority
+        # As of the last beat.
+        self.state, self.priority = claim.job.state, claim.job.priority
         self._thread = threading.Thread(
             target=self._beat_of_job, name=f"heartbeat-{claim.job.id}", daemon=True
         )
@@ -59,16 +59,6 @@ class Heartbeat:
     def lost(self) -> bool:
         """Whether the job was cancelled, or belongs to another runner."""
         return self._lost.is_set()
-
-    @property
-    def state(self) -> JobState:
-        """The job's state at the last beat."""
-        return self._state
-
-    @property
-    def priority(self) -> int:
-        """The job's priority at the last beat."""
-        return self._priority
 
     def __enter__(self) -> Self:
         self._thread.start()
@@ -94,7 +84,7 @@ class Heartbeat:
                 renewal = self._store.renew(
                     self._claim, lease_seconds=self._lease_seconds, waiting=self._waiting()
                 )
-                self._state, self._priority = renewal.state, renewal.priority
+                self.state, self.priority = renewal.state, renewal.priority
                 self._after_beat()
             except LeaseLost as error:
                 # A commit that ends the job releases the lease between two beats.

@@ -119,7 +119,7 @@ class Outage:
         self._lock = threading.Lock()
         self._reason: str | None = None
         self._since = 0.0
-        self._failures = 0
+        self.failures = 0  # consecutive
         self._attempt_since: float | None = None
 
     @property
@@ -131,11 +131,6 @@ class Outage:
                 return None
             return self._reason
 
-    @property
-    def failures(self) -> int:
-        """Consecutive failed attempts."""
-        return self._failures
-
     def failed(self, reason: str) -> bool:
         """Record a failure; return whether it is the first."""
         with self._lock:
@@ -143,7 +138,7 @@ class Outage:
             if is_news:
                 self._since = self._clock()
             self._reason, self._attempt_since = reason, None
-            self._failures += 1
+            self.failures += 1
             return is_news
 
     def attempted(self) -> None:
@@ -155,5 +150,5 @@ class Outage:
         """Record a success; return the duration of the outage [s], if there was one."""
         with self._lock:
             was_away = self._reason is not None
-            self._reason, self._attempt_since, self._failures = None, None, 0
+            self._reason, self._attempt_since, self.failures = None, None, 0
             return self._clock() - self._since if was_away else None

@@ -35,19 +35,9 @@ class Enumeration:
         self._name = name
         self._particles = particles
         self._positions = positions
-        self._iteration = 0
-        self._evaluations = 0
+        self.iteration = 0
+        self.evaluations = 0
         self._asked = 0
-
-    @property
-    def iteration(self) -> int:
-        """Number of completed tells."""
-        return self._iteration
-
-    @property
-    def evaluations(self) -> int:
-        """Number of positions evaluated so far."""
-        return self._evaluations
 
     def start_from(self, positions: Floats) -> None:
         """Reject start positions."""
@@ -58,12 +48,12 @@ class Enumeration:
         """Return the positions to evaluate next; the same ones until their fitness is known."""
         if not self._asked:
             self._asked = self._particles if most is None else min(most, self._particles)
-        return self._positions(self._evaluations, self._evaluations + self._asked)
+        return self._positions(self.evaluations, self.evaluations + self._asked)
 
     def tell(self, fitness: Floats) -> None:
         """Proceed to the next positions."""
-        self._evaluations += len(checked_fitness(fitness, self._asked))
-        self._iteration += 1
+        self.evaluations += len(checked_fitness(fitness, self._asked))
+        self.iteration += 1
         self._asked = 0
 
     def dump(self) -> dict[str, Any]:
@@ -71,8 +61,8 @@ class Enumeration:
         return {
             "optimizer": self._name,
             "schema_version": 1,
-            "iteration": self._iteration,
-            "evaluations": self._evaluations,
+            "iteration": self.iteration,
+            "evaluations": self.evaluations,
             "asked": self._asked,
         }
 
@@ -83,5 +73,5 @@ class Enumeration:
             raise ValueError(f"not a state of {self._name}: optimizer: {dumped.optimizer}")
         if dumped.asked > self._particles:
             raise ValueError(f"asked: {dumped.asked} positions, more than {self._name} asks for")
-        self._iteration, self._asked = dumped.iteration, dumped.asked
-        self._evaluations = dumped.evaluations
+        self.iteration, self._asked = dumped.iteration, dumped.asked
+        self.evaluations = dumped.evaluations

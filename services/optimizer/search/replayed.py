@@ -121,15 +121,10 @@ class Replayed:
         self._place: Final = repr((settings.model_dump_json(), space.axes, seed))
         self._start = np.empty((0, space.dimension))
         self._budget = budget
-        self._iteration = 0
+        self.iteration = 0
         self._asked = 0
         self._feedback: list[float] = []
         self._course: _Course | None = None
-
-    @property
-    def iteration(self) -> int:
-        """Number of completed tells."""
-        return self._iteration
 
     @property
     def evaluations(self) -> int:
@@ -157,7 +152,7 @@ class Replayed:
         values = checked_fitness(fitness, self._asked)
         self._running().tell(values)
         self._feedback.extend(values.tolist())
-        self._iteration += 1
+        self.iteration += 1
         self._asked = 0
 
     def dump(self) -> dict[str, Any]:
@@ -168,7 +163,7 @@ class Replayed:
         return {
             "optimizer": self._settings.name,
             "schema_version": 1,
-            "iteration": self._iteration,
+            "iteration": self.iteration,
             "asked": self._asked,
             "budget": self._budget,
             "told": worth(self._feedback),  # codespell:ignore told
@@ -183,7 +178,7 @@ class Replayed:
         if dumped.asked > self._settings.particles:
             raise ValueError(f"asked: {dumped.asked} positions, more than {name} asks for at once")
         self._course = None
-        self._iteration, self._asked = dumped.iteration, dumped.asked
+        self.iteration, self._asked = dumped.iteration, dumped.asked
         self._budget = dumped.budget
         self._feedback = of_worth(dumped.told).tolist()  # codespell:ignore told
 

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, model_validator
 
-from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
 from gaitswarm.services.optimizer.jobs.judgement import Judgement
 from gaitswarm.services.optimizer.jobs.preference import (
@@ -21,7 +20,7 @@ from gaitswarm.services.optimizer.jobs.preference import (
     figure_of_merit,
     judge,
 )
-from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.services.optimizer.jobs.spec import Spec, requested
 from gaitswarm.sim.calibration.targets import QUANTITIES, Target, TargetWalk
 from gaitswarm.sim.calibration.walk import (
     RESULTS,
@@ -277,12 +276,10 @@ class CalibrationSpec(Spec):
                 raise space.refusal(error) from error
             for index, case in self._walks(cases):
                 drive = case.drive(values)
-                try:
+                with requested(f"walks.{index}.design"):
                     law = CONTROLLERS[case.controller].compile(drive)
                     for robot in self.robot_sources:
                         check_drives(law, robot)
-                except SimulationInputError as error:
-                    raise InvalidRequest(str(error), field=f"walks.{index}.design") from error
         self._check_gaits(space, cases)
         searched = {v.name: math.nan for v in space.variables if v.name in GAIT_CATALOGUE}
         for index, case in self._walks(cases):
@@ -302,10 +299,8 @@ class CalibrationSpec(Spec):
     def _check_reach(self, index: int, case: CalibrationWalk, drive: dict[str, float]) -> None:
         gait = {name: value for name, value in drive.items() if name in GAIT_CATALOGUE}
         for robot in self.robot_sources:
-            try:
+            with requested(f"walks.{index}"):
                 check_reach(case.scenario, tuple(gait), tuple(gait.values()), robot=robot)
-            except SimulationInputError as error:
-                raise InvalidRequest(str(error), field=f"walks.{index}") from error
 
     @property
     def objectives(self) -> tuple[Objective, ...]:
@@ -405,7 +400,6 @@ class CalibrationSpec(Spec):
 
     def resolved(self) -> CalibrationSpec:
         """Return the job with scenarios, variables and optimizer written out."""
-        space = self.design_space()
         walks = tuple(
             walk.model_copy(
                 update={
@@ -415,14 +409,7 @@ class CalibrationSpec(Spec):
             )
             for walk in self.walks
         )
-        return self.model_copy(
-            update={
-                "walks": walks,
-                "variables": space.variables,
-                "fixed": space.shown_fixed,
-                "optimizer": self.search,
-            },
-        )
+        return super().resolved().model_copy(update={"walks": walks})
 
 
 def _is_nan(value: float | None) -> bool:

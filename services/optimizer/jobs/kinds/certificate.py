@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 
-from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.design_space import DesignSpace
 from gaitswarm.services.optimizer.jobs.kinds.held_out import (
     certificate_scenarios,
@@ -21,6 +20,7 @@ from gaitswarm.services.optimizer.jobs.kinds.tuning import JobSpec
 from gaitswarm.services.optimizer.jobs.kinds.walks import WalksSpec
 from gaitswarm.services.optimizer.jobs.optimizer_choice import OptimizerChoice
 from gaitswarm.services.optimizer.jobs.preference import PreferenceChoice
+from gaitswarm.services.optimizer.jobs.spec import requested
 from gaitswarm.services.optimizer.search.enumeration import Enumeration
 from gaitswarm.services.optimizer.search.optimizer import Optimizer
 from gaitswarm.services.optimizer.search.random_search import RandomSearchSettings
@@ -309,17 +309,13 @@ class CertificateSpec(WalksSpec):
         self.check_optimizer()
         self.check_precision()
         self._check_engines()
-        try:
+        with requested("design"):
             law = CONTROLLERS[self.controller].compile(self.numbers)
-        except SimulationInputError as error:
-            raise InvalidRequest(str(error), field="design") from error
         self.check_drives(law)
         names, values = tuple(self.numbers), tuple(self.numbers.values())
         for index, scenario in enumerate(self.resolved_scenarios()):
-            try:
+            with requested(f"scenarios.{index}"):
                 check_reach(scenario, names, values, robot=self.robot)
-            except SimulationInputError as error:
-                raise InvalidRequest(str(error), field=f"scenarios.{index}") from error
         space = self.world_space()
         corners = np.stack([space.low, space.high])
         try:
@@ -329,10 +325,8 @@ class CertificateSpec(WalksSpec):
 
     def _check_engines(self) -> None:
         if self.engines:
-            try:
+            with requested("engines"):
                 check_installed()
-            except SimulationInputError as error:
-                raise InvalidRequest(str(error), field="engines") from error
 
     @property
     def held_out_names(self) -> tuple[str, ...]:

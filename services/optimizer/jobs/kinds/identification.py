@@ -136,14 +136,3 @@ class IdentificationSpec(Spec):
         fitness = [math.fsum(row) / len(row) for row in errors.tolist()]
         with np.errstate(divide="ignore"):
             return Judgement(np.array(fitness), np.log(errors))
-
-    def resolved(self) -> IdentificationSpec:
-        """Return the job with its variables and optimizer written out."""
-        space = self.design_space()
-        return self.model_copy(
-            update={
-                "variables": space.variables,
-                "fixed": space.shown_fixed,
-                "optimizer": self.search,
-            },
-        )

@@ -18,6 +18,7 @@ from gaitswarm.services.optimizer.jobs.judgement import Judgement
 from gaitswarm.services.optimizer.jobs.kinds.tuning_worlds import TuningWorlds
 from gaitswarm.services.optimizer.jobs.kinds.walks import WalksSpec
 from gaitswarm.services.optimizer.jobs.preference import PreferenceChoice, objective_vectors
+from gaitswarm.services.optimizer.jobs.spec import requested
 from gaitswarm.services.optimizer.search.registry import METHODS
 from gaitswarm.sim.case import Case, Walk
 from gaitswarm.sim.case_registry import CASES, CaseFamily, CaseSettings, create_case
@@ -188,18 +189,14 @@ class JobSpec(WalksSpec):
                 if isinstance(error, UnreachablePose | BeyondJointLimit) and searches_posture:
                     continue
                 raise InvalidRequest(str(error), field=f"scenarios.{index}") from error
-        try:
+        with requested("case"):
             self.cases({})
-        except SimulationInputError as error:
-            raise InvalidRequest(str(error), field="case") from error
 
     def _check_worlds(self) -> None:
         variables = () if self.worlds is None else self.worlds.variables()
         ends = np.array([[v.low for v in variables], [v.high for v in variables]])
-        try:
+        with requested("worlds.ranges"):
             check_worlds(tuple(v.name for v in variables), ends)
-        except SimulationInputError as error:
-            raise InvalidRequest(str(error), field="worlds.ranges") from error
 
     @property
     def case_names(self) -> tuple[str, ...]:
@@ -271,17 +268,17 @@ class JobSpec(WalksSpec):
 
     def resolved(self) -> JobSpec:
         """Return the job with scenarios, preference, variables and optimizer written out."""
-        space = self.design_space()
-        return self.model_copy(
-            update={
-                "scenarios": self.resolved_scenarios(),
-                "preference": self.resolved_preference(),
-                "variables": space.variables,
-                "fixed": space.shown_fixed,
-                "optimizer": self.search,
-                "worlds": self.worlds
-                and self.worlds.model_copy(update={"ranges": self.worlds.variables()}),
-            }
+        return (
+            super()
+            .resolved()
+            .model_copy(
+                update={
+                    "scenarios": self.resolved_scenarios(),
+                    "preference": self.resolved_preference(),
+                    "worlds": self.worlds
+                    and self.worlds.model_copy(update={"ranges": self.worlds.variables()}),
+                }
+            )
         )
 
 

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import model_validator
 
-from gaitswarm.services.optimizer.errors import InvalidRequest
 from gaitswarm.services.optimizer.jobs.judgement import Judgement
 from gaitswarm.services.optimizer.jobs.preference import (
     PREFERENCES,
@@ -17,9 +16,8 @@ from gaitswarm.services.optimizer.jobs.preference import (
     figure_of_merit,
     judge,
 )
-from gaitswarm.services.optimizer.jobs.spec import Spec
+from gaitswarm.services.optimizer.jobs.spec import Spec, requested
 from gaitswarm.sim.controllers import ControlLaw
-from gaitswarm.sim.errors import SimulationInputError
 from gaitswarm.sim.outcome import OBJECTIVES, Objective
 from gaitswarm.sim.scenario import Scenario, ScenarioChoice, find_scenario
 from gaitswarm.sim.simulate import check_drives
@@ -61,10 +59,8 @@ class WalksSpec(Spec):
         Raises:
             InvalidRequest: It cannot; the field is `controller`.
         """
-        try:
+        with requested("controller"):
             check_drives(law, self.robot)
-        except SimulationInputError as error:
-            raise InvalidRequest(str(error), field="controller") from error
 
     @property
     def objectives(self) -> tuple[Objective, ...]:

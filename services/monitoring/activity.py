@@ -76,19 +76,6 @@ class WorkerHealthView(View):
         description="Of the last task without a result; null if all have one."
     )
 
-    def after(self, task: TaskSpanView) -> WorkerHealthView:
-        """Return the statistics with another task."""
-        failed = task.error is not None
-        return WorkerHealthView(
-            name=self.name,
-            tasks=self.tasks + 1,
-            walks=self.walks + (0 if failed else task.walks),
-            failures=self.failures + failed,
-            compute_seconds=self.compute_seconds + task.compute_seconds,
-            last_seen_at=task.begun_at + timedelta(seconds=task.seconds),
-            error=task.error if failed else self.error,
-        )
-
 
 class MessageView(View):
     """A line of the log."""
@@ -191,13 +178,19 @@ class Activity:
             error=report.error,
         )
         with self._lock:
-            workers = self._of(request.job_id).workers
-            self._of(request.job_id).tasks.append(span)
-            nothing = dict.fromkeys(("tasks", "walks", "failures", "compute_seconds"), 0)
-            unknown = WorkerHealthView.model_validate(
-                {"name": span.worker, "last_seen_at": span.begun_at, "error": None, **nothing}
+            records = self._of(request.job_id)
+            records.tasks.append(span)
+            before, failed = records.workers.get(span.worker), span.error is not None
+            error = before.error if before else None
+            records.workers[span.worker] = WorkerHealthView(
+                name=span.worker,
+                tasks=(before.tasks if before else 0) + 1,
+                walks=(before.walks if before else 0) + (0 if failed else span.walks),
+                failures=(before.failures if before else 0) + failed,
+                compute_seconds=(before.compute_seconds if before else 0) + span.compute_seconds,
+                last_seen_at=span.begun_at + timedelta(seconds=span.seconds),
+                error=span.error if failed else error,
             )
-            workers[span.worker] = workers.get(span.worker, unknown).after(span)
 
     def message(self, job_id: str, message: MessageView) -> None:
         with self._lock:

@@ -41,17 +41,7 @@ _ITERATION_BUCKETS: Final = (0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0, 60
 
 
 class Metrics:
-    """Counters, gauges and histograms of this process. Thread-safe.
-
-    Attributes:
-        registry: of all metrics; the library's global registry is not used.
-        iteration_seconds: duration of a committed iteration's evaluation [s].
-        simulated_seconds: of committed iterations [s].
-        database_seconds: duration of a store operation [s], by operation.
-        stream_lag: from the commit of an iteration to its event [s].
-        http_requests: by method, route template and status.
-        http_seconds: from a request to the start of the response [s], by method and route.
-    """
+    """Counters, gauges and histograms of this process. Thread-safe."""
 
     def __init__(self) -> None:
         self.registry = CollectorRegistry(auto_describe=False)

@@ -20,7 +20,6 @@ from gaitswarm.robustness_index import (
 )
 from gaitswarm.services.optimizer.jobs.preference import judge
 from gaitswarm.services.optimizer.run.evaluator import EvaluationRequest
-from gaitswarm.services.runtime import open_evaluator
 from gaitswarm.sim.assembly import Backend
 from gaitswarm.sim.case import Case, MeasuredWalk
 from gaitswarm.sim.catalogue import design_catalogue
@@ -295,6 +294,8 @@ def _in_parallel(
     cpus: int | None,
 ) -> Sequence[Outcome]:
     """Objectives and measurements for every scenario, computed in threads."""
+    from gaitswarm.services.runtime import open_evaluator
+
     cases: tuple[Case, ...]
     if request.world:
         cases = tuple(_in_world(request, scenario, variables) for scenario in scenarios)
